@@ -1,0 +1,40 @@
+# Every target sets up what it needs: a fresh clone only wants Python 3.11 or newer and a C++ compiler.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+BIN := .venv/bin
+BUILD_INPUTS := pyproject.toml CMakeLists.txt $(wildcard cpp/*)
+DEMO_SHAPE := examples/shapes/watering_can.ply
+
+.PHONY: setup demo test lint types bench clean
+setup: .venv/installed
+
+# torch first and alone: it is the one big download, and stays when the package is rebuilt.
+.venv/torch:
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet torch==2.13.0
+	touch $@
+
+.venv/installed: .venv/torch $(BUILD_INPUTS)
+	$(BIN)/pip install --quiet -e ".[test,dev]"
+	touch $@
+
+demo: setup
+	$(BIN)/partwright fit $(DEMO_SHAPE) -o demo-output
+
+test: setup
+	$(BIN)/python -m pytest -n auto
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+
+types: setup
+	$(BIN)/mypy
+
+bench: setup
+	$(BIN)/python benchmarks/fit.py
+
+clean:
+	rm -rf .venv build dist demo-output .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	find partwright tests examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -f partwright/*.so

@@ -1,0 +1,35 @@
+"""Partwright: a shape goes in, an editable assembly of parts comes out."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+# Public name -> module that defines it. Imported on first use, so that `import partwright` stays cheap.
+_PUBLIC = {
+    "load_shape": "partwright.shapes",
+    "Shape": "partwright.shapes",
+    "fit": "partwright.fitting",
+    "Part": "partwright.assembly",
+    "Assembly": "partwright.assembly",
+    "load_assembly": "partwright.assembly",
+    "evaluate": "partwright.metrics",
+    "export": "partwright.export",
+}
+_MODULES = ("fields", "shapes", "assembly", "meshing", "render", "metrics", "errors", "datasets")
+
+__all__ = ["__version__", *_PUBLIC, *_MODULES]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PUBLIC:
+        return getattr(importlib.import_module(_PUBLIC[name]), name)
+    if name in _MODULES:
+        return importlib.import_module(f"partwright.{name}")
+    raise AttributeError(f"module 'partwright' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,61 @@
+"""Every error that Partwright raises on purpose.
+
+Each message says what was given, what was expected and what to do. The command line prints the message and
+exits with `exit_code`; a traceback that reaches a user is a defect.
+"""
+
+from __future__ import annotations
+
+
+class PartwrightError(Exception):
+    """Root of all named errors."""
+
+    exit_code = 2
+
+
+class UnreadableFileError(PartwrightError):
+    """A file is missing, truncated, or not what its suffix says."""
+
+
+class UnsupportedFormatError(PartwrightError):
+    """The suffix names no format that this build reads or writes."""
+
+
+class EmptyShapeError(PartwrightError):
+    """The file holds no triangles (or none with area)."""
+
+
+class FlatShapeError(PartwrightError):
+    """The shape encloses no volume, so it has no inside to fit."""
+
+
+class NotFiniteError(PartwrightError):
+    """Coordinates or parameters are NaN or infinite."""
+
+
+class NeedsSurfaceError(PartwrightError):
+    """The file holds points without faces where a surface is needed."""
+
+
+class AssemblyFileError(PartwrightError):
+    """An assembly file is truncated, hostile, or breaks the schema."""
+
+
+class NewerVersionError(AssemblyFileError):
+    """An assembly file was written by a newer version of Partwright."""
+
+
+class ParameterError(PartwrightError):
+    """A field's or part's parameter is outside its allowed range."""
+
+
+class SettingError(PartwrightError):
+    """An option has a value that cannot be used, or two options contradict each other."""
+
+
+class MissingDependencyError(PartwrightError):
+    """An optional package is needed; the message carries the install line."""
+
+
+class OutputError(PartwrightError):
+    """The result cannot be written to the path that was asked for."""
