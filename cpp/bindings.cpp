@@ -1,0 +1,151 @@
+// The Python face of the kernel. Arguments are checked by partwright/fields/kernel.py, which is the only caller.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstring>
+
+#include "evaluate.hpp"
+#include "optimise.hpp"
+
+namespace nb = nanobind;
+using namespace partwright;
+
+namespace {
+
+template <typename T>
+using In = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
+template <typename T>
+using Out = nb::ndarray<nb::numpy, T>;
+
+template <typename T>
+Out<T> array(std::vector<size_t> shape) {
+  size_t size = 1;
+  for (size_t s : shape) size *= s;
+  T* data = new T[std::max<size_t>(size, 1)]();
+  nb::capsule owner(data, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+  return Out<T>(data, shape.size(), shape.data(), owner);
+}
+
+std::vector<Part> parts_of(const In<float>& rows) {
+  std::vector<Part> parts(rows.shape(0));
+  for (size_t i = 0; i < parts.size(); ++i) parts[i] = prepare(rows.data() + i * COLUMNS);
+  return parts;
+}
+
+template <typename T>
+std::vector<T> copy(const In<T>& a) {
+  return std::vector<T>(a.data(), a.data() + a.size());
+}
+
+std::vector<char> flags(const In<uint8_t>& a) { return std::vector<char>(a.data(), a.data() + a.size()); }
+
+Samples samples_of(const In<float>& points, const In<float>& target, const In<float>& weight, const In<float>& background) {
+  return {points.data(), target.data(), weight.data(), background.size() ? background.data() : nullptr,
+          int64_t(points.shape(0))};
+}
+
+std::vector<Stage> stages_of(const In<float>& a) {
+  std::vector<Stage> stages;
+  for (size_t i = 0; i < a.shape(0); ++i) stages.push_back({a.data()[2 * i], int(a.data()[2 * i + 1])});
+  return stages;
+}
+
+Limits limits_of(const In<float>& a) {
+  Limits limits;
+  std::copy_n(a.data(), DERIVATIVES, limits.lower.begin());
+  std::copy_n(a.data() + DERIVATIVES, DERIVATIVES, limits.upper.begin());
+  std::copy_n(a.data() + 2 * DERIVATIVES, DERIVATIVES, limits.step.begin());
+  return limits;
+}
+
+}  // namespace
+
+NB_MODULE(_kernel, m) {
+  m.attr("COLUMNS") = int(COLUMNS);
+  m.attr("DERIVATIVES") = int(DERIVATIVES);
+
+  m.def("evaluate", [](In<float> rows, In<float> points, int threads) {
+    auto out = array<float>({points.shape(0)});
+    const auto parts = parts_of(rows);
+    nb::gil_scoped_release release;
+    evaluate(parts, points.data(), int64_t(points.shape(0)), out.data(), threads);
+    return out;
+  });
+
+  m.def("evaluate_parts", [](In<float> rows, In<float> points, int threads) {
+    auto out = array<float>({rows.shape(0), points.shape(0)});
+    const auto parts = parts_of(rows);
+    nb::gil_scoped_release release;
+    evaluate_parts(parts, points.data(), int64_t(points.shape(0)), out.data(), threads);
+    return out;
+  });
+
+  m.def("gradients", [](In<float> rows, In<float> points, In<float> upstream, int threads) {
+    auto out = array<double>({rows.shape(0), size_t(DERIVATIVES)});
+    const auto parts = parts_of(rows);
+    nb::gil_scoped_release release;
+    gradients(parts, points.data(), upstream.data(), int64_t(points.shape(0)), out.data(), threads);
+    return out;
+  });
+
+  m.def("normal_equations", [](In<float> rows, In<uint8_t> live, In<float> points, In<float> target, In<float> weight,
+                               In<float> background, float beta, float overlap, float blending, int threads) {
+    const size_t n = rows.shape(0) * DERIVATIVES;
+    auto matrix = array<double>({n, n});
+    auto gradient = array<double>({n});
+    NormalEquations system;
+    {
+      nb::gil_scoped_release release;
+      system = normal_equations(parts_of(rows), flags(live), samples_of(points, target, weight, background), beta,
+                                {overlap, blending}, threads);
+    }
+    std::copy(system.gradient.begin(), system.gradient.end(), gradient.data());
+    for (const auto& [pair, block] : system.blocks)
+      for (int r = 0; r < DERIVATIVES; ++r)
+        for (int c = 0; c < DERIVATIVES; ++c) {
+          const size_t i = size_t(pair.first) * DERIVATIVES + r, j = size_t(pair.second) * DERIVATIVES + c;
+          matrix.data()[i * n + j] = matrix.data()[j * n + i] = block[r * DERIVATIVES + c];
+        }
+    return nb::make_tuple(system.loss, gradient, matrix);
+  });
+
+  m.def("loss", [](In<float> rows, In<float> points, In<float> target, In<float> weight, In<float> background, float beta,
+                   float overlap, float blending, int threads) {
+    nb::gil_scoped_release release;
+    return loss(parts_of(rows), samples_of(points, target, weight, background), beta, {overlap, blending}, threads);
+  });
+
+  m.def("levenberg_marquardt", [](In<float> rows, In<uint8_t> free, In<uint8_t> tied, In<float> points, In<float> target,
+                                  In<float> weight, In<float> background, In<float> stages, float overlap, float blending,
+                                  In<float> limits, int threads) {
+    auto out = array<float>({rows.shape(0), size_t(COLUMNS)});
+    Outcome outcome;
+    {
+      nb::gil_scoped_release release;
+      outcome = levenberg_marquardt(copy(rows), flags(free), flags(tied), samples_of(points, target, weight, background),
+                                    stages_of(stages), {overlap, blending}, limits_of(limits), threads);
+    }
+    std::copy(outcome.rows.begin(), outcome.rows.end(), out.data());
+    return nb::make_tuple(out, outcome.loss, outcome.iterations);
+  });
+
+  m.def("fit_starts", [](In<float> starts, In<int64_t> first, In<int64_t> last, In<uint8_t> free, In<uint8_t> tied,
+                         In<float> points, In<float> target, In<float> weight, In<float> background, In<float> stages,
+                         float overlap, float blending, In<float> limits, int threads) {
+    auto out = array<float>({starts.shape(0), size_t(COLUMNS)});
+    auto losses = array<double>({starts.shape(0)});
+    std::vector<Outcome> outcomes;
+    {
+      nb::gil_scoped_release release;
+      outcomes = fit_starts(copy(starts), copy(first), copy(last), flags(free), flags(tied),
+                            samples_of(points, target, weight, background), stages_of(stages), {overlap, blending},
+                            limits_of(limits), threads);
+    }
+    for (size_t i = 0; i < outcomes.size(); ++i) {
+      std::copy(outcomes[i].rows.begin(), outcomes[i].rows.end(), out.data() + i * COLUMNS);
+      losses.data()[i] = outcomes[i].loss;
+    }
+    return nb::make_tuple(out, losses);
+  });
+}

@@ -1,0 +1,409 @@
+#include "evaluate.hpp"
+
+#include <cstring>
+
+#include "parallel.hpp"
+
+// One binary carries code for several instruction sets; the loader picks at start.
+#if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__)
+#define PW_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#else
+#define PW_CLONES
+#endif
+
+namespace partwright {
+namespace {
+
+struct Block {
+  alignas(64) float x[BLOCK], y[BLOCK], z[BLOCK];
+};
+
+// Missing points of the last block repeat the first one; callers ignore or zero-weight them.
+int load(const float* points, int64_t first, int64_t count, Block& block) {
+  const int n = int(std::min<int64_t>(BLOCK, count - first));
+  for (int i = 0; i < BLOCK; ++i) {
+    const float* p = points + 3 * (first + (i < n ? i : 0));
+    block.x[i] = p[0];
+    block.y[i] = p[1];
+    block.z[i] = p[2];
+  }
+  return n;
+}
+
+PW_CLONES void values(const Part& p, const Block& b, float* __restrict out) {
+  if (p.bent && p.hollow) {
+    for (int i = 0; i < BLOCK; ++i) out[i] = value<true, true>(p, b.x[i], b.y[i], b.z[i]);
+  } else if (p.bent) {
+    for (int i = 0; i < BLOCK; ++i) out[i] = value<true, false>(p, b.x[i], b.y[i], b.z[i]);
+  } else if (p.hollow) {
+    for (int i = 0; i < BLOCK; ++i) out[i] = value<false, true>(p, b.x[i], b.y[i], b.z[i]);
+  } else {
+    for (int i = 0; i < BLOCK; ++i) out[i] = value<false, false>(p, b.x[i], b.y[i], b.z[i]);
+  }
+}
+
+PW_CLONES void derivatives(const Part& part, const Block& b, float* __restrict out) {
+  const Part p = part;
+  alignas(64) float scratch[SCRATCH_ROWS * BLOCK];
+  for (int i = 0; i < BLOCK; ++i) bend_step(p, b.x[i], b.y[i], b.z[i], scratch + i, BLOCK);
+  for (int i = 0; i < BLOCK; ++i) section_step(p, scratch + i, BLOCK);
+  if (p.hollow) {
+    for (int i = 0; i < BLOCK; ++i) profile_step<true>(p, scratch + i, BLOCK);
+  } else {
+    for (int i = 0; i < BLOCK; ++i) profile_step<false>(p, scratch + i, BLOCK);
+  }
+  for (int i = 0; i < BLOCK; ++i) chain_step(p, scratch + i, out + i, BLOCK);
+}
+
+PW_CLONES void fold(float* __restrict field, const float* __restrict g, float k, float* __restrict weight) {
+  for (int i = 0; i < BLOCK; ++i) {
+    const float w = smooth_weight(field[i], g[i], k);
+    weight[i] = w;
+    field[i] = smooth_minimum(field[i], g[i], k, w);
+  }
+}
+
+PW_CLONES void unfold(float* __restrict carried, const float* __restrict weight, float* __restrict share, float* __restrict blend) {
+  for (int i = 0; i < BLOCK; ++i) {
+    share[i] = carried[i] * (1 - weight[i]);
+    blend[i] = -share[i] * weight[i];
+    carried[i] *= weight[i];
+  }
+}
+
+// exp by the polynomial of the base-2 fraction; relative error 2e-7, no library call in the loop.
+PW_INLINE float exponential(float v) {
+  const float t = std::min(std::max(v * 1.44269504f, -120.f), 120.f);
+  const float whole = std::floor(t + 0.5f), f = t - whole;
+  float p = 0.00015403530f;
+  p = p * f + 0.0013333558f;
+  p = p * f + 0.0096181291f;
+  p = p * f + 0.0555041087f;
+  p = p * f + 0.2402265070f;
+  p = p * f + 0.6931471806f;
+  p = p * f + 1.f;
+  const int32_t bits = (int32_t(whole) + 127) << 23;
+  float scale;
+  std::memcpy(&scale, &bits, 4);
+  return p * scale;
+}
+
+PW_CLONES void occupancy(const float* __restrict field, float beta, float* __restrict out) {
+  for (int i = 0; i < BLOCK; ++i) out[i] = 1.f / (1.f + exponential(beta * field[i]));
+}
+
+// Sixteen floats that the compiler keeps in one register where the machine has one that wide.
+#if defined(__GNUC__)
+typedef float Lanes __attribute__((vector_size(64)));
+PW_INLINE void multiply_add(Lanes& sum, const float* a, const float* b) {
+  Lanes x, y;
+  std::memcpy(&x, a, sizeof x);
+  std::memcpy(&y, b, sizeof y);
+  sum += x * y;
+}
+#else
+struct Lanes {
+  float v[16];
+  float operator[](int i) const { return v[i]; }
+};
+PW_INLINE void multiply_add(Lanes& sum, const float* a, const float* b) {
+  for (int lane = 0; lane < 16; ++lane) sum.v[lane] += a[lane] * b[lane];
+}
+#endif
+
+// C (RA x RB) += A B^T over `length` samples.
+template <int RA, int RB>
+PW_INLINE void outer_tile(const float* a, const float* b, int length, double* c, int stride) {
+  Lanes sums[RA][RB] = {};
+  for (int l = 0; l < length; l += 16)
+#pragma GCC unroll 8
+    for (int i = 0; i < RA; ++i)
+#pragma GCC unroll 8
+      for (int j = 0; j < RB; ++j) multiply_add(sums[i][j], a + i * length + l, b + j * length + l);
+  for (int i = 0; i < RA; ++i)
+    for (int j = 0; j < RB; ++j) {
+      float total = 0;
+      for (int lane = 0; lane < 16; ++lane) total += sums[i][j][lane];
+      c[i * stride + j] += total;
+    }
+}
+
+PW_CLONES void outer_product(const float* a, const float* b, int length, double* c) {
+  for (int i = 0; i < DERIVATIVES; i += 3)
+    for (int j = 0; j < DERIVATIVES; j += 5) outer_tile<3, 5>(a + i * length, b + j * length, length, c + i * DERIVATIVES + j, DERIVATIVES);
+}
+
+PW_CLONES void times_vector(const float* a, const float* v, int length, double* c) {
+  for (int i = 0; i < DERIVATIVES; i += 3) outer_tile<3, 1>(a + i * length, v, length, c + i, 1);
+}
+
+PW_CLONES void scale_rows(const float* __restrict d, const float* __restrict by, int rows, int length, float* __restrict out) {
+  for (int r = 0; r < rows; ++r)
+    for (int i = 0; i < BLOCK; ++i) out[r * length + i] = d[r * BLOCK + i] * by[i];
+}
+
+PW_CLONES float largest(const float* v) {
+  float top[16] = {};
+  for (int i = 0; i < BLOCK; i += 16)
+    for (int lane = 0; lane < 16; ++lane) top[lane] = std::max(top[lane], std::fabs(v[i + lane]));
+  return *std::max_element(top, top + 16);
+}
+
+// Buffers of one thread for an assembly of M parts.
+struct Workspace {
+  explicit Workspace(size_t m) : g(m * BLOCK), weight(m * BLOCK), share(m * BLOCK), blend(m * BLOCK), occ(m * BLOCK) {}
+  std::vector<float> g, weight, share, blend, occ;
+  Block block;
+  alignas(64) float field[BLOCK], total[BLOCK], carried[BLOCK], assembled[BLOCK];
+};
+
+// Fold of all parts over one block, keeping each part's value and fold weight.
+void forward(const std::vector<Part>& parts, const float* background, Workspace& w) {
+  if (background) std::memcpy(w.field, background, sizeof w.field);
+  for (size_t m = 0; m < parts.size(); ++m) {
+    float* g = w.g.data() + m * BLOCK;
+    values(parts[m], w.block, g);
+    if (m == 0 && !background) {
+      std::memcpy(w.field, g, sizeof w.field);
+      std::fill_n(w.weight.data(), BLOCK, 0.f);
+    } else {
+      fold(w.field, g, parts[m].blend, w.weight.data() + m * BLOCK);
+    }
+  }
+}
+
+// dF/dg and dF/dk of every part from the fold weights; `carried` starts as the upstream derivative.
+void backward(size_t parts, Workspace& w) {
+  for (size_t m = parts; m-- > 0;) unfold(w.carried, &w.weight[m * BLOCK], &w.share[m * BLOCK], &w.blend[m * BLOCK]);
+}
+
+PW_CLONES void add(float* __restrict total, const float* __restrict v) {
+  for (int i = 0; i < BLOCK; ++i) total[i] += v[i];
+}
+
+// Residuals of one block and their derivatives by F and by each part's occupancy.
+struct Residuals {
+  alignas(64) float rec[BLOCK], over[BLOCK], blended[BLOCK];
+  alignas(64) float rec_f[BLOCK], over_o[BLOCK], blended_f[BLOCK], blended_o[BLOCK];
+};
+
+PW_CLONES double residuals(const float* __restrict target, const float* __restrict weight, const float* __restrict assembled,
+                           const float* __restrict total, float beta, Penalties penalties, Residuals& r) {
+  const float so = std::sqrt(penalties.overlap), sb = std::sqrt(penalties.blending);
+  float sums[BLOCK];
+  for (int i = 0; i < BLOCK; ++i) {
+    const float sw = std::sqrt(weight[i]), o = assembled[i], slope = -beta * o * (1 - o);
+    r.rec[i] = sw * (o - target[i]);
+    r.rec_f[i] = sw * slope;
+    const float live = weight[i] > 0 ? 1.f : 0.f;
+    const float over = total[i] - 1;
+    r.over[i] = over > 0 ? so * over * live : 0.f;
+    r.over_o[i] = over > 0 ? so * live : 0.f;
+    const float excess = o - std::min(total[i], 1.f);
+    r.blended[i] = excess > 0 ? sb * excess * live : 0.f;
+    r.blended_f[i] = excess > 0 ? sb * slope * live : 0.f;
+    r.blended_o[i] = (excess > 0) & (total[i] < 1) ? -sb * live : 0.f;
+    sums[i] = r.rec[i] * r.rec[i] + r.over[i] * r.over[i] + r.blended[i] * r.blended[i];
+  }
+  double sum = 0;
+  for (int i = 0; i < BLOCK; ++i) sum += sums[i];
+  return 0.5 * sum;
+}
+
+PW_CLONES void by_part(const float* __restrict f, const float* __restrict share, const float* __restrict o, const float* __restrict occ,
+                       float beta, float* __restrict out) {
+  for (int i = 0; i < BLOCK; ++i) out[i] = f[i] * share[i] - o[i] * beta * occ[i] * (1 - occ[i]);
+}
+
+// Loads a block of samples and evaluates residuals; padding gets weight 0.
+double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t first, float beta, Penalties penalties,
+                    Workspace& w, Residuals& r) {
+  alignas(64) float background[BLOCK], target[BLOCK], weight[BLOCK];
+  const int n = load(s.points, first, s.count, w.block);
+  for (int i = 0; i < BLOCK; ++i) {
+    const int64_t j = first + (i < n ? i : 0);
+    target[i] = s.target[j];
+    weight[i] = i < n ? s.weight[j] : 0.f;
+    if (s.background) background[i] = s.background[j];
+  }
+  forward(parts, s.background ? background : nullptr, w);
+  occupancy(w.field, beta, w.assembled);
+  if (penalties.overlap > 0 || penalties.blending > 0) {
+    if (s.background)
+      occupancy(background, beta, w.total);
+    else
+      std::fill_n(w.total, BLOCK, 0.f);
+    for (size_t m = 0; m < parts.size(); ++m) {
+      occupancy(&w.g[m * BLOCK], beta, &w.occ[m * BLOCK]);
+      add(w.total, &w.occ[m * BLOCK]);
+    }
+  } else {
+    std::memcpy(w.total, w.assembled, sizeof w.total);
+  }
+  return residuals(target, weight, w.assembled, w.total, beta, penalties, r);
+}
+
+// Blocks first .. last of one of the fixed pieces.
+std::pair<int64_t, int64_t> piece_range(int64_t count, int64_t piece) {
+  const int64_t blocks = (count + BLOCK - 1) / BLOCK;
+  return {blocks * piece / PIECES, blocks * (piece + 1) / PIECES};
+}
+
+}  // namespace
+
+void evaluate(const std::vector<Part>& parts, const float* points, int64_t count, float* out, int threads) {
+  const int64_t blocks = (count + BLOCK - 1) / BLOCK, batch = 16;
+  parallel_for((blocks + batch - 1) / batch, threads, [&](int64_t item) {
+    Block block;
+    alignas(64) float field[BLOCK], g[BLOCK], weight[BLOCK];
+    for (int64_t b = item * batch; b < std::min(blocks, (item + 1) * batch); ++b) {
+      const int n = load(points, b * BLOCK, count, block);
+      for (size_t m = 0; m < parts.size(); ++m) {
+        values(parts[m], block, m ? g : field);
+        if (m) fold(field, g, parts[m].blend, weight);
+      }
+      std::memcpy(out + b * BLOCK, field, size_t(n) * sizeof(float));
+    }
+  });
+}
+
+void evaluate_parts(const std::vector<Part>& parts, const float* points, int64_t count, float* out, int threads) {
+  const int64_t blocks = (count + BLOCK - 1) / BLOCK, batch = 16;
+  parallel_for((blocks + batch - 1) / batch, threads, [&](int64_t item) {
+    Block block;
+    alignas(64) float g[BLOCK];
+    for (int64_t b = item * batch; b < std::min(blocks, (item + 1) * batch); ++b) {
+      const int n = load(points, b * BLOCK, count, block);
+      for (size_t m = 0; m < parts.size(); ++m) {
+        values(parts[m], block, g);
+        std::memcpy(out + int64_t(m) * count + b * BLOCK, g, size_t(n) * sizeof(float));
+      }
+    }
+  });
+}
+
+void gradients(const std::vector<Part>& parts, const float* points, const float* upstream, int64_t count, double* out,
+               int threads) {
+  const size_t size = parts.size() * DERIVATIVES;
+  std::vector<double> sums(PIECES * size, 0.0);
+  parallel_for(PIECES, threads, [&](int64_t piece) {
+    Workspace w(parts.size());
+    std::vector<float> d(DERIVATIVES * BLOCK), scaled(DERIVATIVES * BLOCK);
+    alignas(64) float ones[BLOCK];
+    std::fill_n(ones, BLOCK, 1.f);
+    const auto [first, last] = piece_range(count, piece);
+    for (int64_t b = first; b < last; ++b) {
+      const int n = load(points, b * BLOCK, count, w.block);
+      forward(parts, nullptr, w);
+      for (int i = 0; i < BLOCK; ++i) w.carried[i] = i < n ? upstream[b * BLOCK + i] : 0.f;
+      backward(parts.size(), w);
+      for (size_t m = 0; m < parts.size(); ++m) {
+        const float *share = &w.share[m * BLOCK], *blend = &w.blend[m * BLOCK];
+        if (largest(share) == 0 && largest(blend) == 0) continue;
+        derivatives(parts[m], w.block, d.data());
+        scale_rows(d.data(), share, FIELD_DERIVATIVES, BLOCK, scaled.data());
+        std::memcpy(&scaled[D_BLEND * BLOCK], blend, BLOCK * sizeof(float));
+        times_vector(scaled.data(), ones, BLOCK, &sums[size_t(piece) * size + m * DERIVATIVES]);
+      }
+    }
+  });
+  for (size_t i = 0; i < size; ++i) {
+    out[i] = 0;
+    for (int piece = 0; piece < PIECES; ++piece) out[i] += sums[size_t(piece) * size + i];
+  }
+}
+
+NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples,
+                                 float beta, Penalties penalties, int threads) {
+  std::vector<NormalEquations> pieces(PIECES);
+  parallel_for(PIECES, threads, [&](int64_t piece) {
+    NormalEquations& sum = pieces[size_t(piece)];
+    sum.gradient.assign(parts.size() * DERIVATIVES, 0.0);
+    Workspace w(parts.size());
+    Residuals r;
+    alignas(64) float coefficient[BLOCK], none[BLOCK] = {};
+    std::vector<float> d(DERIVATIVES * BLOCK), rows;
+    std::vector<int> active;
+    const auto [first, last] = piece_range(samples.count, piece);
+    for (int64_t b = first; b < last; ++b) {
+      sum.loss += sample_block(parts, samples, b * BLOCK, beta, penalties, w, r);
+      // Each residual that is not zero all over the block adds BLOCK columns to the block's Jacobian.
+      const bool over = penalties.overlap > 0 && largest(r.over) > 0;
+      const bool blended = penalties.blending > 0 && largest(r.blended) > 0;
+      const int length = BLOCK * (1 + over + blended);
+      std::fill_n(w.carried, BLOCK, 1.f);
+      backward(parts.size(), w);
+      alignas(64) float residual[3 * BLOCK];
+      std::memcpy(residual, r.rec, sizeof r.rec);
+      if (over) std::memcpy(residual + BLOCK, r.over, sizeof r.over);
+      if (blended) std::memcpy(residual + BLOCK * (1 + over), r.blended, sizeof r.blended);
+      active.clear();
+      rows.clear();
+      for (size_t m = 0; m < parts.size(); ++m) {
+        if (!live[m]) continue;
+        const float *share = &w.share[m * BLOCK], *occ = &w.occ[m * BLOCK];
+        alignas(64) float c[3][BLOCK];
+        by_part(r.rec_f, share, none, none, beta, c[0]);
+        float size = largest(c[0]);
+        if (over) {
+          by_part(none, share, r.over_o, occ, beta, c[1]);
+          size = std::max(size, largest(c[1]));
+        }
+        if (blended) {
+          by_part(r.blended_f, share, r.blended_o, occ, beta, c[1 + over]);
+          size = std::max(size, largest(c[1 + over]));
+        }
+        if (size < 1e-5f) continue;
+        active.push_back(int(m));
+        rows.resize(active.size() * DERIVATIVES * size_t(length));
+        float* out = &rows[(active.size() - 1) * DERIVATIVES * size_t(length)];
+        derivatives(parts[m], w.block, d.data());
+        for (int s = 0; s < length / BLOCK; ++s) scale_rows(d.data(), c[s], FIELD_DERIVATIVES, length, out + s * BLOCK);
+        float* blend_row = out + D_BLEND * length;
+        std::fill_n(blend_row, length, 0.f);
+        by_part(r.rec_f, &w.blend[m * BLOCK], none, none, beta, coefficient);
+        std::memcpy(blend_row, coefficient, sizeof coefficient);
+        if (blended) {
+          by_part(r.blended_f, &w.blend[m * BLOCK], none, none, beta, coefficient);
+          std::memcpy(blend_row + BLOCK * (1 + over), coefficient, sizeof coefficient);
+        }
+      }
+      for (size_t i = 0; i < active.size(); ++i) {
+        const float* a = &rows[i * DERIVATIVES * size_t(length)];
+        times_vector(a, residual, length, &sum.gradient[size_t(active[i]) * DERIVATIVES]);
+        for (size_t j = i; j < active.size(); ++j) {
+          auto& block = sum.blocks[{active[i], active[j]}];
+          if (block.empty()) block.assign(DERIVATIVES * DERIVATIVES, 0.0);
+          outer_product(a, &rows[j * DERIVATIVES * size_t(length)], length, block.data());
+        }
+      }
+    }
+  });
+  NormalEquations total = std::move(pieces[0]);
+  for (int piece = 1; piece < PIECES; ++piece) {
+    const NormalEquations& part = pieces[size_t(piece)];
+    total.loss += part.loss;
+    for (size_t i = 0; i < total.gradient.size(); ++i) total.gradient[i] += part.gradient[i];
+    for (const auto& [key, block] : part.blocks) {
+      auto& sum = total.blocks[key];
+      if (sum.empty()) sum.assign(DERIVATIVES * DERIVATIVES, 0.0);
+      for (size_t i = 0; i < block.size(); ++i) sum[i] += block[i];
+    }
+  }
+  return total;
+}
+
+double loss(const std::vector<Part>& parts, const Samples& samples, float beta, Penalties penalties, int threads) {
+  double sums[PIECES] = {};
+  parallel_for(PIECES, threads, [&](int64_t piece) {
+    Workspace w(parts.size());
+    Residuals r;
+    const auto [first, last] = piece_range(samples.count, piece);
+    for (int64_t b = first; b < last; ++b) sums[piece] += sample_block(parts, samples, b * BLOCK, beta, penalties, w, r);
+  });
+  double total = 0;
+  for (double sum : sums) total += sum;
+  return total;
+}
+
+}  // namespace partwright

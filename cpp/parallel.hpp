@@ -1,0 +1,36 @@
+// Static and dynamic loops over threads. Work items never share output, so results do not depend on the
+// number of threads.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <thread>
+#include <vector>
+
+namespace partwright {
+
+inline int thread_count(int requested) {
+  const int hardware = std::max(1, int(std::thread::hardware_concurrency()));
+  return requested > 0 ? requested : hardware;
+}
+
+// Calls work(item) for every item, each on one thread, in no particular order.
+template <typename Work>
+void parallel_for(int64_t items, int threads, Work work) {
+  threads = int(std::min<int64_t>(thread_count(threads), items));
+  if (threads <= 1) {
+    for (int64_t i = 0; i < items; ++i) work(i);
+    return;
+  }
+  std::atomic<int64_t> next{0};
+  auto run = [&] {
+    for (int64_t i = next++; i < items; i = next++) work(i);
+  };
+  std::vector<std::thread> pool;
+  for (int i = 1; i < threads; ++i) pool.emplace_back(run);
+  run();
+  for (auto& thread : pool) thread.join();
+}
+
+}  // namespace partwright

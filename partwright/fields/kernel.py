@@ -1,0 +1,179 @@
+"""The C++ kernel's face: SuperFrusta over many points, their derivatives, and least-squares fits of them.
+
+A *parameter row* holds one part: translation (3), rotation quaternion w, x, y, z (local to world), size (3),
+roundness, dilation, taper, bulge, onion, and the blend with which it joins the fold (unused in the first row).
+Derivatives are ordered: translation (3), a local rotation vector w with R <- R exp(w) (3), size (3), roundness,
+dilation, taper, bulge, onion, blend. `partwright.fields.reference` is the slow form that tests compare with.
+
+`threads=0` means one thread per core. Results do not depend on the number of threads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from partwright import _kernel
+
+COLUMNS = ("tx", "ty", "tz", "qw", "qx", "qy", "qz", "sx", "sy", "sz",
+           "roundness", "dilation", "taper", "bulge", "onion", "blend")  # fmt: skip
+DERIVATIVES = ("tx", "ty", "tz", "wx", "wy", "wz", "sx", "sy", "sz",
+               "roundness", "dilation", "taper", "bulge", "onion", "blend")  # fmt: skip
+
+Rows = NDArray[np.float32]
+Floats = NDArray[np.float32]
+
+
+def _rows(parameters: ArrayLike) -> Rows:
+    rows = np.ascontiguousarray(parameters, dtype=np.float32)
+    if rows.ndim != 2 or rows.shape[1] != len(COLUMNS) or len(rows) == 0:
+        raise ValueError(f"parameter rows must be (M, {len(COLUMNS)}) with M > 0, got {rows.shape}")
+    return rows
+
+
+def _points(points: ArrayLike) -> Floats:
+    array = np.ascontiguousarray(points, dtype=np.float32)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"points must be (N, 3), got {array.shape}")
+    return array
+
+
+def evaluate(parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> Floats:
+    """Distances (N,) of the smooth union of M parts, folded first to last (SuperFrusta, eq. 4)."""
+    return _kernel.evaluate(_rows(parameters), _points(points), threads)
+
+
+def evaluate_parts(parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> Floats:
+    """Distances (M, N) of each part alone."""
+    return _kernel.evaluate_parts(_rows(parameters), _points(points), threads)
+
+
+def gradients(
+    parameters: ArrayLike, points: ArrayLike, upstream: ArrayLike, threads: int = 0
+) -> NDArray[np.float64]:
+    """Derivatives (M, 15) of sum(upstream * distance) by the parameters, in the order of `DERIVATIVES`."""
+    points = _points(points)
+    weights = np.ascontiguousarray(upstream, dtype=np.float32)
+    if weights.shape != (len(points),):
+        raise ValueError(f"upstream must be ({len(points)},), got {weights.shape}")
+    return _kernel.gradients(_rows(parameters), points, weights, threads)
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a fit compares with: occupancy (N,) in [0, 1] and weight (N,) at points (N, 3).
+
+    `background` (N,) is the distance of parts that stay as they are; it joins the fold first.
+    """
+
+    points: Floats
+    occupancy: Floats
+    weight: Floats
+    background: Floats = field(default_factory=lambda: np.empty(0, np.float32))
+
+    def __post_init__(self) -> None:
+        count = len(_points(self.points))
+        for name in ("occupancy", "weight", "background"):
+            array = getattr(self, name)
+            if array.shape != (count,) and not (name == "background" and array.size == 0):
+                raise ValueError(f"{name} must be ({count},), got {array.shape}")
+
+    def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
+        points, occupancy, weight, background = (
+            np.ascontiguousarray(a, dtype=np.float32)
+            for a in (self.points, self.occupancy, self.weight, self.background)
+        )
+        return points, occupancy, weight, background
+
+
+@dataclass(frozen=True)
+class Penalties:
+    """Weights of the residuals beside the reconstruction: overlap and smooth-union consistency (eq. 8)."""
+
+    overlap: float = 0.0
+    blending: float = 0.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Per derivative: lower and upper bound of the parameter (shape parameters only) and the longest step."""
+
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    step: tuple[float, ...]
+
+    def array(self) -> Floats:
+        return np.ascontiguousarray([self.lower, self.upper, self.step], dtype=np.float32)
+
+
+def normal_equations(
+    parameters: ArrayLike, target: Target, beta: float, penalties: Penalties = Penalties(), threads: int = 0
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Loss, gradient J^T r (15 M,) and Gauss-Newton matrix J^T J (15 M, 15 M) of the weighted residuals.
+
+    The residuals are sqrt(weight) * (sigmoid(-beta * F) - occupancy) and the two penalties; the loss is half
+    their sum of squares.
+    """
+    rows = _rows(parameters)
+    live = np.ones(len(rows), np.uint8)
+    return _kernel.normal_equations(
+        rows, live, *target.arrays(), beta, penalties.overlap, penalties.blending, threads
+    )
+
+
+def loss(
+    parameters: ArrayLike, target: Target, beta: float, penalties: Penalties = Penalties(), threads: int = 0
+) -> float:
+    """Half the sum of squared residuals, as in `normal_equations`."""
+    return _kernel.loss(
+        _rows(parameters), *target.arrays(), beta, penalties.overlap, penalties.blending, threads
+    )
+
+
+def levenberg_marquardt(
+    parameters: ArrayLike,
+    target: Target,
+    stages: ArrayLike,
+    limits: Limits,
+    *,
+    free: NDArray[np.bool_] | None = None,
+    tied: NDArray[np.bool_] | None = None,
+    penalties: Penalties = Penalties(),
+    threads: int = 0,
+) -> tuple[Rows, float, int]:
+    """Minimises the loss over the entries that `free` (M, 15) marks; returns rows, loss and iterations.
+
+    `stages` (S, 2) holds pairs of beta and iterations, run one after another. `tied` (M,) keeps sx = sy.
+    """
+    rows = _rows(parameters)
+    free = np.ones((len(rows), len(DERIVATIVES)), bool) if free is None else free
+    tied = np.zeros(len(rows), bool) if tied is None else tied
+    return _kernel.levenberg_marquardt(
+        rows, free.astype(np.uint8), tied.astype(np.uint8), *target.arrays(),
+        np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(), threads,
+    )  # fmt: skip
+
+
+def fit_starts(
+    starts: ArrayLike,
+    ranges: NDArray[np.int64],
+    target: Target,
+    stages: ArrayLike,
+    limits: Limits,
+    *,
+    free: NDArray[np.bool_] | None = None,
+    tied: NDArray[np.bool_] | None = None,
+    penalties: Penalties = Penalties(),
+    threads: int = 0,
+) -> tuple[Rows, NDArray[np.float64]]:
+    """One single-part fit per start (B, 16), each on the samples `ranges[b, 0]:ranges[b, 1]`; rows and losses."""
+    rows = _rows(starts)
+    free = np.ones((len(rows), len(DERIVATIVES)), bool) if free is None else free
+    tied = np.zeros(len(rows), bool) if tied is None else tied
+    first, last = (np.ascontiguousarray(column, np.int64) for column in np.asarray(ranges).T)
+    return _kernel.fit_starts(
+        rows, first, last, free.astype(np.uint8), tied.astype(np.uint8), *target.arrays(),
+        np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(), threads,
+    )  # fmt: skip
