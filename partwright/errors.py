@@ -59,3 +59,7 @@ class MissingDependencyError(PartwrightError):
 
 class OutputError(PartwrightError):
     """The result cannot be written to the path that was asked for."""
+
+
+class NoSurfaceError(PartwrightError):
+    """A field has no zero level inside the box, or one that never closes."""

@@ -1,0 +1,89 @@
+"""Parts and assemblies as closed meshes in their own units."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.rows import as_superfrustum
+from partwright.meshing.marching import mesh_field
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from partwright.fields import SuperFrustum
+
+_ACROSS = 2.0  # cells across the thinnest wall: under sqrt(3) a slanted wall would show holes
+_FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin walls
+_PART_CELLS = 300_000  # a part's surface is given at most this many cells
+_TIP = 0.25  # of a wall that tapers to nothing, the part that is looked at
+_ROOM = 1e-3  # of the longest side, around the bounds
+
+
+def mesh_assembly(assembly: Assembly | Part, resolution: int = 128, *, sharp: bool = True) -> trimesh.Trimesh:
+    """The whole blended surface, watertight, in the assembly's own units and place.
+
+    resolution: cells along the longest side; up to twice as many where a wall is thinner than two cells (a
+    wall thinner than one cell of those may come out with holes through it, still closed).
+
+    Raises NoSurfaceError where nothing is left of the assembly, as when a difference takes all away.
+    """
+    lower, upper = assembly.bounds()
+    longest = float((upper - lower).max())
+    parts = assembly.parts if isinstance(assembly, Assembly) else (assembly,)
+    wall = min(float(walls(as_superfrustum(part.field)).min()) for part in parts)
+    finest = np.clip(_ACROSS * longest / max(wall, 1e-9 * longest), resolution, _FINEST * resolution)
+    frame = _frame(lower, upper)
+    local = assembly.transformed(frame)
+    room = _ROOM + (upper - lower) * frame.scale / 2
+    mesh = mesh_field(local.distance, -room, room, int(np.ceil(finest)), sharp=sharp)
+    mesh.vertices = frame.inverse()(mesh.vertices)
+    return mesh
+
+
+def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimesh.Trimesh:
+    """One part alone, watertight, in its own units and place.
+
+    It is meshed along its own axes. Cells are made shorter where the part is thin, each axis by itself, so that
+    walls come out complete, as long as that takes no more than a few hundred thousand cells.
+
+    Raises NoSurfaceError for a part without volume.
+    """
+    field = as_superfrustum(part.field)
+    lower, upper = field.bounds()
+    frame = _frame(lower, upper)
+    local = field.scaled(frame.scale)
+    centre = np.asarray(frame.translation)
+    extent = (upper - lower) * frame.scale + 2 * _ROOM
+    counts = np.maximum(resolution * extent / extent.max(), _ACROSS * extent / np.maximum(walls(local), 1e-9))
+    surface = 4 * (counts * np.roll(counts, 1)).sum()
+    counts = np.maximum(counts * min(1.0, float(np.sqrt(_PART_CELLS / surface))), 4.0)
+
+    def distance(points: np.ndarray) -> np.ndarray:
+        return local(points - centre.astype(np.float32))
+
+    mesh = mesh_field(distance, -extent / 2, extent / 2, counts, sharp=sharp)
+    pose = Similarity(1.0, part.rotation, part.translation) @ frame.inverse()
+    mesh.vertices = pose(mesh.vertices)
+    return mesh
+
+
+def walls(field: SuperFrustum) -> np.ndarray:
+    """(3,) how thin the solid is along each local axis, tips aside (no resolution would do for them)."""
+    result = np.array(field.size) + 2 * field.dilation
+    middle = min(field.size[0], field.size[1]) / 2
+    if max(1.0, field.taper) * middle * field.onion > field.dilation:
+        taper = min(max(field.taper, _TIP), 1.0)
+        result[:2] = np.minimum(result[:2], taper * middle * (1.0 - field.onion) + 2 * field.dilation)
+    if field.bulge > 0:
+        result[[0, 2]] = min(result[0], result[2])
+    return result
+
+
+def _frame(lower: np.ndarray, upper: np.ndarray) -> Similarity:
+    """To a box around the origin whose longest side is 1.8: float32 keeps its digits there."""
+    scale = 1.8 / float((upper - lower).max())
+    centre = (np.asarray(lower) + np.asarray(upper)) / 2
+    return Similarity(scale, translation=tuple(-scale * centre))  # type: ignore[arg-type]

@@ -1,0 +1,107 @@
+"""Sharp edges and corners for marching cubes (Kobbelt, Botsch, Schwanecke, Seidel 2001, section 4).
+
+A polygon whose corners' normals disagree holds a feature. It gets one more vertex where the tangent planes of
+its corners meet, and becomes a fan around it; the edges between two fans are flipped so that they run along the
+feature instead of across it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from partwright.meshing.blocks import Distance, Grid, evaluate
+from partwright.meshing.polygons import Polygons
+
+_SHARP = 0.85  # cosine between two normals under which a polygon holds a feature (about 32 degrees)
+_FLAT = 0.06  # directions with a smaller share of the largest eigenvalue are left to the mean
+_PROJECTIONS = 4  # between the cell and the line or point where the planes meet
+_BETTER = 0.5  # of the distance that the polygon's middle has, what a feature may have
+_STEP = 0.02  # finite differences, in cells
+_TETRAHEDRON = np.array([(1, -1, -1), (-1, -1, 1), (-1, 1, -1), (1, 1, 1)], dtype=np.float64)
+
+
+def sharpen(polygons: Polygons, distance: Distance, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (V, 3) and triangles (F, 3) of the surface with its features."""
+    normals = field_normals(distance, polygons.vertices, _STEP * float(grid.cell.min()))
+    candidates = _with_features(polygons, normals)
+    chosen, extra = _feature_points(polygons, normals, candidates, distance, grid)
+    plain = np.ones(len(polygons), dtype=bool)
+    plain[chosen] = False
+    fans = _fans(polygons, chosen)
+    vertices = np.concatenate([polygons.vertices, extra])
+    return vertices, np.concatenate([polygons.triangles(plain), fans])
+
+
+def field_normals(distance: Distance, points: np.ndarray, step: float) -> np.ndarray:
+    """Unit gradients (N, 3) by differences over the corners of a tetrahedron; zero where the field is flat."""
+    taps = points[:, None, :] + step * _TETRAHEDRON
+    values = evaluate(distance, taps.reshape(-1, 3)).reshape(-1, 4).astype(np.float64)
+    gradient = values @ _TETRAHEDRON
+    length = np.linalg.norm(gradient, axis=1, keepdims=True)
+    return np.divide(gradient, length, out=np.zeros_like(gradient), where=length > 0)
+
+
+def _with_features(polygons: Polygons, normals: np.ndarray) -> np.ndarray:
+    """Polygons two of whose corners' normals differ by more than the sharp angle."""
+    around = normals[polygons.index]
+    cosine = np.einsum("pid,pjd->pij", around, around)
+    used = polygons.used
+    cosine[~(used[:, :, None] & used[:, None, :])] = 1.0
+    return np.flatnonzero(cosine.min(axis=(1, 2)) < _SHARP)
+
+
+def _feature_points(
+    polygons: Polygons, normals: np.ndarray, candidates: np.ndarray, distance: Distance, grid: Grid
+) -> tuple[np.ndarray, np.ndarray]:
+    """The polygons that keep a feature, and its place: the least-squares meeting point of the tangent planes.
+
+    A point is kept to its cell, so that fans of neighbours do not overlap, and dropped where it lies farther
+    from the zero level than the polygon's middle does (the normals belonged to a ripple, not to a feature).
+    """
+    index, used = polygons.index[candidates], polygons.used[candidates][:, :, None]
+    points, around = polygons.vertices[index], normals[index] * used
+    middle = (points * used).sum(axis=1) / polygons.length[candidates][:, None]
+    values, axes = np.linalg.eigh(np.einsum("pid,pie->pde", around, around))
+    inverse = np.where(values > _FLAT * values[:, -1:], 1 / np.maximum(values, 1e-12), 0.0)
+    solve = np.einsum("pde,pe,pfe->pdf", axes, inverse, axes, optimize=True)
+    corner = grid.origin + polygons.cell[candidates] * grid.cell
+    place = middle
+    for _ in range(_PROJECTIONS):
+        offsets = ((points - place[:, None]) * around).sum(axis=-1)
+        place = place + np.einsum("pdf,pif,pi->pd", solve, around, offsets, optimize=True)
+        place = np.clip(place, corner, corner + grid.cell)
+    better = np.abs(evaluate(distance, place)) < _BETTER * np.abs(evaluate(distance, middle))
+    return candidates[better], place[better]
+
+
+def _fans(polygons: Polygons, chosen: np.ndarray) -> np.ndarray:
+    """Triangles around the new vertices, numbered on from the old ones, with edges between two fans flipped."""
+    length = polygons.length[chosen]
+    used = polygons.used[chosen]
+    start = polygons.index[chosen][used]
+    place = np.arange(used.shape[1])[None, :] + 1
+    end = np.take_along_axis(polygons.index[chosen], np.where(place < length[:, None], place, 0), axis=1)[used]
+    centre = np.repeat(np.arange(len(chosen)), length) + len(polygons.vertices)
+
+    # The same edge in two fans runs there and back.
+    total = len(polygons.vertices) + len(chosen)
+    key = np.minimum(start, end) * total + np.maximum(start, end)
+    order = np.lexsort((start > end, key))
+    twin = np.flatnonzero(key[order][1:] == key[order][:-1])
+    there, back = order[twin], order[twin + 1]
+    # Two fans that meet in two edges (an ambiguous face) would share the flipped edge: leave them.
+    low, high = np.minimum(centre[there], centre[back]), np.maximum(centre[there], centre[back])
+    _, which, times = np.unique(low * total + high, return_inverse=True, return_counts=True)
+    once = times[which] == 1
+    there, back = there[once], back[once]
+
+    kept = np.ones(len(start), dtype=bool)
+    kept[there] = kept[back] = False
+    plain = np.stack([start[kept], end[kept], centre[kept]], axis=1)
+    flipped = np.concatenate(
+        [
+            np.stack([start[there], centre[back], centre[there]], axis=1),
+            np.stack([end[there], centre[there], centre[back]], axis=1),
+        ]
+    )
+    return np.concatenate([plain, flipped])
