@@ -1,0 +1,46 @@
+"""Colours for signed deviations, and the bar that explains them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from partwright.render.sheet import SOFT_INK, draw_text
+
+# Blue where the result is missing material, light grey where it fits, red where it has too much.
+_STOPS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+_COLOURS = np.array([(38, 84, 165), (125, 170, 222), (226, 226, 224), (240, 150, 110), (186, 42, 50)], dtype=float)
+
+
+def deviation_colours(deviation: np.ndarray, limit: float) -> np.ndarray:
+    """(N, 3) sRGB 0..255 for signed deviations (N,), full colour at +-limit."""
+    share = np.clip(deviation / limit, -1, 1)
+    return np.stack([np.interp(share, _STOPS, _COLOURS[:, i]) for i in range(3)], axis=1)
+
+
+def round_limit(deviation: np.ndarray) -> float:
+    """The end of the scale: 1, 2 or 5 times a power of ten that holds 98 % of the deviations."""
+    most = float(np.quantile(np.abs(deviation), 0.98)) if len(deviation) else 0.0
+    if most <= 0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(most))
+    return next(step * power for step in (1, 2, 5, 10) if step * power >= most * (1 - 1e-9))
+
+
+def add_legend(image: np.ndarray, limit: float, unit: str | None) -> np.ndarray:
+    """The picture with a colour bar along its lower edge, labelled in the input's unit."""
+    height, width = image.shape[:2]
+    left, right = round(0.24 * width), round(0.76 * width)
+    y = height - 40
+    result = image.copy()
+    result[y : y + 8, left:right] = deviation_colours(np.linspace(-limit, limit, right - left), limit)
+    suffix = f" {unit}" if unit else ""
+    labels = [
+        (left, y + 20, f"−{limit:g}{suffix}"),
+        ((left + right) / 2, y + 20, "0"),
+        (right, y + 20, f"+{limit:g}{suffix}"),
+        (left - 34, y + 3, "missing"),
+        (right + 36, y + 3, "too much"),
+    ]
+    return draw_text(result, labels, size=12, colour=SOFT_INK)

@@ -1,0 +1,69 @@
+"""The fit at a glance: input, parts, blended surface and error, side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.assembly.palette import palette
+from partwright.meshing import mesh_assembly
+from partwright.render.camera import Camera
+from partwright.render.deviation_map import add_legend, deviation_colours, round_limit
+from partwright.render.output import write_png
+from partwright.render.raycast import Scene
+from partwright.render.shading import NEUTRAL, look
+from partwright.render.sheet import sheet
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from partwright.assembly import Assembly
+    from partwright.shapes import Shape
+
+CAPTIONS = ("input", "parts", "surface", "error")
+
+
+def preview(
+    shape: Shape,
+    assembly: Assembly,
+    surface: trimesh.Trimesh | None = None,
+    path: str | Path | None = None,
+    *,
+    title: str = "",
+    camera: Camera | None = None,
+    panel: tuple[int, int] = (400, 400),
+) -> np.ndarray:
+    """Draw input | parts | surface | error as one picture (H, W, 3) uint8, and write it as PNG to `path`.
+
+    The parts' panel colours every point of the surface by the part that is nearest there. The error panel
+    colours the input by the assembly's signed distance there: red where the assembly covers the input's
+    surface, blue where it does not reach it, with a legend in the input's unit.
+
+    surface: the assembly's mesh in the input's units, if it is known already.
+    """
+    surface = mesh_assembly(assembly) if surface is None else surface
+    camera = camera or Camera(up=shape.up or "z")
+    width, height = panel
+    given, made = Scene(shape.vertices, shape.faces), Scene(surface.vertices, surface.faces)
+    view = camera.fitted(np.concatenate([given.vertices, made.vertices]), width, height)
+    input_view, result_view = (look(scene, camera, view, width, height) for scene in (given, made))
+
+    nearest = assembly.part_distances(result_view.hits.point).argmin(axis=0)
+    deviation = -assembly.distance(input_view.hits.point)
+    limit = round_limit(deviation)
+    error = input_view.image(deviation_colours(deviation, limit))
+    page = sheet(
+        [
+            input_view.image(np.array(NEUTRAL)),
+            result_view.image(palette(len(assembly))[nearest]),
+            result_view.image(np.array(NEUTRAL)),
+            add_legend(error, limit, shape.unit),
+        ],
+        CAPTIONS,
+        title=title,
+    )
+    if path is not None:
+        write_png(path, page)
+    return page

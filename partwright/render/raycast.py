@@ -1,0 +1,78 @@
+"""Rays against triangles (Embree), and what every pixel of a view sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from partwright.render.camera import View
+from partwright.render.normals import corner_normals, face_normals
+
+_MISS = -1
+
+
+class Scene:
+    """A triangle mesh that rays can be cast at. vertices (V, 3), faces (F, 3)."""
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        self.vertices = np.asarray(vertices, dtype=np.float64)
+        self.faces = np.asarray(faces, dtype=np.int64)
+        self.lower, self.upper = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        # Embree works in float32: bring the mesh to a size and place where that is enough.
+        self._centre = (self.lower + self.upper) / 2
+        self._scale = 2.0 / max(float((self.upper - self.lower).max()), np.finfo(float).tiny)
+        triangles = (self.vertices[self.faces] - self._centre) * self._scale
+        self._embree = EmbreeScene()
+        self._mesh = TriangleMesh(self._embree, np.ascontiguousarray(triangles, dtype=np.float32))
+        self.corner_normals = corner_normals(self.vertices, self.faces)
+        flat = face_normals(self.vertices, self.faces)
+        self.face_normals = (flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)).astype(np.float32)
+
+    def _local(self, points: np.ndarray) -> np.ndarray:
+        return ((points - self._centre) * self._scale).astype(np.float32)
+
+    def first_hit(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Per ray: the face it meets first (-1 where none), the distance, and barycentric u, v (N, 2)."""
+        hit = self._embree.run(self._local(origins), np.ascontiguousarray(directions, dtype=np.float32), output=1)
+        return hit["primID"], hit["tfar"] / self._scale, np.stack([hit["u"], hit["v"]], axis=1)
+
+    def occluded(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """(N,) bool: whether anything lies on the ray."""
+        directions = np.ascontiguousarray(directions, dtype=np.float32)
+        return self._embree.run(self._local(origins), directions, query="OCCLUDED") != _MISS
+
+    @property
+    def size(self) -> float:
+        """Longest side of the bounding box."""
+        return 2.0 / self._scale
+
+
+@dataclass(frozen=True)
+class Hits:
+    """What the pixels of a view see. pixel: (N,) numbers of the pixels that meet the surface; point, normal:
+    (N, 3) shading normals turned to the viewer; face: (N,)."""
+
+    pixel: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    face: np.ndarray
+
+
+def cast(scene: Scene, view: View, width: int, height: int) -> Hits:
+    """One ray through the centre of each pixel."""
+    rays = view.rays(width, height)
+    face, distance, weights = scene.first_hit(np.broadcast_to(view.eye, rays.shape), rays)
+    pixel = np.flatnonzero(face != _MISS)
+    face, rays = face[pixel], rays[pixel]
+    u, v = weights[pixel].T
+    around = scene.corner_normals[face]
+    normal = (1 - u - v)[:, None] * around[:, 0] + u[:, None] * around[:, 1] + v[:, None] * around[:, 2]
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
+    # An open or inverted surface shows its back: shade that like a front.
+    away = np.einsum("nd,nd->n", scene.face_normals[face], rays) > 0
+    normal[away] *= -1
+    return Hits(pixel, view.eye + distance[pixel, None].astype(np.float64) * rays, normal, face)
