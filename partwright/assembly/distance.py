@@ -1,0 +1,125 @@
+"""The signed distance of parts and assemblies in their own units.
+
+The kernel works in float32. Sizes of 1e-6 or places a million units from the origin would leave it no digits,
+so the assembly and the points are first brought to the size and place of the unit frame, in float64.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain, groupby
+from typing import Any, cast
+
+import numpy as np
+
+from partwright.assembly.bounds import bounds
+from partwright.assembly.rows import is_superfrustum, rows
+from partwright.assembly.similarity import Similarity, rotation_matrix
+from partwright.assembly.tree import Assembly, Node, Operation, Part
+from partwright.errors import ParameterError
+from partwright.fields import kernel, smooth_difference, smooth_intersection, smooth_union
+from partwright.fields.operations import is_tensor
+
+_UNIT_SIDE = 1.8
+_FOLD = {"union": smooth_union, "intersection": smooth_intersection, "difference": smooth_difference}
+
+
+def unit_similarity(node: Node) -> Similarity:
+    """The map that centres the box around all leaves at 0 and makes its longest side 1.8."""
+    parts = (node,) if isinstance(node, Part) else node.parts
+    boxes = np.array([bounds(part) for part in parts])
+    lower, upper = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    longest = float((upper - lower).max())
+    scale = _UNIT_SIDE / longest if longest > 0 else 1.0
+    return Similarity(scale, translation=tuple(-scale * (lower + upper) / 2))
+
+
+def distance(node: Node, points: Any) -> Any:
+    """Signed distance (N,) of the node at points (N, 3); see `Assembly.distance`."""
+    frame, unit_node = node._normalised
+    if is_tensor(points):
+        move = points.new_tensor(frame.translation)
+        return _reference(unit_node, points * frame.scale + move) / frame.scale
+    points = _checked(points)
+    return _back(_evaluate(unit_node, frame(points).astype(np.float32)), frame, points)
+
+
+def part_distances(assembly: Assembly, points: np.ndarray) -> np.ndarray:
+    """(M, N) signed distance of each leaf alone at points (N, 3)."""
+    frame, unit_assembly = assembly._normalised
+    points = _checked(points)
+    values = np.stack([d for d, _ in _children(unit_assembly.parts, frame(points).astype(np.float32))])
+    return _back(values, frame, points)
+
+
+def _checked(points: Any) -> np.ndarray:
+    points = np.asarray(points)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ParameterError(f"points: expected shape (N, 3), got {points.shape}")
+    return points
+
+
+def _back(values: np.ndarray, frame: Similarity, points: np.ndarray) -> np.ndarray:
+    """To own units: in float64, which holds lengths that float32 would flush to zero."""
+    own = values.astype(np.float64) / frame.scale
+    return own.astype(np.result_type(points.dtype, np.float32))
+
+
+def _evaluate(node: Node, points: np.ndarray) -> np.ndarray:
+    """(N,) float32 by the kernel; the leaves that begin a union are folded in a single call."""
+    if isinstance(node, Part):
+        return next(_children((node,), points))[0]
+    lead = _leading_leaves(node)
+    values = _children(node.children[len(lead) :], points)
+    if lead:
+        values = chain([(kernel.evaluate(rows(lead), points), 0.0)], values)
+    return _folded(node.operation, values)
+
+
+def _reference(node: Node, points: Any) -> Any:
+    """(N,) by the fields themselves, differentiable where the points are torch tensors."""
+    if isinstance(node, Part):
+        return _posed(node, points)
+    return _folded(node.operation, ((_reference(c, points), c.blend) for c in node.children))
+
+
+def _folded(operation: Operation, values: Iterator[tuple[Any, float]]) -> Any:
+    result, _ = next(values)
+    for value, blend in values:
+        result = _FOLD[operation](result, value, blend)
+    return result
+
+
+def _posed(part: Part, points: Any) -> Any:
+    """The part's field at world points (N, 3) of either library."""
+    rotation, translation = rotation_matrix(part.rotation), np.array(part.translation)
+    if is_tensor(points):
+        rotation, translation = points.new_tensor(rotation), points.new_tensor(translation)
+    else:
+        rotation, translation = rotation.astype(np.float32), translation.astype(np.float32)
+    return part.field((points - translation) @ rotation)
+
+
+def _leading_leaves(node: Assembly) -> list[Part]:
+    lead: list[Part] = []
+    if node.operation == "union":
+        for child in node.children:
+            if not isinstance(child, Part) or not is_superfrustum(child.field):
+                break
+            lead.append(child)
+    return lead
+
+
+def _children(children: tuple[Node, ...], points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
+    """Each child's distance alone and its blend; neighbouring leaves share a kernel call."""
+    for batched, group in groupby(children, lambda c: isinstance(c, Part) and is_superfrustum(c.field)):
+        if batched:
+            leaves = cast(list[Part], list(group))
+            values = kernel.evaluate_parts(rows(leaves), points)
+            yield from zip(values, (leaf.blend for leaf in leaves), strict=True)
+        else:
+            for node in group:
+                yield (
+                    (_posed(node, points) if isinstance(node, Part) else _evaluate(node, points)),
+                    node.blend,
+                )

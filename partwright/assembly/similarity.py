@@ -1,0 +1,118 @@
+"""Similarities: turn, scale uniformly, move. How parts are posed and assemblies are moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from partwright.assembly.checks import Quaternion, Vector, number, unit_quaternion, vector
+from partwright.errors import ParameterError
+
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+NO_ROTATION: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+
+def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The rotation `b` followed by `a`."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+
+
+def rotation_matrix(quaternion: Quaternion) -> np.ndarray:
+    """(3, 3) float64 matrix of a unit quaternion."""
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """The map p -> scale * rotation(p) + translation.
+
+    Raises:
+        ParameterError: scale is not positive, or a number is not finite.
+    """
+
+    scale: float = 1.0
+    rotation: Quaternion = NO_ROTATION
+    translation: Vector = ORIGIN
+
+    def __post_init__(self) -> None:
+        scale = number(self.scale, "scale")
+        if scale <= 0:
+            raise ParameterError(f"scale: expected a positive number, got {scale:g}")
+        object.__setattr__(self, "scale", scale)
+        object.__setattr__(self, "rotation", unit_quaternion(self.rotation, "rotation"))
+        object.__setattr__(self, "translation", vector(self.translation, "translation"))
+
+    @classmethod
+    def from_matrix(cls, matrix: np.ndarray) -> Similarity:
+        """From a (4, 4) homogeneous matrix.
+
+        Raises:
+            ParameterError: the matrix shears, mirrors or scales unevenly.
+        """
+        matrix = np.asarray(matrix, dtype=np.float64)
+        if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+            raise ParameterError(f"expected a finite (4, 4) matrix, got shape {matrix.shape}")
+        linear = matrix[:3, :3]
+        scale = float(np.cbrt(np.linalg.det(linear)))
+        if scale <= 0 or not np.allclose(linear @ linear.T, scale**2 * np.eye(3), atol=1e-6 * scale**2):
+            raise ParameterError("the matrix shears, mirrors or scales unevenly; expected a similarity")
+        return cls(scale, _quaternion(linear / scale), tuple(matrix[:3, 3]))
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Map points (N, 3) or one point (3,), in float64."""
+        turned = np.asarray(points, dtype=np.float64) @ rotation_matrix(self.rotation).T
+        return self.scale * turned + np.array(self.translation)
+
+    def __matmul__(self, first: Similarity) -> Similarity:
+        """`first`, then this one."""
+        return Similarity(
+            self.scale * first.scale,
+            quaternion_product(self.rotation, first.rotation),
+            tuple(self(np.array(first.translation))),
+        )
+
+    def inverse(self) -> Similarity:
+        w, x, y, z = self.rotation
+        back = Similarity(1.0 / self.scale, (w, -x, -y, -z))
+        return Similarity(back.scale, back.rotation, tuple(-back(np.array(self.translation))))
+
+    def matrix(self) -> np.ndarray:
+        """(4, 4) float64 homogeneous matrix."""
+        result = np.eye(4)
+        result[:3, :3] = self.scale * rotation_matrix(self.rotation)
+        result[:3, 3] = self.translation
+        return result
+
+
+def _quaternion(rotation: np.ndarray) -> Quaternion:
+    """Unit quaternion of a (3, 3) rotation, by way of its largest component (Shepperd 1978)."""
+    r = rotation
+    squares = np.array([r.trace(), r[0, 0], r[1, 1], r[2, 2]])
+    symmetric = r + r.T
+    twist = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
+    largest = int(squares.argmax())
+    if largest == 0:
+        q = np.array([1.0 + r.trace(), *twist])
+    else:
+        i = largest - 1
+        q = np.empty(4)
+        q[0] = twist[i]
+        q[1:] = symmetric[i]
+        q[1 + i] = 1.0 + 2.0 * r[i, i] - r.trace()
+    w, x, y, z = (q / np.linalg.norm(q)).tolist()
+    return w, x, y, z

@@ -1,0 +1,311 @@
+"""`Part` and `Assembly`: what every method returns. Immutable; every edit returns a new one."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, TypeVar
+
+import numpy as np
+
+from partwright.assembly.checks import (
+    Quaternion,
+    Vector,
+    blend_width,
+    flat_metadata,
+    printable_name,
+    unit_quaternion,
+    vector,
+)
+from partwright.assembly.names import unique_names
+from partwright.assembly.similarity import NO_ROTATION, ORIGIN, Similarity, quaternion_product
+from partwright.errors import ParameterError
+from partwright.fields import Field, SuperFrustum
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+Operation: TypeAlias = Literal["union", "intersection", "difference"]
+OPERATIONS: tuple[Operation, ...] = ("union", "intersection", "difference")
+MAX_DEPTH = 64
+
+Array = TypeVar("Array", bound=Any)
+
+
+class _Common(ABC):
+    """What parts and assemblies can both do. `a | b`, `a - b`, `a & b`: union, difference, intersection."""
+
+    def __or__(self, other: Node) -> Assembly:
+        return _combine("union", self, other)
+
+    def __sub__(self, other: Node) -> Assembly:
+        return _combine("difference", self, other)
+
+    def __and__(self, other: Node) -> Assembly:
+        return _combine("intersection", self, other)
+
+    @abstractmethod
+    def transformed(self, similarity: Similarity) -> Self:
+        """Turned, scaled and moved."""
+
+    def scaled(self, factor: float) -> Self:
+        """Scaled about the origin by a positive factor: places, sizes, dilations and blends alike."""
+        return self.transformed(Similarity(scale=factor))
+
+    def translated(self, offset: Sequence[float]) -> Self:
+        """Moved by an offset (3,)."""
+        return self.transformed(Similarity(translation=vector(offset, "offset")))
+
+    def bounds(self) -> np.ndarray:
+        """(2, 3) lowest and highest corner, float64."""
+        from partwright.assembly.bounds import bounds
+
+        return bounds(self)  # type: ignore[arg-type]
+
+    @cached_property
+    def _normalised(self) -> tuple[Similarity, Self]:
+        from partwright.assembly.distance import unit_similarity
+
+        frame = unit_similarity(self)  # type: ignore[arg-type]
+        return frame, self.transformed(frame)
+
+    def distance(self, points: Array) -> Array:
+        """Signed distance (N,) at points (N, 3), negative inside, in the points' own dtype.
+
+        A torch tensor is answered by the differentiable reference, anything else by the kernel.
+        """
+        from partwright.assembly.distance import distance
+
+        return distance(self, points)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class Part(_Common):
+    """A field with a pose and a name: one leaf of an assembly.
+
+    Args:
+        field: the solid in its local frame (a `SuperFrustum` or a named solid).
+        translation: place of the local origin.
+        rotation: unit quaternion (w, x, y, z), local to world.
+        blend: width over which this part melts into the parts before it; 0 is a sharp edge.
+        name: unique within an assembly; the assembly names it if it is empty.
+        metadata: what else is known of it, strings and numbers.
+
+    Raises:
+        ParameterError: a value is not finite, the rotation has no length, or the blend is negative.
+    """
+
+    field: Field
+    translation: Vector = ORIGIN
+    rotation: Quaternion = NO_ROTATION
+    blend: float = 0.0
+    name: str = ""
+    metadata: Mapping[str, str | float] = dataclasses.field(default_factory=dict, hash=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.field, Field):
+            raise ParameterError(f"field: expected a field such as SuperFrustum, got {self.field!r:.80}")
+        object.__setattr__(self, "translation", vector(self.translation, "translation"))
+        object.__setattr__(self, "rotation", unit_quaternion(self.rotation, "rotation"))
+        _check_common(self)
+
+    def transformed(self, similarity: Similarity) -> Part:
+        """The part turned, scaled and moved."""
+        return dataclasses.replace(
+            self,
+            field=self.field if similarity.scale == 1.0 else self.field.scaled(similarity.scale),
+            translation=tuple(similarity(np.array(self.translation)).tolist()),
+            rotation=quaternion_product(similarity.rotation, self.rotation),
+            blend=self.blend * similarity.scale,
+        )
+
+
+@dataclass(frozen=True)
+class Assembly(_Common):
+    """Parts and assemblies joined by an operation.
+
+    A union is folded first to last, each child but the first melting into what came before over its own
+    blend. A difference is the first child minus the others, an intersection what all share; blends round
+    their edges in the same way.
+
+    Args:
+        children: parts and assemblies, at least one. Leaves that are unnamed, or share a name, are renamed.
+        operation: "union", "intersection" or "difference".
+        name: of this node; may be empty.
+        blend: of this node within the assembly that holds it.
+        unit: the length unit of all numbers ("mm", "m" ...), None where unknown.
+        up: the axis that points up ("x", "y", "z", "-x" ...), None where unknown.
+        metadata: what else is known, strings and numbers: {"source": "mug.glb"}.
+
+    Raises:
+        ParameterError: no children, an unknown operation, nested more than 64 deep, or a bad number.
+    """
+
+    children: tuple[Node, ...]
+    operation: Operation = "union"
+    name: str = ""
+    blend: float = 0.0
+    unit: str | None = None
+    up: str | None = None
+    metadata: Mapping[str, str | float] = dataclasses.field(default_factory=dict, hash=False)
+
+    def __post_init__(self) -> None:
+        children = tuple(self.children)
+        if not children:
+            raise ParameterError("an assembly needs at least one part, got none")
+        for child in children:
+            if not isinstance(child, Part | Assembly):
+                raise ParameterError(f"children: expected parts and assemblies, got {type(child).__name__}")
+        if self.operation not in OPERATIONS:
+            raise ParameterError(
+                f"operation: expected one of {', '.join(OPERATIONS)}, got {self.operation!r}"
+            )
+        for label in ("unit", "up"):
+            if not isinstance(getattr(self, label), str | None):
+                raise ParameterError(f"{label}: expected a string or None, got {getattr(self, label)!r}")
+        _check_common(self)
+        object.__setattr__(self, "children", _with_unique_names(children))
+        if self.depth > MAX_DEPTH:
+            raise ParameterError(f"assemblies nest at most {MAX_DEPTH} deep, got {self.depth}")
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """The leaves, depth first."""
+        return tuple(_leaves(self.children))
+
+    @cached_property
+    def depth(self) -> int:
+        """1 for an assembly of parts alone."""
+        return 1 + max((child.depth for child in self.children if isinstance(child, Assembly)), default=0)
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    def __getitem__(self, name: str) -> Part:
+        """The leaf of that name."""
+        self._require(name)
+        return next(part for part in self.parts if part.name == name)
+
+    def part_distances(self, points: np.ndarray) -> np.ndarray:
+        """(M, N) signed distance of each leaf alone, unblended, at points (N, 3)."""
+        from partwright.assembly.distance import part_distances
+
+        return part_distances(self, points)
+
+    def transformed(self, similarity: Similarity) -> Assembly:
+        """The assembly turned, scaled and moved as a whole."""
+        children = tuple(child.transformed(similarity) for child in self.children)
+        return dataclasses.replace(self, children=children, blend=self.blend * similarity.scale)
+
+    def renamed(self, old: str, new: str) -> Assembly:
+        """The leaf `old` under a new name.
+
+        Raises:
+            ParameterError: no leaf is named `old`, or another is already named `new`.
+        """
+        if new != old and any(part.name == new for part in self.parts):
+            raise ParameterError(f"a part named {new!r} is already there")
+        return self.replace_part(old, dataclasses.replace(self[old], name=new))
+
+    def replace_part(self, name: str, part: Part) -> Assembly:
+        """The leaf `name` replaced; an unnamed replacement keeps the name."""
+        self._require(name)
+        part = dataclasses.replace(part, name=part.name or name)
+        return _require_some(self._edited(lambda leaf: part if leaf.name == name else leaf))
+
+    def without(self, name: str) -> Assembly:
+        """All but the leaf `name`. Where a difference loses its first child, nothing of it is left.
+
+        Raises:
+            ParameterError: no leaf has that name, or nothing would be left.
+        """
+        self._require(name)
+        return _require_some(self._edited(lambda leaf: None if leaf.name == name else leaf))
+
+    def save(self, path: str | Path) -> None:
+        """Write the assembly file (docs/assembly-file.md); `load_assembly` gives the same assembly back.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        from partwright.assembly.files import save
+
+        save(self, path)
+
+    def _require(self, name: str) -> None:
+        names = [part.name for part in self.parts]
+        if name not in names:
+            shown = ", ".join(names[:20]) + (" ..." if len(names) > 20 else "")
+            raise ParameterError(f"no part is named {name!r}; the names are: {shown}")
+
+    def _edited(self, edit: Callable[[Part], Part | None]) -> Assembly | None:
+        edited = [edit(c) if isinstance(c, Part) else c._edited(edit) for c in self.children]
+        if all(new is old for new, old in zip(edited, self.children, strict=True)):
+            return self
+        if self.operation == "difference" and edited[0] is None:
+            return None
+        children = tuple(child for child in edited if child is not None)
+        return dataclasses.replace(self, children=children) if children else None
+
+
+Node: TypeAlias = Part | Assembly
+
+
+def _combine(operation: Operation, a: Any, b: Any) -> Assembly:
+    """An unnamed `a` of the same operation is continued: the fold runs left to right anyway."""
+    if not isinstance(b, Part | Assembly):
+        return NotImplemented
+    known: dict[str, str | None] = {}
+    for label in ("unit", "up"):
+        values = {v for node in (a, b) if (v := getattr(node, label, None)) is not None}
+        if len(values) > 1:
+            raise ParameterError(
+                f"{label}: one assembly has {a.__dict__[label]!r}, the other {b.__dict__[label]!r}"
+            )
+        known[label] = values.pop() if values else None
+    continued = isinstance(a, Assembly) and a.operation == operation and not a.name
+    return Assembly((*a.children, b) if continued else (a, b), operation, unit=known["unit"], up=known["up"])
+
+
+def _check_common(node: Node) -> None:
+    """What parts and assemblies share. `object.__setattr__` is how a frozen dataclass sets its own."""
+    object.__setattr__(node, "name", printable_name(node.name))
+    object.__setattr__(node, "blend", blend_width(node.blend))
+    object.__setattr__(node, "metadata", flat_metadata(node.metadata))
+
+
+def _leaves(children: Sequence[Node]) -> Iterator[Part]:
+    for child in children:
+        if isinstance(child, Part):
+            yield child
+        else:
+            yield from child.parts
+
+
+def _with_unique_names(children: tuple[Node, ...]) -> tuple[Node, ...]:
+    leaves = list(_leaves(children))
+    wanted = [leaf.name for leaf in leaves]
+    if all(wanted) and len(set(wanted)) == len(wanted):
+        return children
+    names = iter(unique_names(wanted, [_stem(leaf) for leaf in leaves]))
+
+    def rename(node: Node) -> Node:
+        if isinstance(node, Assembly):
+            return dataclasses.replace(node, children=tuple(rename(child) for child in node.children))
+        name = next(names)
+        return node if name == node.name else dataclasses.replace(node, name=name)
+
+    return tuple(rename(child) for child in children)
+
+
+def _stem(part: Part) -> str:
+    return "part" if isinstance(part.field, SuperFrustum) else part.field.kind
+
+
+def _require_some(assembly: Assembly | None) -> Assembly:
+    if assembly is None:
+        raise ParameterError("nothing would be left: an assembly needs at least one part")
+    return assembly

@@ -1,0 +1,55 @@
+"""Random parts and assemblies for property tests."""
+
+from __future__ import annotations
+
+import math
+
+from hypothesis import strategies as st
+
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.fields import Box, Capsule, Cylinder, Sphere, SuperFrustum, Torus
+
+UNIT = st.floats(0.0, 1.0)
+LENGTH = st.floats(0.05, 1.5)
+VECTOR = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
+ROTATION = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: math.hypot(*q) > 0.1)
+NAME = st.text(st.characters(categories=("L", "N", "P", "S")), max_size=8)
+METADATA = st.dictionaries(NAME, NAME | st.floats(allow_nan=False, allow_infinity=False), max_size=2)
+
+SUPERFRUSTA = st.builds(
+    SuperFrustum,
+    size=st.tuples(LENGTH, LENGTH, LENGTH),
+    roundness=UNIT,
+    dilation=st.floats(0.0, 0.3),
+    taper=st.floats(0.0, 2.0),
+    bulge=UNIT,
+    onion=st.floats(0.0, 0.95),
+)
+SOLIDS = st.one_of(
+    st.builds(Box, st.tuples(LENGTH, LENGTH, LENGTH)),
+    st.builds(Sphere, LENGTH),
+    st.builds(Cylinder, LENGTH, LENGTH),
+    st.builds(Capsule, LENGTH, LENGTH),
+    st.builds(Torus, st.floats(0.6, 1.0), st.floats(0.1, 0.5)),
+)
+PARTS = st.builds(
+    Part, SUPERFRUSTA | SOLIDS, VECTOR, ROTATION, blend=st.floats(0.0, 0.3), name=NAME, metadata=METADATA
+)
+OPERATIONS = st.sampled_from(["union", "intersection", "difference"])
+
+
+def assemblies_of(children: st.SearchStrategy) -> st.SearchStrategy:
+    return st.builds(
+        Assembly,
+        st.lists(children, min_size=1, max_size=4).map(tuple),
+        OPERATIONS,
+        name=NAME,
+        blend=st.floats(0.0, 0.3),
+        unit=st.sampled_from([None, "mm"]),
+        up=st.sampled_from([None, "z"]),
+        metadata=METADATA,
+    )
+
+
+ASSEMBLIES = assemblies_of(st.recursive(PARTS, assemblies_of, max_leaves=8))
+SIMILARITIES = st.builds(Similarity, st.floats(0.1, 10.0), ROTATION, VECTOR)

@@ -1,0 +1,65 @@
+"""Bounds hold all of the inside, exactly where that is known, and are not wasteful."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from partwright.assembly import Assembly, Part
+from partwright.fields import Box, Cone, Cylinder, Sphere, SuperFrustum, Torus
+from tests.assembly.strategies import ASSEMBLIES, PARTS
+
+TURN = (0.8, 0.2, 0.5, -0.3)
+
+
+@pytest.mark.parametrize(
+    ("field", "half"),
+    [
+        (Box((1, 2, 3)), (0.5, 1, 1.5)),
+        (Cylinder(0.5, 2), (0.5, 0.5, 1)),
+        (Cone(0.5, 2), (0.5, 0.5, 1)),
+        (Torus(1, 0.25), (1.25, 1.25, 0.25)),
+    ],
+)
+def test_canonical_solids_are_exact(field: object, half: tuple[float, float, float]) -> None:
+    bounds = Part(field, (1, 2, 3)).bounds()
+    assert np.allclose(bounds, np.array([1, 2, 3]) + np.array([[-1], [1]]) * half, atol=0.005 * 0.25)
+
+
+def test_a_turned_sphere_and_cylinder_stay_tight() -> None:
+    assert np.allclose(Part(Sphere(2.0), rotation=TURN).bounds(), [[-2] * 3, [2] * 3], atol=0.005 * 2)
+    quarter = Part(Cylinder(0.5, 2), rotation=(1, 1, 0, 0)).bounds()
+    assert np.allclose(quarter, [[-0.5, -1, -0.5], [0.5, 1, 0.5]])
+    about_axis = Part(Cylinder(0.5, 2), rotation=(2, 0, 0, 1)).bounds()
+    assert np.allclose(about_axis, [[-0.5, -0.5, -1], [0.5, 0.5, 1]])
+
+
+def test_half_ring() -> None:
+    """bulge 1: an arc of a half circle around (0, 0, 0) with radius sz/2, towards -x."""
+    bounds = Part(SuperFrustum((0.2, 0.2, 2.0), roundness=1.0, bulge=1.0)).bounds()
+    assert np.allclose(bounds, [[-1.1, -0.1, -1.1], [0.0, 0.1, 1.1]], atol=2e-3)
+
+
+@settings(max_examples=80, deadline=None)
+@given(PARTS | ASSEMBLIES)
+def test_nothing_lies_outside(node: Part | Assembly) -> None:
+    lower, upper = node.bounds()
+    margin = 0.5 * (upper - lower).max() + 0.1
+    points = np.random.default_rng(1).uniform(lower - margin, upper + margin, (4000, 3))
+    outside = ((points < lower) | (points > upper)).any(axis=1)
+    assert node.distance(points[outside]).min() > -1e-4
+
+
+@settings(max_examples=40, deadline=None)
+@given(PARTS)
+def test_every_side_is_reached(part: Part) -> None:
+    """No face of the box stands further off than a tenth of its longest side."""
+    if part.field.superfrustum().onion > 0:
+        return
+    lower, upper = part.bounds()
+    points = np.random.default_rng(2).uniform(lower, upper, (20000, 3))
+    inside = points[part.distance(points) < 0.02]
+    slack = 0.1 * (upper - lower).max() + 0.05
+    assert (inside.min(axis=0) - lower < slack).all()
+    assert (upper - inside.max(axis=0) < slack).all()

@@ -1,0 +1,96 @@
+"""Assemblies against closed forms, against the torch reference, and under moves, at any size and place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.errors import ParameterError
+from partwright.fields import Box, Sphere
+from partwright.fields.operations import smooth_union
+from tests.assembly.strategies import ASSEMBLIES, SIMILARITIES
+
+POINTS = np.random.default_rng(0).uniform(-2, 2, (400, 3))
+
+
+def length(points: np.ndarray, centre: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
+    return np.linalg.norm(points - np.array(centre), axis=1)
+
+
+def test_operations_are_exact_for_spheres() -> None:
+    a, b = Part(Sphere(1.0)), Part(Sphere(0.5), (1, 0, 0))
+    da, db = length(POINTS) - 1.0, length(POINTS, (1, 0, 0)) - 0.5
+    assert np.allclose((a | b).distance(POINTS), np.minimum(da, db), atol=1e-6)
+    assert np.allclose((a - b).distance(POINTS), np.maximum(da, -db), atol=1e-6)
+    assert np.allclose((a & b).distance(POINTS), np.maximum(da, db), atol=1e-6)
+
+
+def test_union_folds_first_to_last_each_child_with_its_own_blend() -> None:
+    spheres = [Part(Sphere(0.5), (0.4 * i, 0, 0), blend=0.1 * i) for i in range(4)]
+    expected = length(POINTS) - 0.5
+    for i in range(1, 4):
+        expected = smooth_union(expected, length(POINTS, (0.4 * i, 0, 0)) - 0.5, 0.1 * i)
+    flat = Assembly(tuple(spheres))
+    nested_first = Assembly((Assembly(tuple(spheres[:2])), *spheres[2:]))
+    for assembly in (flat, nested_first):
+        assert np.allclose(assembly.distance(POINTS), expected, atol=1e-6)
+
+
+def test_nested_node_joins_with_its_own_blend() -> None:
+    pair = Assembly((Part(Sphere(0.5), (1, 0, 0)), Part(Sphere(0.5), (1.5, 0, 0))), blend=0.3)
+    inner = np.minimum(length(POINTS, (1, 0, 0)), length(POINTS, (1.5, 0, 0))) - 0.5
+    got = Assembly((Part(Sphere(1.0)), pair)).distance(POINTS)
+    assert np.allclose(got, smooth_union(length(POINTS) - 1.0, inner, 0.3), atol=1e-6)
+
+
+@settings(max_examples=60, deadline=None)
+@given(ASSEMBLIES)
+def test_kernel_and_reference_agree(assembly: Assembly) -> None:
+    reference = assembly.distance(torch.tensor(POINTS, dtype=torch.float64)).numpy()
+    size = np.ptp(assembly.bounds(), axis=0).max()
+    assert np.abs(assembly.distance(POINTS) - reference).max() < 2e-5 * max(size, 4.0)
+
+
+def test_torch_points_get_gradients() -> None:
+    points = torch.tensor([[0.9, 0.0, 0.0], [0.0, 2.0, 0.0]], dtype=torch.float64, requires_grad=True)
+    (Part(Sphere(1.0)) | Part(Box((1, 1, 1)), (5, 0, 0))).distance(points).sum().backward()
+    assert torch.allclose(points.grad, torch.tensor([[1.0, 0, 0], [0, 1.0, 0]], dtype=torch.float64))
+
+
+@settings(max_examples=40, deadline=None)
+@given(ASSEMBLIES, SIMILARITIES)
+def test_distance_moves_with_the_assembly(assembly: Assembly, move: Similarity) -> None:
+    before = assembly.distance(POINTS)
+    after = assembly.transformed(move).distance(move(POINTS))
+    assert np.allclose(after, move.scale * before, atol=1e-4 * move.scale)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("place", [0.0, 1e3])
+def test_sizes_and_places_keep_their_digits(scale: float, place: float) -> None:
+    centre = np.array([place, -place, place]) * scale
+    assembly = (Part(Sphere(1.0)) | Part(Sphere(0.5), (1, 0, 0))).scaled(scale).translated(centre)
+    d = np.minimum(length(POINTS) - 1.0, length(POINTS, (1, 0, 0)) - 0.5) * scale
+    assert np.abs(assembly.distance(POINTS * scale + centre) - d).max() < 1e-6 * scale
+
+
+def test_dtype_follows_the_points() -> None:
+    part = Part(Sphere(1.0))
+    assert part.distance(POINTS.astype(np.float32)).dtype == np.float32
+    assert part.distance(POINTS).dtype == np.float64
+    assert part.distance([[2, 0, 0]]).tolist() == pytest.approx([1.0])
+
+
+def test_part_distances_are_unblended(mug: Assembly) -> None:
+    values = mug.part_distances(POINTS)
+    assert values.shape == (3, len(POINTS))
+    for row, part in zip(values, mug.parts, strict=True):
+        assert np.allclose(row, part.distance(POINTS), atol=1e-6)
+
+
+def test_points_of_the_wrong_shape_are_refused(mug: Assembly) -> None:
+    with pytest.raises(ParameterError, match=r"\(N, 3\), got \(3,\)"):
+        mug.distance(np.zeros(3))
