@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass, replace
@@ -80,7 +79,7 @@ def number(owner: Field, name: str, low: float, high: float, *, above: bool = Fa
 def vector(owner: Field, name: str, low: float, high: float) -> tuple[float, float, float]:
     """The parameter `name` of a field as three floats in [low, high]."""
     given = getattr(owner, name)
-    if not isinstance(given, (tuple, list, np.ndarray)) or np.shape(given) != (3,):
+    if not isinstance(given, (tuple, list, np.ndarray)) or len(given) != 3:
         raise ParameterError(f"{owner.kind}: {name} is {brief(given)}; expected three numbers x, y, z")
     x, y, z = (_checked(f"{owner.kind}: {name}", value, low, high, False) for value in given)
     return x, y, z
@@ -106,7 +105,7 @@ def _checked(what: str, given: Any, low: float, high: float, above: bool) -> flo
     allowed = f"{low:g} < value <= {high:g}" if above else f"{low:g} <= value <= {high:g}"
     if isinstance(given, bool) or not isinstance(given, NUMBERS):
         raise ParameterError(f"{what} is {brief(given)}, which is no number; expected {allowed}")
-    # Compared before the conversion: an integer of a file may be too large for a float.
-    if math.isnan(given) or not low <= given <= high or (above and given == low):
+    # Compared before the conversion: an integer of a file may be too large for a float. NaN fails, too.
+    if not low <= given <= high or (above and given == low):
         raise ParameterError(f"{what} is {brief(given)}; expected {allowed}")
     return float(given)
