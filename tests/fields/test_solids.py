@@ -143,8 +143,8 @@ def test_torch_points_give_gradients() -> None:
     [
         ("size", (1, 1)), ("size", "123"), ("size", None), ("size", (1, -1, 1)), ("size", (1, math.nan, 1)),
         ("size", [1, [2], 3]), ("size", {"x": 1}), ("roundness", 1.01), ("roundness", "0.5"),
-        ("roundness", True), ("dilation", -1e-9), ("dilation", math.inf), ("dilation", 10**400), ("taper", 2.5),
-        ("taper", None), ("bulge", -0.1), ("onion", math.nan),
+        ("roundness", True), ("dilation", -1e-9), ("dilation", math.inf), ("dilation", 10**400),
+        ("taper", 2.5), ("taper", None), ("bulge", -0.1), ("onion", math.nan),
     ],
 )  # fmt: skip
 def test_bad_parameters_are_named(name: str, value: Any) -> None:
