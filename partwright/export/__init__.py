@@ -1,0 +1,52 @@
+"""What goes out: one format a file. A new format is a new file and one line in the table."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from partwright.errors import SettingError, UnsupportedFormatError
+
+if TYPE_CHECKING:
+    from partwright.assembly import Assembly
+
+# suffix -> module whose `write(assembly, path, **options)` writes it
+WRITERS = {
+    ".json": "partwright.export.json_file",
+    ".glb": "partwright.export.glb",
+    ".ply": "partwright.export.ply",
+    ".stl": "partwright.export.stl",
+    ".obj": "partwright.export.obj",
+}
+
+__all__ = ["WRITERS", "export"]
+
+
+def export(assembly: Assembly, path: str | Path, **options: Any) -> None:
+    """Write the assembly in the format that the path's suffix names.
+
+    Options: `resolution` for meshes (.glb: cells along each part, default 32; .ply, .stl, .obj: cells along
+    the longest side, default 128).
+
+    Raises:
+        UnsupportedFormatError: the suffix names no known format.
+        SettingError: the format has no such option.
+        OutputError: the file cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in WRITERS:
+        raise UnsupportedFormatError(
+            f"cannot export {Path(path).name}: the suffix {suffix!r} names no format; "
+            f"use one of {', '.join(WRITERS)}"
+        )
+    write: Callable[..., None] = import_module(WRITERS[suffix]).write
+    known = list(inspect.signature(write).parameters)[2:]
+    for name in options:
+        if name not in known:
+            raise SettingError(
+                f"{suffix} has no option {name!r}; it has {', '.join(known) if known else 'none'}"
+            )
+    write(assembly, path, **options)

@@ -1,0 +1,117 @@
+"""GLB: one named, coloured node a part, with the part's parameters in the node's `extras`.
+
+glTF is in metres with Y up, so the root of the scene converts; where the assembly knows no unit or up axis
+its numbers stay as they are, and `asset.extras` says so. Each part is meshed in its own frame and placed by its
+node, so that a far place costs no digits and a node turns about the part's own origin.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from partwright import __version__
+from partwright.assembly import Assembly, Node, Part, Similarity
+from partwright.assembly.palette import palette
+from partwright.assembly.similarity import NO_ROTATION, ORIGIN
+from partwright.meshing import mesh_part
+from partwright.shapes import METRES, canonical_unit, canonical_up
+from partwright.writing import write_bytes
+
+if TYPE_CHECKING:
+    import trimesh
+
+_HALF = math.sqrt(0.5)
+# up axis -> the rotation that turns it to +Y
+_TO_Y_UP = {
+    "y": NO_ROTATION,
+    "-y": (0.0, 1.0, 0.0, 0.0),
+    "z": (_HALF, -_HALF, 0.0, 0.0),
+    "-z": (_HALF, _HALF, 0.0, 0.0),
+    "x": (_HALF, 0.0, 0.0, _HALF),
+    "-x": (_HALF, 0.0, 0.0, -_HALF),
+}
+
+
+def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
+    """Write the parts; `resolution` is the number of cells along each part."""
+    from trimesh.exchange.gltf import export_glb
+
+    def describe(tree: dict[str, Any]) -> None:
+        tree["asset"]["generator"] = f"Partwright {__version__}"
+        tree["asset"]["extras"] = _about(assembly)
+
+    data = export_glb(_scene(assembly, resolution), include_normals=False, tree_postprocessor=describe)
+    write_bytes(path, data)
+
+
+def to_gltf(assembly: Assembly) -> Similarity:
+    """From the assembly's own units and axes to metres and Y up, as far as they are known."""
+    scale = METRES[canonical_unit(assembly.unit)] if assembly.unit else 1.0
+    return Similarity(scale, _TO_Y_UP[canonical_up(assembly.up)] if assembly.up else NO_ROTATION)
+
+
+def _about(assembly: Assembly) -> dict[str, Any]:
+    about: dict[str, Any] = {"unit": assembly.unit, "up": assembly.up, "operation": assembly.operation}
+    if assembly.unit is None:
+        about["note"] = "the length unit is unknown: coordinates are as in the input, not in metres"
+    return about | ({"metadata": dict(assembly.metadata)} if assembly.metadata else {})
+
+
+def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
+    import trimesh
+
+    scene = trimesh.Scene(base_frame="world")
+    colours = dict(zip((p.name for p in assembly.parts), palette(len(assembly)), strict=True))
+    taken = {"world", *colours}
+
+    def add(node: Node, parent: str, pose: np.ndarray, role: str) -> None:
+        extras: dict[str, Any] = {"role": role} if role else {}
+        if isinstance(node, Part):
+            local = dataclasses.replace(node, translation=ORIGIN, rotation=NO_ROTATION)
+            mesh = _coloured(mesh_part(local, resolution), colours[node.name])
+            placed = pose @ Similarity(1.0, node.rotation, node.translation).matrix()
+            scene.add_geometry(mesh, node.name, node.name, parent, placed, metadata=_extras(node) | extras)
+            return
+        name = _free_name(node.name or "assembly", taken)
+        extras |= {"operation": node.operation, "blend": node.blend}
+        scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=extras)
+        for i, child in enumerate(node.children):
+            add(child, name, np.eye(4), "subtracted" if node.operation == "difference" and i else "")
+
+    add(assembly, "world", to_gltf(assembly).matrix(), "")
+    return scene
+
+
+def _extras(part: Part) -> dict[str, Any]:
+    """The part as in an assembly file, but for the name: lengths are in the assembly's unit."""
+    own = {
+        "field": part.field.to_dict(),
+        "translation": list(part.translation),
+        "rotation": list(part.rotation),
+        "blend": part.blend,
+    }
+    return own | ({"metadata": dict(part.metadata)} if part.metadata else {})
+
+
+def _coloured(mesh: trimesh.Trimesh, colour: np.ndarray) -> trimesh.Trimesh:
+    from trimesh.visual import TextureVisuals
+    from trimesh.visual.material import PBRMaterial
+
+    srgb = colour / 255.0  # glTF's factors are linear
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    rgba = [*np.round(255 * linear).astype(int).tolist(), 255]
+    material = PBRMaterial(baseColorFactor=rgba, metallicFactor=0.0, roughnessFactor=0.7)
+    mesh.visual = TextureVisuals(material=material)
+    return mesh
+
+
+def _free_name(wanted: str, taken: set[str]) -> str:
+    name = next(n for i in count(1) if (n := wanted if i == 1 else f"{wanted}_{i:02d}") not in taken)
+    taken.add(name)
+    return name

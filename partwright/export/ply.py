@@ -1,0 +1,41 @@
+"""PLY: the blended surface, binary, with double coordinates so that far places keep their digits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.meshing import mesh_assembly
+from partwright.writing import write_bytes
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from partwright.assembly import Assembly
+
+_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
+
+
+def write(assembly: Assembly, path: str | Path, resolution: int = 128) -> None:
+    """Write the watertight surface in the assembly's own units and place."""
+    write_mesh(mesh_assembly(assembly, resolution), path, assembly.unit)
+
+
+def write_mesh(mesh: trimesh.Trimesh, path: str | Path, unit: str | None = None) -> None:
+    """Write a mesh; its unit goes into a comment."""
+    faces = np.empty(len(mesh.faces), dtype=_FACE)
+    faces["count"], faces["corners"] = 3, mesh.faces
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment unit {unit or 'unknown'}",
+        f"element vertex {len(mesh.vertices)}",
+        *(f"property double {axis}" for axis in "xyz"),
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        "end_header\n",
+    ]
+    vertices = np.ascontiguousarray(mesh.vertices, dtype="<f8")
+    write_bytes(path, "\n".join(header).encode() + vertices.tobytes() + faces.tobytes())
