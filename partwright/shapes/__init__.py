@@ -1,0 +1,30 @@
+"""What comes in: files to shapes with an inside, a unit frame, distances and samples."""
+
+from __future__ import annotations
+
+from partwright.shapes.distance import DistanceSource, MeshDistance
+from partwright.shapes.frame import LONGEST_SIDE, UnitFrame
+from partwright.shapes.grid import DistanceGrid
+from partwright.shapes.loading import MESH_SUFFIXES
+from partwright.shapes.sampling import Samples, SurfaceSamples
+from partwright.shapes.shape import Node, NodeLeftOutWarning, Shape, load_shape
+from partwright.shapes.units import METRES, UP_AXES, canonical_unit, canonical_up
+
+__all__ = [
+    "LONGEST_SIDE",
+    "MESH_SUFFIXES",
+    "METRES",
+    "UP_AXES",
+    "DistanceGrid",
+    "DistanceSource",
+    "MeshDistance",
+    "Node",
+    "NodeLeftOutWarning",
+    "Samples",
+    "Shape",
+    "SurfaceSamples",
+    "UnitFrame",
+    "canonical_unit",
+    "canonical_up",
+    "load_shape",
+]

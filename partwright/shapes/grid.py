@@ -1,0 +1,108 @@
+"""Signed distance on a voxel grid: exact near the surface, within a fraction of a voxel away from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.shapes.distance import DistanceSource
+from partwright.shapes.frame import LONGEST_SIDE
+
+_BAND = 2.5  # voxels: values up to here are exact
+_SITE = 0.6  # voxels: a bit more than half, so that the sites leave no gaps in the surface
+_MARGIN = 2  # voxels around the bounding box
+_COARSEST = 4  # voxels: the blocks that the search for the band starts from
+
+
+@dataclass(frozen=True)
+class DistanceGrid:
+    """values[i, j, k] is the signed distance at origin + spacing * (i, j, k), unit frame."""
+
+    origin: NDArray[np.float64]
+    spacing: float
+    values: NDArray[np.float32]
+
+    def points(self) -> NDArray[np.float64]:
+        """All grid points (nx * ny * nz, 3) in the order of values.ravel()."""
+        return self.origin + self.spacing * np.stack(np.indices(self.values.shape), axis=-1).reshape(-1, 3)
+
+
+def distance_grid(
+    source: DistanceSource, lower: NDArray[np.float64], upper: NDArray[np.float64], resolution: int
+) -> DistanceGrid:
+    """Grid over the box lower..upper plus two voxels, `resolution` points along a side of 1.8.
+
+    Within 2.5 voxels of the surface the values are exact. Beyond, they are the distance to the foot point of the
+    nearest surface voxel: never too small, too large by less than 0.3 voxel.
+    """
+    spacing = LONGEST_SIDE / (resolution - 2 * _MARGIN)
+    sides = np.ceil((upper - lower) / spacing - 1e-9).astype(int) + 2 * _MARGIN
+    shape = (int(sides[0]), int(sides[1]), int(sides[2]))
+    # Points are voxel centres, so none of them lies on the bounding box.
+    origin = (lower + upper) / 2 - spacing * (sides - 1) / 2
+    near, distance = _near_voxels(source, origin, spacing, shape)
+    values = _far_distances(source, origin, spacing, shape, near[distance <= _SITE * spacing])
+    values[tuple(near.T)] = distance
+    inside = source.inside_grid(origin, spacing, shape)
+    np.negative(values, out=values, where=inside)
+    return DistanceGrid(origin, spacing, values)
+
+
+def _near_voxels(
+    source: DistanceSource, origin: NDArray[np.float64], spacing: float, shape: tuple[int, int, int]
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Indices (N, 3) and unsigned distances (N,) of all voxels within the band, found by halving blocks."""
+    index = _COARSEST * np.stack(np.indices([-(-n // _COARSEST) for n in shape]), axis=-1).reshape(-1, 3)
+    size = _COARSEST
+    while size > 1:
+        distance = source.unsigned(origin + spacing * (index + (size - 1) / 2))
+        index = index[distance <= spacing * (_BAND + np.sqrt(3) * (size - 1) / 2)]
+        size //= 2
+        index = (index[:, None] + size * np.array(list(product((0, 1), repeat=3)))).reshape(-1, 3)
+    index = index[(index < shape).all(axis=1)]
+    distance = source.unsigned(origin + spacing * index)
+    close = distance <= spacing * _BAND
+    return index[close], distance[close]
+
+
+def _far_distances(
+    source: DistanceSource,
+    origin: NDArray[np.float64],
+    spacing: float,
+    shape: tuple[int, int, int],
+    sites: NDArray[np.int64],
+) -> NDArray[np.float32]:
+    """Distance of every voxel to the foot point of its nearest site."""
+    from scipy.ndimage import distance_transform_edt
+
+    empty = np.ones(shape, dtype=bool)
+    empty[tuple(sites.T)] = False
+    feet = np.zeros((*shape, 3), dtype=np.float32)
+    feet[tuple(sites.T)] = source.closest(origin + spacing * sites)
+    nearest = distance_transform_edt(empty, return_distances=False, return_indices=True)
+    squared = np.zeros(shape, dtype=np.float32)
+    flat = np.ravel_multi_index(tuple(nearest), shape)
+    for axis in range(3):
+        along = (origin[axis] + spacing * np.arange(shape[axis])).astype(np.float32)
+        place = along.reshape([-1 if a == axis else 1 for a in range(3)])
+        squared += (place - feet[..., axis].ravel()[flat]) ** 2
+    return np.sqrt(squared)
+
+
+def occupancy_grid(
+    source: DistanceSource, lower: NDArray[np.float64], upper: NDArray[np.float64], resolution: int
+) -> NDArray[np.bool_]:
+    """Inside or not at the resolution^3 cell centres of [-1, 1]^3; only cells within lower..upper are tested."""
+    spacing = 2.0 / resolution
+    first = np.clip(np.floor((lower + 1) / spacing), 0, resolution - 1).astype(int)
+    stop = np.clip(np.ceil((upper + 1) / spacing), 1, resolution).astype(int)
+    occupied = np.zeros((resolution,) * 3, dtype=bool)
+    box = tuple(slice(a, b) for a, b in zip(first, stop, strict=True))
+    sides = stop - first
+    occupied[box] = source.inside_grid(
+        -1 + spacing * (first + 0.5), spacing, (int(sides[0]), int(sides[1]), int(sides[2]))
+    )
+    return occupied

@@ -1,0 +1,215 @@
+"""Files to triangles: one list of named pieces with their transforms applied, and what the file says of units."""
+
+from __future__ import annotations
+
+import re
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.errors import (
+    EmptyShapeError,
+    NeedsSurfaceError,
+    UnreadableFileError,
+    UnsupportedFormatError,
+)
+from partwright.shapes.units import canonical_unit
+
+if TYPE_CHECKING:
+    import trimesh
+
+MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf", ".3mf")
+_LARGEST_UNPACKED = 4 << 30  # bytes; a 3MF is a zip archive, and a small one can claim terabytes
+
+# What trimesh, numpy, json, lxml and zipfile raise on bytes that are not what the suffix says. A parser fails
+# wherever the bytes first stop making sense, so the families are wide; none of them can come from our own code
+# here, because nothing but the parser runs inside the try.
+_PARSER_ERRORS = (
+    OSError,
+    EOFError,
+    ValueError,  # includes UnicodeDecodeError and json.JSONDecodeError
+    TypeError,
+    AttributeError,
+    LookupError,
+    ArithmeticError,
+    AssertionError,
+    MemoryError,  # a header that claims more elements than memory holds
+    RuntimeError,  # includes RecursionError and NotImplementedError
+    SyntaxError,  # lxml.etree.XMLSyntaxError
+    ImportError,  # a compressed glTF extension whose decoder is not installed
+    struct.error,
+    zlib.error,
+    zipfile.BadZipFile,
+)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One named mesh of a file in world coordinates: vertices (V, 3) float64, faces (F, 3) int64."""
+
+    name: str
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a file or an object in memory holds, before any repair."""
+
+    name: str
+    pieces: tuple[Piece, ...]
+    unit: str | None
+    up: str | None
+
+
+def read_source(path: Path) -> Source:
+    """Read a mesh file; an instanced geometry gives one piece an instance.
+
+    Raises UnsupportedFormatError, UnreadableFileError, EmptyShapeError or NeedsSurfaceError.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in MESH_SUFFIXES:
+        raise UnsupportedFormatError(
+            f"{path}: '{suffix}' is not a format that is read; expected one of {', '.join(MESH_SUFFIXES)}. "
+            "Export the shape to one of these (STL or OBJ work for CAD models)"
+        )
+    scene = _load_scene(path, suffix)
+    pieces = tuple(_unique_names(_pieces(scene, path.stem)))
+    if not pieces:
+        if any(len(getattr(g, "vertices", ())) for g in scene.geometry.values()):
+            raise NeedsSurfaceError(
+                f"{path}: holds points without faces; a surface of triangles was expected. "
+                "Reconstruct a mesh from the points first"
+            )
+        raise EmptyShapeError(f"{path}: holds no triangles; export the shape again with its mesh")
+    is_gltf = suffix in (".glb", ".gltf")
+    unit = "m" if is_gltf else canonical_unit(scene.units) if suffix == ".3mf" and scene.units else None
+    return Source(path.stem, pieces, unit, "y" if is_gltf else None)
+
+
+def source_of_mesh(mesh: trimesh.Trimesh | tuple[Any, Any]) -> Source:
+    """A Trimesh or (vertices (V, 3), faces (F, 3)) as a source.
+
+    Raises UnreadableFileError for arrays of another form, EmptyShapeError and NeedsSurfaceError as for files.
+    """
+    vertices, faces = mesh if isinstance(mesh, tuple) else (mesh.vertices, getattr(mesh, "faces", ()))
+    try:
+        v = np.array(vertices, dtype=np.float64)
+        f = np.array(faces, dtype=np.int64)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise UnreadableFileError(f"vertices and faces must be arrays of numbers: {error}") from error
+    if v.size == 0 and f.size == 0:
+        raise EmptyShapeError("the mesh has no vertices and no faces")
+    if f.size == 0:
+        raise NeedsSurfaceError(f"{len(v)} points without faces were given; a surface of triangles was expected")
+    if v.ndim != 2 or v.shape[1] != 3 or f.ndim != 2 or f.shape[1] != 3:
+        raise UnreadableFileError(
+            f"vertices {v.shape} and faces {f.shape} were given; expected (V, 3) coordinates and (F, 3) triangles"
+        )
+    return Source("mesh", (Piece("mesh", v, _valid(f, len(v), "the mesh")),), None, None)
+
+
+def _load_scene(path: Path, suffix: str) -> trimesh.Scene:
+    import trimesh
+
+    if not path.is_file():
+        raise UnreadableFileError(f"{path}: no such file; check the path")
+    if path.stat().st_size == 0:
+        raise EmptyShapeError(f"{path}: the file is empty (0 bytes); export the shape again")
+    if suffix == ".3mf":
+        _refuse_zip_bomb(path)
+    # Textures and colours are never used, so they are never decoded: that is faster and safer.
+    options: dict[str, Any] = {"process": False}
+    if suffix in (".obj", ".glb", ".gltf"):
+        options["skip_materials"] = True
+    if suffix == ".obj":
+        options |= {"split_objects": True, "group_material": False}
+    try:
+        with np.errstate(all="ignore"):
+            scene = trimesh.load_scene(path, **options)
+    except _PARSER_ERRORS as error:
+        raise UnreadableFileError(
+            f"{path}: cannot be read as {suffix[1:].upper()} ({type(error).__name__}: {error}); the file is "
+            "truncated or not what its suffix says. Export it again"
+        ) from error
+    return scene
+
+
+def _refuse_zip_bomb(path: Path) -> None:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            unpacked = sum(entry.file_size for entry in archive.infolist())
+    except (zipfile.BadZipFile, OSError, ValueError) as error:
+        raise UnreadableFileError(f"{path}: is not a 3MF archive ({error}); export it again") from error
+    if unpacked > _LARGEST_UNPACKED:
+        raise UnreadableFileError(
+            f"{path}: would unpack to {unpacked / 2**30:.0f} GiB; at most {_LARGEST_UNPACKED >> 30} are accepted"
+        )
+
+
+def _pieces(scene: trimesh.Scene, stem: str) -> Iterator[Piece]:
+    """World-space pieces in the scene's order; the primitives of one glTF mesh are joined into one piece."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for node in scene.graph.nodes_geometry:
+        geometry = scene.graph[node][1]
+        is_primitive = scene.geometry[geometry].metadata.get("from_gltf_primitive", False)
+        owner = scene.graph.transforms.parents.get(node, node) if is_primitive else node
+        groups.setdefault(owner, []).append((node, geometry))
+    for owner, members in groups.items():
+        placed = [_placed(scene, node, geometry, stem) for node, geometry in members]
+        placed = [(v, f) for v, f in placed if len(f)]
+        if not placed:
+            continue
+        offsets = np.cumsum([0] + [len(v) for v, _ in placed])
+        # glTF nodes without a name come as their number; the mesh's own name says more.
+        first = members[0][1]
+        name = (re.sub(r"_\d+$", "", first) if len(members) > 1 else first) if owner.isdigit() else owner
+        yield Piece(
+            stem if Path(name).stem == stem and "." in name else name,
+            np.concatenate([v for v, _ in placed]),
+            np.concatenate([f + o for (_, f), o in zip(placed, offsets[:-1], strict=True)]),
+        )
+
+
+def _placed(
+    scene: trimesh.Scene, node: str, geometry: str, where: str
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    mesh = scene.geometry[geometry]
+    vertices = np.array(getattr(mesh, "vertices", ()), dtype=np.float64).reshape(-1, 3)
+    faces = np.array(getattr(mesh, "faces", ()), dtype=np.int64).reshape(-1, 3)
+    faces = _valid(faces, len(vertices), where)
+    matrix = np.asarray(scene.graph[node][0], dtype=np.float64)
+    if not np.array_equal(matrix, np.eye(4)):
+        with np.errstate(all="ignore"):  # a NaN vertex that no face uses may pass through here
+            vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        if np.linalg.det(matrix[:3, :3]) < 0:  # a mirror turns every triangle inside out
+            faces = faces[:, ::-1]
+    return vertices, np.ascontiguousarray(faces)
+
+
+def _valid(faces: NDArray[np.int64], vertex_count: int, where: str) -> NDArray[np.int64]:
+    if faces.size and (faces.min() < 0 or faces.max() >= vertex_count):
+        raise UnreadableFileError(
+            f"{where}: a triangle names vertex {int(faces.max())} of {vertex_count}; "
+            "the face indices must lie within the vertices. Export the shape again"
+        )
+    return faces
+
+
+def _unique_names(pieces: Iterator[Piece]) -> Iterator[Piece]:
+    """A name that comes again gets a number: wheel, wheel_2, wheel_3."""
+    taken: set[str] = set()
+    for piece in pieces:
+        name, count = piece.name or "node", 1
+        while name in taken:
+            count += 1
+            name = f"{piece.name or 'node'}_{count}"
+        taken.add(name)
+        yield Piece(name, piece.vertices, piece.faces)

@@ -1,0 +1,164 @@
+"""Triangle soup to a surface with an inside, and in plain words what had to be done.
+
+Everything here works in the unit frame, so that its few tolerances mean the same for a ring and for a ship.
+Geometry is moved only where it is open: closed thin walls come out as they went in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.errors import EmptyShapeError, FlatShapeError, OpenShellError
+from partwright.shapes.boolean import unite
+from partwright.shapes.cleaning import drop_doubles, merge_vertices, weld_boundary
+from partwright.shapes.distance import MeshDistance
+from partwright.shapes.holes import fill_holes
+from partwright.shapes.orientation import orient
+from partwright.shapes.sampling import sample_triangles
+from partwright.shapes.topology import EdgeTable, signed_volumes
+from partwright.shapes.winding import winding_grid
+
+_FLAT = 1e-6  # thickness under which the vertices count as one plane
+_NO_VOLUME = 1e-9
+_LEAST_CONFIDENCE = 0.5
+_SIDE_STEP = 2e-5  # how far off a triangle its two sides are looked at
+_CLEAR = 0.2  # a winding number this near to 0 or 1 is clear
+_CHECK = 64  # cells along a side in the search for overlaps
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A repaired surface in the unit frame.
+
+    `faces` is the outer surface. `winding_faces` decide the inside and may hold sheets within the shape as well;
+    with `closed` they have no open edge. `simple`: no point is enclosed twice, so volume is a sum over `faces`.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    winding_faces: NDArray[np.int64]
+    closed: bool
+    simple: bool
+    repairs: tuple[str, ...]
+    confidence: float
+
+    def distance(self) -> MeshDistance:
+        """The distance source of this surface."""
+        return MeshDistance(self.vertices, self.faces, self.winding_faces, self.closed, embedded=self.simple)
+
+
+def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Surface:
+    """Surface of the solid that the triangles mean; vertices (V, 3) in the unit frame, faces (F, 3).
+
+    Raises EmptyShapeError when no triangle has area, FlatShapeError when nothing is enclosed, OpenShellError when
+    the openings are so large that inside and outside cannot be told apart.
+    """
+    notes: list[str] = []
+    _refuse_plane(vertices)
+    vertices, faces = merge_vertices(vertices, faces, notes)
+    faces = drop_doubles(faces, notes)
+    if len(faces) == 0:
+        raise EmptyShapeError("no triangle has any area; export the shape again with its surface")
+    vertices, faces = weld_boundary(vertices, faces, notes)
+    faces = orient(vertices, faces, notes)
+    confidence = 1.0
+    if EdgeTable(faces).balance.any():
+        confidence = _confidence_of_open(vertices, faces)
+        vertices, faces = fill_holes(vertices, faces, notes)
+    if EdgeTable(faces).balance.any():
+        notes.append("the surface stays open; inside and outside are told apart by the generalised winding number")
+        return _surface_of_sheets(vertices, faces, notes, confidence, closed=False)
+    return _surface_of_closed(vertices, faces, notes, confidence)
+
+
+def _refuse_plane(vertices: NDArray[np.float64]) -> None:
+    """Raise FlatShapeError when all vertices lie in one plane, whichever way it is turned."""
+    centred = vertices - vertices.mean(axis=0)
+    normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
+    if np.ptp(centred @ normal) < _FLAT:
+        raise FlatShapeError(
+            "all triangles lie in one plane, so there is no inside to fit; give the sheet a thickness"
+        )
+
+
+def _surface_of_closed(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str], confidence: float
+) -> Surface:
+    vertices, faces = unite(vertices, faces, notes)
+    if abs(signed_volumes(vertices, faces, np.zeros(len(faces), np.int64))[0]) < _NO_VOLUME:
+        raise FlatShapeError("the surface is closed but encloses no volume; give the sheet a thickness")
+    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+    spacing = float((upper - lower).max()) / _CHECK
+    shape = tuple(int(n) for n in np.maximum(np.ceil((upper - lower) / spacing), 1))
+    winding = winding_grid(vertices, faces, lower + spacing / 2, spacing, (shape[0], shape[1], shape[2]))
+    enclosed = winding[winding != 0]
+    odd = float((enclosed != 1).mean()) if enclosed.size else 0.0
+    if odd == 0.0:
+        return Surface(vertices, faces, faces, True, True, tuple(notes), confidence)
+    notes.append(
+        f"the surface passes through itself ({odd:.1%} of what it encloses is enclosed twice or inside out); "
+        "whatever it winds around at least once counts as inside"
+    )
+    return _surface_of_sheets(vertices, faces, notes, min(confidence, 1.0 - odd), closed=True)
+
+
+def _surface_of_sheets(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str], confidence: float, closed: bool
+) -> Surface:
+    """Keep only triangles with the inside on one side and the outside on the other as the surface."""
+    source = MeshDistance(vertices, faces, faces, closed)
+    facing = _facing(source, vertices[faces])
+    outer = facing != 0
+    if not outer.any():
+        raise FlatShapeError(
+            "the surface is open and encloses no volume; close it or give the sheet a thickness"
+        )
+    if not outer.all():
+        notes.append(f"{np.count_nonzero(~outer)} triangles lie within the shape and are no part of its surface")
+    outward = np.where(facing[outer, None] > 0, faces[outer], faces[outer, ::-1])
+    return Surface(vertices, outward, faces, closed, False, tuple(notes), confidence)
+
+
+def _facing(source: MeshDistance, corners: NDArray[np.float64]) -> NDArray[np.int64]:
+    """+1 where a triangle (F, 3, 3) parts inside from outside and faces out, -1 where it faces in, 0 where it parts
+    nothing: looked at in its middle and near its corners."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    facing = np.zeros(len(corners), dtype=np.int64)
+    for weight in ((1 / 3, 1 / 3, 1 / 3), (0.9, 0.05, 0.05), (0.05, 0.9, 0.05), (0.05, 0.05, 0.9)):
+        rest = np.flatnonzero(facing == 0)
+        place = np.einsum("fcd,c->fd", corners[rest], np.array(weight))
+        step = _SIDE_STEP * normal[rest]
+        behind, before = source.inside(place - step), source.inside(place + step)
+        facing[rest] = behind.astype(np.int64) - before
+    return facing
+
+
+def _confidence_of_open(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
+    """Share of points near and around the surface whose winding number is clearly 0 or 1.
+
+    Raises FlatShapeError when none is inside and OpenShellError when too few are clear.
+    """
+    rng = np.random.default_rng(0)
+    source = MeshDistance(vertices, faces, faces, closed=False)
+    near = sample_triangles(vertices, faces, 4000, 0)[0] + 0.02 * rng.standard_normal((4000, 3))
+    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+    around = lower + (upper - lower) * rng.random((4000, 3))
+    winding = source.winding(np.concatenate([near, around]))
+    inside = winding > 0.5
+    if not inside.any():
+        raise FlatShapeError(
+            "the surface is open and encloses no volume; close it or give the sheet a thickness"
+        )
+    # Only what may be inside is in question: the wide outside must not make an open shell look sure.
+    unsure = np.minimum(np.abs(winding), np.abs(winding - 1)) > _CLEAR
+    confidence = 1.0 - float(np.count_nonzero(unsure) / np.count_nonzero(inside | unsure))
+    if confidence < _LEAST_CONFIDENCE:
+        raise OpenShellError(
+            f"the surface is an open shell: only {confidence:.0%} of what it could enclose is clearly inside. "
+            "Close its openings, or give the shell a thickness"
+        )
+    return confidence

@@ -1,0 +1,248 @@
+"""A shape: a surface with an inside, its own units and place, and everything a fit asks of it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from partwright.errors import NotFiniteError, PartwrightError, SettingError
+from partwright.shapes.curvature import CurvatureField
+from partwright.shapes.frame import UnitFrame
+from partwright.shapes.grid import DistanceGrid, distance_grid, occupancy_grid
+from partwright.shapes.loading import Piece, Source, read_source, source_of_mesh
+from partwright.shapes.repair import repair
+from partwright.shapes.sampling import (
+    NEAR_SIGMA,
+    Samples,
+    SurfaceSamples,
+    curvature_weight,
+    morton_order,
+    near_surface,
+    sample_triangles,
+    uniform_box,
+)
+from partwright.shapes.topology import signed_volumes
+from partwright.shapes.units import canonical_unit, canonical_up
+
+if TYPE_CHECKING:
+    import trimesh
+
+_T = TypeVar("_T")
+_CURVATURE_POINTS = 40_000
+
+
+@dataclass(frozen=True)
+class Node:
+    """A named piece of the file: rows start..stop of `shape.input_faces`."""
+
+    name: str
+    start: int
+    stop: int
+
+
+class NodeLeftOutWarning(UserWarning):
+    """A node of a scene encloses nothing, so it is no shape by itself."""
+
+
+class Shape:
+    """What comes in. Build one with `load_shape`.
+
+    name: of the file, without its suffix, or of the node. vertices (V, 3) float64 and faces (F, 3) int64: the
+    repaired outer surface in own units. input_vertices, input_faces: as read, before any repair; `nodes` are ranges
+    of input_faces. frame: to the unit frame and back. unit: "mm", "m" ... or None; up: "x", "y", "z", "-z" ... or
+    None. repairs: what was done to the surface, a sentence each. confidence: 0 to 1, how sure inside and outside
+    are. Results are cached by their arguments; returned arrays are read-only.
+    """
+
+    def __init__(
+        self, name: str, pieces: Sequence[Piece], unit: str | None = None, up: str | None = None
+    ) -> None:
+        offsets = np.cumsum([0] + [len(p.vertices) for p in pieces])
+        ends = np.cumsum([0] + [len(p.faces) for p in pieces]).tolist()
+        self.name, self.unit, self.up = name, unit, up
+        self.input_vertices = np.concatenate([p.vertices for p in pieces])
+        self.input_faces = np.concatenate([p.faces + o for p, o in zip(pieces, offsets[:-1], strict=True)])
+        self.nodes = tuple(Node(p.name, a, b) for p, a, b in zip(pieces, ends[:-1], ends[1:], strict=True))
+        corners = self.input_vertices[self.input_faces]
+        broken = ~np.isfinite(corners).all(axis=(1, 2))
+        if broken.any():
+            raise NotFiniteError(
+                f"{name}: {np.count_nonzero(broken)} of {len(broken)} triangles use a NaN or infinite coordinate; "
+                "all coordinates must be finite. Export the shape again"
+            )
+        self.frame = UnitFrame.of(corners)
+        used, compact = np.unique(self.input_faces, return_inverse=True)
+        self._surface = _named(
+            name, lambda: repair(self.frame.to_unit(self.input_vertices[used]), compact.reshape(-1, 3))
+        )
+        self.vertices = self.frame.from_unit(self._surface.vertices)
+        self.faces = self._surface.faces
+        self.repairs, self.confidence = self._surface.repairs, self._surface.confidence
+        self._source = self._surface.distance()
+        self._cache: dict[tuple[Any, ...], Any] = {}
+
+    def __repr__(self) -> str:
+        return f"Shape({self.name!r}, {len(self.faces)} triangles, unit={self.unit}, up={self.up})"
+
+    @property
+    def area(self) -> float:
+        """Area of the outer surface in own units squared."""
+        corners = self.vertices[self.faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return float(np.linalg.norm(normal, axis=1).sum() / 2)
+
+    @property
+    def volume(self) -> float:
+        """Volume in own units cubed: exact where the surface is simple, else counted on a 128^3 grid."""
+        if self._surface.simple:
+            zero = np.zeros(len(self.faces), dtype=np.int64)
+            unit_volume = float(signed_volumes(self._surface.vertices, self._surface.faces, zero)[0])
+        else:
+            unit_volume = float(np.count_nonzero(self.unit_occupancy(128))) * (2 / 128) ** 3
+        return unit_volume / self.frame.scale**3
+
+    def split_nodes(self) -> list[Shape]:
+        """Each node as a shape of its own, named after the node, with this shape's unit and up axis.
+
+        A node that encloses nothing (a decal, a glass pane) is left out with a NodeLeftOutWarning; when that leaves
+        no node, the last one's error is raised.
+        """
+        shapes: list[Shape] = []
+        failure: PartwrightError | None = None
+        for node in self.nodes:
+            piece = Piece(node.name, self.input_vertices, self.input_faces[node.start : node.stop])
+            try:
+                shapes.append(Shape(node.name, [piece], self.unit, self.up))
+            except PartwrightError as error:
+                failure = error
+                warnings.warn(f"node left out: {error}", NodeLeftOutWarning, stacklevel=2)
+        if not shapes and failure is not None:
+            raise failure
+        return shapes
+
+    def signed_distance(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Signed distance (N,) at points (N, 3), both in own units, negative inside."""
+        unit = self.unit_distance(self.frame.to_unit(points))
+        return self.frame.length_from_unit(unit)
+
+    def unit_distance(self, points: ArrayLike) -> NDArray[np.float32]:
+        """Signed distance (N,) at points (N, 3), both in the unit frame, negative inside.
+
+        Raises NotFiniteError for NaN or infinite points.
+        """
+        array = np.asarray(points)
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise SettingError(f"points of shape {array.shape} were given; expected (N, 3)")
+        if not np.isfinite(array).all():
+            raise NotFiniteError("points hold NaN or infinite coordinates; all must be finite")
+        return self._source.signed(array)
+
+    def unit_surface(self, count: int, seed: int = 0) -> SurfaceSamples:
+        """`count` area-weighted points of the surface with normals and curvature, unit frame."""
+        return self._cached(("surface", count, seed), lambda: self._sample_surface(count, seed))
+
+    def unit_grid(self, resolution: int = 96) -> DistanceGrid:
+        """Signed distance on voxels of size 1.8 / (resolution - 4) over the bounding box and two voxels more.
+
+        Exact within 2.5 voxels of the surface, within 0.3 voxel beyond.
+        """
+        if resolution < 8:
+            raise SettingError(f"grid resolution {resolution} was given; expected 8 or more")
+        return self._cached(
+            ("grid", resolution), lambda: distance_grid(self._source, *self._unit_bounds(), resolution)
+        )
+
+    def unit_occupancy(self, resolution: int = 128) -> NDArray[np.bool_]:
+        """Inside or not (R, R, R) at the cell centres of [-1, 1]^3."""
+        if resolution < 1:
+            raise SettingError(f"occupancy resolution {resolution} was given; expected 1 or more")
+        return self._cached(
+            ("occupancy", resolution), lambda: occupancy_grid(self._source, *self._unit_bounds(), resolution)
+        )
+
+    def samples(
+        self, near: int, uniform: int, seed: int = 0, sigma: float | Sequence[float] = NEAR_SIGMA
+    ) -> Samples:
+        """`near` points near the surface, then `uniform` ones in the box, with signed distance and weight.
+
+        Near points are surface samples moved by isotropic Gaussian noise, an equal share for each sigma (unit
+        lengths). Weights: 1 + sigmoid(curvature) near the surface (SuperFrusta, eq. 7), 1 elsewhere.
+        """
+        widths = (sigma,) if isinstance(sigma, (int, float)) else tuple(sigma)
+        if near < 0 or uniform < 0 or not widths or min(widths) < 0:
+            raise SettingError(f"near={near}, uniform={uniform}, sigma={widths}: none of them may be negative or empty")
+        return self._cached(
+            ("samples", near, uniform, seed, widths), lambda: self._sample(near, uniform, seed, widths)
+        )
+
+    def _unit_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        corners = self._surface.vertices[self._surface.winding_faces].reshape(-1, 3)
+        return corners.min(axis=0), corners.max(axis=0)
+
+    def _sample_surface(self, count: int, seed: int) -> SurfaceSamples:
+        vertices, faces = self._surface.vertices, self._surface.faces
+        points, face = sample_triangles(vertices, faces, count, seed)
+        corners = vertices[faces[face]]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        curvature = self._cached(("curvature",), self._curvature)(points)
+        return SurfaceSamples(
+            points.astype(np.float32), normal.astype(np.float32), curvature.astype(np.float32)
+        )
+
+    def _curvature(self) -> CurvatureField:
+        vertices, faces = self._surface.vertices, self._surface.faces
+        points = sample_triangles(vertices, faces, _CURVATURE_POINTS, 0)[0]
+        return CurvatureField(vertices, faces, points, float(self.area * self.frame.scale**2))
+
+    def _sample(self, near: int, uniform: int, seed: int, sigma: tuple[float, ...]) -> Samples:
+        seeds = np.random.SeedSequence(seed).generate_state(3)
+        surface = self.unit_surface(near, int(seeds[0]))
+        close = near_surface(surface.points, sigma, int(seeds[1]))
+        around = uniform_box(*self._unit_bounds(), uniform, int(seeds[2]))
+        first, second = morton_order(close), morton_order(around)
+        points = np.concatenate([close[first], around[second]])
+        weight = np.concatenate([curvature_weight(surface.curvature[first]), np.ones(uniform, np.float32)])
+        return Samples(points, self._source.signed(points), weight, near)
+
+    def _cached(self, key: tuple[Any, ...], make: Callable[[], _T]) -> _T:
+        if key not in self._cache:
+            made = make()
+            for value in [made, *vars(made).values()] if hasattr(made, "__dict__") else [made]:
+                if isinstance(value, np.ndarray):
+                    value.setflags(write=False)
+            self._cache[key] = made
+        return self._cache[key]
+
+
+def load_shape(
+    source: str | Path | trimesh.Trimesh | tuple[ArrayLike, ArrayLike],
+    unit: str | None = None,
+    up: str | None = None,
+) -> Shape:
+    """Shape of a file, a Trimesh or (vertices (V, 3), faces (F, 3)).
+
+    `unit` and `up` state what the file does not say, or overrule it; the geometry is never scaled or turned.
+    Raises UnsupportedFormatError, UnreadableFileError, EmptyShapeError, NeedsSurfaceError, NotFiniteError,
+    FlatShapeError, OpenShellError, or SettingError for an unknown unit or axis.
+    """
+    stated_unit = None if unit is None else canonical_unit(unit)
+    stated_up = None if up is None else canonical_up(up)
+    read: Source = (
+        read_source(Path(source)) if isinstance(source, (str, Path)) else source_of_mesh(source)  # type: ignore[arg-type]
+    )
+    return Shape(read.name, read.pieces, stated_unit or read.unit, stated_up or read.up)
+
+
+def _named(name: str, work: Callable[[], _T]) -> _T:
+    """Run the repair and put the shape's name before the message of an error."""
+    try:
+        return work()
+    except PartwrightError as error:
+        raise type(error)(f"{name}: {error}") from error

@@ -1,0 +1,131 @@
+"""Connectivity of triangle soups: edges, bodies, boundaries. Arrays in, arrays out; no geometry is changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class EdgeTable:
+    """The half-edges of faces (F, 3), grouped by the undirected edge they run along."""
+
+    faces: NDArray[np.int64]
+
+    @cached_property
+    def _half_edges(self) -> NDArray[np.int64]:
+        return self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+    @cached_property
+    def _sorted(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Order of the half-edges by undirected edge, and where each edge's group starts in that order."""
+        low, high = self._half_edges.min(axis=1), self._half_edges.max(axis=1)
+        key = low * (int(self.faces.max(initial=0)) + 1) + high
+        order = np.argsort(key, kind="stable")
+        key = key[order]
+        return order, np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
+
+    @cached_property
+    def valence(self) -> NDArray[np.int64]:
+        """Triangles at each undirected edge (E,)."""
+        order, start = self._sorted
+        return np.diff(np.r_[start, len(order)])
+
+    @cached_property
+    def balance(self) -> NDArray[np.int64]:
+        """Half-edges one way minus the other way (E,); all zero means closed and consistently wound."""
+        order, start = self._sorted
+        direction = np.where(self._half_edges[order, 0] < self._half_edges[order, 1], 1, -1)
+        return np.add.reduceat(direction, start) if len(start) else np.zeros(0, dtype=np.int64)
+
+    @cached_property
+    def open_half_edges(self) -> NDArray[np.int64]:
+        """Half-edges (B, 2) that have no partner at all."""
+        order, start = self._sorted
+        return self._half_edges[order[start[self.valence == 1]]]
+
+    @cached_property
+    def pairs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Edges (P, 2) with exactly two triangles, and those triangles (P, 2): the first runs along the edge."""
+        order, start = self._sorted
+        first = start[self.valence == 2]
+        return self._half_edges[order[first]], np.stack([order[first] // 3, order[first + 1] // 3], axis=1)
+
+    @cached_property
+    def inconsistent_faces(self) -> NDArray[np.int64]:
+        """Triangles at two-triangle edges that both run along the same way."""
+        order, start = self._sorted
+        first = start[(self.valence == 2) & (self.balance != 0)]
+        return np.unique(np.r_[order[first], order[first + 1]] // 3)
+
+    @cached_property
+    def bodies(self) -> NDArray[np.int64]:
+        """Body number (F,) of each triangle: bodies are connected through edges, not through single vertices."""
+        order, start = self._sorted
+        linked = np.ones(len(order), dtype=bool)
+        linked[start] = False
+        at = np.flatnonzero(linked)
+        return components(len(self.faces), order[at - 1] // 3, order[at] // 3)
+
+    @cached_property
+    def open_bodies(self) -> NDArray[np.bool_]:
+        """Whether each body (number of bodies,) has an edge that is not balanced."""
+        order, start = self._sorted
+        is_open = np.zeros(int(self.bodies.max(initial=-1)) + 1, dtype=bool)
+        is_open[self.bodies[order[start[self.balance != 0]] // 3]] = True
+        return is_open
+
+
+def components(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Connected component (count,) of each node of the graph with edges a[i]-b[i]."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_matrix((np.ones(len(a), dtype=bool), (a, b)), shape=(count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def boundary_loops(open_half_edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Vertex loops along the open half-edges (B, 2); loops that touch themselves or one another are left out."""
+    if len(open_half_edges) == 0:
+        return []
+    starts, start_count = np.unique(open_half_edges[:, 0], return_counts=True)
+    ends, end_count = np.unique(open_half_edges[:, 1], return_counts=True)
+    label_of, inverse = np.unique(open_half_edges, return_inverse=True)
+    inverse = inverse.reshape(-1, 2)
+    label = components(len(label_of), inverse[:, 0], inverse[:, 1])
+    simple = np.ones(int(label.max()) + 1, dtype=bool)
+    once = np.intersect1d(starts[start_count == 1], ends[end_count == 1])
+    simple[label[~np.isin(label_of, once)]] = False
+    follow = dict(open_half_edges.tolist())
+    loops, seen = [], set()
+    for vertex, body in zip(label_of.tolist(), label.tolist(), strict=True):
+        if body in seen or not simple[body]:
+            continue
+        seen.add(body)
+        loop = [vertex]
+        while (following := follow[loop[-1]]) != vertex:
+            loop.append(following)
+        loops.append(np.array(loop, dtype=np.int64))
+    return loops
+
+
+def signed_volumes(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], label: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Volume enclosed by each labelled set of triangles, negative where it is inside out.
+
+    Measured from the set's own area centroid, so that it also tells the facing of a set with openings.
+    """
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    centroid = corners.mean(axis=1)
+    count = int(label.max(initial=-1)) + 1
+    total = np.maximum(np.bincount(label, area, count), np.finfo(np.float64).tiny)
+    middle = np.stack([np.bincount(label, area * centroid[:, k], count) / total for k in range(3)], axis=1)
+    flux = ((centroid - middle[label]) * normal).sum(axis=1)
+    return np.bincount(label, flux, count) / 6

@@ -1,0 +1,57 @@
+"""Length units and up axes: the names that are understood, and what a unit measures in metres."""
+
+from __future__ import annotations
+
+from partwright.errors import SettingError
+
+METRES = {
+    "um": 1e-6,
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "m": 1.0,
+    "km": 1e3,
+    "in": 0.0254,
+    "ft": 0.3048,
+}
+_ALIASES = {
+    "micron": "um",
+    "micrometre": "um",
+    "micrometer": "um",
+    "millimetre": "mm",
+    "millimeter": "mm",
+    "centimetre": "cm",
+    "centimeter": "cm",
+    "metre": "m",
+    "meter": "m",
+    "kilometre": "km",
+    "kilometer": "km",
+    "inch": "in",
+    "inches": "in",
+    "foot": "ft",
+    "feet": "ft",
+}
+UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
+
+
+def canonical_unit(unit: str) -> str:
+    """Short name of a length unit, one of `METRES`.
+
+    Raises SettingError for a name that is not known.
+    """
+    name = unit.strip().lower()
+    for candidate in (name, name.removesuffix("s")):
+        short = _ALIASES.get(candidate, candidate)
+        if short in METRES:
+            return short
+    raise SettingError(f"unknown length unit {unit!r}; expected one of {', '.join(METRES)}")
+
+
+def canonical_up(up: str) -> str:
+    """Up axis as one of `UP_AXES`.
+
+    Raises SettingError for anything else.
+    """
+    axis = up.strip().lower().removeprefix("+")
+    if axis not in UP_AXES:
+        raise SettingError(f"unknown up axis {up!r}; expected one of {', '.join(UP_AXES)}")
+    return axis
