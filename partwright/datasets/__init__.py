@@ -1,0 +1,1 @@
+"""Shapes that the project makes itself."""
