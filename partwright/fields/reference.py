@@ -119,12 +119,10 @@ def profile(
 def rotate_to_local(points: Tensor, translation: Tensor, rotation: Tensor) -> Tensor:
     """Points (..., N, 3) in the local frames of poses.
 
-    translation (..., 3); rotation (..., 4), quaternions (w, x, y, z) local to world of any length other than
-    zero; zero reads as no rotation.
+    translation (..., 3); rotation (..., 4), quaternions (w, x, y, z) local to world of any length but zero.
     """
     w, x, y, z = rotation.unbind(-1)
-    square = (rotation * rotation).sum(-1)
-    twice = 2 / torch.where(square > SQUARE_FLOOR, square, 1.0)
+    twice = 2 / (rotation * rotation).sum(-1)
     rows = (
         (1 - twice * (y * y + z * z), twice * (x * y - w * z), twice * (x * z + w * y)),
         (twice * (x * y + w * z), 1 - twice * (x * x + z * z), twice * (y * z - w * x)),
