@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.shapes.cleaning import counted
 from partwright.shapes.orientation import containers, split_bodies
 from partwright.shapes.topology import EdgeTable, signed_volumes
 
@@ -26,7 +25,8 @@ def unite(
     volume = signed_volumes(vertices, faces, label)
     solids = _with_cavities(vertices, faces, label, bodies, volume)
     if not _boxes_touch(vertices, faces, [bodies[b] for b in np.flatnonzero(volume > 0)]):
-        notes.append(f"{counted(len(solids), 'separate body', 'separate bodies')} kept as they are")
+        if len(solids) > 1:
+            notes.append(f"{len(solids)} separate bodies are kept as they are")
         return vertices, faces
     union = _boolean_union([_manifold(vertices, faces[solid]) for solid in solids])
     if union is None:
@@ -49,9 +49,7 @@ def _with_cavities(
         return bodies
     home: dict[int, int] = {}
     for inner, outer in containers(vertices, faces, label, np.arange(len(bodies))):
-        if volume[inner] <= 0 < volume[outer] and (
-            inner not in home or volume[outer] < volume[home[inner]]
-        ):
+        if volume[inner] <= 0 < volume[outer] and (inner not in home or volume[outer] < volume[home[inner]]):
             home[inner] = outer
     members: dict[int, list[int]] = {int(b): [int(b)] for b in np.flatnonzero(volume > 0)}
     for cavity, solid in home.items():

@@ -34,8 +34,9 @@ def merge_vertices(
 def drop_doubles(faces: NDArray[np.int64], notes: list[str]) -> NDArray[np.int64]:
     """Drop triangles with a repeated corner and triangles that are there more than once.
 
-    Of copies that face the same way one stays. Copies that face opposite ways are the two sides of a sheet: they
-    enclose nothing and go together, unless nearly the whole mesh is drawn two-sided, when one side stays.
+    Of copies that face the same way one stays. Copies that face opposite ways are the two sides of a sheet:
+    they enclose nothing and go together, unless nearly the whole mesh is drawn two-sided, when one side
+    stays.
     """
     sound = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     if not sound.all():
@@ -54,7 +55,7 @@ def drop_doubles(faces: NDArray[np.int64], notes: list[str]) -> NDArray[np.int64
     )[order]
     group = np.repeat(np.arange(len(start)), np.diff(np.r_[start, len(faces)]))
     net = np.bincount(group, facing, len(start))
-    mixed = np.bincount(group, len(start) and np.ones(len(group)), len(start)) > np.abs(net)
+    mixed = np.bincount(group, minlength=len(start)) > np.abs(net)
     two_sided = float(mixed.mean()) > 0.9
     wanted = np.where(net == 0, 1 if two_sided else 0, np.sign(net))
     matches = facing == wanted[group]
@@ -77,7 +78,9 @@ def weld_boundary(
     from scipy.spatial import cKDTree
 
     rim = np.unique(EdgeTable(faces).open_half_edges)
-    pairs = cKDTree(vertices[rim]).query_pairs(_WELD, output_type="ndarray") if len(rim) else np.zeros((0, 2))
+    if len(rim) == 0:
+        return vertices, faces
+    pairs = cKDTree(vertices[rim]).query_pairs(_WELD, output_type="ndarray")
     if len(pairs) == 0:
         return vertices, faces
     label = components(len(rim), pairs[:, 0], pairs[:, 1])

@@ -1,9 +1,10 @@
 """Principal curvature of a triangle mesh, averaged over a small neighbourhood so that slivers do not matter.
 
-Normal cycles (Cohen-Steiner & Morvan 2003, "Restricted Delaunay triangulations and normal cycle"): the curvature
-tensor of a region is the sum over its edges of dihedral angle * length * (e x e), divided by the region's area. It
-is an integral, so it does not depend on how the surface is cut into triangles. Edges and area are collected on a
-coarse grid and smoothed there; a sharp edge therefore reads about 1 / (size of the neighbourhood), never infinity.
+Normal cycles (Cohen-Steiner & Morvan 2003, "Restricted Delaunay triangulations and normal cycle"): the
+curvature tensor of a region is the sum over its edges of dihedral angle * length * (e x e), divided by the
+region's area. It is an integral, so it does not depend on how the surface is cut into triangles. Edges and
+area are collected on a coarse grid and smoothed there; a sharp edge therefore reads about 1 / (size of the
+neighbourhood), never infinity.
 """
 
 from __future__ import annotations
@@ -21,9 +22,13 @@ class CurvatureField:
     """Largest absolute principal curvature near a surface, in 1/unit length."""
 
     def __init__(
-        self, vertices: NDArray[np.float64], faces: NDArray[np.int64], area_points: NDArray[np.float64], area: float
+        self,
+        vertices: NDArray[np.float64],
+        faces: NDArray[np.int64],
+        area_points: NDArray[np.float64],
+        area: float,
     ) -> None:
-        """Vertices (V, 3) and faces (F, 3) in the unit frame; area_points (N, 3) sample their `area` evenly."""
+        """Vertices (V, 3) and faces (F, 3) in the unit frame; area_points (N, 3) sample their area."""
         from scipy.ndimage import gaussian_filter
 
         self._origin = vertices.min(axis=0) - 3 * _CELL
@@ -42,7 +47,7 @@ class CurvatureField:
     ) -> NDArray[np.float64]:
         cell = np.round((points - self._origin) / _CELL).astype(np.int64)
         flat = np.ravel_multi_index(tuple(cell.T), shape)
-        return np.bincount(flat, value, int(np.prod(shape))).reshape(shape)
+        return np.bincount(flat, value, int(np.prod(shape))).astype(np.float64).reshape(shape)
 
     def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Curvature (N,) at surface points (N, 3)."""
@@ -58,8 +63,9 @@ class CurvatureField:
 def _bent_edges(
     vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Pieces of bent edges no longer than a cell: midpoints (P, 3), angle * length (P,), directions (P, 3)."""
-    edge, (left, right) = EdgeTable(faces).pairs[0], EdgeTable(faces).pairs[1].T
+    """Pieces of bent edges, at most a cell long: midpoints (P, 3), angle * length (P,), directions (P, 3)."""
+    edge, beside = EdgeTable(faces).pairs
+    left, right = beside.T
     corners = vertices[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import product
 from operator import attrgetter
@@ -15,7 +15,7 @@ from partwright.shapes.winding import winding_grid
 
 _CHUNK = 262_144  # closest-point queries at once: a query's record takes about 100 bytes
 _INSIDE = 0.5  # generalised winding number above which a point is inside
-_BLOCK = 4
+_BLOCK = 2
 _LATTICE = 0.02  # spacing of the sign lattice, unit frame
 _MANY = 2000  # points from which the lattice pays
 _WITHIN = 1e-3  # barycentric margin for "within a triangle"
@@ -33,17 +33,19 @@ class DistanceSource(Protocol):
     def signed(self, points: NDArray[Any]) -> NDArray[np.float32]:
         """Distance to the surface at points (N, 3), negative inside."""
 
-    def inside_grid(self, origin: ArrayLike, spacing: float, shape: tuple[int, int, int]) -> NDArray[np.bool_]:
+    def inside_grid(
+        self, origin: ArrayLike, spacing: float, shape: tuple[int, int, int]
+    ) -> NDArray[np.bool_]:
         """Whether the points origin + spacing * (i, j, k) lie inside: (nx, ny, nz)."""
 
 
 class MeshDistance:
     """Exact distance to triangles (FCPW's bounding volume hierarchy), sign by winding number (libigl).
 
-    `faces` (F, 3) is the surface that distances are measured to. `winding_faces` decide what is inside; they may
-    hold more (sheets inside the shape). `closed` says that they have no open edge, so that their winding number is
-    an integer and whole grids can be scan converted; `embedded` that the closed surface nowhere passes through
-    itself, which makes most signs cheap. Results do not depend on the number of threads.
+    `faces` (F, 3) is the surface that distances are measured to. `winding_faces` decide what is inside; they
+    may hold more (sheets inside the shape). `closed` says that they have no open edge, so that their winding
+    number is an integer and whole grids can be scan converted; `embedded` that the closed surface nowhere
+    passes through itself, which makes most signs cheap. Results do not depend on the number of threads.
     """
 
     def __init__(
@@ -85,8 +87,8 @@ class MeshDistance:
 
     def closest(self, points: NDArray[Any]) -> NDArray[np.float32]:
         """Nearest surface point (N, 3) of each of the points (N, 3)."""
-        found = [np.concatenate(list(map(attrgetter("p"), f))) for f in self._find(points) if len(f)]
-        return np.concatenate([np.zeros(0, np.float32), *found]).reshape(-1, 3)
+        triangle = np.concatenate([_triangles(found) for found in self._find(points)])
+        return closest_on_triangles(self._vertices[self._faces[triangle]], points).astype(np.float32)
 
     def signed(self, points: NDArray[Any]) -> NDArray[np.float32]:
         """Distance to the nearest triangle at points (N, 3), negative inside."""
@@ -121,11 +123,12 @@ class MeshDistance:
     def _inside_embedded(
         self, points: NDArray[Any], distance: NDArray[np.float32], triangle: NDArray[np.int32]
     ) -> NDArray[np.bool_]:
-        """Sign without winding numbers for most points of a closed surface that nowhere passes through itself.
+        """Sign without winding numbers for most points of a closed surface that nowhere passes through
+        itself.
 
-        A ball of radius `distance` around a point is free of surface, so a lattice point in it has the same sign.
-        Nearer points whose closest point lies within a triangle are inside exactly when they are behind it. What
-        remains (closest to an edge or a corner) goes by winding number.
+        A ball of radius `distance` around a point is free of surface, so a lattice point in it has the same
+        sign. Nearer points whose closest point lies within a triangle are inside exactly when they are behind
+        it. What remains (closest to an edge or a corner) goes by winding number.
         """
         origin, flags = self._lattice
         cell = np.rint((points - origin) / _LATTICE).astype(np.int64)
@@ -149,7 +152,9 @@ class MeshDistance:
         """Whether points (N, 3) lie inside."""
         return self.winding(points) > _INSIDE
 
-    def inside_grid(self, origin: ArrayLike, spacing: float, shape: tuple[int, int, int]) -> NDArray[np.bool_]:
+    def inside_grid(
+        self, origin: ArrayLike, spacing: float, shape: tuple[int, int, int]
+    ) -> NDArray[np.bool_]:
         """Whether the points origin + spacing * (i, j, k) lie inside: (nx, ny, nz)."""
         if self._closed:
             return winding_grid(self._vertices, self._winding_faces, origin, spacing, shape) > 0
@@ -158,10 +163,11 @@ class MeshDistance:
     def _inside_grid_open(
         self, origin: NDArray[np.float64], spacing: float, shape: tuple[int, int, int]
     ) -> NDArray[np.bool_]:
-        """Blocks of 4^3 points: the winding number is harmonic off the surface, so where no triangle comes near and
-        all corners agree clearly, the block agrees; only the other blocks are evaluated point by point."""
+        """Flags in blocks of 2^3 points: the winding number is harmonic off the surface, so a block that no
+        triangle comes near and whose corners agree clearly agrees throughout; the others go point by point.
+        """
         blocks = tuple(-(-n // _BLOCK) for n in shape)
-        corners = np.stack(np.indices([b + 1 for b in blocks]), axis=-1).reshape(-1, 3)
+        corners = grid_indices([b + 1 for b in blocks])
         clear = self.winding(origin + spacing * _BLOCK * corners).reshape([b + 1 for b in blocks])
         ends = np.stack(
             [
@@ -169,7 +175,7 @@ class MeshDistance:
                 for offset in product((0, 1), repeat=3)
             ]
         )
-        centres = np.stack(np.indices(blocks), axis=-1).reshape(-1, 3) + 0.5
+        centres = grid_indices(blocks) + 0.5
         away = self.unsigned(origin + spacing * _BLOCK * centres).reshape(blocks) > spacing * _BLOCK * 0.87
         settled = away & ((ends.min(axis=0) > _INSIDE + 0.1) | (ends.max(axis=0) < _INSIDE - 0.1))
         inside = ends[0] > _INSIDE
@@ -180,6 +186,11 @@ class MeshDistance:
         todo = np.argwhere(~settled)
         inside[~settled] = self.inside(origin + spacing * todo)
         return inside
+
+
+def grid_indices(sides: Sequence[int]) -> NDArray[np.int64]:
+    """All (i, j, k) of a grid (nx * ny * nz, 3), the last index running fastest."""
+    return np.moveaxis(np.indices(tuple(sides)), 0, -1).reshape(-1, 3)
 
 
 def _distances(found: Any) -> NDArray[np.float32]:
@@ -193,7 +204,7 @@ def _triangles(found: Any) -> NDArray[np.int32]:
 def _side_of_triangle(
     corners: NDArray[np.float64], points: NDArray[Any]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Side of each triangle (N, 3, 3) a point (N, 3) is on, positive in front; and whether it projects into it."""
+    """Side of its triangle (N, 3, 3) a point (N, 3) is on, positive in front; whether it projects into it."""
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     w = points - corners[:, 0]
     normal = np.cross(u, v)
@@ -202,3 +213,21 @@ def _side_of_triangle(
     first = (np.cross(w, v) * normal).sum(axis=1) / square
     sure = (first > _WITHIN) & (second > _WITHIN) & (first + second < 1 - _WITHIN)
     return (w * normal).sum(axis=1), sure
+
+
+def closest_on_triangles(corners: NDArray[np.float64], points: NDArray[Any]) -> NDArray[np.float64]:
+    """Point (N, 3) of each triangle (N, 3, 3) that is closest to the point (N, 3) of the same row."""
+    side, within = _side_of_triangle(corners, points)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    square = np.maximum((normal * normal).sum(axis=1), np.finfo(np.float64).tiny)
+    best = points - (side / square)[:, None] * normal
+    least = np.where(within, 0.0, np.inf)
+    for k in range(3):
+        start, along = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]
+        length = np.maximum((along * along).sum(axis=1), np.finfo(np.float64).tiny)
+        fraction = np.clip(((points - start) * along).sum(axis=1) / length, 0.0, 1.0)
+        foot = start + fraction[:, None] * along
+        squared = ((points - foot) ** 2).sum(axis=1)
+        nearer = squared < least
+        best[nearer], least[nearer] = foot[nearer], squared[nearer]
+    return best

@@ -8,11 +8,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.shapes.distance import DistanceSource
+from partwright.shapes.distance import DistanceSource, grid_indices
 from partwright.shapes.frame import LONGEST_SIDE
 
 _BAND = 2.5  # voxels: values up to here are exact
-_SITE = 0.6  # voxels: a bit more than half, so that the sites leave no gaps in the surface
+_SITE = 0.9  # voxels: more than half a voxel's diagonal, so that the sites leave no gaps in the surface
 _MARGIN = 2  # voxels around the bounding box
 _COARSEST = 4  # voxels: the blocks that the search for the band starts from
 
@@ -27,7 +27,7 @@ class DistanceGrid:
 
     def points(self) -> NDArray[np.float64]:
         """All grid points (nx * ny * nz, 3) in the order of values.ravel()."""
-        return self.origin + self.spacing * np.stack(np.indices(self.values.shape), axis=-1).reshape(-1, 3)
+        return self.origin + self.spacing * grid_indices(self.values.shape)
 
 
 def distance_grid(
@@ -35,8 +35,8 @@ def distance_grid(
 ) -> DistanceGrid:
     """Grid over the box lower..upper plus two voxels, `resolution` points along a side of 1.8.
 
-    Within 2.5 voxels of the surface the values are exact. Beyond, they are the distance to the foot point of the
-    nearest surface voxel: never too small, too large by less than 0.3 voxel.
+    Within 2.5 voxels of the surface the values are exact. Beyond, they are the distance to the foot point of
+    a nearby surface voxel: never too small, too large by 0.07 voxel on average and by less than one at worst.
     """
     spacing = LONGEST_SIDE / (resolution - 2 * _MARGIN)
     sides = np.ceil((upper - lower) / spacing - 1e-9).astype(int) + 2 * _MARGIN
@@ -55,7 +55,7 @@ def _near_voxels(
     source: DistanceSource, origin: NDArray[np.float64], spacing: float, shape: tuple[int, int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Indices (N, 3) and unsigned distances (N,) of all voxels within the band, found by halving blocks."""
-    index = _COARSEST * np.stack(np.indices([-(-n // _COARSEST) for n in shape]), axis=-1).reshape(-1, 3)
+    index = _COARSEST * grid_indices([-(-n // _COARSEST) for n in shape])
     size = _COARSEST
     while size > 1:
         distance = source.unsigned(origin + spacing * (index + (size - 1) / 2))
@@ -75,27 +75,35 @@ def _far_distances(
     shape: tuple[int, int, int],
     sites: NDArray[np.int64],
 ) -> NDArray[np.float32]:
-    """Distance of every voxel to the foot point of its nearest site."""
+    """Distance (nx, ny, nz) of every voxel to the surface point of one of the sites around it."""
     from scipy.ndimage import distance_transform_edt
 
     empty = np.ones(shape, dtype=bool)
     empty[tuple(sites.T)] = False
-    feet = np.zeros((*shape, 3), dtype=np.float32)
-    feet[tuple(sites.T)] = source.closest(origin + spacing * sites)
-    nearest = distance_transform_edt(empty, return_distances=False, return_indices=True)
-    squared = np.zeros(shape, dtype=np.float32)
-    flat = np.ravel_multi_index(tuple(nearest), shape)
+    feet = np.zeros((empty.size, 3), dtype=np.float32)
+    feet[np.ravel_multi_index(tuple(sites.T), shape)] = source.closest(origin + spacing * sites)
+    index = distance_transform_edt(empty, return_distances=False, return_indices=True)
+    nearest = np.ravel_multi_index(tuple(index), shape)
+    axes = [(origin[k] + spacing * np.arange(shape[k])).astype(np.float32) for k in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    squared = _squared(feet[nearest] - points)
+    # The voxel nearest by its centre need not have the nearest foot point: ask the neighbours for theirs too.
     for axis in range(3):
-        along = (origin[axis] + spacing * np.arange(shape[axis])).astype(np.float32)
-        place = along.reshape([-1 if a == axis else 1 for a in range(3)])
-        squared += (place - feet[..., axis].ravel()[flat]) ** 2
+        ahead, behind = [slice(None)] * 3, [slice(None)] * 3
+        ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
+        for here, there in ((tuple(ahead), tuple(behind)), (tuple(behind), tuple(ahead))):
+            np.minimum(squared[here], _squared(feet[nearest[there]] - points[here]), out=squared[here])
     return np.sqrt(squared)
+
+
+def _squared(offset: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.einsum("...k,...k", offset, offset)
 
 
 def occupancy_grid(
     source: DistanceSource, lower: NDArray[np.float64], upper: NDArray[np.float64], resolution: int
 ) -> NDArray[np.bool_]:
-    """Inside or not at the resolution^3 cell centres of [-1, 1]^3; only cells within lower..upper are tested."""
+    """Inside or not at the resolution^3 cell centres of [-1, 1]^3; outside lower..upper nothing is."""
     spacing = 2.0 / resolution
     first = np.clip(np.floor((lower + 1) / spacing), 0, resolution - 1).astype(int)
     stop = np.clip(np.ceil((upper + 1) / spacing), 1, resolution).astype(int)

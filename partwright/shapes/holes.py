@@ -18,14 +18,15 @@ def fill_holes(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Close every opening that a fan from the middle of its rim closes.
 
-    The rim of a loose patch that other patches already cover is no opening: there the winding number is near 0 or
-    1, not near one half, and the patch stays as it is.
+    The rim of a loose patch that other patches already cover is no opening: there the winding number is near
+    0 or 1, not near one half, and the patch stays as it is.
     """
     loops = boundary_loops(EdgeTable(faces).open_half_edges)
     if not loops:
         return vertices, faces
     source = MeshDistance(vertices, faces, faces, closed=False)
-    lids, middles = [], []
+    lids: list[NDArray[np.int64]] = []
+    middles: list[NDArray[np.float64]] = []
     for loop in loops:
         middle = vertices[loop].mean(axis=0)
         rim = vertices[loop]
@@ -55,5 +56,6 @@ def _is_opening(source: MeshDistance, rim: NDArray[np.float64], middle: NDArray[
 def _area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
     corners = vertices[faces]
     return float(
-        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+        / 2
     )

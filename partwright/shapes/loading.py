@@ -1,4 +1,4 @@
-"""Files to triangles: one list of named pieces with their transforms applied, and what the file says of units."""
+"""Files to triangles: named pieces with their transforms applied, and what the file says of units."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf", ".3mf")
 _LARGEST_UNPACKED = 4 << 30  # bytes; a 3MF is a zip archive, and a small one can claim terabytes
 
 # What trimesh, numpy, json, lxml and zipfile raise on bytes that are not what the suffix says. A parser fails
-# wherever the bytes first stop making sense, so the families are wide; none of them can come from our own code
-# here, because nothing but the parser runs inside the try.
+# wherever the bytes first stop making sense, so the families are wide; none of them can come from our own
+# code here, because nothing but the parser runs inside the try.
 _PARSER_ERRORS = (
     OSError,
     EOFError,
@@ -108,10 +108,13 @@ def source_of_mesh(mesh: trimesh.Trimesh | tuple[Any, Any]) -> Source:
     if v.size == 0 and f.size == 0:
         raise EmptyShapeError("the mesh has no vertices and no faces")
     if f.size == 0:
-        raise NeedsSurfaceError(f"{len(v)} points without faces were given; a surface of triangles was expected")
+        raise NeedsSurfaceError(
+            f"{len(v)} points without faces were given; a surface of triangles was expected"
+        )
     if v.ndim != 2 or v.shape[1] != 3 or f.ndim != 2 or f.shape[1] != 3:
         raise UnreadableFileError(
-            f"vertices {v.shape} and faces {f.shape} were given; expected (V, 3) coordinates and (F, 3) triangles"
+            f"vertices {v.shape} and faces {f.shape} were given; "
+            "expected (V, 3) coordinates and (F, 3) triangles"
         )
     return Source("mesh", (Piece("mesh", v, _valid(f, len(v), "the mesh")),), None, None)
 
@@ -150,7 +153,8 @@ def _refuse_zip_bomb(path: Path) -> None:
         raise UnreadableFileError(f"{path}: is not a 3MF archive ({error}); export it again") from error
     if unpacked > _LARGEST_UNPACKED:
         raise UnreadableFileError(
-            f"{path}: would unpack to {unpacked / 2**30:.0f} GiB; at most {_LARGEST_UNPACKED >> 30} are accepted"
+            f"{path}: would unpack to {unpacked / 2**30:.0f} GiB; "
+            f"at most {_LARGEST_UNPACKED >> 30} are accepted"
         )
 
 
@@ -161,7 +165,7 @@ def _pieces(scene: trimesh.Scene, stem: str) -> Iterator[Piece]:
         geometry = scene.graph[node][1]
         is_primitive = scene.geometry[geometry].metadata.get("from_gltf_primitive", False)
         owner = scene.graph.transforms.parents.get(node, node) if is_primitive else node
-        groups.setdefault(owner, []).append((node, geometry))
+        groups.setdefault(owner, []).append((node, str(geometry)))
     for owner, members in groups.items():
         placed = [_placed(scene, node, geometry, stem) for node, geometry in members]
         placed = [(v, f) for v, f in placed if len(f)]

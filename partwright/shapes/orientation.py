@@ -26,7 +26,9 @@ def orient(vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[
     inward[closed] = volume[root] < 0
     if not inward.any():
         return faces
-    notes.append(f"turned {counted(int(np.count_nonzero(inward)), 'inside-out body', 'inside-out bodies')} around")
+    notes.append(
+        f"turned {counted(int(np.count_nonzero(inward)), 'inside-out body', 'inside-out bodies')} around"
+    )
     faces = faces.copy()
     turned = inward[edges.bodies]
     faces[turned] = faces[turned, ::-1]
@@ -58,9 +60,7 @@ def _make_consistent(
     return faces
 
 
-def _facing(
-    vertices: NDArray[np.float64], a: NDArray[np.int64], b: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _facing(vertices: NDArray[np.float64], a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.float64]:
     def normals(f: NDArray[np.int64]) -> NDArray[np.float64]:
         return np.cross(vertices[f[:, 1]] - vertices[f[:, 0]], vertices[f[:, 2]] - vertices[f[:, 0]])
 
@@ -76,7 +76,10 @@ def _areas(
 
 
 def containers(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], label: NDArray[np.int64], bodies: NDArray[np.int64]
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    label: NDArray[np.int64],
+    bodies: NDArray[np.int64],
 ) -> list[tuple[int, int]]:
     """(inner, outer) for every two of the closed `bodies` of which one lies wholly within the other."""
     import igl
@@ -84,7 +87,9 @@ def containers(
     if len(bodies) < 2:
         return []
     members = _split(label, bodies)
-    boxes = np.array([[vertices[faces[m]].min(axis=(0, 1)), vertices[faces[m]].max(axis=(0, 1))] for m in members])
+    boxes = np.array(
+        [[vertices[faces[m]].min(axis=(0, 1)), vertices[faces[m]].max(axis=(0, 1))] for m in members]
+    )
     probes = [vertices[np.unique(faces[m])] for m in members]
     probes = [p[:: max(1, len(p) // _PROBES)] for p in probes]
     found = []

@@ -33,8 +33,9 @@ _CHECK = 64  # cells along a side in the search for overlaps
 class Surface:
     """A repaired surface in the unit frame.
 
-    `faces` is the outer surface. `winding_faces` decide the inside and may hold sheets within the shape as well;
-    with `closed` they have no open edge. `simple`: no point is enclosed twice, so volume is a sum over `faces`.
+    `faces` is the outer surface. `winding_faces` decide the inside and may hold sheets within the shape as
+    well; with `closed` they have no open edge. `simple`: no point is enclosed twice, so volume is a sum over
+    `faces`.
     """
 
     vertices: NDArray[np.float64]
@@ -53,8 +54,8 @@ class Surface:
 def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Surface:
     """Surface of the solid that the triangles mean; vertices (V, 3) in the unit frame, faces (F, 3).
 
-    Raises EmptyShapeError when no triangle has area, FlatShapeError when nothing is enclosed, OpenShellError when
-    the openings are so large that inside and outside cannot be told apart.
+    Raises EmptyShapeError when no triangle has area, FlatShapeError when nothing is enclosed, OpenShellError
+    when the openings are so large that inside and outside cannot be told apart.
     """
     notes: list[str] = []
     _refuse_plane(vertices)
@@ -69,7 +70,9 @@ def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Surface:
         confidence = _confidence_of_open(vertices, faces)
         vertices, faces = fill_holes(vertices, faces, notes)
     if EdgeTable(faces).balance.any():
-        notes.append("the surface stays open; inside and outside are told apart by the generalised winding number")
+        notes.append(
+            "the surface stays open; inside and outside are told apart by the generalised winding number"
+        )
         return _surface_of_sheets(vertices, faces, notes, confidence, closed=False)
     return _surface_of_closed(vertices, faces, notes, confidence)
 
@@ -117,14 +120,16 @@ def _surface_of_sheets(
             "the surface is open and encloses no volume; close it or give the sheet a thickness"
         )
     if not outer.all():
-        notes.append(f"{np.count_nonzero(~outer)} triangles lie within the shape and are no part of its surface")
+        notes.append(
+            f"{np.count_nonzero(~outer)} triangles lie within the shape and are no part of its surface"
+        )
     outward = np.where(facing[outer, None] > 0, faces[outer], faces[outer, ::-1])
     return Surface(vertices, outward, faces, closed, False, tuple(notes), confidence)
 
 
 def _facing(source: MeshDistance, corners: NDArray[np.float64]) -> NDArray[np.int64]:
-    """+1 where a triangle (F, 3, 3) parts inside from outside and faces out, -1 where it faces in, 0 where it parts
-    nothing: looked at in its middle and near its corners."""
+    """+1 where a triangle (F, 3, 3) parts inside from outside and faces out, -1 where it faces in, 0 where it
+    parts nothing: looked at in its middle and near its corners."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     facing = np.zeros(len(corners), dtype=np.int64)
@@ -158,7 +163,7 @@ def _confidence_of_open(vertices: NDArray[np.float64], faces: NDArray[np.int64])
     confidence = 1.0 - float(np.count_nonzero(unsure) / np.count_nonzero(inside | unsure))
     if confidence < _LEAST_CONFIDENCE:
         raise OpenShellError(
-            f"the surface is an open shell: only {confidence:.0%} of what it could enclose is clearly inside. "
-            "Close its openings, or give the shell a thickness"
+            f"the surface is an open shell: only {confidence:.0%} of what it could enclose is clearly "
+            "inside. Close its openings, or give the shell a thickness"
         )
     return confidence

@@ -14,7 +14,7 @@ _ENLARGED = 0.05  # unit lengths that the box of the uniform samples reaches bey
 
 @dataclass(frozen=True)
 class SurfaceSamples:
-    """Area-weighted surface points (N, 3), outward normals (N, 3), |principal curvature| (N,) in 1/unit length."""
+    """Area-weighted points (N, 3), outward normals (N, 3), |principal curvature| (N,) in 1/unit length."""
 
     points: NDArray[np.float32]
     normals: NDArray[np.float32]
@@ -52,9 +52,7 @@ def sample_triangles(
     return (1 - root) * a + root * ((1 - second) * b + second * c), face
 
 
-def near_surface(
-    surface: NDArray[np.float32], sigma: Sequence[float], seed: int
-) -> NDArray[np.float32]:
+def near_surface(surface: NDArray[np.float32], sigma: Sequence[float], seed: int) -> NDArray[np.float32]:
     """Surface points (N, 3) moved by isotropic Gaussian noise, each sigma used for an equal share of them."""
     rng = np.random.default_rng(seed)
     width = np.asarray(sigma, dtype=np.float64)[rng.permutation(len(surface)) % len(sigma)]

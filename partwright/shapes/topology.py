@@ -1,4 +1,4 @@
-"""Connectivity of triangle soups: edges, bodies, boundaries. Arrays in, arrays out; no geometry is changed."""
+"""Connectivity of triangles: edges, bodies, boundaries. Arrays in, arrays out; no geometry is changed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ class EdgeTable:
     @cached_property
     def _sorted(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Order of the half-edges by undirected edge, and where each edge's group starts in that order."""
-        low, high = self._half_edges.min(axis=1), self._half_edges.max(axis=1)
+        start, end = self._half_edges.T
+        low, high = np.minimum(start, end), np.maximum(start, end)
         key = low * (int(self.faces.max(initial=0)) + 1) + high
         order = np.argsort(key, kind="stable")
         key = key[order]
@@ -49,7 +50,7 @@ class EdgeTable:
 
     @cached_property
     def pairs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Edges (P, 2) with exactly two triangles, and those triangles (P, 2): the first runs along the edge."""
+        """Edges (P, 2) with two triangles, and those triangles (P, 2): the first runs along the edge."""
         order, start = self._sorted
         first = start[self.valence == 2]
         return self._half_edges[order[first]], np.stack([order[first] // 3, order[first + 1] // 3], axis=1)
@@ -63,7 +64,7 @@ class EdgeTable:
 
     @cached_property
     def bodies(self) -> NDArray[np.int64]:
-        """Body number (F,) of each triangle: bodies are connected through edges, not through single vertices."""
+        """Body number (F,) of each triangle: bodies hang together by edges, not by single vertices."""
         order, start = self._sorted
         linked = np.ones(len(order), dtype=bool)
         linked[start] = False
@@ -89,7 +90,7 @@ def components(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArra
 
 
 def boundary_loops(open_half_edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Vertex loops along the open half-edges (B, 2); loops that touch themselves or one another are left out."""
+    """Vertex loops along the open half-edges (B, 2); those that touch themselves or others are left out."""
     if len(open_half_edges) == 0:
         return []
     starts, start_count = np.unique(open_half_edges[:, 0], return_counts=True)

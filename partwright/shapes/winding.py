@@ -1,9 +1,9 @@
 """Winding numbers of a closed mesh on a whole grid at once, by scan conversion.
 
-Every triangle is projected along z onto the grid's columns. A column that it covers gets +1 or -1 at the height
-where it crosses, and a running sum down the column is the winding number. The two triangles at an edge compute
-the crossing from the same numbers in the same order and cover half-open intervals, so no column is ever counted
-twice or missed: on a closed mesh the result is an exact integer, whatever slivers it has.
+Every triangle is projected along z onto the grid's columns. A column that it covers gets +1 or -1 at the
+height where it crosses, and a running sum down the column is the winding number. The two triangles at an edge
+compute the crossing from the same numbers in the same order and cover half-open intervals, so no column is
+ever counted twice or missed: on a closed mesh the result is an exact integer, whatever slivers it has.
 """
 
 from __future__ import annotations
