@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from partwright.errors import OutputError
@@ -30,7 +31,8 @@ def replacing(path: str | Path) -> Iterator[Path]:
         reason = error.strerror or error
         raise OutputError(f"cannot write {path}: {reason}; choose another place with -o") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # not there, renamed, or in no folder at all: said above
+            temporary.unlink()
 
 
 def write_bytes(path: str | Path, data: bytes) -> None:
@@ -41,3 +43,46 @@ def write_bytes(path: str | Path, data: bytes) -> None:
     """
     with replacing(path) as temporary:
         temporary.write_bytes(data)
+
+
+def check_folder(folder: str | Path) -> None:
+    """Whether results can be written into `folder`, which may not exist yet: ask before the work, not after.
+
+    Raises:
+        OutputError: a file is in the way, or the nearest existing folder is not writable.
+    """
+    folder = Path(folder)
+    nearest = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
+    if not nearest.is_dir():
+        raise OutputError(f"cannot write into {folder}: {nearest} is a file; choose another place with -o")
+    if not os.access(nearest, os.W_OK):
+        raise OutputError(
+            f"cannot write into {folder}: {nearest} is not writable; choose another place with -o"
+        )
+
+
+@contextmanager
+def replacing_files(folder: str | Path) -> Iterator[Path]:
+    """A temporary folder whose files move into `folder`, which is made if need be, when the block ends well.
+
+    Other files of `folder` stay. Nothing is moved where the block fails.
+
+    Raises:
+        OutputError: as `check_folder`, or the disk is full.
+    """
+    folder = Path(folder)
+    check_folder(folder)
+    staging = folder.absolute().with_name(f".{folder.absolute().name}.{os.getpid()}.part")
+    try:
+        staging.mkdir(parents=True)
+        yield staging
+        if folder.exists():
+            for path in sorted(staging.iterdir()):
+                os.replace(path, folder / path.name)
+        else:
+            os.rename(staging, folder)
+    except OSError as error:
+        reason = error.strerror or error
+        raise OutputError(f"cannot write into {folder}: {reason}; choose another place with -o") from error
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)

@@ -22,7 +22,7 @@ _WALL = 0.7
 
 
 def watering_can() -> trimesh.Trimesh:
-    """A can of 17 cm height: tapered hollow body with a rolled rim, half a lid, a spout with a rose, a handle."""
+    """A can 17 cm high: tapered hollow body with a rolled rim, half a lid, a spout with a rose, a handle."""
     import trimesh
 
     made = _can().to_mesh()
@@ -33,7 +33,9 @@ def watering_can() -> trimesh.Trimesh:
 
 def write(path: str | Path) -> None:
     """Write the watering can as binary PLY."""
-    write_bytes(path, watering_can().export(file_type="ply"))
+    from trimesh.exchange.ply import export_ply
+
+    write_bytes(path, export_ply(watering_can()))
 
 
 def _can() -> manifold3d.Manifold:

@@ -1,8 +1,8 @@
 """GLB: one named, coloured node a part, with the part's parameters in the node's `extras`.
 
 glTF is in metres with Y up, so the root of the scene converts; where the assembly knows no unit or up axis
-its numbers stay as they are, and `asset.extras` says so. Each part is meshed in its own frame and placed by its
-node, so that a far place costs no digits and a node turns about the part's own origin.
+its numbers stay as they are, and `asset.extras` says so. Each part is meshed in its own frame and placed by
+its node, so that a far place costs no digits and a node turns about the part's own origin.
 """
 
 from __future__ import annotations

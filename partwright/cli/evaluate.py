@@ -1,0 +1,36 @@
+"""`partwright evaluate`: how well an assembly stands for a shape."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "evaluate",
+        help="score an assembly against a shape",
+        description="Scores an assembly against the shape it stands for.",
+    )
+    command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    command.add_argument("shape", metavar="SHAPE", type=Path, help="the mesh or scene it was made from")
+    command.add_argument("--json", action="store_true", help="print the scores as JSON")
+    command.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    import json
+
+    from partwright.assembly import load_assembly
+    from partwright.cli.tables import print_scores
+    from partwright.metrics import evaluate
+    from partwright.shapes import load_shape
+
+    assembly = load_assembly(arguments.assembly)
+    shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
+    scores = evaluate(assembly, shape)
+    if arguments.json:
+        print(json.dumps(scores.to_dict(), indent=2))
+    else:
+        print_scores(arguments.assembly.name, scores, shape.unit)
+    return 0

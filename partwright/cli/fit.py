@@ -1,0 +1,83 @@
+"""`partwright fit`: a shape in, a folder with the assembly, meshes, report and preview out."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "fit",
+        help="fit an assembly of parts to a shape",
+        description="Fits an assembly of parts to a shape. Writes assembly.json, parts.glb, surface.ply, "
+        "report.json and preview.png.",
+    )
+    option = command.add_argument
+    option("shape", metavar="SHAPE", type=Path, help="mesh or scene: OBJ, PLY, STL, OFF, GLB, glTF, 3MF")
+    option(
+        "-o",
+        "--output",
+        metavar="DIR",
+        type=Path,
+        default=None,
+        help="where to write; SHAPE-parts if not given",
+    )
+    option(
+        "--method", choices=("superfrusta",), default="superfrusta", help="how to fit (default: %(default)s)"
+    )
+    option(
+        "--quality",
+        choices=("draft", "normal", "high"),
+        default="normal",
+        help="how much time to spend (default: %(default)s)",
+    )
+    option("--max-parts", metavar="N", type=int, help="at most N parts")
+    option("--min-iou", metavar="X", type=float, help="stop at the fewest parts that reach IoU X")
+    option("--per-node", action="store_true", help="fit each node of a scene by itself")
+    option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
+    option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
+    option("--device", choices=("auto", "cpu"), default="auto", help="what computes (default: %(default)s)")
+    option(
+        "--seed",
+        metavar="S",
+        type=int,
+        default=0,
+        help="the same seed makes a run repeat (default: %(default)s)",
+    )
+    option("--threads", metavar="N", type=int, default=0, help="threads to use (default: one per core)")
+    command.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from partwright.cli.progress import Display
+    from partwright.cli.tables import print_result, warn
+    from partwright.fitting import fit
+    from partwright.shapes import load_shape
+    from partwright.writing import check_folder
+
+    folder: Path = arguments.output or Path(f"{arguments.shape.stem}-parts")
+    check_folder(folder)
+    with Display() as display:
+        shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
+        result = fit(
+            shape,
+            arguments.method,
+            quality=arguments.quality,
+            max_parts=arguments.max_parts,
+            min_iou=arguments.min_iou,
+            per_node=arguments.per_node,
+            seed=arguments.seed,
+            device=arguments.device,
+            threads=arguments.threads,
+            progress=display.show,
+            source=arguments.shape.name,
+        )
+        display.stage("writing")
+        result.save(folder)
+    print_result(result, folder)
+    warn(result.warnings)
+    if result.outcome == "interrupted":
+        warn([f"interrupted: {folder} holds the best assembly so far"])
+        return 130
+    return 0

@@ -1,0 +1,67 @@
+"""A fit's progress: a bar on a terminal, plain lines elsewhere; both on stderr."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import Any, Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+_QUIET = 1.0  # seconds between plain lines of one stage
+
+
+class Display:
+    """A context in which `show` takes the method's progress and `stage` names what else goes on."""
+
+    def __init__(self) -> None:
+        console = Console(file=sys.stderr)
+        self._bar = (
+            Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                TextColumn("{task.fields[detail]}"),
+                TimeRemainingColumn(compact=True),
+                console=console,
+                transient=True,
+            )
+            if console.is_terminal
+            else None
+        )
+        self._last_stage, self._last_time = "", 0.0
+
+    def __enter__(self) -> Self:
+        if self._bar:
+            self._bar.start()
+            self._task = self._bar.add_task("reading", total=1.0, detail="")
+        else:
+            self._line("reading")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar:
+            self._bar.stop()
+
+    def show(self, step: Any) -> None:
+        """One report of the method: .stage .round .rounds .parts .iou .fraction."""
+        detail = f"round {step.round}/{step.rounds}  {step.parts} parts  IoU {step.iou:.3f}"
+        if self._bar:
+            self._bar.update(self._task, description=step.stage, completed=step.fraction, detail=detail)
+        elif step.stage != self._last_stage or time.monotonic() - self._last_time > _QUIET:
+            self._line(f"{step.stage}: {detail}  {step.fraction:.0%}")
+            self._last_stage, self._last_time = step.stage, time.monotonic()
+
+    def stage(self, name: str) -> None:
+        """A stage without rounds, after the method's own."""
+        if self._bar:
+            self._bar.update(self._task, description=name, completed=1.0)
+        else:
+            self._line(name)
+
+    @staticmethod
+    def _line(text: str) -> None:
+        print(f"partwright: {text}", file=sys.stderr, flush=True)

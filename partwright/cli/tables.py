@@ -1,0 +1,56 @@
+"""What the commands print at the end."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from partwright.fitting import Result
+    from partwright.metrics import Scores
+
+
+def print_result(result: Result, folder: Path) -> None:
+    """The outcome of a fit: scores, time, and where the files are."""
+    table = _scores_table(result.shape.name, result.scores, result.shape.unit)
+    table.add_row("outcome", result.outcome.replace("_", " "))
+    table.add_row("seconds", f"{result.report['seconds']['all']:.1f}")
+    _print(table)
+    print(f"written to {folder}")
+
+
+def print_scores(name: str, scores: Scores, unit: str | None) -> None:
+    _print(_scores_table(name, scores, unit))
+
+
+def warn(messages: Iterable[str]) -> None:
+    for message in messages:
+        print(f"partwright: warning: {message}", file=sys.stderr)
+
+
+def _scores_table(name: str, scores: Scores, unit: str | None) -> Table:
+    table = Table(title=escape(name), box=box.SIMPLE_HEAD, show_header=False, title_justify="left")
+    table.add_column()
+    table.add_column(justify="right")
+    length = f" {unit}" if unit else ""
+    table.add_row("parts", str(scores.parts))
+    table.add_row("IoU", f"{scores.iou:.4f}")
+    table.add_row("bi-surface IoU", f"{scores.bi_surface_iou:.4f}")
+    table.add_row("Chamfer x 1000", f"{1e3 * scores.chamfer:.3f} (floor {1e3 * scores.chamfer_floor:.3f})")
+    if scores.emd is not None:
+        table.add_row("EMD", f"{scores.emd:.4f}")
+    table.add_row("overlap", f"{scores.overlap:.3f}")
+    table.add_row("95 % deviation", f"{scores.deviation_95:.3g}{length}")
+    table.add_row("largest deviation", f"{scores.max_deviation:.3g}{length}, {scores.worst_place}")
+    return table
+
+
+def _print(table: Table) -> None:
+    Console(width=None if sys.stdout.isatty() else 100).print(table)

@@ -1,0 +1,228 @@
+"""`fit`: a shape in, a result out. Picks the method, scores what it made, writes the result's files."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from partwright import __version__
+from partwright.assembly import Assembly
+from partwright.assembly.checks import MAX_NAME
+from partwright.errors import SettingError
+from partwright.shapes import Shape
+from partwright.writing import replacing_files, write_bytes
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from partwright.metrics import Scores
+
+# method -> the module whose `fit(shape, settings, progress=...)` and `Settings` do it
+METHODS = {"superfrusta": "partwright.superfrusta"}
+QUALITIES = ("draft", "normal", "high")
+DEVICES = ("auto", "cpu")
+# A result stands for the worst of its pieces, in this order.
+OUTCOMES = ("interrupted", "budget_reached", "converged", "target_reached")
+FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
+
+POOR_IOU = 0.85
+POOR_DEVIATION = 0.1  # of the longest side
+UNSURE = 0.5
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a fit returns.
+
+    assembly: in the shape's own units and place. outcome: "converged", "budget_reached", "target_reached" or
+    "interrupted". report: what report.json holds. surface: the blended surface's mesh, in the shape's units.
+    """
+
+    shape: Shape
+    assembly: Assembly
+    outcome: str
+    scores: Scores
+    surface: trimesh.Trimesh
+    report: dict[str, Any]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should be told about the result, a sentence each; empty where it is good."""
+        return tuple(self.report["warnings"])
+
+    def save(self, folder: str | Path) -> None:
+        """Write assembly.json, parts.glb, surface.ply, report.json and preview.png, all or none.
+
+        Raises:
+            OutputError: they cannot be written there.
+        """
+        from partwright.export import export
+        from partwright.export.ply import write_mesh
+        from partwright.render import preview
+
+        with replacing_files(folder) as staging:
+            self.assembly.save(staging / "assembly.json")
+            export(self.assembly, staging / "parts.glb")
+            write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
+            write_bytes(staging / "report.json", (json.dumps(self.report, indent=2) + "\n").encode())
+            preview(self.shape, self.assembly, self.surface, staging / "preview.png", title=self.shape.name)
+
+
+def fit(
+    shape: Shape,
+    method: str = "superfrusta",
+    *,
+    quality: str = "normal",
+    max_parts: int | None = None,
+    min_iou: float | None = None,
+    per_node: bool = False,
+    seed: int = 0,
+    device: str = "auto",
+    threads: int = 0,
+    progress: Callable[[Any], None] | None = None,
+    source: str | None = None,
+) -> Result:
+    """Fit an assembly to a shape.
+
+    Args:
+        quality: "draft", "normal" or "high".
+        max_parts: at most so many parts (with per_node: in each node).
+        min_iou: stop at the fewest parts that reach it.
+        per_node: fit each node of a scene by itself; the assembly's children are named after the nodes.
+        seed: the same seed gives the same assembly, at any number of threads.
+        device: "cpu", or "auto" for the best there is.
+        threads: 0 means one per core.
+        progress: called with the method's progress: .stage .round .rounds .parts .iou .fraction.
+        source: the file's name, for the report.
+
+    Raises:
+        SettingError: an option has a value that cannot be used.
+    """
+    started = time.perf_counter()
+    if method not in METHODS:
+        raise SettingError(f"unknown method {method!r}; expected one of {', '.join(METHODS)}")
+    if device not in DEVICES:
+        raise SettingError(
+            f"device {device!r} is not available for {method}; use one of {', '.join(DEVICES)}"
+        )
+    module = import_module(METHODS[method])
+    settings = module.Settings.for_quality(
+        quality, max_parts=max_parts, min_iou=min_iou, seed=seed, threads=threads
+    )
+    pieces = shape.split_nodes() if per_node else [shape]
+    fitted = _fit_pieces(module, pieces, settings, progress)
+    assembly = _assembled(shape, pieces, fitted, per_node, source)
+    seconds = _seconds(fitted)
+    scores, surface = _scored(shape, assembly, seed, seconds)
+    seconds["all"] = time.perf_counter() - started
+    outcome = next(o for o in OUTCOMES if any(one.outcome == o for one in fitted))
+    report = {
+        "outcome": outcome,
+        "version": __version__,
+        "method": method,
+        "seed": seed,
+        "settings": {"quality": quality, "per_node": per_node, **dataclasses.asdict(settings)},
+        "input": _input(shape, source),
+        "seconds": {stage: round(spent, 3) for stage, spent in seconds.items()},
+        "parts": len(assembly),
+        "instances": len(assembly),
+        "scores": scores.to_dict(),
+        "warnings": _warnings(shape, scores),
+    }
+    return Result(shape, assembly, outcome, scores, surface, report)
+
+
+def _fit_pieces(
+    module: Any, pieces: list[Shape], settings: Any, progress: Callable[[Any], None] | None
+) -> list[Any]:
+    """Each piece by the method; after an interruption the rest are left out."""
+    fitted: list[Any] = []
+    for i, piece in enumerate(pieces):
+
+        def report(step: Any, i: int = i, name: str = piece.name) -> None:
+            assert progress is not None
+            stage = step.stage if len(pieces) == 1 else f"{name}: {step.stage}"
+            progress(dataclasses.replace(step, stage=stage, fraction=(i + step.fraction) / len(pieces)))
+
+        fitted.append(module.fit(piece, settings, progress=report if progress else None))
+        if fitted[-1].outcome == "interrupted":
+            break
+    return fitted
+
+
+def _assembled(
+    shape: Shape, pieces: list[Shape], fitted: list[Any], per_node: bool, source: str | None
+) -> Assembly:
+    """One assembly that knows the shape's name, unit and up axis; by nodes, one named child a node."""
+    whole: Assembly = fitted[0].assembly
+    if per_node:
+        named = zip(pieces, fitted, strict=False)  # after an interruption, only the first pieces are fitted
+        whole = Assembly(
+            tuple(dataclasses.replace(one.assembly, name=_clean(piece.name)) for piece, one in named)
+        )
+    metadata = {**whole.metadata, "source": source or shape.name}
+    return dataclasses.replace(
+        whole, name=_clean(shape.name), unit=shape.unit, up=shape.up, metadata=metadata
+    )
+
+
+def _clean(name: str) -> str:
+    """A file's or node's name as the name of an assembly."""
+    return "".join(c if c.isprintable() else "_" for c in name)[:MAX_NAME]
+
+
+def _seconds(fitted: list[Any]) -> dict[str, float]:
+    """The stages of all pieces, added."""
+    seconds: dict[str, float] = {}
+    for one in fitted:
+        for stage, spent in one.seconds.items():
+            seconds[stage] = seconds.get(stage, 0.0) + spent
+    return seconds
+
+
+def _input(shape: Shape, source: str | None) -> dict[str, Any]:
+    return {
+        "file": source or shape.name,
+        "unit": shape.unit,
+        "up": shape.up,
+        "triangles": len(shape.input_faces),
+        "repairs": list(shape.repairs),
+        "confidence": shape.confidence,
+    }
+
+
+def _scored(
+    shape: Shape, assembly: Assembly, seed: int, seconds: dict[str, float]
+) -> tuple[Scores, trimesh.Trimesh]:
+    from partwright.meshing import mesh_assembly
+    from partwright.metrics import evaluate
+
+    start = time.perf_counter()
+    surface = mesh_assembly(assembly)
+    meshed = time.perf_counter()
+    scores = evaluate(assembly, shape, seed=seed, emd=False, surface=surface)
+    seconds |= {"meshing": meshed - start, "scores": time.perf_counter() - meshed}
+    return scores, surface
+
+
+def _warnings(shape: Shape, scores: Scores) -> list[str]:
+    result = []
+    side = float((shape.vertices.max(axis=0) - shape.vertices.min(axis=0)).max())
+    if scores.iou < POOR_IOU or scores.max_deviation > POOR_DEVIATION * side:
+        unit = f" {shape.unit}" if shape.unit else ""
+        result.append(
+            f"the fit is poor in places: IoU {scores.iou:.3f}; it is furthest off, by "
+            f"{scores.max_deviation:.3g}{unit}, at the {scores.worst_place}; try --quality high or more parts"
+        )
+    if shape.confidence < UNSURE:
+        repairs = "; ".join(shape.repairs)
+        result.append(
+            f"it is unsure what lies inside this surface (confidence {shape.confidence:.2f}): {repairs}"
+        )
+    return result

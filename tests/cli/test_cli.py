@@ -1,0 +1,200 @@
+"""The commands, in this process with a small method, and as a user's process for what only shows there."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+
+import partwright
+from partwright.assembly import load_assembly
+from partwright.cli.main import main
+from partwright.errors import PartwrightError
+from partwright.fitting import FILES, fit
+from partwright.shapes import load_shape
+from tests.cli.conftest import BoxMethod
+
+
+def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "partwright", *arguments], capture_output=True, text=True)
+
+
+def test_help_and_version_import_nothing_heavy() -> None:
+    code = (
+        "import sys\nfrom partwright.cli.main import main\n"
+        "try: main(['fit', '--help'])\nexcept SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'trimesh', 'torch', 'rich', 'PIL'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+    assert command("--version").stdout == f"partwright {partwright.__version__}\n"
+
+
+def test_every_option_is_passed_on(method: BoxMethod, block: Path, tmp_path: Path, monkeypatch: Any) -> None:
+    seen: dict[str, Any] = {}
+
+    def spy(shape: Any, method: str, **options: Any) -> Any:
+        seen.update(options, method=method, unit=shape.unit, up=shape.up)
+        return fit(shape, method, **options)
+
+    monkeypatch.setattr("partwright.fitting.fit", spy)
+    options = "--quality draft --max-parts 5 --min-iou 0.9 --unit mm --up x --device cpu --seed 7 --threads 2"
+    assert main(["fit", str(block), "-o", str(tmp_path / "out"), *options.split()]) == 0
+    expected = {"quality": "draft", "max_parts": 5, "min_iou": 0.9, "unit": "mm", "up": "x", "device": "cpu"}
+    assert expected.items() <= seen.items()
+    assert (seen["seed"], seen["threads"], seen["per_node"]) == (7, 2, False)
+
+
+def test_fit_writes_five_files(method: BoxMethod, block: Path, tmp_path: Path, capsys: Any) -> None:
+    folder = tmp_path / "deep" / "out"
+    assert main(["fit", str(block), "-o", str(folder), "--unit", "mm"]) == 0
+    assert sorted(p.name for p in folder.iterdir()) == sorted(FILES)
+    assert [p.name for p in folder.parent.iterdir()] == ["out"]
+    assembly = load_assembly(folder / "assembly.json")
+    assert assembly.unit == "mm"
+    assert assembly.parts[0].translation == pytest.approx((10, 20, 30))
+    assert trimesh.load_mesh(folder / "surface.ply").volume == pytest.approx(8.0, rel=1e-3)
+    report = json.loads((folder / "report.json").read_text())
+    assert report["scores"]["iou"] > 0.98
+    assert report["scores"]["max_deviation"] < 0.05
+    assert (report["outcome"], report["parts"], report["instances"]) == ("converged", 1, 1)
+    assert report["input"]["file"] == "block.stl"
+    assert report["seconds"]["seeding"] == 0.25
+    assert report["seconds"]["all"] > 0
+    captured = capsys.readouterr()
+    assert "bi-surface IoU" in captured.out
+    assert f"written to {folder}" in captured.out
+    assert "optimising: round 1/2  1 parts  IoU 0.500  50%" in captured.err
+    assert "warning" not in captured.err
+
+
+def test_an_existing_folder_keeps_its_other_files(method: BoxMethod, block: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "notes.txt").write_text("mine")
+    (folder / "report.json").write_text("old")
+    assert main(["fit", str(block), "-o", str(folder)]) == 0
+    assert (folder / "notes.txt").read_text() == "mine"
+    assert json.loads((folder / "report.json").read_text())["method"] == "superfrusta"
+
+
+def test_the_default_folder_is_named_after_the_shape(
+    method: BoxMethod, block: Path, monkeypatch: Any
+) -> None:
+    monkeypatch.chdir(block.parent)
+    assert main(["fit", "block.stl"]) == 0
+    assert (block.parent / "block-parts" / "preview.png").exists()
+
+
+def test_per_node(method: BoxMethod, scene: Path, tmp_path: Path) -> None:
+    assert main(["fit", str(scene), "-o", str(tmp_path / "out"), "--per-node"]) == 0
+    assembly = load_assembly(tmp_path / "out" / "assembly.json")
+    places = {child.name: child.parts[0].translation[0] for child in assembly.children}
+    assert places == {"left": pytest.approx(-2.0), "right": pytest.approx(2.0)}
+    assert (assembly.unit, assembly.up, len(assembly)) == ("m", "y", 2)
+
+
+def test_a_poor_fit_is_told(method: BoxMethod, block: Path, tmp_path: Path, capsys: Any) -> None:
+    method.shrink = 0.5
+    assert main(["fit", str(block), "-o", str(tmp_path / "out")]) == 0
+    error = capsys.readouterr().err
+    assert "warning: the fit is poor in places: IoU 0.1" in error
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report["scores"]["worst_place"] in error
+
+
+def test_an_interrupted_fit_writes_what_it_has(
+    method: BoxMethod, block: Path, tmp_path: Path, capsys: Any
+) -> None:
+    method.outcome = "interrupted"
+    assert main(["fit", str(block), "-o", str(tmp_path / "out")]) == 130
+    assert "holds the best assembly so far" in capsys.readouterr().err
+    assert json.loads((tmp_path / "out" / "report.json").read_text())["outcome"] == "interrupted"
+
+
+def test_an_interruption_ends_a_scene_early(method: BoxMethod, scene: Path) -> None:
+    method.outcome = "interrupted"
+    result = fit(load_shape(scene), per_node=True)
+    assert (result.outcome, len(result.assembly)) == ("interrupted", 1)
+
+
+def test_an_interruption_before_there_is_anything(
+    method: BoxMethod, block: Path, tmp_path: Path, monkeypatch: Any, capsys: Any
+) -> None:
+    def interrupt(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(method, "fit", interrupt, raising=False)
+    assert main(["fit", str(block), "-o", str(tmp_path / "out")]) == 130
+    assert "nothing was written" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_evaluate(method: BoxMethod, block: Path, tmp_path: Path, capsys: Any) -> None:
+    fit(load_shape(block)).assembly.save(tmp_path / "a.json")
+    assert main(["evaluate", str(tmp_path / "a.json"), str(block), "--json"]) == 0
+    scores = json.loads(capsys.readouterr().out)
+    assert scores["iou"] > 0.98
+    assert scores["emd"] is not None
+    assert main(["evaluate", str(tmp_path / "a.json"), str(block)]) == 0
+    assert "EMD" in capsys.readouterr().out
+
+
+def test_export(method: BoxMethod, block: Path, tmp_path: Path) -> None:
+    fit(load_shape(block)).assembly.save(tmp_path / "a.json")
+    assert main(["export", str(tmp_path / "a.json"), "-o", str(tmp_path / "a.stl")]) == 0
+    assert trimesh.load_mesh(tmp_path / "a.stl").is_watertight
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["fit", "missing.stl"], "missing.stl"),
+        (["fit", "{block}", "-o", "{block}"], "is a file"),
+        (["fit", "{block}", "--unit", "parsec"], "parsec"),
+        (["fit", "{block}", "--max-parts", "0"], "max_parts: expected at least 1, got 0"),
+        (["evaluate", "{block}", "{block}"], "not UTF-8"),
+        (["export", "missing.json", "-o", "a.glb"], "missing.json"),
+        (["export", "{assembly}", "-o", "a.step"], "use one of .json, .glb"),
+        (["export", "{assembly}", "-o", "{assembly}/a.glb"], "cannot write"),
+    ],
+)
+def test_errors_are_one_line_and_code_2(
+    method: BoxMethod,
+    block: Path,
+    tmp_path: Path,
+    capsys: Any,
+    monkeypatch: Any,
+    arguments: list[str],
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assembly = tmp_path / "assembly.json"
+    fit(load_shape(block)).assembly.save(assembly)
+    before = sorted(tmp_path.iterdir())
+    assert main([a.format(block=block, assembly=assembly) for a in arguments]) == 2
+    captured = capsys.readouterr()
+    last = captured.err.strip().splitlines()[-1]
+    assert last.startswith("partwright: error: ")
+    assert message in last
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_users_process_ends_with_the_code_and_without_a_traceback(tmp_path: Path) -> None:
+    ended = command("fit", str(tmp_path / "missing.stl"))
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert "Traceback" not in ended.stderr
+    assert command("fit").returncode == 2
+    assert command("fit", "x.stl", "--quality", "best").returncode == 2
+
+
+def test_unknown_methods_and_devices(block: Path) -> None:
+    shape = load_shape(block)
+    for options in ({"method": "magic"}, {"device": "abacus"}):
+        with pytest.raises(PartwrightError, match=r"expected one of|use one of"):
+            fit(shape, **options)
