@@ -6,7 +6,7 @@ import colorsys
 
 import numpy as np
 
-# Hand-picked so that neighbours differ in hue and lightness; more parts than these continue by the golden angle.
+# Hand-picked so that neighbours differ in hue and lightness; more parts continue by the golden angle.
 _FIRST = (
     (0x4E, 0x8F, 0xD0),
     (0xF2, 0x9E, 0x4C),

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
     from partwright.fields import SuperFrustum
 
-_ACROSS = 2.0  # cells across the thinnest wall: under sqrt(3) a slanted wall would show holes
+# Cells across the thinnest wall. Under sqrt(3) a slanted wall would show holes; 3 also keep a thin rod round.
+_ACROSS, _ACROSS_PART = 2.0, 3.0
 _FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin walls
 _PART_CELLS = 300_000  # a part's surface is given at most this many cells
 _TIP = 0.25  # of a wall that tapers to nothing, the part that is looked at
@@ -46,8 +47,8 @@ def mesh_assembly(assembly: Assembly | Part, resolution: int = 128, *, sharp: bo
 def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimesh.Trimesh:
     """One part alone, watertight, in its own units and place.
 
-    It is meshed along its own axes. Cells are made shorter where the part is thin, each axis by itself, so that
-    walls come out complete, as long as that takes no more than a few hundred thousand cells.
+    It is meshed along its own axes. Cells are made shorter where the part is thin, each axis by itself, so
+    that walls come out complete, as long as that takes no more than a few hundred thousand cells.
 
     Raises NoSurfaceError for a part without volume.
     """
@@ -57,7 +58,8 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     local = field.scaled(frame.scale)
     centre = np.asarray(frame.translation)
     extent = (upper - lower) * frame.scale + 2 * _ROOM
-    counts = np.maximum(resolution * extent / extent.max(), _ACROSS * extent / np.maximum(walls(local), 1e-9))
+    thin = np.maximum(walls(local), 1e-9)
+    counts = np.maximum(resolution * extent / extent.max(), _ACROSS_PART * extent / thin)
     surface = 4 * (counts * np.roll(counts, 1)).sum()
     counts = np.maximum(counts * min(1.0, float(np.sqrt(_PART_CELLS / surface))), 4.0)
 
@@ -86,4 +88,4 @@ def _frame(lower: np.ndarray, upper: np.ndarray) -> Similarity:
     """To a box around the origin whose longest side is 1.8: float32 keeps its digits there."""
     scale = 1.8 / float((upper - lower).max())
     centre = (np.asarray(lower) + np.asarray(upper)) / 2
-    return Similarity(scale, translation=tuple(-scale * centre))  # type: ignore[arg-type]
+    return Similarity(scale, translation=tuple(-scale * centre))

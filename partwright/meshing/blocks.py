@@ -57,8 +57,8 @@ def evaluate(distance: Distance, points: np.ndarray) -> np.ndarray:
 def active_blocks(distance: Distance, grid: Grid, lipschitz: float = LIPSCHITZ) -> np.ndarray:
     """Blocks (K, 3) of BLOCK^3 cells that the zero level may enter, as integer block coordinates.
 
-    A block whose centre is farther from zero than lipschitz times its half diagonal is left out. The others are
-    halved until they are BLOCK cells long.
+    A block whose centre is farther from zero than lipschitz times its half diagonal is left out. The others
+    are halved until they are BLOCK cells long.
     """
     size = COARSEST
     counts = -(-grid.cells // size)
@@ -70,7 +70,12 @@ def active_blocks(distance: Distance, grid: Grid, lipschitz: float = LIPSCHITZ) 
         if size == BLOCK:
             return blocks
         size //= 2
-        blocks = (2 * blocks[:, None] + _CHILDREN).reshape(-1, 3)
+        blocks = subdivided(blocks)
+
+
+def subdivided(blocks: np.ndarray) -> np.ndarray:
+    """The eight halves (8 K, 3) of each block (K, 3), in coordinates of half the size."""
+    return (2 * blocks[:, None] + _CHILDREN).reshape(-1, 3)
 
 
 def block_values(distance: Distance, grid: Grid, blocks: np.ndarray) -> np.ndarray:
@@ -90,19 +95,20 @@ def surface_blocks(
 ) -> tuple[np.ndarray, np.ndarray]:
     """All blocks that the zero level enters, with their corner values: (K, 3), (K, B + 1, B + 1, B + 1).
 
-    Wherever the sign changes on a block's face, the neighbour is added too. So no surface is cut open, whether
-    the bound on the field's slope was too low or the surface leaves the box.
+    Wherever the sign changes on a block's face, the neighbour is added too. So no surface is cut open,
+    whether the bound on the field's slope was too low or the surface leaves the box.
 
-    Raises NoSurfaceError where the field has one sign everywhere, or where the surface runs on past twice the box.
+    Raises NoSurfaceError where the field has one sign everywhere, or the surface runs on past twice the box.
     """
     blocks = active_blocks(distance, grid, lipschitz)
     values = block_values(distance, grid, blocks)
     newest, newest_values = blocks, values
     limit = grid.cells // BLOCK + 2
+    unit = np.eye(3, dtype=np.int64)
     while len(newest):
         neighbours = np.concatenate(
             [
-                newest[_changes(newest_values.take(side, axis=1 + axis))] + step * np.eye(3, dtype=np.int64)[axis]
+                newest[_changes(newest_values.take(side, axis=1 + axis))] + step * unit[axis]
                 for axis in range(3)
                 for side, step in ((0, -1), (BLOCK, 1))
             ]
@@ -127,5 +133,7 @@ def surface_blocks(
 
 
 def _changes(values: np.ndarray) -> np.ndarray:
-    inside = (values < 0).reshape(len(values), -1)
-    return inside.any(axis=1) & ~inside.all(axis=1)
+    """Whether the sign changes within values[i]."""
+    rest = tuple(range(1, values.ndim))
+    inside = values < 0
+    return np.asarray(inside.any(axis=rest) & ~inside.all(axis=rest))

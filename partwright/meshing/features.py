@@ -1,8 +1,8 @@
 """Sharp edges and corners for marching cubes (Kobbelt, Botsch, Schwanecke, Seidel 2001, section 4).
 
-A polygon whose corners' normals disagree holds a feature. It gets one more vertex where the tangent planes of
-its corners meet, and becomes a fan around it; the edges between two fans are flipped so that they run along the
-feature instead of across it.
+A polygon whose corners' normals disagree holds a feature. It gets one more vertex where the tangent planes
+of its corners meet, and becomes a fan around it; the edges between two fans are flipped so that they run
+along the feature instead of across it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def sharpen(polygons: Polygons, distance: Distance, grid: Grid) -> tuple[np.ndar
 
 
 def field_normals(distance: Distance, points: np.ndarray, step: float) -> np.ndarray:
-    """Unit gradients (N, 3) by differences over the corners of a tetrahedron; zero where the field is flat."""
+    """Unit gradients (N, 3) by differences over a tetrahedron's corners; zero where the field is flat."""
     taps = points[:, None, :] + step * _TETRAHEDRON
     values = evaluate(distance, taps.reshape(-1, 3)).reshape(-1, 4).astype(np.float64)
     gradient = values @ _TETRAHEDRON
@@ -75,12 +75,13 @@ def _feature_points(
 
 
 def _fans(polygons: Polygons, chosen: np.ndarray) -> np.ndarray:
-    """Triangles around the new vertices, numbered on from the old ones, with edges between two fans flipped."""
+    """Triangles around the new vertices, numbered on from the old ones; edges between two fans flipped."""
     length = polygons.length[chosen]
     used = polygons.used[chosen]
     start = polygons.index[chosen][used]
     place = np.arange(used.shape[1])[None, :] + 1
-    end = np.take_along_axis(polygons.index[chosen], np.where(place < length[:, None], place, 0), axis=1)[used]
+    place = np.where(place < length[:, None], place, 0)
+    end = np.take_along_axis(polygons.index[chosen], place, axis=1)[used]
     centre = np.repeat(np.arange(len(chosen)), length) + len(polygons.vertices)
 
     # The same edge in two fans runs there and back.

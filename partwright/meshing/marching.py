@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from partwright.meshing.tables import CORNERS, EDGE_AXIS, EDGES, loop_table
 if TYPE_CHECKING:
     import trimesh
 
+Vector: TypeAlias = Sequence[float] | np.ndarray
+
 # Vertices keep this part of an edge from its ends, so that no two of them ever coincide.
 _MARGIN = 0.004
 _STEPS = 10
@@ -24,21 +26,21 @@ _TOLERANCE = 2e-3  # of a cell
 
 def mesh_field(
     distance: Distance,
-    lower: Sequence[float] | np.ndarray,
-    upper: Sequence[float] | np.ndarray,
-    resolution: int | Sequence[float] | np.ndarray = 128,
+    lower: Vector,
+    upper: Vector,
+    resolution: int | Vector = 128,
     *,
     lipschitz: float = LIPSCHITZ,
     sharp: bool = True,
 ) -> trimesh.Trimesh:
     """The zero level of a field as a closed mesh with outward normals.
 
-    Only cells near the surface are evaluated (see `blocks`), and every vertex is moved along its edge onto the
-    zero level by regula falsi, so its error is far below a cell. With `sharp`, edges and corners of the surface
-    are kept where the normals around a cell disagree (Kobbelt et al. 2001, Extended Marching Cubes).
+    Only cells near the surface are evaluated (see `blocks`), and every vertex is moved along its edge onto
+    the zero level by regula falsi, so its error is far below a cell. With `sharp`, edges and corners of the
+    surface are kept where the normals around a cell disagree (Kobbelt et al. 2001, Extended Marching Cubes).
     The mesh is a closed two-manifold for every field: see `tables`.
 
-    distance: maps points (N, 3) float32 to values (N,), negative inside; its frame should lie near the origin.
+    distance: maps points (N, 3) float32 to values (N,), negative inside; best in a frame around the origin.
     lower, upper: (3,) the box that holds the surface; a surface that leaves it is followed, not cut.
     resolution: cells along the box's longest side, or along each side (cells need not be cubes).
     lipschitz: an upper bound of the field's slope; a piece whose field is steeper may be missed.
@@ -48,25 +50,25 @@ def mesh_field(
     """
     import trimesh
 
-    grid = Grid.around(*_box(lower, upper), _cell(lower, upper, resolution))
+    low, high = _box(lower, upper)
+    grid = Grid.around(low, high, _cell(low, high, resolution))
     polygons = marching_polygons(distance, grid, lipschitz)
-    vertices, faces = sharpen(polygons, distance, grid) if sharp else (polygons.vertices, polygons.triangles())
+    if sharp:
+        vertices, faces = sharpen(polygons, distance, grid)
+    else:
+        vertices, faces = polygons.vertices, polygons.triangles()
     return trimesh.Trimesh(vertices, faces, process=False)
 
 
-def _box(lower: Sequence[float] | np.ndarray, upper: Sequence[float] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _box(lower: Vector, upper: Vector) -> tuple[np.ndarray, np.ndarray]:
     low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
-    if low.shape != (3,) or high.shape != (3,) or not np.isfinite([low, high]).all() or not (high > low).all():
+    shaped = low.shape == high.shape == (3,) and bool(np.isfinite([low, high]).all())
+    if not shaped or not (high > low).all():
         raise SettingError(f"The box from {low} to {high} has no volume; give lower < upper along each axis.")
     return low, high
 
 
-def _cell(
-    lower: Sequence[float] | np.ndarray,
-    upper: Sequence[float] | np.ndarray,
-    resolution: int | Sequence[float] | np.ndarray,
-) -> np.ndarray:
-    low, high = _box(lower, upper)
+def _cell(low: np.ndarray, high: np.ndarray, resolution: int | Vector) -> np.ndarray:
     counts = np.asarray(resolution, dtype=np.float64)
     if counts.shape not in ((), (3,)) or not (counts >= 1).all() or not (counts <= 4096).all():
         raise SettingError(f"The resolution {resolution} is not one or three numbers from 1 to 4096.")
@@ -78,13 +80,7 @@ def marching_polygons(distance: Distance, grid: Grid, lipschitz: float = LIPSCHI
     """The polygons in which the zero level meets the cells, their corners moved onto it."""
     table = loop_table()
     blocks, values = surface_blocks(distance, grid, lipschitz)
-    inside = values < 0
-    pattern = np.zeros((len(blocks), BLOCK, BLOCK, BLOCK), dtype=np.uint8)
-    for corner, (x, y, z) in enumerate(CORNERS):
-        pattern |= inside[:, x : x + BLOCK, y : y + BLOCK, z : z + BLOCK].astype(np.uint8) << np.uint8(corner)
-    block, *local = np.nonzero((pattern > 0) & (pattern < 255))
-    place = np.stack(local, axis=-1)
-    pattern = pattern[block, place[:, 0], place[:, 1], place[:, 2]]
+    block, place, pattern = _crossed_cells(values)
 
     # One polygon a loop, in the order of the cells.
     cell = np.repeat(np.arange(len(block)), table.count[pattern])
@@ -99,11 +95,7 @@ def marching_polygons(distance: Distance, grid: Grid, lipschitz: float = LIPSCHI
     start = place[owner] + CORNERS[EDGES[edge_used, 0]]
     lattice = blocks[block[owner]] * BLOCK + start
     axis = EDGE_AXIS[edge_used]
-    x, y, z = (lattice - lattice.min(axis=0)).T
-    ny, nz = lattice.max(axis=0)[1:] - lattice.min(axis=0)[1:] + 1
-    _, representative, number = np.unique(
-        ((x * ny + y) * nz + z) * 3 + axis, return_index=True, return_inverse=True
-    )
+    representative, number = _welded(lattice, axis)
     index = np.zeros(edge.shape, dtype=np.int64)
     index[used] = number
 
@@ -120,6 +112,25 @@ def marching_polygons(distance: Distance, grid: Grid, lipschitz: float = LIPSCHI
     )
     corner = blocks[block] * BLOCK + place
     return Polygons(vertices, index, length, table.triangles[kind, loop], corner[cell])
+
+
+def _crossed_cells(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cells in which the sign changes: their block (K,), place in the block (K, 3), sign pattern (K,)."""
+    inside = (values < 0).astype(np.uint8)
+    patterns = np.zeros((len(values), BLOCK, BLOCK, BLOCK), dtype=np.uint8)
+    for corner, (i, j, k) in enumerate(CORNERS.tolist()):
+        patterns |= inside[:, i : i + BLOCK, j : j + BLOCK, k : k + BLOCK] << np.uint8(corner)
+    found = np.argwhere((patterns > 0) & (patterns < 255))
+    return found[:, 0], found[:, 1:], patterns[tuple(found.T)]
+
+
+def _welded(lattice: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lattice edges (N,), given by their lower corner and axis, welded: one of each (V,), numbers (N,)."""
+    x, y, z = (lattice - lattice.min(axis=0)).T
+    ny, nz = np.ptp(lattice, axis=0)[1:] + 1
+    key = ((x * ny + y) * nz + z) * 3 + axis
+    _, representative, number = np.unique(key, return_index=True, return_inverse=True)
+    return representative, number
 
 
 def _on_zero_level(

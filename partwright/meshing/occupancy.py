@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from partwright.meshing.blocks import BLOCK, LIPSCHITZ, Distance, Grid, evaluate
+from partwright.meshing.blocks import BLOCK, LIPSCHITZ, Distance, Grid, evaluate, subdivided
 
 _CELLS = np.stack(np.meshgrid(*[np.arange(BLOCK)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _LEVELS = (16, 8, BLOCK)
@@ -27,14 +27,11 @@ def occupancy_grid(distance: Distance, resolution: int = 128, lipschitz: float =
         _view(inside, size)[tuple(blocks[far & (values < 0)].T)] = True
         blocks = blocks[~far]
         if size > BLOCK:
-            blocks = (2 * blocks[:, None] + _CELLS_OF_TWO).reshape(-1, 3)
+            blocks = subdivided(blocks)
     cells = blocks[:, None] * BLOCK + _CELLS
     values = evaluate(distance, grid.points(cells + 0.5))
     _view(inside, BLOCK)[tuple(blocks.T)] = (values < 0).reshape(-1, BLOCK, BLOCK, BLOCK)
     return inside[:resolution, :resolution, :resolution]
-
-
-_CELLS_OF_TWO = np.stack(np.meshgrid(*[np.arange(2)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def _view(grid: np.ndarray, size: int) -> np.ndarray:

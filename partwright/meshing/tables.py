@@ -3,9 +3,9 @@
 A cell has eight corners, numbered by the bits x + 2 y + 4 z, and twelve edges, four along each axis. For each
 of the 256 sign patterns the surface meets the cell's six faces in segments; where a face is ambiguous the
 segments always cut off the inside corners, so that two cells agree about the face they share. Chained, the
-segments make closed loops around the cell. A loop is cut into triangles without ever joining two points of one
-face by a diagonal, since the neighbour might use the same diagonal. Both rules together make the surface a
-closed two-manifold for every field (each edge has exactly two triangles, each point one fan).
+segments make closed loops around the cell. A loop is cut into triangles without ever joining two points of
+one face by a diagonal, since the neighbour might use the same diagonal. Both rules together make the surface
+a closed two-manifold for every field (each edge has exactly two triangles, each point one fan).
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ Triangle = tuple[int, int, int]
 class LoopTable:
     """Loops of every sign pattern (bit c of the pattern is set where corner c is inside).
 
-    count: (256,) number of loops; length: (256, L) points of each loop; edges: (256, L, P) the cell edges they
-    lie on, in order, counter-clockwise seen from outside, padded with 0; triangles: (256, L, P - 2, 3) places
-    within the loop.
+    count: (256,) number of loops; length: (256, L) points of each loop; edges: (256, L, P) the cell edges
+    they lie on, in order, counter-clockwise seen from outside, padded with 0; triangles: (256, L, P - 2, 3)
+    places within the loop.
     """
 
     count: np.ndarray

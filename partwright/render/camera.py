@@ -13,10 +13,23 @@ from partwright.errors import SettingError
 _FRONTS = {"x": (0.0, -1.0, 0.0), "y": (0.0, 0.0, 1.0), "z": (0.0, -1.0, 0.0)}
 
 
+def picture_axes(up: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """To the right, up and towards the viewer, (3,) each, as seen from the front. up: "x", "-y" ...
+
+    Raises SettingError for another axis.
+    """
+    if up.removeprefix("-") not in _FRONTS:
+        raise SettingError(f"The up axis is {up!r}; expected x, y or z, or one of them with a minus.")
+    above = np.zeros(3)
+    above["xyz".index(up[-1])] = -1.0 if up.startswith("-") else 1.0
+    front = np.array(_FRONTS[up[-1]])
+    return np.cross(above, front), above, front
+
+
 @dataclass(frozen=True)
 class View:
-    """A camera in its place: eye (3,), the picture's right, up and towards-the-viewer axes (3,), half-width and
-    half-height of the picture at distance 1."""
+    """A camera in its place: eye (3,), the picture's right, up and towards-the-viewer axes (3,), half-width
+    and half-height of the picture at distance 1."""
 
     eye: np.ndarray
     right: np.ndarray
@@ -25,12 +38,13 @@ class View:
     half: tuple[float, float]
 
     def rays(self, width: int, height: int) -> np.ndarray:
-        """(height * width, 3) float32 unit directions through the pixels' centres, row by row from the top."""
+        """(height * width, 3) float32 unit directions through the pixels' centres, by rows from the top."""
         x = ((np.arange(width) + 0.5) / width * 2 - 1) * self.half[0]
         y = (1 - (np.arange(height) + 0.5) / height * 2) * self.half[1]
-        rays = x[None, :, None] * self.right + y[:, None, None] * self.up - self.back
-        rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-        return rays.reshape(-1, 3).astype(np.float32)
+        across = x[:, None] * self.right - self.back
+        rays = (across[None] + y[:, None, None] * self.up).astype(np.float32)
+        rays /= np.sqrt(1 + x[None, :] ** 2 + y[:, None] ** 2)[..., None].astype(np.float32)
+        return rays.reshape(-1, 3)
 
 
 @dataclass(frozen=True)
@@ -49,23 +63,19 @@ class Camera:
     margin: float = 0.08
 
     def __post_init__(self) -> None:
-        if self.up.removeprefix("-") not in _FRONTS:
-            raise SettingError(f"The up axis is {self.up!r}; expected x, y or z, or one of them with a minus.")
+        picture_axes(self.up)
         if not 1 <= self.field_of_view <= 120 or not 0 <= self.margin < 0.5:
             raise SettingError("A camera sees between 1 and 120 degrees, with a margin from 0 to 0.5.")
 
     @property
     def up_axis(self) -> np.ndarray:
         """(3,) unit vector."""
-        axis = np.zeros(3)
-        axis["xyz".index(self.up[-1])] = -1.0 if self.up.startswith("-") else 1.0
-        return axis
+        return picture_axes(self.up)[1]
 
     def fitted(self, points: np.ndarray, width: int, height: int) -> View:
         """The view that just holds all points (N, 3) and centres them in a picture of that shape."""
-        up_axis, front = self.up_axis, np.array(_FRONTS[self.up[-1]])
+        side, up_axis, front = picture_axes(self.up)
         azimuth, elevation = math.radians(self.azimuth), math.radians(self.elevation)
-        side = np.cross(up_axis, front)
         level = math.cos(azimuth) * front + math.sin(azimuth) * side
         back = math.cos(elevation) * level + math.sin(elevation) * up_axis
         right = -math.sin(azimuth) * front + math.cos(azimuth) * side
@@ -74,7 +84,7 @@ class Camera:
         tangent = math.tan(math.radians(self.field_of_view) / 2)
         half = (tangent * width / height, tangent)
         x, y, z = (points @ axis for axis in (right, up, back))
-        distance, shift = 0.0, []
+        distance, shift = -math.inf, []
         for offset, share in ((x, half[0]), (y, half[1])):
             slope = share * (1 - 2 * self.margin)
             high, low = (slope * z + offset).max(), (slope * z - offset).max()

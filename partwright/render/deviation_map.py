@@ -10,7 +10,7 @@ from partwright.render.sheet import SOFT_INK, draw_text
 
 # Blue where the result is missing material, light grey where it fits, red where it has too much.
 _STOPS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-_COLOURS = np.array([(38, 84, 165), (125, 170, 222), (226, 226, 224), (240, 150, 110), (186, 42, 50)], dtype=float)
+_COLOURS = np.array([(38, 84, 165), (125, 170, 222), (226, 226, 224), (240, 150, 110), (186, 42, 50)])
 
 
 def deviation_colours(deviation: np.ndarray, limit: float) -> np.ndarray:
@@ -32,14 +32,14 @@ def add_legend(image: np.ndarray, limit: float, unit: str | None) -> np.ndarray:
     """The picture with a colour bar along its lower edge, labelled in the input's unit."""
     height, width = image.shape[:2]
     left, right = round(0.24 * width), round(0.76 * width)
-    y = height - 40
+    y = height - 30
     result = image.copy()
     result[y : y + 8, left:right] = deviation_colours(np.linspace(-limit, limit, right - left), limit)
     suffix = f" {unit}" if unit else ""
     labels = [
-        (left, y + 20, f"−{limit:g}{suffix}"),
-        ((left + right) / 2, y + 20, "0"),
-        (right, y + 20, f"+{limit:g}{suffix}"),
+        (left, y + 17, f"-{limit:g}{suffix}"),
+        ((left + right) / 2, y + 17, "0"),
+        (right, y + 17, f"+{limit:g}{suffix}"),
         (left - 34, y + 3, "missing"),
         (right + 36, y + 3, "too much"),
     ]

@@ -63,7 +63,8 @@ def turntable(
     for frame in range(frames):
         turned = replace(camera, azimuth=camera.azimuth + 360.0 * frame / frames)
         buffer = look(scene, turned, turned.fitted(swept, width, height), width, height)
-        pictures.append(Image.fromarray(buffer.image(colours[buffer.hits.face] if colours.ndim == 2 else colours)))
+        shown = colours[buffer.hits.face] if colours.ndim == 2 else colours
+        pictures.append(Image.fromarray(buffer.image(shown)))
     first, *rest = [picture.quantize(128, dither=Image.Dither.NONE) for picture in pictures]
     write(
         path,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,11 +45,13 @@ def preview(
     surface: the assembly's mesh in the input's units, if it is known already.
     """
     surface = mesh_assembly(assembly) if surface is None else surface
-    camera = camera or Camera(up=shape.up or "z")
+    camera = camera or Camera(up=shape.up or "z", margin=0.1)
     width, height = panel
     given, made = Scene(shape.vertices, shape.faces), Scene(surface.vertices, surface.faces)
     view = camera.fitted(np.concatenate([given.vertices, made.vertices]), width, height)
-    input_view, result_view = (look(scene, camera, view, width, height) for scene in (given, made))
+    with ThreadPoolExecutor(2) as pool:
+        views = pool.map(lambda scene: look(scene, camera, view, width, height), (given, made))
+        input_view, result_view = views
 
     nearest = assembly.part_distances(result_view.hits.point).argmin(axis=0)
     deviation = -assembly.distance(input_view.hits.point)

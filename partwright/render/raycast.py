@@ -30,15 +30,20 @@ class Scene:
         self._mesh = TriangleMesh(self._embree, np.ascontiguousarray(triangles, dtype=np.float32))
         self.corner_normals = corner_normals(self.vertices, self.faces)
         flat = face_normals(self.vertices, self.faces)
-        self.face_normals = (flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)).astype(np.float32)
+        length = np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
+        self.face_normals = (flat / length).astype(np.float32)
 
     def _local(self, points: np.ndarray) -> np.ndarray:
         return ((points - self._centre) * self._scale).astype(np.float32)
 
-    def first_hit(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Per ray: the face it meets first (-1 where none), the distance, and barycentric u, v (N, 2)."""
-        hit = self._embree.run(self._local(origins), np.ascontiguousarray(directions, dtype=np.float32), output=1)
-        return hit["primID"], hit["tfar"] / self._scale, np.stack([hit["u"], hit["v"]], axis=1)
+    def first_hit(
+        self, origins: np.ndarray, directions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Per ray: the face met first (-1 where none), the distance (inf where none), and u, v (N, 2)."""
+        directions = np.ascontiguousarray(directions, dtype=np.float32)
+        hit = self._embree.run(self._local(origins), directions, output=1)
+        distance = np.where(hit["primID"] != _MISS, hit["tfar"].astype(np.float64) / self._scale, np.inf)
+        return hit["primID"], distance, np.stack([hit["u"], hit["v"]], axis=1)
 
     def occluded(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(N,) bool: whether anything lies on the ray."""
@@ -62,9 +67,8 @@ class Hits:
     face: np.ndarray
 
 
-def cast(scene: Scene, view: View, width: int, height: int) -> Hits:
-    """One ray through the centre of each pixel."""
-    rays = view.rays(width, height)
+def cast(scene: Scene, view: View, rays: np.ndarray) -> Hits:
+    """What the rays (N, 3) from the view's eye, one a pixel, meet."""
     face, distance, weights = scene.first_hit(np.broadcast_to(view.eye, rays.shape), rays)
     pixel = np.flatnonzero(face != _MISS)
     face, rays = face[pixel], rays[pixel]
@@ -75,4 +79,4 @@ def cast(scene: Scene, view: View, width: int, height: int) -> Hits:
     # An open or inverted surface shows its back: shade that like a front.
     away = np.einsum("nd,nd->n", scene.face_normals[face], rays) > 0
     normal[away] *= -1
-    return Hits(pixel, view.eye + distance[pixel, None].astype(np.float64) * rays, normal, face)
+    return Hits(pixel, view.eye + distance[pixel, None] * rays, normal, face)

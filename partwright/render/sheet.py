@@ -36,7 +36,11 @@ def sheet(
         y = top + row * (height + above) + above
         page[y : y + height, column * width : (column + 1) * width] = image
     labels = [
-        (((number % columns) + 0.5) * width, top + (number // columns) * (height + above) + above / 2 + 1, text)
+        (
+            (number % columns + 0.5) * width,
+            top + (number // columns) * (height + above) + above / 2 + 1,
+            text,
+        )
         for number, text in enumerate(captions)
     ]
     page = draw_text(page, labels, size=15, colour=SOFT_INK)
@@ -56,7 +60,7 @@ def draw_text(
     draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(size=size)
     for x, y, text in labels:
         shown = text
-        while len(shown) > 1 and draw.textlength(shown, font=font) > image.shape[1] - 8:
-            shown = shown[:-2].rstrip("…") + "…"
+        while len(shown) > 4 and draw.textlength(shown, font=font) > image.shape[1] - 8:
+            shown = shown.removesuffix("...")[:-1] + "..."
         draw.text((x, y), shown, fill=colour, font=font, anchor="mm")
     return np.asarray(canvas)

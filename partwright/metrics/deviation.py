@@ -1,0 +1,50 @@
+"""How far apart two surfaces are, and where most."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+COUNT = 30_000
+_MIDDLE = 1 / 3  # of a half extent: nearer to the middle than this a direction is not named
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """maximum and quantile_95: lengths; worst_point: (3,) where the maximum is."""
+
+    maximum: float
+    quantile_95: float
+    worst_point: np.ndarray
+
+
+def deviation(
+    on_first: np.ndarray, to_second: np.ndarray, on_second: np.ndarray, to_first: np.ndarray
+) -> Deviation:
+    """Unsigned distances between two surfaces, over dense samples of both (a sampled Hausdorff distance).
+
+    The maximum is the larger of both directions', and so is the 95 % quantile.
+
+    on_first, on_second: (N, 3) and (M, 3) surface points; to_second, to_first: their distances across.
+    """
+    there, back = np.abs(to_second), np.abs(to_first)
+    points, distances = (on_first, there) if there.max() >= back.max() else (on_second, back)
+    worst = int(distances.argmax())
+    quantile = max(float(np.quantile(there, 0.95)), float(np.quantile(back, 0.95)))
+    return Deviation(float(distances[worst]), quantile, np.asarray(points[worst], dtype=np.float64))
+
+
+def place_name(unit_point: np.ndarray, unit_size: np.ndarray, up: str | None = None) -> str:
+    """A place in words, as seen from the front: "front upper left", "right", "middle".
+
+    unit_point: (3,) from the bounding box's centre; unit_size: (3,) its sides; up: the up axis, z if None.
+    """
+    from partwright.render.camera import picture_axes
+
+    words = (("right", "left"), ("upper", "lower"), ("front", "back"))
+    named = []
+    for axis, (positive, negative) in zip(picture_axes(up or "z"), words, strict=True):
+        share = float(unit_point @ axis) / max(float(unit_size @ np.abs(axis)) / 2, 1e-12)
+        named.append(positive if share > _MIDDLE else negative if share < -_MIDDLE else "")
+    return " ".join(word for word in reversed(named) if word) or "middle"

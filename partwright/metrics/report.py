@@ -1,0 +1,113 @@
+"""All measures of one result at once."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from partwright.meshing import mesh_assembly
+from partwright.metrics import bi_surface, chamfer, emd
+from partwright.metrics import deviation as deviations
+from partwright.metrics.frames import in_unit_frame
+from partwright.metrics.iou import RESOLUTION, iou
+from partwright.metrics.overlap import overlap
+from partwright.shapes.distance import MeshDistance
+from partwright.shapes.sampling import sample_triangles
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from partwright.assembly import Assembly
+    from partwright.shapes import Shape
+
+
+@dataclass(frozen=True)
+class Scores:
+    """How good an assembly is. All are numbers of the unit frame, except the deviations and the worst place,
+    which are in the input's own units and place."""
+
+    iou: float
+    bi_surface_iou: float
+    chamfer: float
+    chamfer_floor: float
+    emd: float | None
+    overlap: float
+    parts: int
+    max_deviation: float
+    deviation_95: float
+    worst_place: str
+    worst_point: tuple[float, float, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """For report.json."""
+        return asdict(self) | {"worst_point": list(self.worst_point)}
+
+
+def evaluate(
+    assembly: Assembly,
+    shape: Shape,
+    seed: int = 0,
+    emd: bool = True,
+    surface: trimesh.Trimesh | None = None,
+) -> Scores:
+    """Measure an assembly against the shape it stands for. docs/metrics.md defines each score.
+
+    seed: of the sampled points. emd: also match points, which may take a second (None where left out).
+    surface: `mesh_assembly(assembly)` in the input's units, if it is known already.
+
+    Raises NoSurfaceError where nothing is left of the assembly.
+    """
+    surface = mesh_assembly(assembly) if surface is None else surface
+    local = in_unit_frame(assembly, shape.frame)
+    vertices = shape.frame.to_unit(surface.vertices)
+    seeds = [int(s) for s in np.random.SeedSequence(seed).generate_state(5)]
+
+    def of_result(count: int, which: int) -> np.ndarray:
+        return sample_triangles(vertices, surface.faces, count, which)[0]
+
+    def of_shape(count: int, which: int) -> np.ndarray:
+        return shape.unit_surface(count, which).points
+
+    target, again = of_shape(chamfer.COUNT, seeds[0]), of_shape(chamfer.COUNT, seeds[1])
+    result = of_result(chamfer.COUNT, seeds[2])
+    apart = _deviation(shape, surface, vertices, result, target)
+    return Scores(
+        iou=iou(local.distance, shape.unit_occupancy(RESOLUTION)),
+        bi_surface_iou=bi_surface.bi_surface_iou(
+            local.distance,
+            shape.unit_distance,
+            of_result(bi_surface.COUNT, seeds[3]),
+            of_shape(bi_surface.COUNT, seeds[3]),
+            seeds[4],
+        ),
+        chamfer=chamfer.chamfer(result, target),
+        chamfer_floor=chamfer.chamfer(again, target),
+        emd=_emd(of_result, of_shape, seeds) if emd else None,
+        overlap=overlap(assembly),
+        parts=len(assembly),
+        max_deviation=float(shape.frame.length_from_unit(apart.maximum)),
+        deviation_95=float(shape.frame.length_from_unit(apart.quantile_95)),
+        worst_place=deviations.place_name(
+            apart.worst_point, shape.frame.length_to_unit(np.ptp(shape.vertices, axis=0)), shape.up
+        ),
+        worst_point=tuple(shape.frame.from_unit(apart.worst_point).tolist()),
+    )
+
+
+def _emd(of_result: Any, of_shape: Any, seeds: list[int]) -> float:
+    return emd.emd(of_result(emd.COUNT, seeds[3]), of_shape(emd.COUNT, seeds[4]))
+
+
+def _deviation(
+    shape: Shape, surface: trimesh.Trimesh, vertices: np.ndarray, result: np.ndarray, target: np.ndarray
+) -> deviations.Deviation:
+    """Between the input's surface and the assembly's mesh, unit frame; the input's corners count too."""
+    corners = shape.frame.to_unit(shape.vertices)
+    if len(corners) > deviations.COUNT:
+        corners = corners[:: -(-len(corners) // deviations.COUNT)]
+    on_shape = np.concatenate([target, corners])
+    faces = np.asarray(surface.faces)
+    to_result = MeshDistance(vertices, faces, faces, True).unsigned(on_shape)
+    return deviations.deviation(result, shape.unit_distance(result), on_shape, to_result)
