@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "evaluate.hpp"
+#include "morphology.hpp"
 #include "optimise.hpp"
 
 namespace nb = nanobind;
@@ -40,8 +41,8 @@ std::vector<T> copy(const In<T>& a) {
 
 std::vector<char> flags(const In<uint8_t>& a) { return std::vector<char>(a.data(), a.data() + a.size()); }
 
-Samples samples_of(const In<float>& points, const In<float>& target, const In<float>& weight, const In<float>& background) {
-  return {points.data(), target.data(), weight.data(), background.size() ? background.data() : nullptr,
+Samples samples_of(const In<float>& points, const In<float>& distance, const In<float>& weight, const In<float>& background) {
+  return {points.data(), distance.data(), weight.data(), background.size() ? background.data() : nullptr,
           int64_t(points.shape(0))};
 }
 
@@ -89,7 +90,7 @@ NB_MODULE(_kernel, m) {
     return out;
   });
 
-  m.def("normal_equations", [](In<float> rows, In<uint8_t> live, In<float> points, In<float> target, In<float> weight,
+  m.def("normal_equations", [](In<float> rows, In<uint8_t> live, In<float> points, In<float> distance, In<float> weight,
                                In<float> background, float beta, float overlap, float blending, int threads) {
     const size_t n = rows.shape(0) * DERIVATIVES;
     auto matrix = array<double>({n, n});
@@ -97,7 +98,7 @@ NB_MODULE(_kernel, m) {
     NormalEquations system;
     {
       nb::gil_scoped_release release;
-      system = normal_equations(parts_of(rows), flags(live), samples_of(points, target, weight, background), beta,
+      system = normal_equations(parts_of(rows), flags(live), samples_of(points, distance, weight, background), beta,
                                 {overlap, blending}, threads);
     }
     std::copy(system.gradient.begin(), system.gradient.end(), gradient.data());
@@ -110,20 +111,20 @@ NB_MODULE(_kernel, m) {
     return nb::make_tuple(system.loss, gradient, matrix);
   });
 
-  m.def("loss", [](In<float> rows, In<float> points, In<float> target, In<float> weight, In<float> background, float beta,
+  m.def("loss", [](In<float> rows, In<float> points, In<float> distance, In<float> weight, In<float> background, float beta,
                    float overlap, float blending, int threads) {
     nb::gil_scoped_release release;
-    return loss(parts_of(rows), samples_of(points, target, weight, background), beta, {overlap, blending}, threads);
+    return loss(parts_of(rows), samples_of(points, distance, weight, background), beta, {overlap, blending}, threads);
   });
 
-  m.def("levenberg_marquardt", [](In<float> rows, In<uint8_t> free, In<uint8_t> tied, In<float> points, In<float> target,
+  m.def("levenberg_marquardt", [](In<float> rows, In<uint8_t> free, In<uint8_t> tied, In<float> points, In<float> distance,
                                   In<float> weight, In<float> background, In<float> stages, float overlap, float blending,
                                   In<float> limits, int threads) {
     auto out = array<float>({rows.shape(0), size_t(COLUMNS)});
     Outcome outcome;
     {
       nb::gil_scoped_release release;
-      outcome = levenberg_marquardt(copy(rows), flags(free), flags(tied), samples_of(points, target, weight, background),
+      outcome = levenberg_marquardt(copy(rows), flags(free), flags(tied), samples_of(points, distance, weight, background),
                                     stages_of(stages), {overlap, blending}, limits_of(limits), threads);
     }
     std::copy(outcome.rows.begin(), outcome.rows.end(), out.data());
@@ -131,7 +132,7 @@ NB_MODULE(_kernel, m) {
   });
 
   m.def("fit_starts", [](In<float> starts, In<int64_t> first, In<int64_t> last, In<uint8_t> free, In<uint8_t> tied,
-                         In<float> points, In<float> target, In<float> weight, In<float> background, In<float> stages,
+                         In<float> points, In<float> distance, In<float> weight, In<float> background, In<float> stages,
                          float overlap, float blending, In<float> limits, int threads) {
     auto out = array<float>({starts.shape(0), size_t(COLUMNS)});
     auto losses = array<double>({starts.shape(0)});
@@ -139,7 +140,7 @@ NB_MODULE(_kernel, m) {
     {
       nb::gil_scoped_release release;
       outcomes = fit_starts(copy(starts), copy(first), copy(last), flags(free), flags(tied),
-                            samples_of(points, target, weight, background), stages_of(stages), {overlap, blending},
+                            samples_of(points, distance, weight, background), stages_of(stages), {overlap, blending},
                             limits_of(limits), threads);
     }
     for (size_t i = 0; i < outcomes.size(); ++i) {
@@ -147,5 +148,24 @@ NB_MODULE(_kernel, m) {
       losses.data()[i] = outcomes[i].loss;
     }
     return nb::make_tuple(out, losses);
+  });
+
+  m.def("removal_counts", [](In<float> rows, In<float> points, In<uint8_t> inside, In<float> weight, int threads) {
+    auto out = array<double>({rows.shape(0) + 1, 2});
+    const auto parts = parts_of(rows);
+    nb::gil_scoped_release release;
+    removal_counts(parts, points.data(), inside.data(), weight.data(), int64_t(points.shape(0)), out.data(), threads);
+    return out;
+  });
+
+  m.def("decompose", [](In<float> field, float spacing, int regions, double fraction, double least_depth, double least_voxels) {
+    const Grid grid{int(field.shape(0)), int(field.shape(1)), int(field.shape(2)), spacing};
+    auto labels = array<int32_t>({field.shape(0), field.shape(1), field.shape(2)});
+    std::vector<float> depths;
+    {
+      nb::gil_scoped_release release;
+      depths = decompose(copy(field), grid, {regions, fraction, least_depth, least_voxels}, labels.data());
+    }
+    return nb::make_tuple(labels, depths);
   });
 }

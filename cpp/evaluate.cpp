@@ -195,14 +195,13 @@ PW_CLONES double residuals(const float* __restrict target, const float* __restri
     const float sw = std::sqrt(weight[i]), o = assembled[i], slope = -beta * o * (1 - o);
     r.rec[i] = sw * (o - target[i]);
     r.rec_f[i] = sw * slope;
-    const float live = weight[i] > 0 ? 1.f : 0.f;
-    const float over = total[i] - 1;
-    r.over[i] = over > 0 ? so * over * live : 0.f;
-    r.over_o[i] = over > 0 ? so * live : 0.f;
-    const float excess = o - std::min(total[i], 1.f);
-    r.blended[i] = excess > 0 ? sb * excess * live : 0.f;
-    r.blended_f[i] = excess > 0 ? sb * slope * live : 0.f;
-    r.blended_o[i] = (excess > 0) & (total[i] < 1) ? -sb * live : 0.f;
+    const float over = total[i] - 1, wo = sw * so;
+    r.over[i] = over > 0 ? wo * over : 0.f;
+    r.over_o[i] = over > 0 ? wo : 0.f;
+    const float excess = o - std::min(total[i], 1.f), wb = sw * sb;
+    r.blended[i] = excess > 0 ? wb * excess : 0.f;
+    r.blended_f[i] = excess > 0 ? wb * slope : 0.f;
+    r.blended_o[i] = (excess > 0) & (total[i] < 1) ? -wb : 0.f;
     sums[i] = r.rec[i] * r.rec[i] + r.over[i] * r.over[i] + r.blended[i] * r.blended[i];
   }
   double sum = 0;
@@ -218,15 +217,16 @@ PW_CLONES void by_part(const float* __restrict f, const float* __restrict share,
 // Loads a block of samples and evaluates residuals; padding gets weight 0.
 double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t first, float beta, Penalties penalties,
                     Workspace& w, Residuals& r) {
-  alignas(64) float background[BLOCK], target[BLOCK], weight[BLOCK];
+  alignas(64) float background[BLOCK], distance[BLOCK], target[BLOCK], weight[BLOCK];
   const int n = load(s.points, first, s.count, w.block);
   for (int i = 0; i < BLOCK; ++i) {
     const int64_t j = first + (i < n ? i : 0);
-    target[i] = s.target[j];
+    distance[i] = s.distance[j];
     weight[i] = i < n ? s.weight[j] : 0.f;
     if (s.background) background[i] = s.background[j];
   }
   forward(parts, s.background ? background : nullptr, w);
+  occupancy(distance, beta, target);
   occupancy(w.field, beta, w.assembled);
   if (penalties.overlap > 0 || penalties.blending > 0) {
     if (s.background)
@@ -404,6 +404,73 @@ double loss(const std::vector<Part>& parts, const Samples& samples, float beta, 
   double total = 0;
   for (double sum : sums) total += sum;
   return total;
+}
+
+namespace {
+
+PW_CLONES void count(const float* __restrict field, const float* __restrict inside, const float* __restrict weight, float* __restrict both,
+                     float* __restrict either) {
+  for (int i = 0; i < BLOCK; ++i) {
+    const float in = field[i] < 0 ? 1.f : 0.f;
+    both[i] = weight[i] * in * inside[i];
+    either[i] = weight[i] * std::max(in, inside[i]);
+  }
+}
+
+double sum(const float* v) {
+  double total = 0;
+  for (int i = 0; i < BLOCK; ++i) total += v[i];
+  return total;
+}
+
+}  // namespace
+
+void removal_counts(const std::vector<Part>& parts, const float* points, const uint8_t* inside, const float* weight,
+                    int64_t total, double* out, int threads) {
+  const size_t m = parts.size(), size = 2 * (m + 1);
+  std::vector<double> sums(PIECES * size, 0.0);
+  parallel_for(PIECES, threads, [&](int64_t piece) {
+    Workspace w(m);
+    double* counts = &sums[size_t(piece) * size];
+    alignas(64) float in[BLOCK], weights[BLOCK], both[BLOCK], either[BLOCK], field[BLOCK], dropped[BLOCK];
+    const auto [first, last] = piece_range(total, piece);
+    for (int64_t b = first; b < last; ++b) {
+      const int n = load(points, b * BLOCK, total, w.block);
+      for (int i = 0; i < BLOCK; ++i) {
+        in[i] = i < n && inside[b * BLOCK + i] ? 1.f : 0.f;
+        weights[i] = i < n ? weight[b * BLOCK + i] : 0.f;
+      }
+      forward(parts, nullptr, w);
+      count(w.field, in, weights, both, either);
+      const double base_both = sum(both), base_either = sum(either);
+      std::fill_n(w.carried, BLOCK, 1.f);
+      backward(m, w);
+      for (size_t i = 0; i <= m; ++i) {
+        double now_both = base_both, now_either = base_either;
+        if (i < m && largest(&w.share[i * BLOCK]) > 0) {
+          bool empty = true;
+          for (size_t j = 0; j < m; ++j) {
+            if (j == i) continue;
+            if (empty)
+              std::memcpy(field, &w.g[j * BLOCK], sizeof field);
+            else
+              fold(field, &w.g[j * BLOCK], parts[j].blend, dropped);
+            empty = false;
+          }
+          if (empty) std::fill_n(field, BLOCK, 1.f);
+          count(field, in, weights, both, either);
+          now_both = sum(both);
+          now_either = sum(either);
+        }
+        counts[2 * i] += now_both;
+        counts[2 * i + 1] += now_either;
+      }
+    }
+  });
+  for (size_t i = 0; i < size; ++i) {
+    out[i] = 0;
+    for (int piece = 0; piece < PIECES; ++piece) out[i] += sums[size_t(piece) * size + i];
+  }
 }
 
 }  // namespace partwright

@@ -25,11 +25,11 @@ void evaluate_parts(const std::vector<Part>& parts, const float* points, int64_t
 void gradients(const std::vector<Part>& parts, const float* points, const float* upstream, int64_t count,
                double* out, int threads);
 
-// What a fit compares with: at each point a target occupancy, a weight, and (optionally) the field of parts
-// that stay as they are, which joins the fold first.
+// What a fit compares with: at each point the shape's signed distance, a weight, and (optionally) the field of
+// parts that stay as they are, which joins the fold first.
 struct Samples {
   const float* points;
-  const float* target;
+  const float* distance;
   const float* weight;
   const float* background;  // null when there is none
   int64_t count;
@@ -54,5 +54,10 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
                                  float beta, Penalties penalties, int threads);
 
 double loss(const std::vector<Part>& parts, const Samples& samples, float beta, Penalties penalties, int threads);
+
+// Weighted intersection and union with the occupancy `inside`, of the whole assembly (last entry) and of the
+// assembly without each part: (M + 1, 2). Only blocks that a part touches are folded again without it.
+void removal_counts(const std::vector<Part>& parts, const float* points, const uint8_t* inside, const float* weight,
+                    int64_t count, double* out, int threads);
 
 }  // namespace partwright

@@ -63,6 +63,9 @@ void move(float* row, const double* delta, const Limits& limits, bool tied) {
     entry = std::min(std::max(entry + float(d[i]), limits.lower[i]), limits.upper[i]);
   }
   if (tied) row[SY] = row[SX];
+  // An arc tighter than half the section's width folds through its own centre.
+  if (delta[D_BULGE] != 0 || delta[D_SX] != 0 || delta[D_SZ] != 0)
+    row[BULGE] = std::min(row[BULGE], std::asin(std::min(1.f, row[SZ] / std::max(row[SX], 1e-6f))) / HALF_PI);
 }
 
 std::vector<Part> prepared(const std::vector<float>& rows) {
@@ -176,7 +179,7 @@ std::vector<Outcome> fit_starts(const std::vector<float>& starts, const std::vec
   std::vector<Outcome> out(first.size());
   parallel_for(int64_t(first.size()), threads, [&](int64_t i) {
     const int64_t a = first[size_t(i)];
-    const Samples own{samples.points + 3 * a, samples.target + a, samples.weight + a,
+    const Samples own{samples.points + 3 * a, samples.distance + a, samples.weight + a,
                       samples.background ? samples.background + a : nullptr, last[size_t(i)] - a};
     const std::vector<float> row(&starts[size_t(i) * COLUMNS], &starts[size_t(i) * COLUMNS] + COLUMNS);
     const std::vector<char> mask(&free[size_t(i) * DERIVATIVES], &free[size_t(i) * DERIVATIVES] + DERIVATIVES);

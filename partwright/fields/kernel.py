@@ -63,34 +63,34 @@ def gradients(
 
 @dataclass(frozen=True)
 class Target:
-    """What a fit compares with: occupancy (N,) in [0, 1] and weight (N,) at points (N, 3).
+    """What a fit compares with: the shape's signed distance (N,) and a weight (N,) at points (N, 3).
 
     `background` (N,) is the distance of parts that stay as they are; it joins the fold first.
     """
 
     points: Floats
-    occupancy: Floats
+    distance: Floats
     weight: Floats
     background: Floats = field(default_factory=lambda: np.empty(0, np.float32))
 
     def __post_init__(self) -> None:
         count = len(_points(self.points))
-        for name in ("occupancy", "weight", "background"):
+        for name in ("distance", "weight", "background"):
             array = getattr(self, name)
             if array.shape != (count,) and not (name == "background" and array.size == 0):
                 raise ValueError(f"{name} must be ({count},), got {array.shape}")
 
     def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
-        points, occupancy, weight, background = (
+        points, distance, weight, background = (
             np.ascontiguousarray(a, dtype=np.float32)
-            for a in (self.points, self.occupancy, self.weight, self.background)
+            for a in (self.points, self.distance, self.weight, self.background)
         )
-        return points, occupancy, weight, background
+        return points, distance, weight, background
 
 
 @dataclass(frozen=True)
 class Penalties:
-    """Weights of the residuals beside the reconstruction: overlap and smooth-union consistency (eq. 8)."""
+    """Weights, relative to the reconstruction, of overlap and smooth-union consistency (eq. 8)."""
 
     overlap: float = 0.0
     blending: float = 0.0
@@ -113,8 +113,9 @@ def normal_equations(
 ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
     """Loss, gradient J^T r (15 M,) and Gauss-Newton matrix J^T J (15 M, 15 M) of the weighted residuals.
 
-    The residuals are sqrt(weight) * (sigmoid(-beta * F) - occupancy) and the two penalties; the loss is half
-    their sum of squares.
+    The residuals are sqrt(weight) * (sigmoid(-beta * F) - sigmoid(-beta * distance)) and the two penalties;
+    the loss is half their sum of squares. A soft target costs nothing where F equals the distance, which a
+    hard one does, and fits better.
     """
     rows = _rows(parameters)
     live = np.ones(len(rows), np.uint8)
@@ -177,3 +178,31 @@ def fit_starts(
         rows, first, last, free.astype(np.uint8), tied.astype(np.uint8), *target.arrays(),
         np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(), threads,
     )  # fmt: skip
+
+
+def removal_counts(
+    parameters: ArrayLike, points: ArrayLike, inside: NDArray[np.bool_], weight: ArrayLike, threads: int = 0
+) -> NDArray[np.float64]:
+    """Weighted intersection and union (M + 1, 2) with the occupancy `inside` (N,).
+
+    Row i < M is the assembly without part i, the last row the whole assembly.
+    """
+    return _kernel.removal_counts(
+        _rows(parameters), _points(points), np.ascontiguousarray(inside, np.uint8),
+        np.ascontiguousarray(weight, np.float32), threads,
+    )  # fmt: skip
+
+
+def decompose(
+    field: ArrayLike, spacing: float, regions: int, fraction: float, least_depth: float, least_voxels: float
+) -> tuple[NDArray[np.int32], list[float]]:
+    """Morphological decomposition (eq. 5-6) of {field < 0} on a grid (X, Y, Z) with voxels of size `spacing`.
+
+    Returns the region of each voxel (-1 outside all), thickest first, and each region's erosion depth.
+    `fraction` is kappa, of the volume that is left; regions shallower than `least_depth` (length) or smaller
+    than `least_voxels` end the decomposition.
+    """
+    grid = np.ascontiguousarray(field, np.float32)
+    if grid.ndim != 3:
+        raise ValueError(f"the field must be (X, Y, Z), got {grid.shape}")
+    return _kernel.decompose(grid, spacing, regions, fraction, least_depth, least_voxels)

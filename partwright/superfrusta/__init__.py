@@ -1,0 +1,8 @@
+"""Method 1: assemblies of SuperFrusta by Residual Primitive Fitting."""
+
+from __future__ import annotations
+
+from partwright.superfrusta.resfit import Fitted, Progress, fit
+from partwright.superfrusta.settings import Settings
+
+__all__ = ["Fitted", "Progress", "Settings", "fit"]

@@ -1,0 +1,88 @@
+"""What a fit sees of a shape: signed distances on a grid and at weighted sample points, in the unit frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.fields import kernel
+from partwright.shapes import Shape
+from partwright.shapes.grid import DistanceGrid
+from partwright.superfrusta.settings import Settings
+
+Rows = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Samples (the first `near` lie near the surface, the rest is uniform in the box) and the grid.
+
+    points (N, 3), distance (N,), weight (N,) = 1 + sigmoid(curvature) near the surface (eq. 7), 1 elsewhere.
+    """
+
+    points: NDArray[np.float32]
+    distance: NDArray[np.float32]
+    weight: NDArray[np.float32]
+    near: int
+    grid: DistanceGrid
+    threads: int
+
+    @classmethod
+    def of(cls, shape: Shape, settings: Settings) -> Evidence:
+        grid = shape.unit_grid(settings.resolution)
+        samples = shape.samples(settings.near, settings.uniform, settings.seed)
+        return cls(samples.points, samples.distance, samples.weight, samples.near, grid, settings.threads)
+
+    @cached_property
+    def inside(self) -> NDArray[np.bool_]:
+        return self.distance < 0
+
+    @cached_property
+    def grid_points(self) -> NDArray[np.float32]:
+        """(X * Y * Z, 3), in the order of grid.values.ravel()."""
+        return self.grid.points().astype(np.float32)
+
+    @cached_property
+    def voxel(self) -> NDArray[np.int64]:
+        """Index into grid.values.ravel() of the voxel that each sample lies in (or is nearest to)."""
+        shape = np.array(self.grid.values.shape)
+        cell = np.rint((self.points - self.grid.origin) / self.grid.spacing).astype(np.int64)
+        return np.ravel_multi_index(tuple(np.clip(cell, 0, shape - 1).T), tuple(shape))
+
+    @cached_property
+    def inside_voxels(self) -> int:
+        return int(np.count_nonzero(self.grid.values < 0))
+
+    @cached_property
+    def thickness(self) -> float:
+        """Typical depth of the solid: the 90 % quantile of the depths inside."""
+        inside = self.grid.values[self.grid.values < 0]
+        return float(-np.quantile(inside, 0.1)) if len(inside) else self.grid.spacing
+
+    @cached_property
+    def training(self) -> NDArray[np.int64]:
+        """The samples that optimisation runs on: every second one near the surface, every third elsewhere."""
+        return np.concatenate([np.arange(0, self.near, 2), np.arange(self.near, len(self.points), 3)])
+
+    def target(self, index: NDArray[np.int64], weight: NDArray[np.float32] | None = None) -> kernel.Target:
+        """Samples by index as the kernel takes them; weights are scaled to sum to 1."""
+        weight = self.weight[index] if weight is None else weight
+        return kernel.Target(
+            self.points[index], self.distance[index], weight / max(float(weight.sum()), 1e-9)
+        )
+
+    def field(self, rows: Rows) -> NDArray[np.float32]:
+        """Distance (N,) of the assembly at the samples; far outside where there are no parts yet."""
+        if len(rows) == 0:
+            return np.full(len(self.points), np.float32(10))
+        return kernel.evaluate(rows, self.points, self.threads)
+
+    def grid_field(self, rows: Rows) -> NDArray[np.float32]:
+        """Distance (X, Y, Z) of the assembly on the grid; far outside where there are no parts yet."""
+        shape = self.grid.values.shape
+        if len(rows) == 0:
+            return np.full(shape, np.float32(10))
+        return kernel.evaluate(rows, self.grid_points, self.threads).reshape(shape)

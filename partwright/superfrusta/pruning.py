@@ -1,0 +1,61 @@
+"""Fewer parts: removals that the objective rewards, alone or followed by a refit of the neighbours."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.fields import kernel
+from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta.objective import removal_scores, score
+from partwright.superfrusta.refining import TOUCH_UP, refine
+from partwright.superfrusta.settings import Settings
+
+_TOUCHING = 0.06  # unit lengths within which parts count as neighbours
+
+
+def prune(evidence: Evidence, rows: Rows, alpha: float, locked: int = 0) -> Rows:
+    """Removes parts one by one while the objective R - alpha * parts does not fall (section 3.4, Pruning)."""
+    while len(rows) > max(1, locked):
+        without, whole = removal_scores(evidence, rows)
+        without[:locked] = -np.inf
+        worst = int(without.argmax())
+        if without[worst] + alpha < whole:
+            break
+        rows = np.delete(rows, worst, axis=0)
+    return rows
+
+
+def cheapest_removal(
+    evidence: Evidence, rows: Rows, settings: Settings, locked: int = 0
+) -> tuple[Rows, float, float]:
+    """The assembly with one part less that keeps the most of R after its neighbours are refitted.
+
+    Returns it with its R, and the R of the assembly as given. The `settings.trials` most promising parts are tried.
+    """
+    without, whole = removal_scores(evidence, rows)
+    without[:locked] = -np.inf
+    best: tuple[Rows, float] | None = None
+    for index in np.argsort(-without, kind="stable")[: settings.trials]:
+        if not np.isfinite(without[index]):
+            continue
+        moving = neighbours(evidence, rows, int(index))
+        moving[:locked] = False
+        thinned = refine(
+            evidence, np.delete(rows, index, axis=0), TOUCH_UP, settings, np.delete(moving, index)
+        )
+        kept = score(evidence, thinned)
+        if best is None or kept > best[1]:
+            best = thinned, kept
+    if best is None:
+        return rows, whole, whole
+    return best[0], best[1], whole
+
+
+def neighbours(evidence: Evidence, rows: Rows, index: int) -> NDArray[np.bool_]:
+    """Parts (M,) that come near the given one, itself not counted."""
+    distance = kernel.evaluate_parts(rows, evidence.points[::8], evidence.threads)
+    around = np.abs(distance[index]) < _TOUCHING
+    near = (distance[:, around] < _TOUCHING).any(axis=1)
+    near[index] = False
+    return np.asarray(near)

@@ -1,0 +1,69 @@
+"""Optimisation of a whole assembly, or of some of its parts while the others stay."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.fields import kernel
+from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta.settings import Settings
+
+# A side shorter than this is thinner than any wall that the samples can see.
+_SHORTEST = 0.004
+LIMITS = kernel.Limits(
+    lower=(-2.0,) * 3 + (-9.0,) * 3 + (_SHORTEST,) * 3 + (0.0, 0.0, 0.0, 0.0, 0.0, 1e-3),
+    upper=(2.0,) * 3 + (9.0,) * 3 + (2.5,) * 3 + (1.0, 0.5, 2.0, 1.0, 1.0, 0.3),
+    step=(0.1,) * 3 + (0.3,) * 3 + (0.2,) * 3 + (0.3, 0.05, 0.3, 0.3, 0.3, 0.05),
+)
+START_BLEND = 0.02
+_BLEND = kernel.DERIVATIVES.index("blend")
+
+# Sharpness of the occupancy sigmoid and iterations, for solids of ordinary thickness.
+COARSE_TO_FINE = ((15.0, 10), (40.0, 10), (100.0, 8))
+FINE = ((40.0, 10), (100.0, 8))
+TOUCH_UP = ((40.0, 4), (100.0, 4))
+POLISH = ((40.0, 6), (100.0, 15))
+
+Stages = tuple[tuple[float, int], ...]
+
+
+def sharpened(stages: Stages, thickness: float) -> NDArray[np.float32]:
+    """Stages (S, 2) for a solid of the given depth: at beta * depth << 1 the sigmoid cannot see a thin wall."""
+    factor = float(np.clip(0.04 / max(thickness, 1e-6), 1.0, 4.0))
+    return np.array([(beta * factor, iterations) for beta, iterations in stages], dtype=np.float32)
+
+
+def penalties(settings: Settings) -> kernel.Penalties:
+    return kernel.Penalties(settings.overlap, settings.blending)
+
+
+def freedom(parts: NDArray[np.bool_], settings: Settings) -> NDArray[np.bool_]:
+    """Which parameters (M, 15) may move: all of the marked parts, less the blend where unions are plain."""
+    free = np.repeat(parts[:, None], len(kernel.DERIVATIVES), axis=1)
+    if not settings.smooth:
+        free[:, _BLEND] = False
+    return free
+
+
+def refine(
+    evidence: Evidence,
+    rows: Rows,
+    stages: Stages,
+    settings: Settings,
+    moving: NDArray[np.bool_] | None = None,
+) -> Rows:
+    """Minimises the reconstruction and quality losses (eq. 7-8) over the parts marked in `moving` (M,)."""
+    moving = np.ones(len(rows), bool) if moving is None else moving
+    if not moving.any():
+        return rows
+    refined, _, _ = kernel.levenberg_marquardt(
+        rows,
+        evidence.target(evidence.training),
+        sharpened(stages, evidence.thickness),
+        LIMITS,
+        free=freedom(moving, settings),
+        penalties=penalties(settings),
+        threads=settings.threads,
+    )
+    return refined

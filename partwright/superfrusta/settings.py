@@ -1,0 +1,106 @@
+"""Settings of a SuperFrusta fit. Defaults that differ from the paper say so and why."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+
+from partwright.errors import SettingError
+
+Quality = Literal["draft", "normal", "high"]
+Optimiser = Literal["newton", "adam"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a shape is fitted. Lengths are in the unit frame (longest side 1.8).
+
+    Residual Primitive Fitting (sections 3.1, 3.3, 3.4, 4):
+        rounds: at most so many rounds of growing (paper: 10).
+        regions: regions of the decomposition a round (paper: 7 iterations of MSD).
+        kappa: share of the remaining volume that a core must hold (eq. 5; the paper gives no value).
+        alpha: price of a part in the objective (eq. 2). The paper's 1e-3 leaves about a third more parts for
+            half a point of IoU.
+        optimiser: "newton", Levenberg-Marquardt on the occupancy residuals with analytic derivatives, or "adam",
+            the paper's three losses by gradient descent.
+        overlap, blending: weights of the quality terms of eq. 8 beside the reconstruction (paper: 1e-2 in a mean
+            that is not squared).
+        soft_target: compare with sigmoid(-beta * S) of the shape's own distance S instead of its 0/1 occupancy.
+
+    Ours:
+        cycles: times that the grown assembly is thinned out, refitted and grown again.
+        trials: removals that are tried with a refit before the cheapest is taken.
+        patience: rounds without progress before growing stops.
+        max_parts: at most so many parts (None: as many as pay for themselves).
+        min_iou: stop removing parts where the IoU would fall below, and keep removing above (None: by alpha).
+        near, uniform: sample points near the surface and in the box. resolution: grid of the decomposition.
+    """
+
+    rounds: int = 10
+    regions: int = 7
+    kappa: float = 0.02
+    alpha: float = 2e-3
+    optimiser: Optimiser = "newton"
+    overlap: float = 0.05
+    blending: float = 0.05
+    smooth: bool = True
+    cycles: int = 2
+    trials: int = 3
+    patience: int = 2
+    max_parts: int | None = None
+    min_iou: float | None = None
+    near: int = 30_000
+    uniform: int = 30_000
+    resolution: int = 96
+    seed: int = 0
+    threads: int = 0
+    device: str = "cpu"
+
+    def __post_init__(self) -> None:
+        for name in ("rounds", "regions", "trials", "patience", "near", "uniform"):
+            _check(name, getattr(self, name), low=1)
+        _check("cycles", self.cycles, low=0)
+        _check("resolution", self.resolution, low=24, high=512)
+        _check("kappa", self.kappa, low=1e-4, high=1.0)
+        for name in ("alpha", "overlap", "blending"):
+            _check(name, getattr(self, name), low=0.0)
+        if self.max_parts is not None:
+            _check("max_parts", self.max_parts, low=1)
+        if self.min_iou is not None:
+            _check("min_iou", self.min_iou, low=0.0, high=1.0)
+        _check("seed", self.seed, low=0)
+        _check("threads", self.threads, low=0)
+        if self.optimiser not in ("newton", "adam"):
+            raise SettingError(f'optimiser: expected "newton" or "adam", got {self.optimiser!r}')
+
+    @classmethod
+    def for_quality(cls, quality: Quality = "normal", **changes: Any) -> Settings:
+        """The preset `draft`, `normal` or `high`, with `changes` on top.
+
+        Raises:
+            SettingError: the preset or a change is unknown or out of range.
+        """
+        if quality not in PRESETS:
+            raise SettingError(f"quality: expected one of {', '.join(PRESETS)}, got {quality!r}")
+        unknown = set(changes) - set(cls.__dataclass_fields__)
+        if unknown:
+            raise SettingError(f"unknown settings: {', '.join(sorted(unknown))}")
+        return replace(PRESETS[quality], **changes)
+
+    def as_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def _check(name: str, value: float, low: float, high: float = math.inf) -> None:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not number or not low <= value <= high:
+        upper = f" and at most {high:g}" if math.isfinite(high) else ""
+        raise SettingError(f"{name}: expected a number of at least {low:g}{upper}, got {value!r}")
+
+
+PRESETS: dict[str, Settings] = {
+    "draft": Settings(rounds=2, cycles=1, trials=1, near=12_000, uniform=12_000, resolution=72),
+    "normal": Settings(),
+    "high": Settings(cycles=5, trials=6, patience=3, near=60_000, uniform=60_000, resolution=128),
+}
