@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from partwright.errors import EmptyShapeError, FlatShapeError
+from partwright.errors import EmptyShapeError, FlatShapeError, NotFiniteError
 
 LONGEST_SIDE = 1.8
 
@@ -23,13 +23,18 @@ class UnitFrame:
     def of(cls, points: ArrayLike) -> UnitFrame:
         """Frame of the bounding box of finite points (N, 3).
 
-        Raises EmptyShapeError without points and FlatShapeError when all of them coincide.
+        Raises EmptyShapeError without points, FlatShapeError when all of them coincide, NotFiniteError.
         """
         array = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         if len(array) == 0:
             raise EmptyShapeError("no points: the unit frame needs at least two that differ")
         lower, upper = array.min(axis=0), array.max(axis=0)
-        longest = float((upper - lower).max())
+        with np.errstate(over="ignore"):
+            longest = float((upper - lower).max())
+        if not np.isfinite(longest):
+            raise NotFiniteError(
+                "coordinates are NaN, infinite, or too large to subtract; scale the shape down"
+            )
         if longest < np.finfo(np.float64).tiny:
             raise FlatShapeError("all vertices lie at one point; a shape with volume was expected")
         x, y, z = (0.5 * lower + 0.5 * upper).tolist()

@@ -66,10 +66,12 @@ def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Surface:
     vertices, faces = weld_boundary(vertices, faces, notes)
     faces = orient(vertices, faces, notes)
     confidence = 1.0
-    if EdgeTable(faces).balance.any():
+    is_open = EdgeTable(faces).balance.any()
+    if is_open:
         confidence = _confidence_of_open(vertices, faces)
         vertices, faces = fill_holes(vertices, faces, notes)
-    if EdgeTable(faces).balance.any():
+        is_open = EdgeTable(faces).balance.any()
+    if is_open:
         notes.append(
             "the surface stays open; inside and outside are told apart by the generalised winding number"
         )
@@ -99,6 +101,8 @@ def _surface_of_closed(
     winding = winding_grid(vertices, faces, lower + spacing / 2, spacing, (shape[0], shape[1], shape[2]))
     enclosed = winding[winding != 0]
     odd = float((enclosed != 1).mean()) if enclosed.size else 0.0
+    if odd == 0.0 and EdgeTable(faces).valence.max() > 2:  # bodies that share an edge may share a wall too
+        return _surface_of_sheets(vertices, faces, notes, confidence, closed=True, simple=True)
     if odd == 0.0:
         return Surface(vertices, faces, faces, True, True, tuple(notes), confidence)
     notes.append(
@@ -109,7 +113,12 @@ def _surface_of_closed(
 
 
 def _surface_of_sheets(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str], confidence: float, closed: bool
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    notes: list[str],
+    confidence: float,
+    closed: bool,
+    simple: bool = False,
 ) -> Surface:
     """Keep only triangles with the inside on one side and the outside on the other as the surface."""
     source = MeshDistance(vertices, faces, faces, closed)
@@ -124,7 +133,7 @@ def _surface_of_sheets(
             f"{np.count_nonzero(~outer)} triangles lie within the shape and are no part of its surface"
         )
     outward = np.where(facing[outer, None] > 0, faces[outer], faces[outer, ::-1])
-    return Surface(vertices, outward, faces, closed, False, tuple(notes), confidence)
+    return Surface(vertices, outward, faces, closed, simple, tuple(notes), confidence)
 
 
 def _facing(source: MeshDistance, corners: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -74,8 +74,8 @@ class Shape:
         finite = np.isfinite(corners).all(axis=1)
         if not finite.all():
             raise NotFiniteError(
-                f"{name}: {np.count_nonzero(~finite)} of {len(used)} vertices have a NaN or infinite coordinate; "
-                "all coordinates must be finite. Export the shape again"
+                f"{name}: {np.count_nonzero(~finite)} of {len(used)} vertices have a NaN or infinite "
+                "coordinate; all coordinates must be finite. Export the shape again"
             )
         self.frame = _named(name, lambda: UnitFrame.of(corners))
         self._surface = _named(name, lambda: repair(self.frame.to_unit(corners), compact.reshape(-1, 3)))

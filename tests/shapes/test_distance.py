@@ -1,0 +1,136 @@
+"""Signed distances, grids and occupancies against exact boxes and spheres."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from solids import box, box_distance, inverted, sphere, together
+
+from partwright.errors import NotFiniteError, SettingError
+from partwright.shapes import UnitFrame, load_shape
+from partwright.shapes.winding import winding_grid
+
+HALF = np.array([0.9, 0.6, 0.3])
+
+
+@pytest.fixture(scope="module")
+def brick():
+    return load_shape(box(2 * HALF * 10, (5, -7, 100)))
+
+
+def test_unit_distance_of_a_box_is_exact(brick):
+    points = np.random.default_rng(0).uniform(-1, 1, (5000, 3)).astype(np.float32)
+    np.testing.assert_allclose(brick.unit_distance(points), box_distance(points, HALF), atol=1e-6)
+    assert brick.unit_distance(points).dtype == np.float32
+    few = brick.unit_distance(points[:50])  # the path without the lattice of signs
+    np.testing.assert_array_equal(few, brick.unit_distance(points)[:50])
+
+
+def test_signed_distance_is_in_own_units(brick):
+    points = np.array([[5, -7, 100], [5, -7, 110], [20, -7, 100]], dtype=float)
+    np.testing.assert_allclose(brick.signed_distance(points), [-3, 7, 6], rtol=1e-5)
+
+
+def test_distance_agrees_with_libigl_in_value_and_sign():
+    rng = np.random.default_rng(1)
+    mesh = sphere(subdivisions=3)
+    bumpy = trimesh.Trimesh(mesh.vertices * rng.uniform(0.7, 1.0, (len(mesh.vertices), 1)), mesh.faces)
+    shape = load_shape(bumpy)
+    points = shape.samples(4000, 4000, seed=2).points.astype(np.float64)
+    vertices = shape.frame.to_unit(shape.vertices)
+    kind = (
+        igl.SIGNED_DISTANCE_TYPE_PSEUDONORMAL if hasattr(igl, "SIGNED_DISTANCE_TYPE_PSEUDONORMAL") else None
+    )
+    exact = igl.signed_distance(points, vertices, shape.faces, sign_type=kind)[0]
+    np.testing.assert_allclose(shape.unit_distance(points), exact, atol=1e-6)
+
+
+def test_bad_points_are_named(brick):
+    with pytest.raises(NotFiniteError):
+        brick.unit_distance(np.array([[0, np.nan, 0]]))
+    with pytest.raises(SettingError):
+        brick.unit_distance(np.zeros(3))
+    assert brick.unit_distance(np.zeros((0, 3))).shape == (0,)
+
+
+def test_grid_is_exact_in_the_band_and_close_beyond(brick):
+    grid = brick.unit_grid(64)
+    assert grid.spacing == pytest.approx(1.8 / 60)
+    assert grid.values.shape[0] == 64
+    exact = box_distance(grid.points(), HALF).reshape(grid.values.shape)
+    band = np.abs(exact) < 2.5 * grid.spacing
+    np.testing.assert_allclose(grid.values[band], exact[band], atol=1e-6)
+    error = (np.abs(grid.values) - np.abs(exact)) / grid.spacing
+    assert error.min() > -1e-3
+    assert error.max() < 0.8
+    assert error.mean() < 0.1
+    np.testing.assert_array_equal(grid.values < 0, exact < 0)
+
+
+def test_grid_covers_the_box_and_is_cached(brick):
+    grid = brick.unit_grid(32)
+    top = grid.origin + grid.spacing * (np.array(grid.values.shape) - 1)
+    assert (grid.origin < -HALF - grid.spacing).all()
+    assert (top > HALF + grid.spacing).all()
+    assert brick.unit_grid(32) is grid
+    with pytest.raises(ValueError, match="read-only"):
+        grid.values[0] = 0
+    with pytest.raises(SettingError):
+        brick.unit_grid(2)
+
+
+def test_grid_error_falls_as_the_grid_is_refined():
+    shape = load_shape(sphere())
+    errors = []
+    for resolution in (24, 48, 96):
+        grid = shape.unit_grid(resolution)
+        errors.append(
+            np.abs(
+                grid.values - (np.linalg.norm(grid.points(), axis=1) - 0.9).reshape(grid.values.shape)
+            ).max()
+        )
+    assert errors[0] > 1.5 * errors[1] > 2 * errors[2]
+
+
+def test_occupancy_is_the_sign_at_the_cell_centres():
+    shape = load_shape(together(sphere(), inverted(sphere(0.5)), sphere(0.2, 2)))
+    occupied = shape.unit_occupancy(64)
+    centres = -1 + (np.argwhere(np.ones((64,) * 3)) + 0.5) / 32
+    assert occupied.shape == (64, 64, 64)
+    np.testing.assert_array_equal(occupied.ravel(), shape.unit_distance(centres) < 0)
+    assert shape.unit_occupancy(64) is occupied
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_scan_conversion_is_an_exact_winding_number(seed):
+    rng = np.random.default_rng(seed)
+    # Closed, wildly self-intersecting, with vertices exactly on grid lines.
+    mesh = sphere(subdivisions=1)
+    vertices = np.round(rng.uniform(-1, 1, (len(mesh.vertices), 3)) * 8) / 8
+    counted = winding_grid(vertices, np.asarray(mesh.faces), (-1.03, -1, -0.97), 0.125, (17, 18, 16))
+    points = np.array([-1.03, -1, -0.97]) + 0.125 * np.argwhere(np.ones(counted.shape))
+    exact = igl.winding_number(vertices, np.asarray(mesh.faces, dtype=np.int64), points)
+    clear = np.abs(exact - np.round(exact)) < 1e-6
+    on_grid_line = np.isclose(points[:, 1] * 8, np.round(points[:, 1] * 8))
+    assert clear[~on_grid_line].size == 0 or (counted.ravel()[clear] == np.round(exact[clear])).mean() > 0.999
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    centre=st.tuples(*[st.floats(-1e3, 1e3)] * 3),
+    size=st.floats(1e-6, 1e6),
+    seed=st.integers(0, 1000),
+)
+def test_unit_frame_round_trip(centre, size, seed):
+    points = np.array(centre) + size * np.random.default_rng(seed).uniform(-1, 1, (20, 3))
+    frame = UnitFrame.of(points)
+    unit = frame.to_unit(points)
+    assert np.ptp(unit, axis=0).max() == pytest.approx(1.8)
+    scale = np.abs(points).max()
+    np.testing.assert_allclose(frame.from_unit(unit), points, rtol=1e-12, atol=1e-12 * scale)
+    np.testing.assert_allclose(frame.length_from_unit(frame.length_to_unit(size)), size, rtol=1e-12)
