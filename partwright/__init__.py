@@ -5,6 +5,9 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
+# Not lazy: the function has the name of the package it lives in, and whichever is bound last stays.
+from partwright.export import export
+
 __version__ = "0.1.0"
 
 # Public name -> module that defines it. Imported on first use, so that `import partwright` stays cheap.
@@ -16,11 +19,10 @@ _PUBLIC = {
     "Assembly": "partwright.assembly",
     "load_assembly": "partwright.assembly",
     "evaluate": "partwright.metrics",
-    "export": "partwright.export",
 }
 _MODULES = ("fields", "shapes", "assembly", "meshing", "render", "metrics", "errors", "datasets")
 
-__all__ = ["__version__", *_PUBLIC, *_MODULES]
+__all__ = ["__version__", "export", *_PUBLIC, *_MODULES]
 
 
 def __getattr__(name: str) -> Any:
