@@ -2,8 +2,9 @@
 
 A *parameter row* holds one part: translation (3), rotation quaternion w, x, y, z (local to world), size (3),
 roundness, dilation, taper, bulge, onion, and the blend with which it joins the fold (unused in the first row).
-Derivatives are ordered: translation (3), a local rotation vector w with R <- R exp(w) (3), size (3), roundness,
-dilation, taper, bulge, onion, blend. `partwright.fields.reference` is the slow form that tests compare with.
+Derivatives are ordered: translation (3), a local rotation vector w with R <- R exp(w) (3), size (3),
+roundness, dilation, taper, bulge, onion, blend. `partwright.fields.reference` is the slow form that tests
+compare with.
 
 `threads=0` means one thread per core. Results do not depend on the number of threads.
 """
@@ -153,7 +154,8 @@ def levenberg_marquardt(
     tied = np.zeros(len(rows), bool) if tied is None else tied
     return _kernel.levenberg_marquardt(
         rows, free.astype(np.uint8), tied.astype(np.uint8), *target.arrays(),
-        np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(), threads,
+        np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(),
+        threads,
     )  # fmt: skip
 
 
@@ -169,14 +171,15 @@ def fit_starts(
     penalties: Penalties = Penalties(),
     threads: int = 0,
 ) -> tuple[Rows, NDArray[np.float64]]:
-    """One single-part fit per start (B, 16), each on the samples `ranges[b, 0]:ranges[b, 1]`; rows and losses."""
+    """One single-part fit per start (B, 16), on the samples `ranges[b, 0]:ranges[b, 1]`; rows and losses."""
     rows = _rows(starts)
     free = np.ones((len(rows), len(DERIVATIVES)), bool) if free is None else free
     tied = np.zeros(len(rows), bool) if tied is None else tied
     first, last = (np.ascontiguousarray(column, np.int64) for column in np.asarray(ranges).T)
     return _kernel.fit_starts(
         rows, first, last, free.astype(np.uint8), tied.astype(np.uint8), *target.arrays(),
-        np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(), threads,
+        np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(),
+        threads,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""One round of growth: what the assembly leaves unexplained is decomposed, and parts are fitted to the pieces."""
+"""One round of growth: the unexplained residual is decomposed, and parts are fitted to the pieces."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy import ndimage
 from partwright.fields import kernel
 from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.objective import occupancy_score
-from partwright.superfrusta.refining import LIMITS, freedom, penalties, sharpened
+from partwright.superfrusta.refining import LIMITS, Stages, freedom, sharpened
 from partwright.superfrusta.seeding import starts
 from partwright.superfrusta.settings import Settings
 
@@ -24,13 +24,15 @@ _KEPT = 4  # starts that survive screening
 _SCREEN = ((15.0, 5),)
 _FIT = ((15.0, 4), (40.0, 10))
 
+SampleSet = tuple[NDArray[np.int64], NDArray[np.float32]]
+
 
 @dataclass(frozen=True)
 class Region:
     """Voxels (X * Y * Z,) to explain, their depth, and how the fit looks at what surrounds them.
 
     `margin`: how far around the region samples count, as a share of its longest side. `elsewhere`: weight of
-    unexplained inside samples outside the region. Explained ones weigh nothing: a part may run into them freely.
+    unexplained inside samples outside the region. Explained ones weigh nothing: a part may run into them.
     """
 
     voxels: NDArray[np.bool_]
@@ -40,7 +42,7 @@ class Region:
 
 
 def regions(evidence: Evidence, rows: Rows, settings: Settings) -> list[Region]:
-    """Morphological decomposition of the residual max(S, -F), and its largest connected pieces as they are."""
+    """Morphological decomposition of the residual max(S, -F), and its largest connected pieces whole."""
     grid = evidence.grid
     residual = np.maximum(grid.values, -evidence.grid_field(rows))
     least_depth, least = _LEAST_DEPTH * grid.spacing, _LEAST_VOLUME * evidence.inside_voxels
@@ -72,9 +74,7 @@ def grow(evidence: Evidence, rows: Rows, settings: Settings, most: int) -> Rows:
     )
 
 
-def _samples(
-    evidence: Evidence, field: NDArray[np.float32], region: Region
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+def _samples(evidence: Evidence, field: NDArray[np.float32], region: Region) -> SampleSet:
     """Sample indices around the region and their weights."""
     voxels = evidence.grid_points[region.voxels]
     low, high = voxels.min(axis=0), voxels.max(axis=0)
@@ -93,7 +93,6 @@ def _fit_regions(
 ) -> Rows:
     """The best part for each region: all starts are screened briefly on few samples, the best go on."""
     sets = [_samples(evidence, field, region) for region in wanted]
-    sets, wanted = zip(*((s, r) for s, r in zip(sets, wanted, strict=True) if s[1].any()), strict=True)
     guesses = [starts(evidence.grid_points[region.voxels], evidence.grid.spacing) for region in wanted]
     owner = np.repeat(np.arange(len(wanted)), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))
@@ -112,7 +111,17 @@ def _best(
     return mine[np.argsort(losses[mine], kind="stable")[:count]]
 
 
-def _run(evidence, rows, owner, sets, every, stages, depth, settings):  # type: ignore[no-untyped-def]
+def _run(
+    evidence: Evidence,
+    rows: Rows,
+    owner: NDArray[np.int64],
+    sets: list[SampleSet],
+    every: int,
+    stages: Stages,
+    depth: float,
+    settings: Settings,
+) -> tuple[Rows, NDArray[np.float64]]:
+    """Single-part fits of all rows, each to every n-th sample of the set that `owner` names."""
     index = [s[0][::every] for s in sets]
     weight = [s[1][::every] for s in sets]
     ends = np.cumsum([len(i) for i in index])

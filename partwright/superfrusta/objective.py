@@ -12,13 +12,13 @@ from partwright.superfrusta.evidence import Evidence, Rows
 def occupancy_score(evidence: Evidence, occupied: NDArray[np.bool_]) -> NDArray[np.float64]:
     """R of occupancies (..., N) at the samples.
 
-    R is the mean of two IoUs with the shape's occupancy: over the near-surface samples, each counted with its
-    weight 1 + sigmoid(curvature), and over the uniform samples of the bounding box. The paper's R is the first
-    alone; the second keeps deep, smooth volume from being given away.
+    R is the mean of two IoUs with the shape's occupancy: over the near-surface samples, each counted with
+    its weight 1 + sigmoid(curvature), and over the uniform samples of the bounding box. The paper's R is the
+    first alone; the second keeps deep, smooth volume from being given away.
     """
-    both = (occupied & evidence.inside) * evidence.weight
-    either = (occupied | evidence.inside) * evidence.weight
-    near = evidence.near
+    weight, near = evidence.weight.astype(np.float64), evidence.near
+    both = (occupied & evidence.inside) * weight
+    either = (occupied | evidence.inside) * weight
     surface = both[..., :near].sum(-1) / np.maximum(either[..., :near].sum(-1), 1e-9)
     volume = both[..., near:].sum(-1) / np.maximum(either[..., near:].sum(-1), 1e-9)
     return np.asarray(0.5 * (surface + volume), dtype=np.float64)
@@ -33,16 +33,16 @@ def volume_iou(evidence: Evidence, rows: Rows) -> float:
     """IoU over the uniform samples alone: an estimate of the grid IoU."""
     occupied = evidence.field(rows)[evidence.near :] < 0
     inside = evidence.inside[evidence.near :]
-    return float(np.count_nonzero(occupied & inside) / max(np.count_nonzero(occupied | inside), 1))
+    return float(np.count_nonzero(occupied & inside)) / max(int(np.count_nonzero(occupied | inside)), 1)
 
 
 def removal_scores(evidence: Evidence, rows: Rows) -> tuple[NDArray[np.float64], float]:
     """R (M,) of the assembly without each part, and R of the whole, from one pass over the samples."""
-    ratios = []
+    ratios: list[NDArray[np.float64]] = []
     for part in (slice(None, evidence.near), slice(evidence.near, None)):
         counts = kernel.removal_counts(
             rows, evidence.points[part], evidence.inside[part], evidence.weight[part], evidence.threads
         )
-        ratios.append(counts[:, 0] / np.maximum(counts[:, 1], 1e-9))
+        ratios.append(np.asarray(counts[:, 0] / np.maximum(counts[:, 1], 1e-9)))
     scores = 0.5 * (ratios[0] + ratios[1])
     return scores[:-1], float(scores[-1])

@@ -31,7 +31,7 @@ def cheapest_removal(
 ) -> tuple[Rows, float, float]:
     """The assembly with one part less that keeps the most of R after its neighbours are refitted.
 
-    Returns it with its R, and the R of the assembly as given. The `settings.trials` most promising parts are tried.
+    Returns it with its R, and the R of the assembly as given. `settings.trials` promising parts are tried.
     """
     without, whole = removal_scores(evidence, rows)
     without[:locked] = -np.inf
@@ -56,6 +56,6 @@ def neighbours(evidence: Evidence, rows: Rows, index: int) -> NDArray[np.bool_]:
     """Parts (M,) that come near the given one, itself not counted."""
     distance = kernel.evaluate_parts(rows, evidence.points[::8], evidence.threads)
     around = np.abs(distance[index]) < _TOUCHING
-    near = (distance[:, around] < _TOUCHING).any(axis=1)
+    near: NDArray[np.bool_] = np.asarray((distance[:, around] < _TOUCHING).any(axis=1))
     near[index] = False
-    return np.asarray(near)
+    return near

@@ -29,7 +29,7 @@ Stages = tuple[tuple[float, int], ...]
 
 
 def sharpened(stages: Stages, thickness: float) -> NDArray[np.float32]:
-    """Stages (S, 2) for a solid of the given depth: at beta * depth << 1 the sigmoid cannot see a thin wall."""
+    """Stages (S, 2) for a solid of the given depth: at beta * depth << 1 the sigmoid sees no thin wall."""
     factor = float(np.clip(0.04 / max(thickness, 1e-6), 1.0, 4.0))
     return np.array([(beta * factor, iterations) for beta, iterations in stages], dtype=np.float32)
 

@@ -1,7 +1,7 @@
 """Residual Primitive Fitting (SuperFrusta, section 3.1): grow into the residual, optimise, prune, repeat.
 
-After growing, the assembly is thinned out with refits and grown again: at the same number of parts that explains
-more than stopping early.
+After growing, the assembly is thinned out with refits and grown again: at the same number of parts that
+explains more than stopping early.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ def fit(
         outcome = "interrupted"
     if run.best is None:
         raise EmptyShapeError(
-            f"{shape.name}: no part could be placed; the shape has no volume that {settings.near} samples can "
-            "see. Check its thickness, or use --quality high"
+            f"{shape.name}: no part could be placed; the shape has no volume that {settings.near} samples "
+            "can see. Check its thickness, or use --quality high"
         )
     parts = parts_from_rows(run.best)
     unit = Assembly(parts, unit=shape.unit)

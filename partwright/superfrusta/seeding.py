@@ -1,4 +1,4 @@
-"""Starting parts for a region of volume: principal axes, and several guesses of what it may be (section 3.3)."""
+"""Starting parts for a region of volume: principal axes, and guesses of what it may be (section 3.3)."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _TRIM = 3.0  # percent at either end of an extent that do not count
 def starts(points: NDArray[np.float32], spacing: float) -> Rows:
     """Starting rows (K, 16) for a region given by its voxel centres (n, 3).
 
-    Straight ones along each principal and each frame axis, boxy and round; hollow ones along each principal axis;
-    bent ones along the longest, bulging to four sides. Optimisation from all of them decides, where the paper
-    chooses one axis by its cylindricity: one start fails on bent and hollow regions.
+    Straight ones along each principal and each frame axis, boxy and round; hollow ones along each principal
+    axis; bent ones along the longest, bulging to four sides. Optimisation from all of them decides, where the
+    paper chooses one axis by its cylindricity: one start fails on bent and hollow regions.
     """
     points = points[:: max(1, len(points) // _ENOUGH)].astype(np.float64)
     centre = points.mean(axis=0)

@@ -22,11 +22,11 @@ class Settings:
         kappa: share of the remaining volume that a core must hold (eq. 5; the paper gives no value).
         alpha: price of a part in the objective (eq. 2). The paper's 1e-3 leaves about a third more parts for
             half a point of IoU.
-        optimiser: "newton", Levenberg-Marquardt on the occupancy residuals with analytic derivatives, or "adam",
-            the paper's three losses by gradient descent.
-        overlap, blending: weights of the quality terms of eq. 8 beside the reconstruction (paper: 1e-2 in a mean
-            that is not squared).
-        soft_target: compare with sigmoid(-beta * S) of the shape's own distance S instead of its 0/1 occupancy.
+        optimiser: "newton", Levenberg-Marquardt on the occupancy residuals with analytic derivatives, or
+            "adam", the paper's three losses by gradient descent.
+        overlap, blending: weights of the quality terms of eq. 8 beside the reconstruction (paper: 1e-2 in a
+            mean that is not squared).
+        smooth: parts blend into each other (eq. 4); otherwise unions are plain.
 
     Ours:
         cycles: times that the grown assembly is thinned out, refitted and grown again.
