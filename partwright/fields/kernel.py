@@ -1,7 +1,8 @@
 """The C++ kernel's face: SuperFrusta over many points, their derivatives, and least-squares fits of them.
 
-A *parameter row* holds one part: translation (3), rotation quaternion w, x, y, z (local to world), size (3),
-roundness, dilation, taper, bulge, onion, and the blend with which it joins the fold (unused in the first row).
+A *parameter row* holds one part: translation (3), rotation quaternion w, x, y, z (local to world), size
+(3), roundness, dilation, taper, bulge, onion, and the blend with which it joins the fold (unused in the first
+row).
 Derivatives are ordered: translation (3), a local rotation vector w with R <- R exp(w) (3), size (3),
 roundness, dilation, taper, bulge, onion, blend. `partwright.fields.reference` is the slow form that tests
 compare with.
