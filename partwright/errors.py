@@ -63,3 +63,7 @@ class OutputError(PartwrightError):
 
 class NoSurfaceError(PartwrightError):
     """A field has no zero level inside the box, or one that never closes."""
+
+
+class OpenShellError(PartwrightError):
+    """The surface is an open shell whose openings leave inside and outside undecided."""

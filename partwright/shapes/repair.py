@@ -18,7 +18,7 @@ from partwright.shapes.distance import MeshDistance
 from partwright.shapes.holes import fill_holes
 from partwright.shapes.orientation import orient
 from partwright.shapes.sampling import sample_triangles
-from partwright.shapes.topology import EdgeTable, signed_volumes
+from partwright.shapes.topology import EdgeTable, components, signed_volumes
 from partwright.shapes.winding import winding_grid
 
 _FLAT = 1e-6  # thickness under which the vertices count as one plane
@@ -27,6 +27,7 @@ _LEAST_CONFIDENCE = 0.5
 _SIDE_STEP = 2e-5  # how far off a triangle its two sides are looked at
 _CLEAR = 0.2  # a winding number this near to 0 or 1 is clear
 _CHECK = 64  # cells along a side in the search for overlaps
+_PROBES = 8  # triangles of a patch that are looked at to see whether it is a wall
 
 
 @dataclass(frozen=True)
@@ -101,9 +102,8 @@ def _surface_of_closed(
     winding = winding_grid(vertices, faces, lower + spacing / 2, spacing, (shape[0], shape[1], shape[2]))
     enclosed = winding[winding != 0]
     odd = float((enclosed != 1).mean()) if enclosed.size else 0.0
-    if odd == 0.0 and EdgeTable(faces).valence.max() > 2:  # bodies that share an edge may share a wall too
-        return _surface_of_sheets(vertices, faces, notes, confidence, closed=True, simple=True)
     if odd == 0.0:
+        faces = _drop_shared_walls(vertices, faces, notes)
         return Surface(vertices, faces, faces, True, True, tuple(notes), confidence)
     notes.append(
         f"the surface passes through itself ({odd:.1%} of what it encloses is enclosed twice or inside out); "
@@ -112,13 +112,37 @@ def _surface_of_closed(
     return _surface_of_sheets(vertices, faces, notes, min(confidence, 1.0 - odd), closed=True)
 
 
+def _drop_shared_walls(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str]
+) -> NDArray[np.int64]:
+    """Drop walls within the shape, where two bodies meet along common edges.
+
+    Edges with more than two triangles cut the surface into patches; a patch is a wall when the inside is on
+    both sides of its largest triangles.
+    """
+    edges = EdgeTable(faces)
+    if edges.valence.max() == 2:
+        return faces
+    patch = components(len(faces), *edges.pairs[1].T)
+    corners = vertices[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    order = np.lexsort((-area, patch))
+    rank = np.arange(len(order)) - np.searchsorted(patch[order], patch[order])
+    probe = order[rank < _PROBES]
+    parts = _facing(MeshDistance(vertices, faces, faces, closed=True), corners[probe]) != 0
+    kept = faces[(np.bincount(patch[probe], parts) > 0)[patch]]
+    if len(kept) == len(faces) or EdgeTable(kept).balance.any():
+        return faces
+    notes.append(f"dropped {len(faces) - len(kept)} triangles of walls between bodies")
+    return kept
+
+
 def _surface_of_sheets(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int64],
     notes: list[str],
     confidence: float,
     closed: bool,
-    simple: bool = False,
 ) -> Surface:
     """Keep only triangles with the inside on one side and the outside on the other as the surface."""
     source = MeshDistance(vertices, faces, faces, closed)
@@ -133,7 +157,7 @@ def _surface_of_sheets(
             f"{np.count_nonzero(~outer)} triangles lie within the shape and are no part of its surface"
         )
     outward = np.where(facing[outer, None] > 0, faces[outer], faces[outer, ::-1])
-    return Surface(vertices, outward, faces, closed, simple, tuple(notes), confidence)
+    return Surface(vertices, outward, faces, closed, False, tuple(notes), confidence)
 
 
 def _facing(source: MeshDistance, corners: NDArray[np.float64]) -> NDArray[np.int64]:
