@@ -137,7 +137,7 @@ class MeshDistance:
         inside[within] = flags[tuple(cell[within].T)]
         near = np.flatnonzero(within & (distance <= _LATTICE))  # half a cell's diagonal is 0.87 of it
         side, sure = _side_of_triangle(self._vertices[self._faces[triangle[near]]], points[near])
-        inside[near[sure]] = side[sure] < 0
+        sure &= (side < 0) == inside[near]
         rest = near[~sure]
         inside[rest] = self.inside(points[rest])
         return inside

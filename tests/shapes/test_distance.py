@@ -134,3 +134,12 @@ def test_unit_frame_round_trip(centre, size, seed):
     scale = np.abs(points).max()
     np.testing.assert_allclose(frame.from_unit(unit), points, rtol=1e-12, atol=1e-12 * scale)
     np.testing.assert_allclose(frame.length_from_unit(frame.length_to_unit(size)), size, rtol=1e-12)
+
+
+def test_a_fold_without_thickness_does_not_turn_signs():
+    corners = 0.3 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    pillow = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3], [1, 0, 3], [1, 3, 2]], process=False)
+    shape = load_shape(together(box((1.8, 1.8, 1.8)), pillow))
+    points = np.random.default_rng(0).uniform(-0.85, 0.85, (5000, 3)) * [1, 1, 0.1]
+    assert (shape.unit_distance(points) < 0).all()
+    assert shape.volume == pytest.approx(1.8**3)
