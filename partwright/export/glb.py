@@ -19,6 +19,7 @@ from partwright import __version__
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.palette import palette
 from partwright.assembly.similarity import NO_ROTATION, ORIGIN
+from partwright.errors import NoSurfaceError
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
 from partwright.writing import write_bytes
@@ -73,10 +74,15 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
     def add(node: Node, parent: str, pose: np.ndarray, role: str) -> None:
         extras: dict[str, Any] = {"role": role} if role else {}
         if isinstance(node, Part):
-            local = dataclasses.replace(node, translation=ORIGIN, rotation=NO_ROTATION)
-            mesh = _coloured(mesh_part(local, resolution), colours[node.name])
             placed = pose @ Similarity(1.0, node.rotation, node.translation).matrix()
-            scene.add_geometry(mesh, node.name, node.name, parent, placed, metadata=_extras(node) | extras)
+            mesh = _local_mesh(node, resolution)
+            about = _extras(node) | extras
+            if mesh is None:
+                about["note"] = "this part has no volume of its own"
+                scene.graph.update(frame_to=node.name, frame_from=parent, matrix=placed, metadata=about)
+            else:
+                mesh = _coloured(mesh, colours[node.name])
+                scene.add_geometry(mesh, node.name, node.name, parent, placed, metadata=about)
             return
         name = _free_name(node.name or "assembly", taken)
         extras |= {"operation": node.operation, "blend": node.blend}
@@ -86,6 +92,14 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
 
     add(assembly, "world", to_gltf(assembly).matrix(), "")
     return scene
+
+
+def _local_mesh(part: Part, resolution: int) -> trimesh.Trimesh | None:
+    """The part in its own frame; None for one without volume, which only shows where it blends."""
+    try:
+        return mesh_part(dataclasses.replace(part, translation=ORIGIN, rotation=NO_ROTATION), resolution)
+    except NoSurfaceError:
+        return None
 
 
 def _extras(part: Part) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from partwright.assembly.palette import palette
 from partwright.errors import OutputError, SettingError, UnsupportedFormatError
 from partwright.export import WRITERS, export
 from partwright.export.glb import to_gltf
-from partwright.fields import Box, Cylinder, Sphere
+from partwright.fields import Box, Cylinder, Sphere, SuperFrustum
 
 BALL_VOLUME = 4 / 3 * np.pi
 
@@ -116,6 +116,15 @@ def test_subtracted_parts_are_marked(tmp_path: Path) -> None:
     nodes = {node["name"]: node for node in header(tmp_path / "a.glb")["nodes"]}
     assert nodes["hole"]["extras"]["role"] == "subtracted"
     assert "role" not in nodes["block"]["extras"]
+
+
+def test_a_part_without_volume_is_a_node_without_mesh(tmp_path: Path) -> None:
+    sheet = Part(SuperFrustum((1, 1, 1), onion=1.0), name="sheet")
+    export(Part(Sphere(1.0), name="ball") | sheet, tmp_path / "a.glb")
+    nodes = {node["name"]: node for node in header(tmp_path / "a.glb")["nodes"]}
+    assert "mesh" not in nodes["sheet"]
+    assert nodes["sheet"]["extras"]["note"] == "this part has no volume of its own"
+    assert "mesh" in nodes["ball"]
 
 
 def test_json_is_the_assembly_file(tmp_path: Path) -> None:
