@@ -78,7 +78,7 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
             mesh = _local_mesh(node, resolution)
             about = _extras(node) | extras
             if mesh is None:
-                about["note"] = "this part has no volume of its own"
+                about["note"] = "no surface of its own at this resolution"
                 scene.graph.update(frame_to=node.name, frame_from=parent, matrix=placed, metadata=about)
             else:
                 mesh = _coloured(mesh, colours[node.name])

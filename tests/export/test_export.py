@@ -123,7 +123,7 @@ def test_a_part_without_volume_is_a_node_without_mesh(tmp_path: Path) -> None:
     export(Part(Sphere(1.0), name="ball") | sheet, tmp_path / "a.glb")
     nodes = {node["name"]: node for node in header(tmp_path / "a.glb")["nodes"]}
     assert "mesh" not in nodes["sheet"]
-    assert nodes["sheet"]["extras"]["note"] == "this part has no volume of its own"
+    assert nodes["sheet"]["extras"]["note"] == "no surface of its own at this resolution"
     assert "mesh" in nodes["ball"]
 
 
