@@ -8,6 +8,7 @@ import numpy as np
 
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.rows import as_superfrustum
+from partwright.meshing.dust import without_dust
 from partwright.meshing.marching import mesh_field
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 # Cells across the thinnest wall. Under sqrt(3) a slanted wall would show holes; 3 also keep a thin rod round.
 _ACROSS, _ACROSS_PART = 2.0, 3.0
 _FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin walls
-_PART_CELLS = 300_000  # a part's surface is given at most this many cells
+_PART_CELLS = 120_000  # a part's surface is given at most this many cells
 _TIP = 0.25  # of a wall that tapers to nothing, the part that is looked at
 _ROOM = 1e-3  # of the longest side, around the bounds
 
@@ -26,29 +27,33 @@ _ROOM = 1e-3  # of the longest side, around the bounds
 def mesh_assembly(assembly: Assembly | Part, resolution: int = 128, *, sharp: bool = True) -> trimesh.Trimesh:
     """The whole blended surface, watertight, in the assembly's own units and place.
 
-    resolution: cells along the longest side; up to twice as many where a wall is thinner than two cells (a
-    wall thinner than one cell of those may come out with holes through it, still closed).
+    resolution: cells along the longest side; up to twice as many where that is enough to put two cells across
+    a thin wall. Walls that are thinner still may come out with holes through them (the mesh is closed all the
+    same), and crumbs of them that are shorter than three cells are left out.
 
     Raises NoSurfaceError where nothing is left of the assembly, as when a difference takes all away.
     """
+    import trimesh
+
     lower, upper = assembly.bounds()
     longest = float((upper - lower).max())
     parts = assembly.parts if isinstance(assembly, Assembly) else (assembly,)
-    wall = min(float(walls(as_superfrustum(part.field)).min()) for part in parts)
-    finest = np.clip(_ACROSS * longest / max(wall, 1e-9 * longest), resolution, _FINEST * resolution)
+    thinnest = np.array([walls(as_superfrustum(part.field)).min() for part in parts]) / longest
+    wanted = _ACROSS / np.maximum(thinnest, 1e-9)
+    counts = int(np.ceil(wanted[wanted <= _FINEST * resolution].max(initial=resolution)))
     frame = _frame(lower, upper)
     local = assembly.transformed(frame)
     room = _ROOM + (upper - lower) * frame.scale / 2
-    mesh = mesh_field(local.distance, -room, room, int(np.ceil(finest)), sharp=sharp)
-    mesh.vertices = frame.inverse()(mesh.vertices)
-    return mesh
+    mesh = mesh_field(local.distance, -room, room, counts, sharp=sharp)
+    vertices, faces = without_dust(mesh.vertices, mesh.faces, np.full(3, 2 * room.max() / counts))
+    return trimesh.Trimesh(frame.inverse()(vertices), faces, process=False)
 
 
 def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimesh.Trimesh:
     """One part alone, watertight, in its own units and place.
 
     It is meshed along its own axes. Cells are made shorter where the part is thin, each axis by itself, so
-    that walls come out complete, as long as that takes no more than a few hundred thousand cells.
+    that walls come out complete, as long as that takes no more than about 100,000 cells.
 
     Raises NoSurfaceError for a part without volume.
     """

@@ -12,6 +12,8 @@ from partwright.errors import SettingError
 # Up axis -> the side that azimuth 0 looks at.
 _FRONTS = {"x": (0.0, -1.0, 0.0), "y": (0.0, 0.0, 1.0), "z": (0.0, -1.0, 0.0)}
 
+_NEAREST = 0.5  # of the longest side, between the eye and the nearest point
+
 
 def picture_axes(up: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """To the right, up and towards the viewer, (3,) each, as seen from the front. up: "x", "-y" ...
@@ -83,11 +85,14 @@ class Camera:
 
         tangent = math.tan(math.radians(self.field_of_view) / 2)
         half = (tangent * width / height, tangent)
-        x, y, z = (points @ axis for axis in (right, up, back))
-        distance, shift = -math.inf, []
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        x, y, z = ((points - middle) @ axis for axis in (right, up, back))
+        # Not at the very tip of a needle that points at the viewer.
+        distance, shift = z.max() + _NEAREST * np.ptp(points, axis=0).max(), []
         for offset, share in ((x, half[0]), (y, half[1])):
             slope = share * (1 - 2 * self.margin)
             high, low = (slope * z + offset).max(), (slope * z - offset).max()
             distance = max(distance, (high + low) / (2 * slope))
             shift.append((high - low) / 2)
-        return View(shift[0] * right + shift[1] * up + distance * back, right, up, back, half)
+        eye = middle + shift[0] * right + shift[1] * up + distance * back
+        return View(eye, right, up, back, half)

@@ -92,10 +92,18 @@ def test_union_and_difference() -> None:
 def test_thin_wall_in_an_assembly() -> None:
     """2 % of the size: thinner than a cell of the resolution that was asked for."""
     plate = Part(Box((1.0, 1.0, 0.02)), rotation=(0.9659258, 0.2588190, 0.0, 0.0))
-    mesh = mesh_assembly(Assembly((plate,)), 48)
+    mesh = mesh_assembly(Assembly((plate,)), 56)
     assert mesh.is_volume
     assert mesh.euler_number == 2
     assert mesh.volume == pytest.approx(0.02, rel=0.02)
+
+
+def test_crumbs_are_left_out_and_bodies_kept() -> None:
+    ball = Part(Sphere(0.5))
+    crumb, pebble = (Part(Sphere(r), translation=(0.9, 0.0, 0.0)) for r in (0.01, 0.1))
+    assert mesh_assembly(ball | crumb, 32).body_count == 1
+    assert mesh_assembly(ball | pebble, 32).body_count == 2
+    assert mesh_assembly(ball | crumb, 32).is_volume
 
 
 def test_nothing_left_is_named() -> None:

@@ -45,11 +45,13 @@ def test_everything_is_in_the_picture_and_touches_its_margin(
     camera = Camera(azimuth, elevation, field_of_view, up, margin=0.1)
     view = camera.fitted(points, 300, 200)
     depth = (view.eye - points) @ view.back
-    assert (depth > 0).all()
+    nearest = 0.5 * np.ptp(points, axis=0).max()
+    assert depth.min() > 0.999 * nearest
     x = (points - view.eye) @ view.right / depth / view.half[0]
     y = (points - view.eye) @ view.up / depth / view.half[1]
     widest = max(np.abs(x).max(), np.abs(y).max())
-    assert widest == pytest.approx(0.8, abs=1e-6)
+    assert widest <= 0.8 + 1e-6
+    assert widest == pytest.approx(0.8, abs=1e-6) or depth.min() < 1.001 * nearest
     np.testing.assert_allclose(np.stack([view.right, view.up, view.back]) @ view.back, [0, 0, 1], atol=1e-12)
     assert view.up @ camera.up_axis > 0
 

@@ -1,0 +1,29 @@
+"""Crumbs: what is left of a sheet that is thinner than the grid can show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+_SMALLEST = 3.0  # cells; a body that is shorter along each axis is a crumb
+
+
+def without_dust(vertices: np.ndarray, faces: np.ndarray, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (V, 3) and faces (F, 3) without closed pieces shorter than three cells along each axis.
+
+    Where all pieces are that small, nothing is dropped.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    links = coo_array((np.ones(len(start), dtype=bool), (start, end)), shape=(len(vertices),) * 2)
+    pieces, piece = connected_components(links, directed=False)
+    order = np.argsort(piece, kind="stable")
+    first = np.searchsorted(piece[order], np.arange(pieces))
+    size = np.maximum.reduceat(vertices[order], first) - np.minimum.reduceat(vertices[order], first)
+    large = np.asarray((size >= _SMALLEST * cell).any(axis=1))
+    if large.all() or not large.any():
+        return vertices, faces
+    kept = large[piece]
+    number = np.cumsum(kept) - 1
+    return vertices[kept], number[faces[kept[faces[:, 0]]]]
