@@ -8,6 +8,7 @@ import numpy as np
 
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.rows import as_superfrustum
+from partwright.errors import NoSurfaceError
 from partwright.meshing.dust import without_dust
 from partwright.meshing.marching import mesh_field
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 _ACROSS, _ACROSS_PART = 2.0, 3.0
 _FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin walls
 _PART_CELLS = 120_000  # a part's surface is given at most this many cells
+_MOST = 1024.0  # cells along one axis of a part
 _TIP = 0.25  # of a wall that tapers to nothing, the part that is looked at
 _ROOM = 1e-3  # of the longest side, around the bounds
 
@@ -36,12 +38,11 @@ def mesh_assembly(assembly: Assembly | Part, resolution: int = 128, *, sharp: bo
     import trimesh
 
     lower, upper = assembly.bounds()
-    longest = float((upper - lower).max())
+    frame, longest = _frame(lower, upper), float((upper - lower).max())
     parts = assembly.parts if isinstance(assembly, Assembly) else (assembly,)
     thinnest = np.array([walls(as_superfrustum(part.field)).min() for part in parts]) / longest
     wanted = _ACROSS / np.maximum(thinnest, 1e-9)
     counts = int(np.ceil(wanted[wanted <= _FINEST * resolution].max(initial=resolution)))
-    frame = _frame(lower, upper)
     local = assembly.transformed(frame)
     room = _ROOM + (upper - lower) * frame.scale / 2
     mesh = mesh_field(local.distance, -room, room, counts, sharp=sharp)
@@ -66,7 +67,7 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     thin = np.maximum(walls(local), 1e-9)
     counts = np.maximum(resolution * extent / extent.max(), _ACROSS_PART * extent / thin)
     surface = 4 * (counts * np.roll(counts, 1)).sum()
-    counts = np.maximum(counts * min(1.0, float(np.sqrt(_PART_CELLS / surface))), 4.0)
+    counts = np.clip(counts * min(1.0, float(np.sqrt(_PART_CELLS / surface))), 4.0, _MOST)
 
     def distance(points: np.ndarray) -> np.ndarray:
         return local(points - centre.astype(np.float32))
@@ -91,6 +92,9 @@ def walls(field: SuperFrustum) -> np.ndarray:
 
 def _frame(lower: np.ndarray, upper: np.ndarray) -> Similarity:
     """To a box around the origin whose longest side is 1.8: float32 keeps its digits there."""
-    scale = 1.8 / float((upper - lower).max())
+    longest = float((upper - lower).max())
+    if longest <= 0:
+        raise NoSurfaceError("The part or assembly has no size at all; give it an extent or a dilation.")
+    scale = 1.8 / longest
     centre = (np.asarray(lower) + np.asarray(upper)) / 2
     return Similarity(scale, translation=tuple(-scale * centre))

@@ -107,6 +107,13 @@ def test_crumbs_are_left_out_and_bodies_kept() -> None:
 
 
 def test_nothing_left_is_named() -> None:
+    point = Part(SuperFrustum((0.0, 0.0, 0.0)))
+    with pytest.raises(NoSurfaceError):
+        mesh_part(point)
+    with pytest.raises(NoSurfaceError):
+        mesh_assembly(point)
+    with pytest.raises(NoSurfaceError):
+        mesh_part(Part(SuperFrustum((1.0, 0.0, 0.5))))
     with pytest.raises(NoSurfaceError):
         mesh_assembly(Part(Sphere(0.5)) - Part(Sphere(1.0)), 24)
 
