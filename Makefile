@@ -2,10 +2,12 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 BUILD_INPUTS := pyproject.toml CMakeLists.txt $(wildcard cpp/*)
+# An editable install knows the Python files of its day, so it is named after their list.
+INSTALLED := .venv/installed-$(shell find partwright -name '*.py' | LC_ALL=C sort | cksum | cut -d' ' -f1)
 DEMO_SHAPE := examples/shapes/watering_can.ply
 
 .PHONY: setup demo test lint types bench clean
-setup: .venv/installed
+setup: $(INSTALLED)
 
 # torch first and alone: it is the one big download, and stays when the package is rebuilt.
 .venv/torch:
@@ -13,7 +15,7 @@ setup: .venv/installed
 	$(BIN)/pip install --quiet torch==2.13.0
 	touch $@
 
-.venv/installed: .venv/torch $(BUILD_INPUTS)
+$(INSTALLED): .venv/torch $(BUILD_INPUTS)
 	$(BIN)/pip install --quiet -e ".[test,dev]"
 	touch $@
 
