@@ -7,37 +7,125 @@
 namespace partwright {
 namespace {
 
-// In-place Cholesky of the lower triangle, then both triangular solves; false when not positive definite.
-bool solve(std::vector<double>& a, std::vector<double>& b, int n) {
-  for (int i = 0; i < n; ++i) {
-    double* row = &a[size_t(i) * n];
+using Square = std::array<double, DERIVATIVES * DERIVATIVES>;
+using Vector = std::array<double, DERIVATIVES>;
+
+// Lower Cholesky factor in place; false when not positive definite.
+bool factor(Square& a) {
+  for (int i = 0; i < DERIVATIVES; ++i)
     for (int j = 0; j <= i; ++j) {
-      const double* other = &a[size_t(j) * n];
-      double lanes[8] = {};
-      int k = 0;
-      for (; k + 8 <= j; k += 8)
-        for (int lane = 0; lane < 8; ++lane) lanes[lane] += row[k + lane] * other[k + lane];
-      double sum = row[j];
-      for (double lane : lanes) sum -= lane;
-      for (; k < j; ++k) sum -= row[k] * other[k];
-      if (i == j) {
-        if (!(sum > 0)) return false;
-        row[j] = std::sqrt(sum);
-      } else {
-        row[j] = sum / other[j];
-      }
+      double sum = a[i * DERIVATIVES + j];
+      for (int k = 0; k < j; ++k) sum -= a[i * DERIVATIVES + k] * a[j * DERIVATIVES + k];
+      if (i == j && !(sum > 0)) return false;
+      a[i * DERIVATIVES + j] = i == j ? std::sqrt(sum) : sum / a[j * DERIVATIVES + j];
     }
-  }
-  for (int i = 0; i < n; ++i) {
-    for (int k = 0; k < i; ++k) b[i] -= a[size_t(i) * n + k] * b[k];
-    b[i] /= a[size_t(i) * n + i];
-  }
-  for (int i = n - 1; i >= 0; --i) {
-    b[i] /= a[size_t(i) * n + i];
-    for (int k = 0; k < i; ++k) b[k] -= a[size_t(i) * n + k] * b[i];
-  }
   return true;
 }
+
+void solve(const Square& l, const double* b, double* x) {
+  for (int i = 0; i < DERIVATIVES; ++i) {
+    double sum = b[i];
+    for (int k = 0; k < i; ++k) sum -= l[i * DERIVATIVES + k] * x[k];
+    x[i] = sum / l[i * DERIVATIVES + i];
+  }
+  for (int i = DERIVATIVES - 1; i >= 0; --i) {
+    double sum = x[i];
+    for (int k = i + 1; k < DERIVATIVES; ++k) sum -= l[k * DERIVATIVES + i] * x[k];
+    x[i] = sum / l[i * DERIVATIVES + i];
+  }
+}
+
+// Diagonal damping that keeps parameters without influence in place.
+constexpr double FLOOR = 1e-3;
+
+// The damped Gauss-Newton step by conjugate gradients. Parts couple only where they touch, so each part's own
+// block is nearly all there is: with the blocks' factors as preconditioner a few products with the sparse matrix
+// do, where a dense factorisation would cost the cube of the number of parts.
+class DampedStep {
+ public:
+  DampedStep(const NormalEquations& system, const std::vector<char>& moving) : system_(system), moving_(moving) {}
+
+  // Entries of `step` that do not move are 0. False when a block is not positive definite.
+  bool operator()(double damping, std::vector<double>& step) {
+    const size_t n = moving_.size();
+    factors_.assign(n / DERIVATIVES, identity());
+    damping_.assign(n, 0.0);
+    for (const auto& [pair, block] : system_.blocks) {
+      if (pair.first != pair.second) continue;
+      const size_t base = size_t(pair.first) * DERIVATIVES;
+      Square& own = factors_[size_t(pair.first)];
+      for (int r = 0; r < DERIVATIVES; ++r)
+        for (int c = 0; c < DERIVATIVES; ++c)
+          if (moving_[base + r] && moving_[base + c]) own[r * DERIVATIVES + c] = block[r * DERIVATIVES + c];
+      for (int r = 0; r < DERIVATIVES; ++r) {
+        if (!moving_[base + r]) continue;
+        damping_[base + r] = damping * (block[r * DERIVATIVES + r] + FLOOR) + 1e-9;
+        own[r * DERIVATIVES + r] += damping_[base + r];
+      }
+      if (!factor(own)) return false;
+    }
+    step.assign(n, 0.0);
+    std::vector<double> residual(n), z(n), p(n), q(n);
+    for (size_t i = 0; i < n; ++i) residual[i] = moving_[i] ? -system_.gradient[i] : 0.0;
+    precondition(residual, z);
+    p = z;
+    double rz = dot(residual, z);
+    const double enough = rz * 1e-6;
+    for (int iteration = 0; iteration < 60 && rz > enough && rz > 0; ++iteration) {
+      multiply(p, q);
+      const double alpha = rz / dot(p, q);
+      for (size_t i = 0; i < n; ++i) {
+        step[i] += alpha * p[i];
+        residual[i] -= alpha * q[i];
+      }
+      precondition(residual, z);
+      const double next = dot(residual, z);
+      for (size_t i = 0; i < n; ++i) p[i] = z[i] + next / rz * p[i];
+      rz = next;
+    }
+    return true;
+  }
+
+ private:
+  static Square identity() {
+    Square a{};
+    for (int i = 0; i < DERIVATIVES; ++i) a[i * DERIVATIVES + i] = 1;
+    return a;
+  }
+
+  static double dot(const std::vector<double>& a, const std::vector<double>& b) {
+    double sum = 0;
+    for (size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+    return sum;
+  }
+
+  void precondition(const std::vector<double>& r, std::vector<double>& z) const {
+    for (size_t i = 0; i < factors_.size(); ++i) solve(factors_[i], &r[i * DERIVATIVES], &z[i * DERIVATIVES]);
+    for (size_t i = 0; i < z.size(); ++i) z[i] = moving_[i] ? z[i] : 0.0;
+  }
+
+  void multiply(const std::vector<double>& x, std::vector<double>& y) const {
+    for (size_t i = 0; i < y.size(); ++i) y[i] = damping_[i] * x[i];
+    for (const auto& [pair, block] : system_.blocks) {
+      const double *xi = &x[size_t(pair.first) * DERIVATIVES], *xj = &x[size_t(pair.second) * DERIVATIVES];
+      double *yi = &y[size_t(pair.first) * DERIVATIVES], *yj = &y[size_t(pair.second) * DERIVATIVES];
+      const bool twice = pair.first != pair.second;
+      for (int r = 0; r < DERIVATIVES; ++r) {
+        double sum = 0;
+        for (int c = 0; c < DERIVATIVES; ++c) sum += block[r * DERIVATIVES + c] * xj[c];
+        yi[r] += sum;
+        if (twice)
+          for (int c = 0; c < DERIVATIVES; ++c) yj[c] += block[r * DERIVATIVES + c] * xi[r];
+      }
+    }
+    for (size_t i = 0; i < y.size(); ++i) y[i] = moving_[i] ? y[i] : 0.0;
+  }
+
+  const NormalEquations& system_;
+  const std::vector<char>& moving_;
+  std::vector<Square> factors_;
+  std::vector<double> damping_;
+};
 
 float& shape_entry(float* row, int derivative) { return row[SX + derivative - D_SX]; }
 
@@ -86,9 +174,6 @@ void tie(NormalEquations& system, const std::vector<char>& tied) {
   }
 }
 
-// Diagonal damping that keeps parameters without influence in place.
-constexpr double FLOOR = 1e-3;
-
 }  // namespace
 
 Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied,
@@ -99,56 +184,30 @@ Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& fr
   for (int i = 0; i < parts; ++i)
     for (int d = 0; d < DERIVATIVES; ++d) live[size_t(i)] |= free[size_t(i) * DERIVATIVES + d];
   Outcome out{std::move(rows), 0, 0};
-  std::vector<int> index;
-  std::vector<double> matrix, step, delta(size_t(parts) * DERIVATIVES);
+  std::vector<char> moving(size_t(parts) * DERIVATIVES);
+  std::vector<double> step;
   for (const Stage& stage : stages) {
     double damping = 1e-2;
     NormalEquations system = normal_equations(prepared(out.rows), live, samples, stage.beta, penalties, threads);
     tie(system, tied);
     for (int iteration = 0; iteration < stage.iterations; ++iteration) {
       // A variable at its bound that wants to leave the box takes no part in the step.
-      index.assign(size_t(parts) * DERIVATIVES, -1);
-      int n = 0;
-      for (int i = 0; i < parts; ++i) {
-        for (int d = 0; d < DERIVATIVES; ++d) {
-          const size_t at = size_t(i) * DERIVATIVES + d;
-          if (!free[at] || (tied[size_t(i)] && d == D_SY)) continue;
-          if (d >= D_SX) {
-            const float v = shape_entry(&out.rows[size_t(i) * COLUMNS], d);
-            if ((v <= limits.lower[d] && system.gradient[at] > 0) || (v >= limits.upper[d] && system.gradient[at] < 0)) continue;
-          }
-          index[at] = n++;
-        }
+      for (size_t at = 0; at < moving.size(); ++at) {
+        const size_t i = at / DERIVATIVES;
+        const int d = int(at % DERIVATIVES);
+        moving[at] = free[at] && !(tied[i] && d == D_SY);
+        if (!moving[at] || d < D_SX) continue;
+        const float v = shape_entry(&out.rows[i * COLUMNS], d);
+        if ((v <= limits.lower[d] && system.gradient[at] > 0) || (v >= limits.upper[d] && system.gradient[at] < 0)) moving[at] = 0;
       }
-      if (n == 0) break;
+      DampedStep damped(system, moving);
       bool accepted = false;
       double gain = 0;
       for (int attempt = 0; attempt < 5 && !accepted; ++attempt) {
-        matrix.assign(size_t(n) * n, 0.0);
-        step.assign(size_t(n), 0.0);
-        for (const auto& [pair, block] : system.blocks)
-          for (int r = 0; r < DERIVATIVES; ++r)
-            for (int c = 0; c < DERIVATIVES; ++c) {
-              const int i = index[size_t(pair.first) * DERIVATIVES + r], j = index[size_t(pair.second) * DERIVATIVES + c];
-              if (i >= 0 && j >= 0) matrix[size_t(std::max(i, j)) * n + std::min(i, j)] = block[r * DERIVATIVES + c];
-            }
-        for (size_t at = 0; at < index.size(); ++at)
-          if (index[at] >= 0) {
-            double& diagonal = matrix[size_t(index[at]) * n + index[at]];
-            diagonal += damping * (diagonal + FLOOR) + 1e-9;
-            step[size_t(index[at])] = -system.gradient[at];
-          }
-        if (solve(matrix, step, n)) {
+        if (damped(damping, step)) {
           std::vector<float> candidate = out.rows;
-          for (int i = 0; i < parts; ++i) {
-            if (!live[size_t(i)]) continue;
-            double* d = &delta[size_t(i) * DERIVATIVES];
-            for (int j = 0; j < DERIVATIVES; ++j) {
-              const int at = index[size_t(i) * DERIVATIVES + j];
-              d[j] = at >= 0 ? step[size_t(at)] : 0;
-            }
-            move(&candidate[size_t(i) * COLUMNS], d, limits, tied[size_t(i)]);
-          }
+          for (int i = 0; i < parts; ++i)
+            if (live[size_t(i)]) move(&candidate[size_t(i) * COLUMNS], &step[size_t(i) * DERIVATIVES], limits, tied[size_t(i)]);
           const double now = loss(prepared(candidate), samples, stage.beta, penalties, threads);
           if (now < system.loss) {
             gain = (system.loss - now) / system.loss;
