@@ -1,0 +1,526 @@
+"""The kernel's evaluations and fits in PyTorch: the same functions as `fields.kernel`, for a CUDA device.
+
+Every fit is a batch of B assemblies of M parts with P samples each: a whole assembly is a batch of one, the
+starts of `fit_starts` are B assemblies of one part. Steps, bounds and acceptance are those of
+cpp/optimise.cpp; each assembly of the batch has its own damping and ends on its own. Distances come from
+`fields.reference` in float32, sums over samples and linear solves are float64. The two kernels take the same
+steps, but a fit whose minimum is not sharp may end elsewhere: rounding decides which step is accepted.
+
+Costs of a step: the derivatives (one reverse pass over the pairs of part and point that the loss can feel)
+and J^T J, which take about a third each on a CPU with 24 parts; then the distances. A step is over a thousand
+operations however few the samples, so a small fit on a GPU waits for their launches.
+
+Repeats to the bit on the same device with the same number of torch threads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+from torch import Tensor
+
+from partwright.fields import reference
+from partwright.fields.kernel import DERIVATIVES, Floats, Limits, Penalties, Rows, Target, _points, _rows
+from partwright.fields.operations import SHARP
+
+# Memory that one pair of part and point takes at its peak: distances alone, and with derivatives.
+FORWARD_BYTES, DERIVATIVE_BYTES = 200, 2000
+# A pair whose residuals move less than this per unit of distance takes no part in a step.
+NEGLIGIBLE = 1e-6
+# Farther than any point: the fold of no parts.
+FAR = 1e6
+
+# As in cpp/optimise.cpp.
+START_DAMPING, LEAST_DAMPING, RELAX, TIGHTEN = 1e-2, 1e-6, 0.3, 6.0
+DAMPING_FLOOR, RIDGE = 1e-3, 1e-9
+ATTEMPTS, LEAST_GAIN = 5, 1e-4
+
+WIDTH = len(DERIVATIVES)
+D_SX, D_SY, D_SZ, D_BULGE = (DERIVATIVES.index(name) for name in ("sx", "sy", "sz", "bulge"))
+SX, SY, SZ, BULGE, BLEND = 7, 8, 9, 13, 15  # columns of a row
+
+
+class TorchKernel:
+    """Evaluates and fits SuperFrusta on `device`; drop-in for the functions of `fields.kernel`.
+
+    `memory` bounds, in bytes, what one call holds on the device beside its samples and its matrix. `threads`
+    in the methods is part of the shared signature and has no effect: the device decides.
+    """
+
+    def __init__(self, device: str | torch.device = "cuda", memory: int = 1 << 30) -> None:
+        self.device = torch.device(device)
+        self.memory = memory
+
+    @torch.no_grad()
+    def evaluate(self, parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> Floats:
+        """Distances (N,) of the smooth union of M parts, folded first to last (SuperFrusta, eq. 4)."""
+        rows = self._tensor(_rows(parameters))[None]
+        folded = [fold(g, rows[..., BLEND], None)[0][0] for g in self._distances(rows, points)]
+        return _numpy(torch.cat(folded))
+
+    @torch.no_grad()
+    def evaluate_parts(self, parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> Floats:
+        """Distances (M, N) of each part alone."""
+        rows = self._tensor(_rows(parameters))[None]
+        return _numpy(torch.cat([g[0] for g in self._distances(rows, points)], 1))
+
+    @torch.no_grad()
+    def removal_counts(
+        self,
+        parameters: ArrayLike,
+        points: ArrayLike,
+        inside: NDArray[np.bool_],
+        weight: ArrayLike,
+        threads: int = 0,
+    ) -> NDArray[np.float64]:
+        """Weighted intersection and union (M + 1, 2) with the occupancy `inside` (N,).
+
+        Row i < M is the assembly without part i, the last row the whole assembly.
+        """
+        rows = self._tensor(_rows(parameters))[None]
+        solid = torch.as_tensor(inside, dtype=torch.bool, device=self.device)
+        mass = torch.as_tensor(weight, dtype=torch.float32, device=self.device)
+        counts = torch.zeros(rows.shape[1] + 1, 2, dtype=torch.float64, device=self.device)
+        first = 0
+        for g in self._distances(rows, points):
+            span = slice(first, first + g.shape[2])
+            occupied = fold_without(g[0], rows[0, :, BLEND]) < 0
+            both, either = occupied & solid[span], occupied | solid[span]
+            counts += torch.stack([(both * mass[span]).sum(1), (either * mass[span]).sum(1)], 1)
+            first = span.stop
+        return counts.cpu().numpy()
+
+    @torch.no_grad()
+    def normal_equations(
+        self,
+        parameters: ArrayLike,
+        target: Target,
+        beta: float,
+        penalties: Penalties = Penalties(),  # noqa: B008 (frozen)
+        threads: int = 0,
+    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+        """Loss, gradient J^T r (15 M,) and Gauss-Newton matrix J^T J (15 M, 15 M) of the residuals."""
+        rows = self._tensor(_rows(parameters))[None]
+        every = torch.arange(rows.shape[1], device=self.device)
+        system = self._system(rows, self._samples(target), every, beta, penalties)
+        loss, gradient, matrix = (value[0].cpu().numpy() for value in system)
+        return float(loss), gradient, matrix
+
+    @torch.no_grad()
+    def loss(
+        self,
+        parameters: ArrayLike,
+        target: Target,
+        beta: float,
+        penalties: Penalties = Penalties(),  # noqa: B008
+        threads: int = 0,
+    ) -> float:
+        """Half the sum of squared residuals, as in `normal_equations`."""
+        rows = self._tensor(_rows(parameters))[None]
+        return float(self._loss(rows, self._samples(target), beta, penalties))
+
+    @torch.no_grad()
+    def levenberg_marquardt(
+        self,
+        parameters: ArrayLike,
+        target: Target,
+        stages: ArrayLike,
+        limits: Limits,
+        *,
+        free: NDArray[np.bool_] | None = None,
+        tied: NDArray[np.bool_] | None = None,
+        penalties: Penalties = Penalties(),  # noqa: B008
+        threads: int = 0,
+    ) -> tuple[Rows, float, int]:
+        """Minimises the loss over the entries that `free` (M, 15) marks; returns rows, loss and iterations.
+
+        `stages` (S, 2) holds pairs of beta and iterations, run one after another. `tied` (M,) keeps sx = sy.
+        """
+        rows = _rows(parameters)
+        problem = self._problem(rows[None], self._samples(target), limits, free, tied, penalties)
+        fitted, losses, iterations = self._minimise(problem, stages)
+        return _numpy(fitted[0]), float(losses[0]), int(iterations[0])
+
+    @torch.no_grad()
+    def fit_starts(
+        self,
+        starts: ArrayLike,
+        ranges: NDArray[np.int64],
+        target: Target,
+        stages: ArrayLike,
+        limits: Limits,
+        *,
+        free: NDArray[np.bool_] | None = None,
+        tied: NDArray[np.bool_] | None = None,
+        penalties: Penalties = Penalties(),  # noqa: B008
+        threads: int = 0,
+    ) -> tuple[Rows, NDArray[np.float64]]:
+        """One single-part fit per start (B, 16), each on the samples `ranges[b, 0]:ranges[b, 1]`.
+
+        Returns rows and losses. All starts run as one batch; shorter ranges are padded with weight 0.
+        """
+        rows = _rows(starts)
+        problem = self._problem(rows[:, None], self._ranges(target, ranges), limits, free, tied, penalties)
+        fitted, losses, _ = self._minimise(problem, stages)
+        return _numpy(fitted[:, 0]), losses.cpu().numpy()
+
+    def _tensor(self, array: NDArray) -> Tensor:
+        return torch.as_tensor(array, device=self.device)
+
+    def _span(self, pairs: int, bytes_each: int) -> int:
+        """How many points fit into the memory when each brings this many pairs."""
+        return max(1, self.memory // (bytes_each * pairs))
+
+    def _distances(self, rows: Tensor, points: ArrayLike) -> Iterator[Tensor]:
+        """Distances (1, M, n) of each part alone, for spans of the points (N, 3)."""
+        span = self._span(rows.shape[1], FORWARD_BYTES)
+        for piece in self._tensor(_points(points)).split(span):
+            yield distances(rows, local_points(rows, piece[None]))
+
+    def _samples(self, target: Target) -> Samples:
+        points, distance, weight, background = (self._tensor(array)[None] for array in target.arrays())
+        return Samples(points, distance, weight, background if background.numel() else None)
+
+    def _ranges(self, target: Target, ranges: NDArray[np.int64]) -> Samples:
+        """Samples of each range (B, 2), padded to the longest."""
+        first, last = self._tensor(np.ascontiguousarray(ranges, np.int64)).unbind(1)
+        offset = torch.arange(int((last - first).max()), device=self.device)
+        index = first[:, None] + offset
+        real = index < last[:, None]
+        index = torch.where(real, index, 0)
+        points, distance, weight, background = (self._tensor(array) for array in target.arrays())
+        behind = background[index] if background.numel() else None
+        return Samples(points[index], distance[index], weight[index] * real, behind)
+
+    def _problem(
+        self,
+        rows: NDArray[np.float32],
+        samples: Samples,
+        limits: Limits,
+        free: NDArray[np.bool_] | None,
+        tied: NDArray[np.bool_] | None,
+        penalties: Penalties,
+    ) -> Problem:
+        """`free` and `tied` as given by the caller, over all parts of all assemblies of `rows` (B, M, 16)."""
+        batch = rows.shape[:2]
+        free = np.ones((*batch, WIDTH), bool) if free is None else free.reshape(*batch, WIDTH)
+        tied = np.zeros(batch, bool) if tied is None else tied.reshape(batch)
+        movable = self._tensor(free)
+        live = movable.any(-1)
+        return Problem(
+            self._tensor(rows.copy()),
+            samples,
+            movable,
+            self._tensor(tied) & live,
+            live.any(0).nonzero()[:, 0],
+            self._tensor(limits.array()),
+            penalties,
+        )
+
+    def _loss(self, rows: Tensor, samples: Samples, beta: float, penalties: Penalties) -> Tensor:
+        """Losses (B,)."""
+        total = torch.zeros(len(rows), dtype=torch.float64, device=self.device)
+        for piece in samples.pieces(self._span(rows.shape[0] * rows.shape[1], FORWARD_BYTES)):
+            g = distances(rows, local_points(rows, piece.points))
+            field, _ = fold(g, rows[..., BLEND], piece.background)
+            residual, _, _ = residuals(field, g, piece, beta, penalties)
+            total += 0.5 * (residual * residual).sum((1, 2), dtype=torch.float64)
+        return total
+
+    def _system(
+        self, rows: Tensor, samples: Samples, parts: Tensor, beta: float, penalties: Penalties
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Loss (B,), J^T r (B, 15 L) and J^T J (B, 15 L, 15 L) over the L parts of that index."""
+        size = len(parts) * WIDTH
+        loss, gradient, matrix = (
+            torch.zeros(len(rows), *shape, dtype=torch.float64, device=self.device)
+            for shape in ((), (size,), (size, size))
+        )
+        for piece in samples.pieces(self._span(rows.shape[0] * rows.shape[1], DERIVATIVE_BYTES)):
+            residual, jacobian = linearised(rows, piece, parts, beta, penalties)
+            loss += 0.5 * (residual * residual).sum(1, dtype=torch.float64)
+            gradient += torch.einsum("bkn,bk->bn", jacobian, residual)
+            matrix += jacobian.mT @ jacobian
+        return loss, gradient, matrix
+
+    def _minimise(self, problem: Problem, stages: ArrayLike) -> tuple[Tensor, Tensor, Tensor]:
+        """Rows (B, M, 16), losses (B,) and iterations (B,) after all stages of Levenberg-Marquardt."""
+        loss = torch.zeros(len(problem.rows), dtype=torch.float64, device=self.device)
+        iterations = torch.zeros(len(problem.rows), dtype=torch.int64, device=self.device)
+        for beta, most in np.asarray(stages, np.float32):
+            loss = self._stage(problem, float(beta), int(most), iterations)
+        return problem.rows, loss, iterations
+
+    def _stage(self, problem: Problem, beta: float, most: int, iterations: Tensor) -> Tensor:
+        """Runs one stage on problem.rows in place, counts its iterations, and returns the losses (B,)."""
+        batch = torch.arange(len(problem.rows), device=self.device)
+        damping = torch.full((len(batch),), START_DAMPING, dtype=torch.float64, device=self.device)
+        loss, gradient, matrix = self._tied_system(problem, batch, beta)
+        running = torch.ones(len(batch), dtype=torch.bool, device=self.device)
+        for iteration in range(most):
+            variable = problem.variables(gradient)
+            running &= variable.any(1)
+            iterations += running
+            before, accepted = loss.clone(), torch.zeros_like(running)
+            trying = batch[running]
+            for _ in range(ATTEMPTS):
+                if len(trying) == 0:
+                    break
+                step = damped_step(matrix[trying], gradient[trying], variable[trying], damping[trying])
+                candidate = problem.moved(trying, step)
+                now = self._loss(candidate, problem.samples.of(trying), beta, problem.penalties)
+                better = now < loss[trying]  # a step that could not be solved for is NaN, and never better
+                won, old = trying[better], damping[trying]
+                problem.rows[won], loss[won], accepted[won] = candidate[better], now[better], True
+                damping[trying] = torch.where(better, (old * RELAX).clamp(min=LEAST_DAMPING), old * TIGHTEN)
+                trying = trying[~better]
+            running &= accepted & (before - loss >= LEAST_GAIN * before)
+            going = batch[running]
+            if iteration + 1 == most or len(going) == 0:
+                break
+            loss[going], gradient[going], matrix[going] = self._tied_system(problem, going, beta)
+        return loss
+
+    def _tied_system(self, problem: Problem, which: Tensor, beta: float) -> tuple[Tensor, Tensor, Tensor]:
+        """The system of some assemblies; sx and sy of tied parts are one variable, kept in sx."""
+        samples, parts = problem.samples.of(which), problem.parts
+        loss, gradient, matrix = self._system(problem.rows[which], samples, parts, beta, problem.penalties)
+        tied = problem.tied[which][:, parts].double()
+        slope = gradient.view(len(which), len(parts), WIDTH)
+        slope[..., D_SX] += tied * slope[..., D_SY]
+        blocks = matrix.view(len(which), len(parts), WIDTH, len(parts), WIDTH)
+        blocks[:, :, D_SX] += tied[:, :, None, None] * blocks[:, :, D_SY]
+        blocks[..., D_SX] += tied[:, None, None] * blocks[..., D_SY]
+        return loss, gradient, matrix
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What B fits compare with: points (B, P, 3), distance, weight and, if any, background (B, P)."""
+
+    points: Tensor
+    distance: Tensor
+    weight: Tensor
+    background: Tensor | None
+
+    def of(self, which: Tensor) -> Samples:
+        """The samples of the assemblies of that index."""
+        if len(which) == len(self.points):
+            return self
+        behind = None if self.background is None else self.background[which]
+        return Samples(self.points[which], self.distance[which], self.weight[which], behind)
+
+    def pieces(self, span: int) -> Iterator[Samples]:
+        """The samples in spans of so many points."""
+        for first in range(0, self.points.shape[1], span):
+            part = slice(first, first + span)
+            behind = None if self.background is None else self.background[:, part]
+            yield Samples(self.points[:, part], self.distance[:, part], self.weight[:, part], behind)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """B assemblies in the course of a fit.
+
+    rows (B, M, 16) change in place. free (B, M, 15) and tied (B, M) as in the kernel; `parts` (L,) is the
+    index of those that move in any assembly; limits (3, 15): lower and upper bounds, longest steps.
+    """
+
+    rows: Tensor
+    samples: Samples
+    free: Tensor
+    tied: Tensor
+    parts: Tensor
+    limits: Tensor
+    penalties: Penalties
+
+    def variables(self, gradient: Tensor) -> Tensor:
+        """Entries (B, 15 L) that the next step may move: at a bound, only those that want back inside."""
+        lower, upper, _ = self.limits[:, D_SX:]
+        value = self.rows[:, self.parts, SX:]
+        slope = gradient.view(len(self.rows), len(self.parts), WIDTH)[..., D_SX:]
+        leaving = ((value <= lower) & (slope > 0)) | ((value >= upper) & (slope < 0))
+        variable = self.free[:, self.parts].clone()
+        variable[..., D_SX:] &= ~leaving
+        variable[..., D_SY] &= ~self.tied[:, self.parts]
+        return variable.flatten(1)
+
+    def moved(self, which: Tensor, step: Tensor) -> Tensor:
+        """Rows (n, M, 16) of the assemblies of that index after steps (n, 15 L), clipped, within bounds."""
+        rows = self.rows[which]
+        delta = step.new_zeros(*rows.shape[:2], WIDTH)
+        delta[:, self.parts] = step.view(len(which), -1, WIDTH)
+        lower, upper, longest = self.limits
+        clipped = delta.clamp(-longest.double(), longest.double())
+        shape = (rows[..., SX:] + clipped[..., D_SX:].float()).clamp(lower[D_SX:], upper[D_SX:])
+        shape = torch.where(delta[..., D_SX:] != 0, shape, rows[..., SX:])
+        rotation = turned(rows[..., 3:7], clipped[..., 3:6])
+        moved = torch.cat([rows[..., :3] + clipped[..., :3].float(), rotation, shape], -1)
+        moved[..., SY] = torch.where(self.tied[which], moved[..., SX], moved[..., SY])
+        touched = (delta[..., [D_BULGE, D_SX, D_SZ]] != 0).any(-1)
+        tightest = tightest_bulge(moved[..., SX], moved[..., SZ])
+        moved[..., BULGE] = torch.where(
+            touched, torch.minimum(moved[..., BULGE], tightest), moved[..., BULGE]
+        )
+        return moved
+
+
+def tightest_bulge(width: Tensor, height: Tensor) -> Tensor:
+    """The largest bulge of parts of these sx and sz.
+
+    An arc tighter than half the section's width folds through its own centre.
+    """
+    return torch.asin((height / width.clamp(min=1e-6)).clamp(max=1)) / (math.pi / 2)
+
+
+def turned(rotation: Tensor, vector: Tensor) -> Tensor:
+    """Quaternions (..., 4) after R <- R exp(vector), vector (..., 3) in float64; the same where it is 0."""
+    angle = vector.norm(dim=-1, keepdim=True)
+    small = angle <= 1e-9
+    ratio = torch.where(small, 0.5, (angle / 2).sin() / torch.where(small, 1.0, angle))
+    a, v = rotation.double(), ratio * vector
+    c, scalar, imaginary = (angle / 2).cos(), a[..., :1], a[..., 1:]
+    product = torch.cat(
+        [
+            scalar * c - (imaginary * v).sum(-1, keepdim=True),
+            scalar * v + c * imaginary + torch.linalg.cross(imaginary, v),
+        ],
+        -1,
+    )
+    product = product / product.norm(dim=-1, keepdim=True)
+    return torch.where(angle > 0, product.float(), rotation)
+
+
+def damped_step(matrix: Tensor, gradient: Tensor, variable: Tensor, damping: Tensor) -> Tensor:
+    """Levenberg-Marquardt steps (n, V): zero where not `variable`, NaN where the matrix cannot be factored.
+
+    The floor keeps parameters without influence in place.
+    """
+    diagonal = matrix.diagonal(dim1=1, dim2=2)
+    extra = damping[:, None] * (diagonal + DAMPING_FLOOR) + RIDGE
+    both = variable[:, :, None] & variable[:, None, :]
+    damped = torch.where(both, matrix, 0.0) + torch.diag_embed(torch.where(variable, extra, 1.0))
+    factor, failed = torch.linalg.cholesky_ex(damped)
+    step = torch.cholesky_solve(torch.where(variable, -gradient, 0.0)[..., None], factor)[..., 0]
+    return torch.where((failed == 0)[:, None], step, torch.nan)
+
+
+def local_points(rows: Tensor, points: Tensor) -> Tensor:
+    """Points (B, P, 3) in the frame of each part of rows (B, M, 16): (B, M, P, 3)."""
+    return reference.rotate_to_local(points[:, None], rows[..., :3], rows[..., 3:7])
+
+
+def distances(rows: Tensor, local: Tensor) -> Tensor:
+    """Distances (B, M, P) of each part alone at its local points (B, M, P, 3)."""
+    return reference.superfrustum(local, rows[..., SX:10], *rows[..., 10:BLEND].unbind(-1))
+
+
+def fold_step(field: Tensor, g: Tensor, blend: Tensor) -> tuple[Tensor, Tensor]:
+    """Smooth minimum of the fold so far and the next part, and dU/dfield; dU/dg is 1 less that."""
+    radius = blend.clamp(min=SHARP)
+    smooth = (0.5 + (g - field) / (2 * radius)).clamp(0, 1)
+    weight = torch.where(blend > SHARP, smooth, (field <= g).to(g))
+    return g + (field - g) * weight - blend * weight * (1 - weight), weight
+
+
+def fold(g: Tensor, blends: Tensor, background: Tensor | None) -> tuple[Tensor, Tensor]:
+    """Smooth union (B, P) of distances (B, M, P) after the background, if any.
+
+    Also the weights (B, M, P) with which what came before each part goes on.
+    """
+    field = g[:, 0] if background is None else background
+    weights = torch.zeros_like(g)
+    for part in range(background is None, g.shape[1]):
+        field, weights[:, part] = fold_step(field, g[:, part], blends[:, part, None])
+    return field, weights
+
+
+def fold_without(g: Tensor, blends: Tensor) -> Tensor:
+    """Smooth unions (M + 1, n) of distances (M, n) without each part in turn, and of all of them."""
+    parts = len(g)
+    field = torch.full((parts + 1, g.shape[1]), FAR, dtype=g.dtype, device=g.device)
+    for part in range(parts):
+        joined, _ = fold_step(field, g[part], blends[part])
+        empty = field == FAR
+        joined = torch.where(empty, g[part], joined)
+        joined[part] = field[part]
+        field = joined
+    return field
+
+
+def residuals(
+    field: Tensor, g: Tensor, samples: Samples, beta: float, penalties: Penalties
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Residuals (B, S, P), their derivatives by the assembly's distance, and by the occupancy of any part.
+
+    The reconstruction against a soft target (eq. 7), then the penalties of eq. 8 that weigh anything.
+    """
+    root = samples.weight.sqrt()
+    whole = torch.sigmoid(-beta * field)
+    slope = -beta * whole * (1 - whole)
+    none = torch.zeros_like(root)
+    kinds = [(root * (whole - torch.sigmoid(-beta * samples.distance)), root * slope, none)]
+    if penalties.overlap > 0 or penalties.blending > 0:
+        total = torch.sigmoid(-beta * g).sum(1)
+        if samples.background is not None:
+            total = total + torch.sigmoid(-beta * samples.background)
+    if penalties.overlap > 0:
+        factor = torch.where(total > 1, root * math.sqrt(penalties.overlap), 0.0)
+        kinds.append((factor * (total - 1), none, factor))
+    if penalties.blending > 0:
+        excess = whole - total.clamp(max=1)
+        factor = torch.where(excess > 0, root * math.sqrt(penalties.blending), 0.0)
+        kinds.append((factor * excess, factor * slope, torch.where(total < 1, -factor, 0.0)))
+    residual, by_field, by_part = (torch.stack(column, 1) for column in zip(*kinds, strict=True))
+    return residual, by_field, by_part
+
+
+def linearised(
+    rows: Tensor, samples: Samples, parts: Tensor, beta: float, penalties: Penalties
+) -> tuple[Tensor, Tensor]:
+    """Residuals (B, S P) and their Jacobian (B, S P, 15 L) by the L parts of that index."""
+    local = local_points(rows, samples.points)
+    g = distances(rows, local)
+    field, weights = fold(g, rows[..., BLEND], samples.background)
+    residual, by_field, by_part = residuals(field, g, samples, beta, penalties)
+
+    later = torch.cat([weights[:, 1:], torch.ones_like(weights[:, :1])], 1).flip(1).cumprod(1).flip(1)
+    share = ((1 - weights) * later)[:, parts]  # dF/dg
+    by_blend = -share * weights[:, parts]
+    occupancy = torch.sigmoid(-beta * g[:, parts])
+    slope = beta * occupancy * (1 - occupancy)
+    by_distance = by_field[:, :, None] * share[:, None] - by_part[:, :, None] * slope[:, None]  # (B, S, L, P)
+
+    batch, kinds, points = residual.shape
+    jacobian = rows.new_zeros(batch, kinds, points, len(parts), WIDTH)
+    jacobian[..., -1] = (by_field[:, :, None] * by_blend[:, None]).mT
+    b, part, p = (by_distance.abs().amax(1) > NEGLIGIBLE).nonzero().unbind(1)
+    pair = derivatives(rows[b, parts[part]], local[b, parts[part], p])
+    jacobian[b, :, p, part, :-1] = by_distance[b, :, part, p][..., None] * pair[:, None]
+    return residual.flatten(1), jacobian.view(batch, kinds * points, -1)
+
+
+def derivatives(rows: Tensor, local: Tensor) -> Tensor:
+    """Derivatives (K, 14) of the distances of K parts (K, 16), each at one local point (K, 3).
+
+    Every pair owns its leaves, so that one reverse pass over the sum gives all of them.
+    """
+    with torch.enable_grad():
+        leaves = [
+            leaf.detach().clone().requires_grad_() for leaf in (local, rows[:, SX:10], *rows[:, 10:BLEND].T)
+        ]
+        total = reference.superfrustum(leaves[0][:, None], *leaves[1:]).sum()
+        slope, size, *scalars = torch.autograd.grad(total, leaves)
+    identity = torch.eye(3, dtype=rows.dtype, device=rows.device)
+    rotation = reference.rotate_to_local(identity, torch.zeros_like(rows[:, :3]), rows[:, 3:7])
+    translation = -(rotation * slope[:, None]).sum(-1)
+    return torch.cat([translation, torch.linalg.cross(slope, local), size, torch.stack(scalars, 1)], 1)
+
+
+def _numpy(tensor: Tensor) -> Floats:
+    return tensor.cpu().numpy()

@@ -1,0 +1,229 @@
+"""The PyTorch kernel against the compiled one: the same equations, the same fits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from partwright.fields import kernel
+from partwright.superfrusta.torch_kernel import TorchKernel
+
+LIMITS = kernel.Limits(
+    lower=(-2.0,) * 3 + (-9.0,) * 3 + (0.004,) * 3 + (0.0, 0.0, 0.0, 0.0, 0.0, 1e-3),
+    upper=(2.0,) * 3 + (9.0,) * 3 + (2.5,) * 3 + (1.0, 0.5, 2.0, 1.0, 1.0, 0.3),
+    step=(0.1,) * 3 + (0.3,) * 3 + (0.2,) * 3 + (0.3, 0.05, 0.3, 0.3, 0.3, 0.05),
+)
+STAGES = [(15, 10), (40, 10), (100, 8)]
+BOTH = kernel.Penalties(0.05, 0.05)
+DEVICES = [
+    "cpu",
+    pytest.param("cuda", marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device")),
+]
+
+
+@pytest.fixture(params=DEVICES)
+def torch_kernel(request: pytest.FixtureRequest) -> TorchKernel:
+    return TorchKernel(request.param)
+
+
+def random_rows(generator: np.random.Generator, parts: int) -> np.ndarray:
+    """Parts of ordinary proportions, well inside all bounds."""
+    rotation = generator.normal(size=(parts, 4))
+    columns = [
+        generator.uniform(-0.5, 0.5, (parts, 3)),
+        rotation / np.linalg.norm(rotation, axis=1, keepdims=True),
+        generator.uniform([0.3, 0.3, 0.6], [0.6, 0.6, 0.9], (parts, 3)),
+        generator.uniform([0.1, 0.01, 0.5, 0.05, 0.1, 0.01], [0.9, 0.1, 1.5, 0.3, 0.6, 0.2], (parts, 6)),
+    ]
+    return np.hstack(columns).astype(np.float32)
+
+
+def target_of(rows: np.ndarray, generator: np.random.Generator, count: int = 3000) -> kernel.Target:
+    points = generator.uniform(-1, 1, (count, 3)).astype(np.float32)
+    weight = generator.uniform(0.5, 2, count).astype(np.float32)
+    return kernel.Target(points, kernel.evaluate(rows, points), weight / weight.sum())
+
+
+def perturbed(rows: np.ndarray, generator: np.random.Generator, amount: float = 0.05) -> np.ndarray:
+    changed = rows.copy()
+    changed[:, :3] += generator.normal(size=(len(rows), 3)) * amount
+    changed[:, 3:7] += generator.normal(size=(len(rows), 4)) * amount
+    changed[:, 7:10] *= 1 + generator.normal(size=(len(rows), 3)) * amount
+    changed[:, 10:15] = [0.5, 0.02, 1.0, 0.1, 0.2]
+    return changed
+
+
+@pytest.mark.parametrize("parts", [1, 5])
+def test_distances_equal_the_compiled_kernel(torch_kernel: TorchKernel, parts: int) -> None:
+    generator = np.random.default_rng(parts)
+    rows = random_rows(generator, parts)
+    points = generator.uniform(-1, 1, (4000, 3)).astype(np.float32)
+    np.testing.assert_allclose(torch_kernel.evaluate(rows, points), kernel.evaluate(rows, points), atol=2e-6)
+    alone = torch_kernel.evaluate_parts(rows, points)
+    np.testing.assert_allclose(alone, kernel.evaluate_parts(rows, points), atol=2e-6)
+
+
+@pytest.mark.parametrize("penalties", [kernel.Penalties(), kernel.Penalties(0.1, 0), BOTH])
+@pytest.mark.parametrize("background", [False, True])
+@pytest.mark.parametrize(("parts", "beta"), [(1, 15.0), (4, 40.0), (4, 100.0)])
+def test_normal_equations_equal_the_compiled_kernel(
+    torch_kernel: TorchKernel, parts: int, beta: float, background: bool, penalties: kernel.Penalties
+) -> None:
+    generator = np.random.default_rng(7)
+    truth = random_rows(generator, parts)
+    target = target_of(truth, generator)
+    rows = perturbed(truth, generator)
+    if background:
+        behind = kernel.evaluate(random_rows(generator, 1), target.points)
+        target = kernel.Target(target.points, target.distance, target.weight, behind)
+    loss, gradient, matrix = kernel.normal_equations(rows, target, beta, penalties)
+    found_loss, found_gradient, found_matrix = torch_kernel.normal_equations(rows, target, beta, penalties)
+    assert found_loss == pytest.approx(loss, rel=1e-4)
+    assert torch_kernel.loss(rows, target, beta, penalties) == pytest.approx(loss, rel=1e-4)
+    assert np.linalg.norm(found_gradient - gradient) < 2e-5 * np.linalg.norm(gradient)
+    scale = np.sqrt(np.diag(matrix))  # every entry, in units of its own row and column
+    assert np.linalg.norm(found_matrix - matrix) < 1e-5 * np.linalg.norm(matrix)
+    assert (np.abs(found_matrix - matrix) <= 1e-3 * (scale[:, None] * scale + 1e-9)).all()
+
+
+def test_little_memory_gives_the_same_sums() -> None:
+    generator = np.random.default_rng(1)
+    truth = random_rows(generator, 3)
+    target, rows = target_of(truth, generator), perturbed(truth, generator)
+    whole, pieces = TorchKernel("cpu"), TorchKernel("cpu", memory=1 << 20)
+    expected = whole.normal_equations(rows, target, 40.0, BOTH)
+    for found, value in zip(pieces.normal_equations(rows, target, 40.0, BOTH), expected, strict=True):
+        np.testing.assert_allclose(found, value, rtol=1e-4, atol=1e-6 * np.abs(value).max())
+    np.testing.assert_array_equal(pieces.evaluate(rows, target.points), whole.evaluate(rows, target.points))
+
+
+@pytest.mark.parametrize("penalties", [kernel.Penalties(), BOTH])
+@pytest.mark.parametrize("parts", [1, 3])
+def test_a_fit_takes_the_same_steps_as_the_compiled_one(
+    torch_kernel: TorchKernel, parts: int, penalties: kernel.Penalties
+) -> None:
+    generator = np.random.default_rng(parts)
+    truth = random_rows(generator, parts + 1)  # one part too few: no exact fit
+    target, start = target_of(truth, generator), perturbed(truth, generator)[:parts]
+    expected, loss, count = kernel.levenberg_marquardt(start, target, [(15, 5)], LIMITS, penalties=penalties)
+    rows, found, steps = torch_kernel.levenberg_marquardt(
+        start, target, [(15, 5)], LIMITS, penalties=penalties
+    )
+    assert steps == count
+    assert found == pytest.approx(loss, rel=1e-4)
+    np.testing.assert_allclose(rows, expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("penalties", [kernel.Penalties(), BOTH])
+@pytest.mark.parametrize("parts", [1, 3])
+def test_a_fit_ends_where_the_compiled_one_ends(
+    torch_kernel: TorchKernel, parts: int, penalties: kernel.Penalties
+) -> None:
+    generator = np.random.default_rng(parts)
+    truth = random_rows(generator, parts)
+    exact, start = target_of(truth, generator), perturbed(truth, generator, 0.03)
+    noise = generator.normal(size=len(exact.points)).astype(np.float32) * 0.01  # a minimum above 0
+    target = kernel.Target(exact.points, exact.distance + noise, exact.weight)
+    _, loss, _ = kernel.levenberg_marquardt(start, target, STAGES, LIMITS, penalties=penalties)
+    rows, found, steps = torch_kernel.levenberg_marquardt(start, target, STAGES, LIMITS, penalties=penalties)
+    assert loss < 0.7 * kernel.loss(start, target, STAGES[-1][0], penalties)
+    assert found == pytest.approx(loss, rel=0.02)
+    assert found == pytest.approx(kernel.loss(rows, target, STAGES[-1][0], penalties), rel=1e-4)
+    assert 0 < steps <= sum(count for _, count in STAGES)
+    np.testing.assert_allclose(np.linalg.norm(rows[:, 3:7], axis=1), 1, atol=1e-6)
+
+
+def test_only_free_entries_move_and_ties_hold(torch_kernel: TorchKernel) -> None:
+    generator = np.random.default_rng(4)
+    truth = random_rows(generator, 3)
+    target, start = target_of(truth, generator), perturbed(truth, generator)
+    start[1, 8] = start[1, 7]
+    start[0, 8] = 2 * start[0, 7]  # marked as tied, but nothing of it is free
+    free = np.ones((3, 15), bool)
+    free[0] = False
+    free[1, 3:6] = False
+    tied = np.array([True, True, False])
+    options = {"free": free, "tied": tied}
+    rows, loss, _ = torch_kernel.levenberg_marquardt(start, target, STAGES, LIMITS, **options)
+    _, expected, _ = kernel.levenberg_marquardt(start, target, STAGES, LIMITS, **options)
+    np.testing.assert_array_equal(rows[0], start[0])
+    np.testing.assert_array_equal(rows[1, 3:7], start[1, 3:7])
+    assert rows[1, 7] == rows[1, 8] != start[1, 7]
+    assert loss == pytest.approx(expected, rel=0.02)
+
+
+def test_a_fit_stays_in_the_box_and_off_folded_arcs(torch_kernel: TorchKernel) -> None:
+    generator = np.random.default_rng(5)
+    bent = random_rows(generator, 1)
+    bent[0, 7:15] = [0.5, 0.3, 0.55, 0.5, 0.01, 1.0, 1.0, 0.0]
+    target = target_of(bent, generator)
+    start = perturbed(bent, generator, 0.02)
+    start[0, 7:10] = [0.4, 0.3, 0.3]
+    start[0, 13] = 0.5
+    rows, _, _ = torch_kernel.levenberg_marquardt(start, target, STAGES, LIMITS)
+    lower, upper, _ = LIMITS.array()
+    assert (rows[0, 7:] >= lower[6:]).all()
+    assert (rows[0, 7:] <= upper[6:]).all()
+    assert np.sin(rows[0, 13] * np.pi / 2) <= min(1.0, rows[0, 9] / rows[0, 7]) + 1e-5
+
+
+def test_starts_of_unequal_ranges_each_fit_like_alone(torch_kernel: TorchKernel) -> None:
+    generator = np.random.default_rng(6)
+    truths = random_rows(generator, 3)
+    targets = [
+        target_of(row[None], generator, count) for row, count in zip(truths, (900, 1500, 600), strict=True)
+    ]
+    joined = kernel.Target(
+        *(np.concatenate([getattr(t, name) for t in targets]) for name in ("points", "distance", "weight"))
+    )
+    ends = np.cumsum([900, 1500, 600])
+    ranges = np.stack([ends - [900, 1500, 600], ends], 1)
+    starts = np.concatenate([perturbed(truths, generator), perturbed(truths, generator)])
+    free = np.ones((6, 15), bool)
+    free[2, 12] = False  # the bulge of one start
+    ranges = np.concatenate([ranges, ranges])
+    expected, expected_losses = kernel.fit_starts(starts, ranges, joined, STAGES, LIMITS, free=free)
+    rows, losses = torch_kernel.fit_starts(starts, ranges, joined, STAGES, LIMITS, free=free)
+    initial = np.array([kernel.loss(s[None], targets[i % 3], STAGES[-1][0]) for i, s in enumerate(starts)])
+    assert rows.shape == expected.shape
+    assert rows[2, 13] == starts[2, 13]
+    np.testing.assert_array_less(np.abs(losses - expected_losses), 0.02 * expected_losses + 1e-4 * initial)
+    for i in range(6):
+        _, alone, _ = torch_kernel.levenberg_marquardt(
+            starts[i : i + 1], targets[i % 3], STAGES, LIMITS, free=free[i : i + 1]
+        )
+        assert losses[i] == pytest.approx(alone, rel=0.02, abs=1e-4 * initial[i])
+
+
+def test_a_background_is_part_of_what_is_explained(torch_kernel: TorchKernel) -> None:
+    generator = np.random.default_rng(8)
+    truth = random_rows(generator, 2)
+    whole = target_of(truth, generator)
+    behind = kernel.evaluate(truth[:1], whole.points)
+    target = kernel.Target(whole.points, whole.distance, whole.weight, behind)
+    assert torch_kernel.loss(truth[1:], target, 40.0) < 1e-10
+    start = perturbed(truth[1:], generator)
+    ranges = np.array([[0, len(whole.points)]])
+    _, losses = torch_kernel.fit_starts(start, ranges, target, STAGES, LIMITS)
+    _, expected = kernel.fit_starts(start, ranges, target, STAGES, LIMITS)
+    assert losses == pytest.approx(expected, rel=0.02, abs=1e-7)
+
+
+@pytest.mark.parametrize("parts", [1, 4])
+def test_removal_counts_equal_the_compiled_kernel(torch_kernel: TorchKernel, parts: int) -> None:
+    generator = np.random.default_rng(9)
+    rows = random_rows(generator, parts)
+    points = generator.uniform(-1, 1, (5000, 3)).astype(np.float32)
+    inside = generator.random(5000) < 0.4
+    weight = generator.uniform(0.5, 1.5, 5000).astype(np.float32)
+    found = torch_kernel.removal_counts(rows, points, inside, weight)
+    assert found.shape == (parts + 1, 2)
+    np.testing.assert_allclose(found, kernel.removal_counts(rows, points, inside, weight), rtol=1e-5)
+
+
+def test_wrong_shapes_are_refused() -> None:
+    with pytest.raises(ValueError, match="parameter rows must be"):
+        TorchKernel("cpu").evaluate(np.zeros((2, 12)), np.zeros((4, 3)))
+    with pytest.raises(ValueError, match="points must be"):
+        TorchKernel("cpu").evaluate(np.ones((2, 16)), np.zeros((4, 2)))
