@@ -133,6 +133,17 @@ PW_CLONES void outer_product(const float* a, const float* b, int length, double*
     for (int j = 0; j < DERIVATIVES; j += 5) outer_tile<3, 5>(a + i * length, b + j * length, length, c + i * DERIVATIVES + j, DERIVATIVES);
 }
 
+// A A^T: only tiles that reach the lower triangle; `mirror` fills in the rest once all are summed.
+PW_CLONES void outer_square(const float* a, int length, double* c) {
+  for (int i = 0; i < DERIVATIVES; i += 3)
+    for (int j = 0; j <= i + 2; j += 5) outer_tile<3, 5>(a + i * length, a + j * length, length, c + i * DERIVATIVES + j, DERIVATIVES);
+}
+
+void mirror(std::vector<double>& c) {
+  for (int i = 0; i < DERIVATIVES; ++i)
+    for (int j = i + 1; j < DERIVATIVES; ++j) c[size_t(i) * DERIVATIVES + j] = c[size_t(j) * DERIVATIVES + i];
+}
+
 PW_CLONES void times_vector(const float* a, const float* v, int length, double* c) {
   for (int i = 0; i < DERIVATIVES; i += 3) outer_tile<3, 1>(a + i * length, v, length, c + i, 1);
 }
@@ -140,6 +151,38 @@ PW_CLONES void times_vector(const float* a, const float* v, int length, double* 
 PW_CLONES void scale_rows(const float* __restrict d, const float* __restrict by, int rows, int length, float* __restrict out) {
   for (int r = 0; r < rows; ++r)
     for (int i = 0; i < BLOCK; ++i) out[r * length + i] = d[r * BLOCK + i] * by[i];
+}
+
+// Columns of a Jacobian: which points of a block have one, padded to whole lanes.
+struct Columns {
+  int index[BLOCK];
+  int count = 0, padded = 0;
+
+  void collect(const float* size, float least) {
+    count = 0;
+    for (int i = 0; i < BLOCK; ++i) {
+      index[count] = i;
+      count += size[i] > least;
+    }
+    padded = (count + 15) / 16 * 16;
+  }
+};
+
+void gather(const float* v, const Columns& columns, float* out) {
+  for (int i = 0; i < columns.count; ++i) out[i] = v[columns.index[i]];
+  std::fill(out + columns.count, out + columns.padded, 0.f);
+}
+
+PW_CLONES void gather_scaled(const float* __restrict d, const float* __restrict by, const Columns& columns, int rows, int length,
+                             float* __restrict out) {
+  for (int r = 0; r < rows; ++r) {
+    for (int i = 0; i < columns.count; ++i) out[r * length + i] = d[r * BLOCK + columns.index[i]] * by[columns.index[i]];
+    for (int i = columns.count; i < columns.padded; ++i) out[r * length + i] = 0;
+  }
+}
+
+PW_CLONES void keep_larger(float* __restrict size, const float* __restrict v) {
+  for (int i = 0; i < BLOCK; ++i) size[i] = std::max(size[i], std::fabs(v[i]));
 }
 
 PW_CLONES float largest(const float* v) {
@@ -154,7 +197,7 @@ struct Workspace {
   explicit Workspace(size_t m) : g(m * BLOCK), weight(m * BLOCK), share(m * BLOCK), blend(m * BLOCK), occ(m * BLOCK) {}
   std::vector<float> g, weight, share, blend, occ;
   Block block;
-  alignas(64) float field[BLOCK], total[BLOCK], carried[BLOCK], assembled[BLOCK];
+  alignas(64) float field[BLOCK], total[BLOCK], carried[BLOCK], assembled[BLOCK], weights[BLOCK];
 };
 
 // Fold of all parts over one block, keeping each part's value and fold weight.
@@ -180,6 +223,9 @@ void backward(size_t parts, Workspace& w) {
 PW_CLONES void add(float* __restrict total, const float* __restrict v) {
   for (int i = 0; i < BLOCK; ++i) total[i] += v[i];
 }
+
+// Reconstruction, overlap and smooth-union consistency.
+constexpr int KINDS = 3;
 
 // Residuals of one block and their derivatives by F and by each part's occupancy.
 struct Residuals {
@@ -217,12 +263,12 @@ PW_CLONES void by_part(const float* __restrict f, const float* __restrict share,
 // Loads a block of samples and evaluates residuals; padding gets weight 0.
 double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t first, float beta, Penalties penalties,
                     Workspace& w, Residuals& r) {
-  alignas(64) float background[BLOCK], distance[BLOCK], target[BLOCK], weight[BLOCK];
+  alignas(64) float background[BLOCK], distance[BLOCK], target[BLOCK];
   const int n = load(s.points, first, s.count, w.block);
   for (int i = 0; i < BLOCK; ++i) {
     const int64_t j = first + (i < n ? i : 0);
     distance[i] = s.distance[j];
-    weight[i] = i < n ? s.weight[j] : 0.f;
+    w.weights[i] = i < n ? s.weight[j] : 0.f;
     if (s.background) background[i] = s.background[j];
   }
   forward(parts, s.background ? background : nullptr, w);
@@ -240,7 +286,7 @@ double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t fi
   } else {
     std::memcpy(w.total, w.assembled, sizeof w.total);
   }
-  return residuals(target, weight, w.assembled, w.total, beta, penalties, r);
+  return residuals(target, w.weights, w.assembled, w.total, beta, penalties, r);
 }
 
 // Blocks first .. last of one of the fixed pieces.
@@ -321,62 +367,70 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
     sum.gradient.assign(parts.size() * DERIVATIVES, 0.0);
     Workspace w(parts.size());
     Residuals r;
-    alignas(64) float coefficient[BLOCK], none[BLOCK] = {};
-    std::vector<float> d(DERIVATIVES * BLOCK), rows;
+    alignas(64) float none[BLOCK] = {};
+    std::vector<float> d(DERIVATIVES * BLOCK), rows, coefficients;
     std::vector<int> active;
     const auto [first, last] = piece_range(samples.count, piece);
     for (int64_t b = first; b < last; ++b) {
       sum.loss += sample_block(parts, samples, b * BLOCK, beta, penalties, w, r);
-      // Each residual that is not zero all over the block adds BLOCK columns to the block's Jacobian.
-      const bool over = penalties.overlap > 0 && largest(r.over) > 0;
-      const bool blended = penalties.blending > 0 && largest(r.blended) > 0;
-      const int length = BLOCK * (1 + over + blended);
       std::fill_n(w.carried, BLOCK, 1.f);
       backward(parts.size(), w);
-      alignas(64) float residual[3 * BLOCK];
-      std::memcpy(residual, r.rec, sizeof r.rec);
-      if (over) std::memcpy(residual + BLOCK, r.over, sizeof r.over);
-      if (blended) std::memcpy(residual + BLOCK * (1 + over), r.blended, sizeof r.blended);
+      // Each point has up to three residuals, and each residual that moves with some part is a column of the
+      // block's Jacobian. Saturated points, most of them where beta is large, have none.
+      const bool over = penalties.overlap > 0 && largest(r.over) > 0;
+      const bool blended = penalties.blending > 0 && largest(r.blended) > 0;
+      const bool used[KINDS] = {true, over, blended};
+      const float* residual[KINDS] = {r.rec, r.over, r.blended};
+      const float *by_field[KINDS] = {r.rec_f, none, r.blended_f}, *by_occupancy[KINDS] = {none, r.over_o, r.blended_o};
+      const float least = 1e-3f * 0.25f * beta * std::sqrt(*std::max_element(w.weights, w.weights + BLOCK));
+      alignas(64) float size[KINDS][BLOCK] = {};
       active.clear();
-      rows.clear();
+      coefficients.clear();
       for (size_t m = 0; m < parts.size(); ++m) {
         if (!live[m]) continue;
-        const float *share = &w.share[m * BLOCK], *occ = &w.occ[m * BLOCK];
-        alignas(64) float c[3][BLOCK];
-        by_part(r.rec_f, share, none, none, beta, c[0]);
-        float size = largest(c[0]);
-        if (over) {
-          by_part(none, share, r.over_o, occ, beta, c[1]);
-          size = std::max(size, largest(c[1]));
+        coefficients.resize((active.size() + 1) * KINDS * BLOCK);
+        float* c = &coefficients[active.size() * KINDS * BLOCK];
+        float top = 0;
+        for (int kind = 0; kind < KINDS; ++kind) {
+          if (!used[kind]) continue;
+          by_part(by_field[kind], &w.share[m * BLOCK], by_occupancy[kind], &w.occ[m * BLOCK], beta, c + kind * BLOCK);
+          top = std::max(top, largest(c + kind * BLOCK));
         }
-        if (blended) {
-          by_part(r.blended_f, share, r.blended_o, occ, beta, c[1 + over]);
-          size = std::max(size, largest(c[1 + over]));
-        }
-        if (size < 1e-5f) continue;
+        if (top < least) continue;
+        for (int kind = 0; kind < KINDS; ++kind)
+          if (used[kind]) keep_larger(size[kind], c + kind * BLOCK);
         active.push_back(int(m));
-        rows.resize(active.size() * DERIVATIVES * size_t(length));
-        float* out = &rows[(active.size() - 1) * DERIVATIVES * size_t(length)];
-        derivatives(parts[m], w.block, d.data());
-        for (int s = 0; s < length / BLOCK; ++s) scale_rows(d.data(), c[s], FIELD_DERIVATIVES, length, out + s * BLOCK);
-        float* blend_row = out + D_BLEND * length;
-        std::fill_n(blend_row, length, 0.f);
-        by_part(r.rec_f, &w.blend[m * BLOCK], none, none, beta, coefficient);
-        std::memcpy(blend_row, coefficient, sizeof coefficient);
-        if (blended) {
-          by_part(r.blended_f, &w.blend[m * BLOCK], none, none, beta, coefficient);
-          std::memcpy(blend_row + BLOCK * (1 + over), coefficient, sizeof coefficient);
-        }
       }
+      if (active.empty()) continue;
+      Columns columns[KINDS];
+      int length = 0;
+      for (int kind = 0; kind < KINDS; ++kind) {
+        if (used[kind]) columns[kind].collect(size[kind], least);
+        length += columns[kind].padded;
+      }
+      alignas(64) float errors[KINDS * BLOCK];
+      for (int kind = 0, at = 0; kind < KINDS; at += columns[kind++].padded) gather(residual[kind], columns[kind], errors + at);
+      rows.resize(active.size() * DERIVATIVES * size_t(length));
       for (size_t i = 0; i < active.size(); ++i) {
-        const float* a = &rows[i * DERIVATIVES * size_t(length)];
-        times_vector(a, residual, length, &sum.gradient[size_t(active[i]) * DERIVATIVES]);
+        const size_t m = size_t(active[i]);
+        float* out = &rows[i * DERIVATIVES * size_t(length)];
+        derivatives(parts[m], w.block, d.data());
+        for (int kind = 0, at = 0; kind < KINDS; at += columns[kind++].padded) {
+          gather_scaled(d.data(), &coefficients[(i * KINDS + size_t(kind)) * BLOCK], columns[kind], FIELD_DERIVATIVES, length, out + at);
+          gather_scaled(&w.blend[m * BLOCK], by_field[kind], columns[kind], 1, length, out + D_BLEND * length + at);
+        }
+        times_vector(out, errors, length, &sum.gradient[m * DERIVATIVES]);
+      }
+      for (size_t i = 0; i < active.size(); ++i)
         for (size_t j = i; j < active.size(); ++j) {
           auto& block = sum.blocks[{active[i], active[j]}];
           if (block.empty()) block.assign(DERIVATIVES * DERIVATIVES, 0.0);
-          outer_product(a, &rows[j * DERIVATIVES * size_t(length)], length, block.data());
+          const float *a = &rows[i * DERIVATIVES * size_t(length)], *c = &rows[j * DERIVATIVES * size_t(length)];
+          if (i == j)
+            outer_square(a, length, block.data());
+          else
+            outer_product(a, c, length, block.data());
         }
-      }
     }
   });
   NormalEquations total = std::move(pieces[0]);
@@ -390,6 +444,8 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
       for (size_t i = 0; i < block.size(); ++i) sum[i] += block[i];
     }
   }
+  for (auto& [pair, block] : total.blocks)
+    if (pair.first == pair.second) mirror(block);
   return total;
 }
 
