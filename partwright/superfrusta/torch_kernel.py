@@ -3,8 +3,9 @@
 Every fit is a batch of B assemblies of M parts with P samples each: a whole assembly is a batch of one, the
 starts of `fit_starts` are B assemblies of one part. Steps, bounds and acceptance are those of
 cpp/optimise.cpp; each assembly of the batch has its own damping and ends on its own. Distances come from
-`fields.reference` in float32, sums over samples and linear solves are float64. The two kernels take the same
-steps, but a fit whose minimum is not sharp may end elsewhere: rounding decides which step is accepted.
+`fields.reference` in float32, sums over samples and linear solves are float64. Steps are solved
+for by dense factorisation and saturated points keep their share of the gradient, where the compiled kernel
+is content with a thousandth. A fit whose minimum is not sharp may therefore end elsewhere.
 
 Costs of a step: the derivatives (one reverse pass over the pairs of part and point that the loss can feel)
 and J^T J, which take about a third each on a CPU with 24 parts; then the distances. A step is over a thousand
