@@ -1,0 +1,38 @@
+"""Small meshes that a few SuperFrusta explain exactly, or nearly."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from manifold3d import CrossSection, Manifold
+
+
+def box(size, centre=(0.0, 0.0, 0.0)) -> trimesh.Trimesh:
+    return trimesh.creation.box(size).apply_translation(centre)
+
+
+def union(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
+    return trimesh.boolean.union(meshes, engine="manifold")
+
+
+def bracket() -> trimesh.Trimesh:
+    """An L of two boxes."""
+    return union(box((2, 1, 0.3)), box((0.3, 1, 1.5), (-0.85, 0, 0.6)))
+
+
+def table() -> trimesh.Trimesh:
+    """A top and four legs."""
+    legs = [box((0.15, 0.15, 1.05), (x, y, 0.5)) for x in (-0.85, 0.85) for y in (-0.5, 0.5)]
+    return union(box((2, 1.2, 0.15), (0, 0, 1)), *legs)
+
+
+def pipe() -> trimesh.Trimesh:
+    """A tube of outer radius 1, wall 0.3 and height 2."""
+    return trimesh.creation.annulus(0.7, 1.0, 2.0)
+
+
+def half_torus() -> trimesh.Trimesh:
+    """A round rod bent through 180 degrees."""
+    section = CrossSection.circle(0.2, 32).translate((1.0, 0.0))
+    made = Manifold.revolve(section, 64, 180).to_mesh()
+    return trimesh.Trimesh(np.asarray(made.vert_properties)[:, :3], np.asarray(made.tri_verts))

@@ -1,0 +1,125 @@
+"""Growing into a residual and pruning what does not pay, on assemblies whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from partwright.fields import kernel
+from partwright.shapes import load_shape
+from partwright.superfrusta import Settings
+from partwright.superfrusta.evidence import Evidence
+from partwright.superfrusta.growing import grow
+from partwright.superfrusta.objective import score
+from partwright.superfrusta.pruning import cheapest_removal, neighbours, prune
+from partwright.superfrusta.refining import POLISH, refine
+from tests.superfrusta.meshes import box, union
+from tests.superfrusta.rows import box as box_row
+
+SETTINGS = Settings.for_quality("draft", threads=1)
+NONE = np.empty((0, 16), np.float32)
+
+# Two blocks apart along x, in the unit frame already: 1.8 long.
+LEFT = ((0.6, 0.8, 0.5), (-0.6, 0.0, 0.0))
+RIGHT = ((0.6, 0.4, 0.5), (0.6, 0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def pair() -> Evidence:
+    return Evidence.of(load_shape(union(box(*LEFT), box(*RIGHT))), SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def exact() -> np.ndarray:
+    return np.array([box_row(*LEFT), box_row(*RIGHT)])
+
+
+def test_two_blocks_grow_two_parts(pair: Evidence, exact: np.ndarray) -> None:
+    grown = grow(pair, NONE, SETTINGS, most=5)
+    assert len(grown) == 2
+    assert score(pair, grown) > 0.95
+    assert np.sort(grown[:, 0]) == pytest.approx([-0.6, 0.6], abs=0.02)
+
+
+def test_what_is_explained_already_grows_nothing(pair: Evidence, exact: np.ndarray) -> None:
+    assert score(pair, exact) > 0.998
+    assert grow(pair, exact, SETTINGS, most=5).shape == (0, 16)
+
+
+def test_the_other_block_grows_where_one_is_missing(pair: Evidence, exact: np.ndarray) -> None:
+    for there, missing in ((0, 1), (1, 0)):
+        grown = grow(pair, exact[[there]], SETTINGS, most=5)
+        assert len(grown) == 1
+        points = pair.points[pair.near :]
+        occupied, wanted = (kernel.evaluate(r, points) < 0 for r in (grown, exact[[missing]]))
+        assert np.count_nonzero(occupied & wanted) > 0.95 * np.count_nonzero(occupied | wanted)
+
+
+def test_no_more_than_wanted_grow_and_the_best_comes_first(pair: Evidence) -> None:
+    assert grow(pair, NONE, SETTINGS, most=0).shape == (0, 16)
+    one = grow(pair, NONE, SETTINGS, most=1)
+    assert len(one) == 1
+    assert one[0, 0] < 0  # the larger block
+
+
+def test_growing_repeats_at_any_number_of_threads(pair: Evidence) -> None:
+    first = grow(pair, NONE, SETTINGS, most=5)
+    for threads in (1, 2):
+        again = Evidence(pair.points, pair.distance, pair.weight, pair.near, pair.grid, threads)
+        changed = Settings.for_quality("draft", threads=threads)
+        np.testing.assert_array_equal(grow(again, NONE, changed, most=5), first)
+
+
+def test_pruning_drops_copies_crumbs_and_strays_only(pair: Evidence, exact: np.ndarray) -> None:
+    copy = box_row((0.5, 0.6, 0.4), LEFT[1])  # inside the left block
+    crumb = box_row((0.02, 0.02, 0.02), (0.6, 0.21, 0.0))
+    stray = box_row((0.2, 0.2, 0.2), (0.0, 0.3, 0.0))  # outside the shape
+    rows = np.array([copy, exact[0], crumb, stray, exact[1]])
+    np.testing.assert_array_equal(prune(pair, rows, alpha=1e-3), exact)
+    # Free parts stay unless they do harm; dear parts go, but never the last one.
+    assert len(prune(pair, exact, alpha=0.0)) == 2
+    np.testing.assert_array_equal(prune(pair, exact, alpha=10.0), exact[:1])
+
+
+def test_locked_parts_are_never_pruned(pair: Evidence, exact: np.ndarray) -> None:
+    stray = box_row((0.2, 0.2, 0.2), (0.0, 0.3, 0.0))
+    rows = np.array([stray, exact[0], exact[1]])
+    np.testing.assert_array_equal(prune(pair, rows, alpha=1e-3, locked=1), rows)
+    np.testing.assert_array_equal(prune(pair, rows, alpha=10.0, locked=1), rows[:1])
+
+
+def test_the_cheapest_removal_is_the_part_that_explains_least(pair: Evidence, exact: np.ndarray) -> None:
+    halves = np.array(
+        [
+            exact[0],
+            box_row((0.3, 0.4, 0.5), (0.45, 0.0, 0.0)),
+            box_row((0.3, 0.4, 0.5), (0.75, 0.0, 0.0)),
+        ]
+    )
+    thinned, kept, whole = cheapest_removal(pair, halves, SETTINGS)
+    assert len(thinned) == 2
+    assert whole == pytest.approx(score(pair, halves))
+    assert kept == pytest.approx(score(pair, thinned))
+    # The other half moves over to take the place of both.
+    assert kept > whole - 0.01
+    np.testing.assert_array_equal(thinned[0], exact[0])
+
+
+def test_neighbours_touch(pair: Evidence, exact: np.ndarray) -> None:
+    touching = box_row((0.3, 0.4, 0.5), (0.15, 0.0, 0.0))
+    rows = np.array([*exact, touching])
+    assert neighbours(pair, rows, 1).tolist() == [False, False, True]
+    assert neighbours(pair, rows, 0).tolist() == [False, False, False]
+
+
+def test_refining_moves_the_marked_parts_only(pair: Evidence, exact: np.ndarray) -> None:
+    moved = exact.copy()
+    moved[:, 0] += 0.03
+    refined = refine(pair, moved, POLISH, SETTINGS, np.array([False, True]))
+    np.testing.assert_array_equal(refined[0], moved[0])
+    assert refined[1, 0] == pytest.approx(0.6, abs=0.003)
+    assert score(pair, refined) > score(pair, moved)
+    nothing = np.zeros(2, bool)
+    np.testing.assert_array_equal(refine(pair, moved, POLISH, SETTINGS, nothing), moved)
+    plain = Settings.for_quality("draft", threads=1, smooth=False)
+    np.testing.assert_array_equal(refine(pair, moved, POLISH, plain)[:, 15], moved[:, 15])
