@@ -75,14 +75,16 @@ class Evidence:
         )
 
     def field(self, rows: Rows) -> NDArray[np.float32]:
-        """Distance (N,) of the assembly at the samples; far outside where there are no parts yet."""
-        if len(rows) == 0:
-            return np.full(len(self.points), np.float32(10))
-        return kernel.evaluate(rows, self.points, self.threads)
+        """Distance (N,) of the assembly at the samples."""
+        return distance_of(rows, self.points, self.threads)
 
     def grid_field(self, rows: Rows) -> NDArray[np.float32]:
-        """Distance (X, Y, Z) of the assembly on the grid; far outside where there are no parts yet."""
-        shape = self.grid.values.shape
-        if len(rows) == 0:
-            return np.full(shape, np.float32(10))
-        return kernel.evaluate(rows, self.grid_points, self.threads).reshape(shape)
+        """Distance (X, Y, Z) of the assembly on the grid."""
+        return distance_of(rows, self.grid_points, self.threads).reshape(self.grid.values.shape)
+
+
+def distance_of(rows: Rows, points: NDArray[np.float32], threads: int) -> NDArray[np.float32]:
+    """Distance (N,) of the assembly at points; far outside where there are no parts yet."""
+    if len(rows) == 0:
+        return np.full(len(points), np.float32(10))
+    return kernel.evaluate(rows, points, threads)

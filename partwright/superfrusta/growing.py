@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from partwright.fields import kernel
-from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta.evidence import Evidence, Rows, distance_of
 from partwright.superfrusta.objective import occupancy_score
-from partwright.superfrusta.refining import LIMITS, Stages, freedom, sharpened
+from partwright.superfrusta.refining import LIMITS, freedom, sharpened
 from partwright.superfrusta.seeding import starts
 from partwright.superfrusta.settings import Settings
 
@@ -24,21 +24,32 @@ _KEPT = 4  # starts that survive screening
 _SCREEN = ((15.0, 5),)
 _FIT = ((15.0, 4), (40.0, 10))
 
-SampleSet = tuple[NDArray[np.int64], NDArray[np.float32]]
 
 
 @dataclass(frozen=True)
 class Region:
-    """Voxels (X * Y * Z,) to explain, their depth, and how the fit looks at what surrounds them.
+    """Voxels (X * Y * Z,) to explain with one part, beside parts `others` that stay.
 
-    `margin`: how far around the region samples count, as a share of its longest side. `elsewhere`: weight of
-    unexplained inside samples outside the region. Explained ones weigh nothing: a part may run into them.
+    depth: of the erosion. margin: how far around the region samples count, as a share of its longest side.
+    elsewhere: weight of inside samples outside the region that no part explains yet. frames: rotations (w, x, y, z)
+    to start from beside the principal axes.
     """
 
     voxels: NDArray[np.bool_]
+    others: Rows
     depth: float
     margin: float
     elsewhere: float
+    frames: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 4), np.float32))
+
+
+@dataclass(frozen=True)
+class View:
+    """The samples that a region's part is fitted to: indices, weights, and the distance of the other parts."""
+
+    index: NDArray[np.int64]
+    weight: NDArray[np.float32]
+    background: NDArray[np.float32]
 
 
 def regions(evidence: Evidence, rows: Rows, settings: Settings) -> list[Region]:
@@ -52,14 +63,14 @@ def regions(evidence: Evidence, rows: Rows, settings: Settings) -> list[Region]:
     found = []
     for label, depth in enumerate(depths):
         voxels = (labels == label).ravel()
-        found += [Region(voxels, depth, 0.2, 0.15), Region(voxels, depth, 0.5, 1.0)]
+        found += [Region(voxels, rows, depth, 0.2, 0.15), Region(voxels, rows, depth, 0.5, 1.0)]
     if len(depths) > 1:
         pieces, _ = ndimage.label(residual < -least_depth)
         sizes = np.bincount(pieces.ravel())
         sizes[0] = 0
         for piece in np.argsort(-sizes, kind="stable")[:_LARGEST]:
             if sizes[piece] > least:
-                found.append(Region((pieces == piece).ravel(), float(np.median(depths)), 0.1, 0.3))
+                found.append(Region((pieces == piece).ravel(), rows, float(np.median(depths)), 0.1, 0.3))
     return found
 
 
@@ -68,39 +79,42 @@ def grow(evidence: Evidence, rows: Rows, settings: Settings, most: int) -> Rows:
     wanted = regions(evidence, rows, settings)
     if not wanted or most <= 0:
         return np.empty((0, 16), np.float32)
-    field = evidence.field(rows)
-    return _select(
-        evidence, _fit_regions(evidence, field, wanted, settings), field < 0, settings.alpha / 2, most
-    )
+    candidates = fit_regions(evidence, wanted, settings)
+    return _select(evidence, candidates, evidence.field(rows) < 0, settings.alpha / 2, most)
 
 
-def _samples(evidence: Evidence, field: NDArray[np.float32], region: Region) -> SampleSet:
-    """Sample indices around the region and their weights."""
+def _view(evidence: Evidence, region: Region) -> View:
     voxels = evidence.grid_points[region.voxels]
     low, high = voxels.min(axis=0), voxels.max(axis=0)
     margin = max(0.06, region.margin * float((high - low).max()))
     index = np.flatnonzero(((evidence.points > low - margin) & (evidence.points < high + margin)).all(axis=1))
     if len(index) > _PLENTY:
         index = index[np.linspace(0, len(index) - 1, _PLENTY).astype(np.int64)]
+    background = distance_of(region.others, evidence.points[index], evidence.threads)
     weight = evidence.weight[index].copy()
-    elsewhere = evidence.inside[index] & ~region.voxels[evidence.voxel[index]]
-    weight[elsewhere] *= np.where(field[index][elsewhere] < 0, 0.0, region.elsewhere)
-    return index, weight / max(float(weight.sum()), 1e-9)
+    unexplained = evidence.inside[index] & ~region.voxels[evidence.voxel[index]] & (background > 0)
+    weight[unexplained] *= region.elsewhere
+    return View(index, weight / max(float(weight.sum()), 1e-9), background)
 
 
-def _fit_regions(
-    evidence: Evidence, field: NDArray[np.float32], wanted: list[Region], settings: Settings
+def fit_regions(
+    evidence: Evidence, wanted: list[Region], settings: Settings, overlap: float = 0.0
 ) -> Rows:
-    """The best part for each region: all starts are screened briefly on few samples, the best go on."""
-    sets = [_samples(evidence, field, region) for region in wanted]
-    guesses = [starts(evidence.grid_points[region.voxels], evidence.grid.spacing) for region in wanted]
+    """The best part for each region: all starts are screened briefly on few samples, the best go on.
+
+    `overlap` is the price of running into the other parts. Growth asks none: a new part that may not cross what is
+    there gets stuck in its region.
+    """
+    views = [_view(evidence, region) for region in wanted]
+    spacing = evidence.grid.spacing
+    guesses = [starts(evidence.grid_points[region.voxels], spacing, region.frames) for region in wanted]
     owner = np.repeat(np.arange(len(wanted)), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))
     screened, losses = _run(
-        evidence, np.concatenate(guesses), owner, sets, _SCREEN_EVERY, _SCREEN, depth, settings
+        evidence, np.concatenate(guesses), owner, views, _SCREEN_EVERY, sharpened(_SCREEN, depth), overlap, settings
     )
     kept = np.concatenate([_best(losses, owner, i, _KEPT) for i in range(len(wanted))])
-    fitted, losses = _run(evidence, screened[kept], owner[kept], sets, 1, _FIT, depth, settings)
+    fitted, losses = _run(evidence, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings)
     return fitted[np.concatenate([_best(losses, owner[kept], i, 1) for i in range(len(wanted))])]
 
 
@@ -115,23 +129,32 @@ def _run(
     evidence: Evidence,
     rows: Rows,
     owner: NDArray[np.int64],
-    sets: list[SampleSet],
+    views: list[View],
     every: int,
-    stages: Stages,
-    depth: float,
+    stages: NDArray[np.float32],
+    overlap: float,
     settings: Settings,
 ) -> tuple[Rows, NDArray[np.float64]]:
-    """Single-part fits of all rows, each to every n-th sample of the set that `owner` names."""
-    index = [s[0][::every] for s in sets]
-    weight = [s[1][::every] for s in sets]
-    ends = np.cumsum([len(i) for i in index])
-    ranges = np.stack([ends - [len(i) for i in index], ends], axis=1)
-    joined = np.concatenate(index)
-    target = kernel.Target(evidence.points[joined], evidence.distance[joined], np.concatenate(weight))
+    """Single-part fits of all rows, each to every n-th sample of the view that `owner` names."""
+    index = np.concatenate([view.index[::every] for view in views])
+    counts = np.array([len(view.index[::every]) for view in views])
+    ends = np.cumsum(counts)
+    target = kernel.Target(
+        evidence.points[index],
+        evidence.distance[index],
+        np.concatenate([view.weight[::every] for view in views]),
+        np.concatenate([view.background[::every] for view in views]),
+    )
     return kernel.fit_starts(
-        rows, ranges[owner], target, sharpened(stages, depth), LIMITS,
-        free=freedom(np.ones(len(rows), bool), settings), threads=settings.threads,
-    )  # fmt: skip
+        rows,
+        np.stack([ends - counts, ends], axis=1)[owner],
+        target,
+        stages,
+        LIMITS,
+        free=freedom(np.ones(len(rows), bool), settings),
+        penalties=kernel.Penalties(overlap=overlap),
+        threads=settings.threads,
+    )
 
 
 def _select(

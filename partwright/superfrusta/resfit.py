@@ -20,6 +20,7 @@ from partwright.errors import EmptyShapeError
 from partwright.shapes import Shape
 from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.growing import grow
+from partwright.superfrusta.merging import merge
 from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.pruning import cheapest_removal, prune
 from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, refine
@@ -146,6 +147,8 @@ class Run:
         """Removes parts with refits while the objective, the part budget or the target asks for it."""
         settings = self.settings
         most = settings.max_parts if settings.max_parts is not None else len(rows)
+        with self.timed("merge"):
+            rows = merge(evidence, rows, settings)
         with self.timed("thin"):
             while len(rows) > 1:
                 thinned, kept, whole = cheapest_removal(evidence, rows, settings)

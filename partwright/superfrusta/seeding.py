@@ -12,15 +12,17 @@ from partwright.superfrusta.refining import START_BLEND
 Frame = NDArray[np.float64]  # columns are the part's axes
 
 _ENOUGH = 600  # points that describe a region well enough for its extents
+_NONE = np.empty((0, 4), np.float32)
 _TRIM = 3.0  # percent at either end of an extent that do not count
 
 
-def starts(points: NDArray[np.float32], spacing: float) -> Rows:
+def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float32] = _NONE) -> Rows:
     """Starting rows (K, 16) for a region given by its voxel centres (n, 3).
 
     Straight ones along each principal and each frame axis, boxy and round; hollow ones along each principal
     axis; bent ones along the longest, bulging to four sides. Optimisation from all of them decides, where the
-    paper chooses one axis by its cylindricity: one start fails on bent and hollow regions.
+    paper chooses one axis by its cylindricity: one start fails on bent and hollow regions. `frames` (F, 4), the
+    rotations of parts that the region was covered by, add one boxy and one round start each.
     """
     points = points[:: max(1, len(points) // _ENOUGH)].astype(np.float64)
     centre = points.mean(axis=0)
@@ -39,6 +41,9 @@ def starts(points: NDArray[np.float32], spacing: float) -> Rows:
         for axis in range(3):
             frame = _along(basis, axis)
             rows += [start(frame, 0.2), start(frame, 0.9)]
+    for w, x, y, z in frames:
+        frame = Rotation.from_quat([x, y, z, w]).as_matrix()
+        rows += [start(frame, 0.2), start(frame, 0.9)]
     rows += [start(_along(axes, axis), 0.9, onion=0.75) for axis in range(3)]
     longest = _along(axes, 2)
     for turn in range(4):
