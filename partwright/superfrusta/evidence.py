@@ -11,16 +11,20 @@ from numpy.typing import NDArray
 from partwright.fields import kernel
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid
+from partwright.shapes.sampling import morton_order
 from partwright.superfrusta.settings import Settings
 
 Rows = NDArray[np.float32]
 
+_REACH = 1.2  # half the side of the cube that guards fill
+_LOUDEST = 3.0
+
 
 @dataclass(frozen=True)
 class Evidence:
-    """Samples (the first `near` lie near the surface, the rest is uniform in the box) and the grid.
+    """Samples (the first `near` lie near the surface, the rest fills the box and more) and the grid.
 
-    points (N, 3), distance (N,), weight (N,) = 1 + sigmoid(curvature) near the surface (eq. 7), 1 elsewhere.
+    points (N, 3), distance (N,), weight (N,) = 1 + sigmoid(curvature) near the surface (eq. 7), 1 in the box.
     """
 
     points: NDArray[np.float32]
@@ -34,7 +38,15 @@ class Evidence:
     def of(cls, shape: Shape, settings: Settings) -> Evidence:
         grid = shape.unit_grid(settings.resolution)
         samples = shape.samples(settings.near, settings.uniform, settings.seed)
-        return cls(samples.points, samples.distance, samples.weight, samples.near, grid, settings.threads)
+        guards, density = _guards(grid, settings)
+        return cls(
+            np.concatenate([samples.points, guards]),
+            np.concatenate([samples.distance, shape.unit_distance(guards)]),
+            np.concatenate([samples.weight, np.full(len(guards), density, np.float32)]),
+            samples.near,
+            grid,
+            settings.threads,
+        )
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
@@ -81,6 +93,23 @@ class Evidence:
     def grid_field(self, rows: Rows) -> NDArray[np.float32]:
         """Distance (X, Y, Z) of the assembly on the grid."""
         return distance_of(rows, self.grid_points, self.threads).reshape(self.grid.values.shape)
+
+
+def _guards(grid: DistanceGrid, settings: Settings) -> tuple[NDArray[np.float32], float]:
+    """Points (G, 3) around the box that the uniform samples fill, and their weight.
+
+    Without them nothing would stop a part from growing out of the box. The weight makes up for their lower
+    density, up to a limit beyond which few points would speak too loudly.
+    """
+    low = grid.origin
+    high = low + grid.spacing * (np.array(grid.values.shape) - 1)
+    rng = np.random.default_rng(settings.seed + 1)
+    points = rng.uniform(-_REACH, _REACH, (settings.uniform // 3, 3)).astype(np.float32)
+    points = points[((points < low) | (points > high)).any(axis=1)]
+    points = points[morton_order(points)]
+    around = (2 * _REACH) ** 3 - float(np.prod(high - low))
+    density = around / max(len(points), 1) * settings.uniform / float(np.prod(high - low))
+    return points, min(density, _LOUDEST)
 
 
 def distance_of(rows: Rows, points: NDArray[np.float32], threads: int) -> NDArray[np.float32]:

@@ -25,14 +25,13 @@ _SCREEN = ((15.0, 5),)
 _FIT = ((15.0, 4), (40.0, 10))
 
 
-
 @dataclass(frozen=True)
 class Region:
     """Voxels (X * Y * Z,) to explain with one part, beside parts `others` that stay.
 
     depth: of the erosion. margin: how far around the region samples count, as a share of its longest side.
-    elsewhere: weight of inside samples outside the region that no part explains yet. frames: rotations (w, x, y, z)
-    to start from beside the principal axes.
+    elsewhere: weight of inside samples outside the region that no part explains yet. frames: rotations (w, x,
+    y, z) to start from beside the principal axes.
     """
 
     voxels: NDArray[np.bool_]
@@ -97,13 +96,11 @@ def _view(evidence: Evidence, region: Region) -> View:
     return View(index, weight / max(float(weight.sum()), 1e-9), background)
 
 
-def fit_regions(
-    evidence: Evidence, wanted: list[Region], settings: Settings, overlap: float = 0.0
-) -> Rows:
+def fit_regions(evidence: Evidence, wanted: list[Region], settings: Settings, overlap: float = 0.0) -> Rows:
     """The best part for each region: all starts are screened briefly on few samples, the best go on.
 
-    `overlap` is the price of running into the other parts. Growth asks none: a new part that may not cross what is
-    there gets stuck in its region.
+    `overlap` is the price of running into the other parts. Growth asks none: a new part that may not cross
+    what is there gets stuck in its region.
     """
     views = [_view(evidence, region) for region in wanted]
     spacing = evidence.grid.spacing
@@ -111,10 +108,19 @@ def fit_regions(
     owner = np.repeat(np.arange(len(wanted)), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))
     screened, losses = _run(
-        evidence, np.concatenate(guesses), owner, views, _SCREEN_EVERY, sharpened(_SCREEN, depth), overlap, settings
+        evidence,
+        np.concatenate(guesses),
+        owner,
+        views,
+        _SCREEN_EVERY,
+        sharpened(_SCREEN, depth),
+        overlap,
+        settings,
     )
     kept = np.concatenate([_best(losses, owner, i, _KEPT) for i in range(len(wanted))])
-    fitted, losses = _run(evidence, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings)
+    fitted, losses = _run(
+        evidence, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings
+    )
     return fitted[np.concatenate([_best(losses, owner[kept], i, 1) for i in range(len(wanted))])]
 
 

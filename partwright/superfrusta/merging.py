@@ -8,23 +8,27 @@ from numpy.typing import NDArray
 from partwright.fields import kernel
 from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.growing import Region, fit_regions
-from partwright.superfrusta.objective import occupancy_score, score
+from partwright.superfrusta.objective import occupancy_score, removal_scores, score
 from partwright.superfrusta.pruning import neighbours
 from partwright.superfrusta.refining import TOUCH_UP, refine
 from partwright.superfrusta.settings import Settings
 
 _TOUCHING = 0.03  # unit lengths
 _LOSS = 0.02  # of R: a merger that costs more before its refit is not tried
-_TRIED = 6
+_FITTED = 20  # pairs that get a part fitted
+_TRIED = 6  # of them, pairs that are tried with a refit
 
 
 def merge(evidence: Evidence, rows: Rows, settings: Settings, locked: int = 0) -> Rows:
     """Replaces pairs by single parts while the objective does not fall; each pair's part is fitted afresh.
 
-    All touching pairs are fitted in one batch; the most promising are then tried one after another with a refit of
-    their neighbours.
+    Of the touching pairs, those with the least valuable member are fitted in one batch; the most promising
+    are then tried one after another with a refit of their neighbours.
     """
-    pairs = _touching_pairs(evidence, rows, locked)
+    without, whole = removal_scores(evidence, rows)
+    pairs = sorted(_touching_pairs(evidence, rows, locked), key=lambda p: (-max(without[list(p)]), p))[
+        :_FITTED
+    ]
     if not pairs:
         return rows
     owner = _owners(evidence, rows)
@@ -42,7 +46,6 @@ def merge(evidence: Evidence, rows: Rows, settings: Settings, locked: int = 0) -
     merged = fit_regions(evidence, regions, settings, settings.overlap)
     occupied = kernel.evaluate_parts(rows, evidence.points, evidence.threads) < 0
     single = kernel.evaluate_parts(merged, evidence.points, evidence.threads) < 0
-    whole = score(evidence, rows)
     kept = np.array([_without(evidence, occupied, pair) for pair in pairs])
     estimate = occupancy_score(evidence, kept | single) - occupancy_score(evidence, occupied.any(axis=0))
     gone: set[int] = set()
@@ -66,7 +69,7 @@ def _touching_pairs(evidence: Evidence, rows: Rows, locked: int) -> list[tuple[i
     near = kernel.evaluate_parts(rows, evidence.points[::4], evidence.threads) < _TOUCHING
     inside = near[:, evidence.inside[::4]].astype(np.float32)
     shared = inside @ inside.T > 2
-    return [(i, j) for i, j in zip(*np.nonzero(np.triu(shared, 1)), strict=True) if i >= locked]
+    return [(int(i), int(j)) for i, j in zip(*np.nonzero(np.triu(shared, 1)), strict=True) if i >= locked]
 
 
 def _owners(evidence: Evidence, rows: Rows) -> NDArray[np.int64]:

@@ -13,8 +13,8 @@ def occupancy_score(evidence: Evidence, occupied: NDArray[np.bool_]) -> NDArray[
     """R of occupancies (..., N) at the samples.
 
     R is the mean of two IoUs with the shape's occupancy: over the near-surface samples, each counted with
-    its weight 1 + sigmoid(curvature), and over the uniform samples of the bounding box. The paper's R is the
-    first alone; the second keeps deep, smooth volume from being given away.
+    its weight 1 + sigmoid(curvature), and over the uniform samples in and around the bounding box. The
+    paper's R is the first alone; the second keeps deep, smooth volume from being given away.
     """
     weight, near = evidence.weight.astype(np.float64), evidence.near
     both = (occupied & evidence.inside) * weight
@@ -31,9 +31,9 @@ def score(evidence: Evidence, rows: Rows) -> float:
 
 def volume_iou(evidence: Evidence, rows: Rows) -> float:
     """IoU over the uniform samples alone: an estimate of the grid IoU."""
-    occupied = evidence.field(rows)[evidence.near :] < 0
-    inside = evidence.inside[evidence.near :]
-    return float(np.count_nonzero(occupied & inside)) / max(int(np.count_nonzero(occupied | inside)), 1)
+    rest = slice(evidence.near, None)
+    occupied, inside, weight = evidence.field(rows)[rest] < 0, evidence.inside[rest], evidence.weight[rest]
+    return float(weight[occupied & inside].sum() / max(float(weight[occupied | inside].sum()), 1e-9))
 
 
 def removal_scores(evidence: Evidence, rows: Rows) -> tuple[NDArray[np.float64], float]:

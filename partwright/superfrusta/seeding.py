@@ -21,8 +21,8 @@ def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float
 
     Straight ones along each principal and each frame axis, boxy and round; hollow ones along each principal
     axis; bent ones along the longest, bulging to four sides. Optimisation from all of them decides, where the
-    paper chooses one axis by its cylindricity: one start fails on bent and hollow regions. `frames` (F, 4), the
-    rotations of parts that the region was covered by, add one boxy and one round start each.
+    paper chooses one axis by its cylindricity: one start fails on bent and hollow regions. `frames` (F, 4),
+    the rotations of parts that the region was covered by, add one boxy and one round start each.
     """
     points = points[:: max(1, len(points) // _ENOUGH)].astype(np.float64)
     centre = points.mean(axis=0)

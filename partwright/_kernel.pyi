@@ -1,0 +1,36 @@
+"""Signatures of the compiled kernel; partwright.fields.kernel documents and checks them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+COLUMNS: int
+DERIVATIVES: int
+
+_F = NDArray[np.float32]
+_D = NDArray[np.float64]
+_B = NDArray[np.uint8]
+_I = NDArray[np.int64]
+
+def evaluate(rows: _F, points: _F, threads: int) -> _F: ...
+def evaluate_parts(rows: _F, points: _F, threads: int) -> _F: ...
+def gradients(rows: _F, points: _F, upstream: _F, threads: int) -> _D: ...
+def normal_equations(
+    rows: _F, live: _B, points: _F, distance: _F, weight: _F, background: _F,
+    beta: float, overlap: float, blending: float, threads: int,
+) -> tuple[float, _D, _D]: ...  # fmt: skip
+def loss(
+    rows: _F, points: _F, distance: _F, weight: _F, background: _F,
+    beta: float, overlap: float, blending: float, threads: int,
+) -> float: ...  # fmt: skip
+def levenberg_marquardt(
+    rows: _F, free: _B, tied: _B, points: _F, distance: _F, weight: _F, background: _F,
+    stages: _F, overlap: float, blending: float, limits: _F, threads: int,
+) -> tuple[_F, float, int]: ...  # fmt: skip
+def fit_starts(
+    starts: _F, first: _I, last: _I, free: _B, tied: _B, points: _F, distance: _F, weight: _F, background: _F,
+    stages: _F, overlap: float, blending: float, limits: _F, threads: int,
+) -> tuple[_F, _D]: ...  # fmt: skip
+def removal_counts(rows: _F, points: _F, inside: _B, weight: _F, threads: int) -> _D: ...
+def decompose(
+    field: _F, spacing: float, regions: int, fraction: float, least_depth: float, least_voxels: float
+) -> tuple[NDArray[np.int32], list[float]]: ...
