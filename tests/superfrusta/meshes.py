@@ -26,6 +26,13 @@ def table() -> trimesh.Trimesh:
     return union(box((2, 1.2, 0.15), (0, 0, 1)), *legs)
 
 
+def corner_tie() -> trimesh.Trimesh:
+    """Three thin plates: one lying, one standing, one leaning down to a corner of the bounding box."""
+    turned = trimesh.transformations.rotation_matrix(np.radians(-45), (0, 1, 0))
+    leaning = box((1.2, 1.1, 0.08)).apply_transform(turned).apply_translation((0.45, 0, -0.4))
+    return union(box((1.05, 1.1, 0.08), (-0.38, 0, 0)), leaning, box((0.08, 1.1, 0.8), (0.1, 0, 0.4)))
+
+
 def pipe() -> trimesh.Trimesh:
     """A tube of outer radius 1, wall 0.3 and height 2."""
     return trimesh.creation.annulus(0.7, 1.0, 2.0)
