@@ -44,7 +44,7 @@ class Region:
 
 @dataclass(frozen=True)
 class View:
-    """The samples that a region's part is fitted to: indices, weights, and the distance of the other parts."""
+    """The samples that a region's part is fitted to: indices, weights, distance of the other parts."""
 
     index: NDArray[np.int64]
     weight: NDArray[np.float32]

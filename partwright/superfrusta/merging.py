@@ -47,7 +47,8 @@ def merge(evidence: Evidence, rows: Rows, settings: Settings, locked: int = 0) -
     occupied = kernel.evaluate_parts(rows, evidence.points, evidence.threads) < 0
     single = kernel.evaluate_parts(merged, evidence.points, evidence.threads) < 0
     kept = np.array([_without(evidence, occupied, pair) for pair in pairs])
-    estimate = occupancy_score(evidence, kept | single) - occupancy_score(evidence, occupied.any(axis=0))
+    together: NDArray[np.bool_] = np.asarray(occupied.any(axis=0))
+    estimate = np.subtract(occupancy_score(evidence, kept | single), occupancy_score(evidence, together))
     gone: set[int] = set()
     alive = np.arange(len(rows))
     for index in np.argsort(-estimate, kind="stable")[:_TRIED]:
@@ -73,7 +74,7 @@ def _touching_pairs(evidence: Evidence, rows: Rows, locked: int) -> list[tuple[i
 
 
 def _owners(evidence: Evidence, rows: Rows) -> NDArray[np.int64]:
-    """The part (X * Y * Z,) that each voxel of the shape lies deepest in or nearest to; -1 outside the shape."""
+    """The part (X * Y * Z,) that each voxel inside lies deepest in or nearest to; -1 outside the shape."""
     inside = np.flatnonzero(evidence.grid.values.ravel() < 0)
     owner = np.full(evidence.grid.values.size, -1, dtype=np.int64)
     distance = kernel.evaluate_parts(rows, evidence.grid_points[inside], evidence.threads)
