@@ -5,9 +5,9 @@
 Nanoseconds per point and part for 24 parts and 16,384 points. "Forward" is the distance of the folded
 assembly, "forward and backward" also its derivatives by every parameter, summed over the points with given
 weights; "normal equations" the loss, J^T r and J^T J of a fit, which grow with the square of the number of
-parts that meet at a point: many, for these random ones. All ways are timed in turns within one run, and the best of
-their turns counts. The table goes to benchmarks/results/kernel.md. Exits with 1 if the compiled kernel on one
-core is less than 40 times as fast as the reference on one core, forward or forward and backward.
+parts that meet at a point: many, for these random ones. All ways are timed in turns within one run, and the
+best of their turns counts. The table goes to benchmarks/results/kernel.md. Exits with 1 if the compiled
+kernel is less than 40 times as fast as the reference, one core each, forward or forward and backward.
 """
 
 from __future__ import annotations

@@ -209,6 +209,14 @@ def test_the_seed_decides_and_the_global_generator_is_left_alone() -> None:
     assert (first != other).any()
 
 
+def test_descent_ends_inside_the_bounds() -> None:
+    truth = rows_of(BOX, ROD)
+    config = PaperConfig(iterations=5, batch=256, rates=(0.5,) * 7, count=0)
+    rows = torch.tensor(optimise(truth, *samples_of(truth), config=config, seed=0).rows)
+    assert (rows[:, 7:] != torch.tensor(truth)[:, 7:]).any()
+    torch.testing.assert_close(project(rows), rows)
+
+
 def test_projection_keeps_rows_inside_their_bounds() -> None:
     wild = np.random.default_rng(0).normal(size=(200, 16)).astype(np.float32) * 4
     rows = project(torch.tensor(wild))

@@ -171,6 +171,23 @@ def test_a_fit_takes_the_same_steps_as_the_compiled_one(
     np.testing.assert_allclose(rows, expected, atol=1e-3 * loose)
 
 
+@pytest.mark.parametrize("tied", [False, True])
+def test_bounds_and_ties_shape_the_steps_as_in_the_compiled_kernel(
+    torch_kernel: TorchKernel, tied: bool
+) -> None:
+    generator = np.random.default_rng(2)
+    truth = random_rows(generator, 1)
+    truth[0, 10:15] = [0.0, 0.0, 1.0, 0.0, 0.0]
+    target, start = target_of(truth, generator), perturbed(truth, generator)
+    start[0, 7:15] = [0.5, 0.5, 0.7, 0.0, 0.0, 1.2, 0.0, 0.0]  # several parameters on their bounds
+    mask = np.array([tied])
+    for steps in (1, 2, 4):
+        expected, loss, _ = kernel.levenberg_marquardt(start, target, [(15, steps)], LIMITS, tied=mask)
+        rows, found, _ = torch_kernel.levenberg_marquardt(start, target, [(15, steps)], LIMITS, tied=mask)
+        assert found == pytest.approx(loss, rel=1e-3)
+        np.testing.assert_allclose(rows, expected, atol=1e-3)
+
+
 def test_the_damped_step_solves_for_the_variables_alone() -> None:
     generator = torch.Generator().manual_seed(0)
     root = torch.randn(2, 40, 8, generator=generator, dtype=torch.float64)
@@ -248,10 +265,14 @@ def test_starts_of_unequal_ranges_each_fit_like_alone(torch_kernel: TorchKernel)
     targets = [
         target_of(row[None], generator, count) for row, count in zip(truths, (900, 1500, 600), strict=True)
     ]
+    lie = kernel.Target(truths[:1, :3], np.ones(1, np.float32), np.ones(1, np.float32))  # in no range
     joined = kernel.Target(
-        *(np.concatenate([getattr(t, name) for t in targets]) for name in ("points", "distance", "weight"))
+        *(
+            np.concatenate([getattr(t, name) for t in (lie, *targets)])
+            for name in ("points", "distance", "weight")
+        )
     )
-    ends = np.cumsum([900, 1500, 600])
+    ends = 1 + np.cumsum([900, 1500, 600])
     ranges = np.stack([ends - [900, 1500, 600], ends], 1)
     starts = np.concatenate([perturbed(truths, generator), perturbed(truths, generator)])
     free = np.ones((6, 15), bool)
