@@ -42,7 +42,7 @@ DAMPING_FLOOR, RIDGE = 1e-3, 1e-9
 ATTEMPTS, LEAST_GAIN = 5, 1e-4
 
 WIDTH = len(DERIVATIVES)
-D_SX, D_SY, D_SZ, D_BULGE = (DERIVATIVES.index(name) for name in ("sx", "sy", "sz", "bulge"))
+D_SX, D_SY, D_BULGE = (DERIVATIVES.index(name) for name in ("sx", "sy", "bulge"))
 SX, SY, SZ, BULGE, BLEND = 7, 8, 9, 13, 15  # columns of a row
 
 
@@ -217,7 +217,7 @@ class TorchKernel:
             self._tensor(rows.copy()),
             samples,
             movable,
-            self._tensor(tied) & live,
+            self._tensor(tied),
             live.any(0).nonzero()[:, 0],
             self._tensor(limits.array()),
             penalties,
@@ -273,7 +273,7 @@ class TorchKernel:
                 if len(trying) == 0:
                     break
                 step = damped_step(matrix[trying], gradient[trying], variable[trying], damping[trying])
-                candidate = problem.moved(trying, step)
+                candidate = problem.moved(trying, step, variable[trying])
                 now = self._loss(candidate, problem.samples.of(trying), beta, problem.penalties)
                 better = now < loss[trying]  # a step that could not be solved for is NaN, and never better
                 won, old = trying[better], damping[trying]
@@ -351,23 +351,26 @@ class Problem:
         variable[..., D_SY] &= ~self.tied[:, self.parts]
         return variable.flatten(1)
 
-    def moved(self, which: Tensor, step: Tensor) -> Tensor:
-        """Rows (n, M, 16) of the assemblies of that index after steps (n, 15 L), clipped, within bounds."""
+    def moved(self, which: Tensor, step: Tensor, variable: Tensor) -> Tensor:
+        """Rows (n, M, 16) of the assemblies of that index after steps (n, 15 L), clipped, within bounds.
+
+        Entries that are not `variable` (n, 15 L) keep their bits.
+        """
         rows = self.rows[which]
         delta = step.new_zeros(*rows.shape[:2], WIDTH)
         delta[:, self.parts] = step.view(len(which), -1, WIDTH)
+        moving = torch.zeros_like(delta, dtype=torch.bool)
+        moving[:, self.parts] = variable.view(len(which), -1, WIDTH)
         lower, upper, longest = self.limits
         clipped = delta.clamp(-longest.double(), longest.double())
         shape = (rows[..., SX:] + clipped[..., D_SX:].float()).clamp(lower[D_SX:], upper[D_SX:])
-        shape = torch.where(delta[..., D_SX:] != 0, shape, rows[..., SX:])
+        shape = torch.where(moving[..., D_SX:], shape, rows[..., SX:])
         rotation = turned(rows[..., 3:7], clipped[..., 3:6])
         moved = torch.cat([rows[..., :3] + clipped[..., :3].float(), rotation, shape], -1)
-        moved[..., SY] = torch.where(self.tied[which], moved[..., SX], moved[..., SY])
-        touched = (delta[..., [D_BULGE, D_SX, D_SZ]] != 0).any(-1)
-        tightest = tightest_bulge(moved[..., SX], moved[..., SZ])
-        moved[..., BULGE] = torch.where(
-            touched, torch.minimum(moved[..., BULGE], tightest), moved[..., BULGE]
-        )
+        together = self.tied[which] & moving[..., D_SX]
+        moved[..., SY] = torch.where(together, moved[..., SX], moved[..., SY])
+        bulge = torch.minimum(moved[..., BULGE], tightest_bulge(moved[..., SX], moved[..., SZ]))
+        moved[..., BULGE] = torch.where(moving[..., D_BULGE], bulge, moved[..., BULGE])
         return moved
 
 

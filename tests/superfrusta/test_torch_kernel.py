@@ -259,6 +259,20 @@ def test_a_fit_stays_in_the_box_and_off_folded_arcs(torch_kernel: TorchKernel) -
     assert np.sin(rows[0, 13] * np.pi / 2) <= min(1.0, rows[0, 9] / rows[0, 7]) + 1e-5
 
 
+def test_a_bulge_that_is_not_free_keeps_its_bits(torch_kernel: TorchKernel) -> None:
+    generator = np.random.default_rng(5)
+    truth = random_rows(generator, 1)
+    target = target_of(truth, generator)
+    start = perturbed(truth, generator, 0.02)
+    start[0, 13] = 0.9  # tighter than its size allows
+    start[0, 9] = 0.5 * start[0, 7]
+    free = np.ones((1, 15), bool)
+    free[0, 12] = False
+    rows, _, _ = torch_kernel.levenberg_marquardt(start, target, STAGES, LIMITS, free=free)
+    assert rows[0, 13] == start[0, 13]
+    assert (rows[0, 7:10] != start[0, 7:10]).all()
+
+
 def test_starts_of_unequal_ranges_each_fit_like_alone(torch_kernel: TorchKernel) -> None:
     generator = np.random.default_rng(6)
     truths = random_rows(generator, 3)
