@@ -8,6 +8,9 @@
 namespace partwright {
 namespace {
 
+// Depths this close, in voxels, count as one level.
+constexpr float LEVEL = 0.05f;
+
 struct Box {
   int lower[3], upper[3];  // upper is one past the end
 };
@@ -164,15 +167,17 @@ std::vector<float> decompose(std::vector<float> field, const Grid& grid, const P
     float depth = 0;
     bool found = false;
     for (uint32_t voxel : order) {
+      // Voxels as deep as the threshold belong to the core whatever their order: a plate's middle is one level.
+      if (found && -field[voxel] < depth - LEVEL * grid.spacing) break;
       const uint32_t root = components.add(voxel);
-      if (components.size(root) > largest) {
+      if (!found && components.size(root) > largest) {
         largest = components.size(root);
         core = root;
       }
-      if (components.size(root) >= wanted) {
+      if (!found && components.size(root) >= wanted) {
         depth = -field[voxel];
         found = true;
-        break;
+        core = root;
       }
     }
     core = components.root(core);

@@ -129,7 +129,8 @@ class DampedStep {
 
 float& shape_entry(float* row, int derivative) { return row[SX + derivative - D_SX]; }
 
-void move(float* row, const double* delta, const Limits& limits, bool tied) {
+// `moving` says which entries may change; all others keep their bits.
+void move(float* row, const double* delta, const char* moving, const Limits& limits, bool tied) {
   double d[DERIVATIVES];
   for (int i = 0; i < DERIVATIVES; ++i)
     d[i] = std::min(std::max(delta[i], -double(limits.step[i])), double(limits.step[i]));
@@ -146,13 +147,13 @@ void move(float* row, const double* delta, const Limits& limits, bool tied) {
   if (angle > 0)
     for (int i = 0; i < 4; ++i) row[QW + i] = float(turned[i] / std::sqrt(norm));
   for (int i = D_SX; i < DERIVATIVES; ++i) {
-    if (delta[i] == 0) continue;
+    if (!moving[i]) continue;
     float& entry = shape_entry(row, i);
     entry = std::min(std::max(entry + float(d[i]), limits.lower[i]), limits.upper[i]);
   }
-  if (tied) row[SY] = row[SX];
+  if (tied && moving[D_SX]) row[SY] = row[SX];
   // An arc tighter than half the section's width folds through its own centre.
-  if (delta[D_BULGE] != 0 || delta[D_SX] != 0 || delta[D_SZ] != 0)
+  if (moving[D_BULGE])
     row[BULGE] = std::min(row[BULGE], std::asin(std::min(1.f, row[SZ] / std::max(row[SX], 1e-6f))) / HALF_PI);
 }
 
@@ -207,7 +208,7 @@ Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& fr
         if (damped(damping, step)) {
           std::vector<float> candidate = out.rows;
           for (int i = 0; i < parts; ++i)
-            if (live[size_t(i)]) move(&candidate[size_t(i) * COLUMNS], &step[size_t(i) * DERIVATIVES], limits, tied[size_t(i)]);
+            if (live[size_t(i)]) move(&candidate[size_t(i) * COLUMNS], &step[size_t(i) * DERIVATIVES], &moving[size_t(i) * DERIVATIVES], limits, tied[size_t(i)]);
           const double now = loss(prepared(candidate), samples, stage.beta, penalties, threads);
           if (now < system.loss) {
             gain = (system.loss - now) / system.loss;

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -22,14 +22,17 @@ if TYPE_CHECKING:
     import trimesh
 
     from partwright.metrics import Scores
+    from partwright.superfrusta import CurvePoint
 
 # method -> the module whose `fit(shape, settings, progress=...)` and `Settings` do it
 METHODS = {"superfrusta": "partwright.superfrusta"}
 QUALITIES = ("draft", "normal", "high")
-DEVICES = ("auto", "cpu")
+DEVICES = ("auto", "cpu", "cuda")
 # A result stands for the worst of its pieces, in this order.
 OUTCOMES = ("interrupted", "budget_reached", "converged", "target_reached")
 FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
+
+CURVE_SIZES = (1, 2, 4, 8, 16, 32, 64)
 
 POOR_IOU = 0.85
 POOR_DEVIATION = 0.1  # of the longest side
@@ -42,6 +45,8 @@ class Result:
 
     assembly: in the shape's own units and place. outcome: "converged", "budget_reached", "target_reached" or
     "interrupted". report: what report.json holds. surface: the blended surface's mesh, in the shape's units.
+    curve: assemblies of falling size, whose parts name their parent in the next smaller one by
+    `metadata["parent"]`.
     """
 
     shape: Shape
@@ -50,6 +55,7 @@ class Result:
     scores: Scores
     surface: trimesh.Trimesh
     report: dict[str, Any]
+    curve: tuple[CurvePoint, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -72,6 +78,19 @@ class Result:
             write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
             write_bytes(staging / "report.json", (json.dumps(self.report, indent=2) + "\n").encode())
             preview(self.shape, self.assembly, self.surface, staging / "preview.png", title=self.shape.name)
+            if self.curve:
+                self._save_curve(staging)
+
+    def _save_curve(self, folder: Path) -> None:
+        """curve_NN.json for sizes that double, and a picture of them."""
+        from partwright.render import curve_sheet
+
+        shown = [p for p in self.curve if p.parts in CURVE_SIZES or p is self.curve[0]][::-1]
+        for point in shown:
+            point.assembly.save(folder / f"curve_{point.parts:02d}.json")
+        captions = [f"{p.parts} parts, IoU {p.iou:.3f}" for p in shown]
+        assemblies = [dataclasses.replace(p.assembly, up=self.assembly.up) for p in shown]
+        curve_sheet(assemblies, captions, folder / "curve.png", title=self.shape.name)
 
 
 def fit(
@@ -81,6 +100,9 @@ def fit(
     quality: str = "normal",
     max_parts: int | None = None,
     min_iou: float | None = None,
+    curve: bool = False,
+    start: Assembly | None = None,
+    locked: Sequence[str] = (),
     per_node: bool = False,
     seed: int = 0,
     device: str = "auto",
@@ -94,9 +116,11 @@ def fit(
         quality: "draft", "normal" or "high".
         max_parts: at most so many parts (with per_node: in each node).
         min_iou: stop at the fewest parts that reach it.
+        curve: also keep the assembly of every size from the result's down to one part (`Result.curve`).
+        start: an assembly to refine and continue. locked: names of its parts that stay as they are.
         per_node: fit each node of a scene by itself; the assembly's children are named after the nodes.
         seed: the same seed gives the same assembly, at any number of threads.
-        device: "cpu", or "auto" for the best there is.
+        device: "cpu", "cuda", or "auto": the compiled kernel on the CPU, which needs no other package.
         threads: 0 means one per core.
         progress: called with the method's progress: .stage .round .rounds .parts .iou .fraction.
         source: the file's name, for the report.
@@ -113,10 +137,18 @@ def fit(
         )
     module = import_module(METHODS[method])
     settings = module.Settings.for_quality(
-        quality, max_parts=max_parts, min_iou=min_iou, seed=seed, threads=threads
+        quality,
+        max_parts=max_parts,
+        min_iou=min_iou,
+        curve=curve,
+        seed=seed,
+        threads=threads,
+        device=device,
     )
+    if per_node and (curve or start is not None):
+        raise SettingError("per_node fits every node anew; it goes with neither a curve nor a start")
     pieces = shape.split_nodes() if per_node else [shape]
-    fitted = _fit_pieces(module, pieces, settings, progress)
+    fitted = _fit_pieces(module, pieces, settings, progress, start, locked)
     assembly = _assembled(shape, pieces, fitted, per_node, source)
     seconds = _seconds(fitted)
     scores, surface = _scored(shape, assembly, seed, seconds)
@@ -135,11 +167,19 @@ def fit(
         "scores": scores.to_dict(),
         "warnings": _warnings(shape, scores),
     }
-    return Result(shape, assembly, outcome, scores, surface, report)
+    points = tuple(fitted[0].curve)
+    if points:
+        report["curve"] = [{"parts": p.parts, "score": p.score, "iou": p.iou} for p in points]
+    return Result(shape, assembly, outcome, scores, surface, report, points)
 
 
 def _fit_pieces(
-    module: Any, pieces: list[Shape], settings: Any, progress: Callable[[Any], None] | None
+    module: Any,
+    pieces: list[Shape],
+    settings: Any,
+    progress: Callable[[Any], None] | None,
+    start: Assembly | None,
+    locked: Sequence[str],
 ) -> list[Any]:
     """Each piece by the method; after an interruption the rest are left out."""
     fitted: list[Any] = []
@@ -150,7 +190,8 @@ def _fit_pieces(
             stage = step.stage if len(pieces) == 1 else f"{name}: {step.stage}"
             progress(dataclasses.replace(step, stage=stage, fraction=(i + step.fraction) / len(pieces)))
 
-        fitted.append(module.fit(piece, settings, progress=report if progress else None))
+        told = report if progress else None
+        fitted.append(module.fit(piece, settings, progress=told, start=start, locked=locked))
         if fitted[-1].outcome == "interrupted":
             break
     return fitted

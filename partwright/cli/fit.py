@@ -34,10 +34,18 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option("--max-parts", metavar="N", type=int, help="at most N parts")
     option("--min-iou", metavar="X", type=float, help="stop at the fewest parts that reach IoU X")
+    option("--curve", action="store_true", help="also write smaller and smaller assemblies, and a picture")
+    option("--start", metavar="ASSEMBLY", type=Path, help="refine and continue this assembly")
+    option("--lock", metavar="NAMES", help="parts of the start that stay as they are, separated by commas")
     option("--per-node", action="store_true", help="fit each node of a scene by itself")
     option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
     option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
-    option("--device", choices=("auto", "cpu"), default="auto", help="what computes (default: %(default)s)")
+    option(
+        "--device",
+        choices=("auto", "cpu", "cuda"),
+        default="auto",
+        help="what computes (default: %(default)s)",
+    )
     option(
         "--seed",
         metavar="S",
@@ -50,6 +58,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from partwright.assembly import load_assembly
     from partwright.cli.progress import Display
     from partwright.cli.tables import print_result, warn
     from partwright.fitting import fit
@@ -66,6 +75,9 @@ def run(arguments: argparse.Namespace) -> int:
             quality=arguments.quality,
             max_parts=arguments.max_parts,
             min_iou=arguments.min_iou,
+            curve=arguments.curve,
+            start=load_assembly(arguments.start) if arguments.start else None,
+            locked=[name for name in (arguments.lock or "").split(",") if name],
             per_node=arguments.per_node,
             seed=arguments.seed,
             device=arguments.device,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from partwright.superfrusta.resfit import Fitted, Progress, fit
+from partwright.superfrusta.resfit import CurvePoint, Fitted, Progress, fit
 from partwright.superfrusta.settings import Settings
 
-__all__ = ["Fitted", "Progress", "Settings", "fit"]
+__all__ = ["CurvePoint", "Fitted", "Progress", "Settings", "fit"]

@@ -8,16 +8,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.fields import kernel
+from partwright.fields.kernel import Target
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid
 from partwright.shapes.sampling import morton_order
+from partwright.superfrusta.backend import Kernel, backend
 from partwright.superfrusta.settings import Settings
 
 Rows = NDArray[np.float32]
 
 _REACH = 1.2  # half the side of the cube that guards fill
 _LOUDEST = 3.0
+_FAR, _FEW = 0.1, 400
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Evidence:
     near: int
     grid: DistanceGrid
     threads: int
+    kernel: Kernel
 
     @classmethod
     def of(cls, shape: Shape, settings: Settings) -> Evidence:
@@ -46,6 +49,7 @@ class Evidence:
             samples.near,
             grid,
             settings.threads,
+            backend(settings.device),
         )
 
     @cached_property
@@ -79,20 +83,34 @@ class Evidence:
         """The samples that optimisation runs on: every second one near the surface, every third elsewhere."""
         return np.concatenate([np.arange(0, self.near, 2), np.arange(self.near, len(self.points), 3)])
 
-    def target(self, index: NDArray[np.int64], weight: NDArray[np.float32] | None = None) -> kernel.Target:
+    @cached_property
+    def outskirts(self) -> NDArray[np.int64]:
+        """A few hundred samples far outside: they keep a part fitted to one region from running away."""
+        outside = self.near + np.flatnonzero(self.distance[self.near :] > _FAR)
+        return outside[:: max(1, len(outside) // _FEW)]
+
+    def target(self, index: NDArray[np.int64], weight: NDArray[np.float32] | None = None) -> Target:
         """Samples by index as the kernel takes them; weights are scaled to sum to 1."""
         weight = self.weight[index] if weight is None else weight
-        return kernel.Target(
-            self.points[index], self.distance[index], weight / max(float(weight.sum()), 1e-9)
-        )
+        return Target(self.points[index], self.distance[index], weight / max(float(weight.sum()), 1e-9))
 
     def field(self, rows: Rows) -> NDArray[np.float32]:
         """Distance (N,) of the assembly at the samples."""
-        return distance_of(rows, self.points, self.threads)
+        return self.distance_of(rows, self.points)
 
     def grid_field(self, rows: Rows) -> NDArray[np.float32]:
         """Distance (X, Y, Z) of the assembly on the grid."""
-        return distance_of(rows, self.grid_points, self.threads).reshape(self.grid.values.shape)
+        return self.distance_of(rows, self.grid_points).reshape(self.grid.values.shape)
+
+    def distance_of(self, rows: Rows, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Distance (N,) of the assembly at points; far outside where there are no parts yet."""
+        if len(rows) == 0:
+            return np.full(len(points), np.float32(10))
+        return self.kernel.evaluate(rows, points, self.threads)
+
+    def parts_of(self, rows: Rows, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Distance (M, N) of each part alone."""
+        return self.kernel.evaluate_parts(rows, points, self.threads)
 
 
 def _guards(grid: DistanceGrid, settings: Settings) -> tuple[NDArray[np.float32], float]:
@@ -110,10 +128,3 @@ def _guards(grid: DistanceGrid, settings: Settings) -> tuple[NDArray[np.float32]
     around = (2 * _REACH) ** 3 - float(np.prod(high - low))
     density = around / max(len(points), 1) * settings.uniform / float(np.prod(high - low))
     return points, min(density, _LOUDEST)
-
-
-def distance_of(rows: Rows, points: NDArray[np.float32], threads: int) -> NDArray[np.float32]:
-    """Distance (N,) of the assembly at points; far outside where there are no parts yet."""
-    if len(rows) == 0:
-        return np.full(len(points), np.float32(10))
-    return kernel.evaluate(rows, points, threads)

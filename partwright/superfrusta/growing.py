@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from partwright.fields import kernel
-from partwright.superfrusta.evidence import Evidence, Rows, distance_of
+from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.objective import occupancy_score
 from partwright.superfrusta.refining import LIMITS, freedom, sharpened
 from partwright.superfrusta.seeding import starts
@@ -79,7 +79,7 @@ def grow(evidence: Evidence, rows: Rows, settings: Settings, most: int) -> Rows:
     if not wanted or most <= 0:
         return np.empty((0, 16), np.float32)
     candidates = fit_regions(evidence, wanted, settings)
-    return _select(evidence, candidates, evidence.field(rows) < 0, settings.alpha / 2, most)
+    return _select(evidence, candidates, evidence.field(rows) < 0, settings.price / 2, most)
 
 
 def _view(evidence: Evidence, region: Region) -> View:
@@ -89,7 +89,8 @@ def _view(evidence: Evidence, region: Region) -> View:
     index = np.flatnonzero(((evidence.points > low - margin) & (evidence.points < high + margin)).all(axis=1))
     if len(index) > _PLENTY:
         index = index[np.linspace(0, len(index) - 1, _PLENTY).astype(np.int64)]
-    background = distance_of(region.others, evidence.points[index], evidence.threads)
+    index = np.concatenate([index, evidence.outskirts])
+    background = evidence.distance_of(region.others, evidence.points[index])
     weight = evidence.weight[index].copy()
     unexplained = evidence.inside[index] & ~region.voxels[evidence.voxel[index]] & (background > 0)
     weight[unexplained] *= region.elsewhere
@@ -151,7 +152,7 @@ def _run(
         np.concatenate([view.weight[::every] for view in views]),
         np.concatenate([view.background[::every] for view in views]),
     )
-    return kernel.fit_starts(
+    return evidence.kernel.fit_starts(
         rows,
         np.stack([ends - counts, ends], axis=1)[owner],
         target,
@@ -167,7 +168,7 @@ def _select(
     evidence: Evidence, candidates: Rows, covered: NDArray[np.bool_], price: float, most: int
 ) -> Rows:
     """Greedy choice: whichever candidate raises R most joins, until none pays its price."""
-    occupied = kernel.evaluate_parts(candidates, evidence.points, evidence.threads) < 0
+    occupied = evidence.parts_of(candidates, evidence.points) < 0
     chosen: list[int] = []
     current = float(occupancy_score(evidence, covered))
     while len(chosen) < most:

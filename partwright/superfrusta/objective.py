@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.fields import kernel
 from partwright.superfrusta.evidence import Evidence, Rows
+
+_MISSED = 5.0  # in units of R per unit length
 
 
 def occupancy_score(evidence: Evidence, occupied: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -29,6 +30,17 @@ def score(evidence: Evidence, rows: Rows) -> float:
     return float(occupancy_score(evidence, evidence.field(rows) < 0))
 
 
+def coverage(evidence: Evidence, rows: Rows) -> float:
+    """R less the mean distance from inside samples to the assembly, times `_MISSED`.
+
+    Where parts must go although none is worthless, R alone would rather drop a leg than thicken another part
+    over it. A chair of few parts is a chair when every place of it is near some part.
+    """
+    field = evidence.field(rows)
+    missed = float(np.maximum(field[evidence.inside], 0).mean())
+    return float(occupancy_score(evidence, field < 0)) - _MISSED * missed
+
+
 def volume_iou(evidence: Evidence, rows: Rows) -> float:
     """IoU over the uniform samples alone: an estimate of the grid IoU."""
     rest = slice(evidence.near, None)
@@ -40,7 +52,7 @@ def removal_scores(evidence: Evidence, rows: Rows) -> tuple[NDArray[np.float64],
     """R (M,) of the assembly without each part, and R of the whole, from one pass over the samples."""
     ratios: list[NDArray[np.float64]] = []
     for part in (slice(None, evidence.near), slice(evidence.near, None)):
-        counts = kernel.removal_counts(
+        counts = evidence.kernel.removal_counts(
             rows, evidence.points[part], evidence.inside[part], evidence.weight[part], evidence.threads
         )
         ratios.append(np.asarray(counts[:, 0] / np.maximum(counts[:, 1], 1e-9)))

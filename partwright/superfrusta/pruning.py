@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.fields import kernel
 from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.objective import removal_scores, score
 from partwright.superfrusta.refining import TOUCH_UP, refine
@@ -26,12 +27,23 @@ def prune(evidence: Evidence, rows: Rows, alpha: float, locked: int = 0) -> Rows
     return rows
 
 
-def cheapest_removal(
-    evidence: Evidence, rows: Rows, settings: Settings, locked: int = 0
-) -> tuple[Rows, float, float]:
-    """The assembly with one part less that keeps the most of R after its neighbours are refitted.
+def drop_least(evidence: Evidence, rows: Rows, locked: int = 0) -> Rows:
+    """The assembly without the part that R misses least."""
+    without, _ = removal_scores(evidence, rows)
+    without[:locked] = -np.inf
+    return np.delete(rows, int(without.argmax()), axis=0)
 
-    Returns it with its R, and the R of the assembly as given. `settings.trials` promising parts are tried.
+
+def cheapest_removal(
+    evidence: Evidence,
+    rows: Rows,
+    settings: Settings,
+    locked: int = 0,
+    measure: Callable[[Evidence, Rows], float] = score,
+) -> tuple[Rows, float, float]:
+    """The assembly with one part less that keeps the most of `measure` after its neighbours are refitted.
+
+    Returns it with its measure, and the R of the assembly as given. `settings.trials` parts are tried.
     """
     without, whole = removal_scores(evidence, rows)
     without[:locked] = -np.inf
@@ -44,7 +56,7 @@ def cheapest_removal(
         thinned = refine(
             evidence, np.delete(rows, index, axis=0), TOUCH_UP, settings, np.delete(moving, index)
         )
-        kept = score(evidence, thinned)
+        kept = measure(evidence, thinned)
         if best is None or kept > best[1]:
             best = thinned, kept
     if best is None:
@@ -54,7 +66,7 @@ def cheapest_removal(
 
 def neighbours(evidence: Evidence, rows: Rows, index: int) -> NDArray[np.bool_]:
     """Parts (M,) that come near the given one, itself not counted."""
-    distance = kernel.evaluate_parts(rows, evidence.points[::8], evidence.threads)
+    distance = evidence.parts_of(rows, evidence.points[::8])
     around = np.abs(distance[index]) < _TOUCHING
     near: NDArray[np.bool_] = np.asarray((distance[:, around] < _TOUCHING).any(axis=1))
     near[index] = False

@@ -13,8 +13,8 @@ from partwright.superfrusta.settings import Settings
 _SHORTEST = 0.004
 LIMITS = kernel.Limits(
     lower=(-2.0,) * 3 + (-9.0,) * 3 + (_SHORTEST,) * 3 + (0.0, 0.0, 0.0, 0.0, 0.0, 1e-3),
-    upper=(2.0,) * 3 + (9.0,) * 3 + (2.5,) * 3 + (1.0, 0.5, 2.0, 1.0, 1.0, 0.3),
-    step=(0.1,) * 3 + (0.3,) * 3 + (0.2,) * 3 + (0.3, 0.05, 0.3, 0.3, 0.3, 0.05),
+    upper=(2.0,) * 3 + (9.0,) * 3 + (2.5,) * 3 + (1.0, 1.0, 2.0, 1.0, 1.0, 0.3),
+    step=(0.1,) * 3 + (0.3,) * 3 + (0.2,) * 3 + (0.3, 0.1, 0.3, 0.3, 0.3, 0.05),
 )
 START_BLEND = 0.02
 _BLEND = kernel.DERIVATIVES.index("blend")
@@ -46,6 +46,28 @@ def freedom(parts: NDArray[np.bool_], settings: Settings) -> NDArray[np.bool_]:
     return free
 
 
+def optimise(evidence: Evidence, rows: Rows, stages: Stages, settings: Settings, locked: int = 0) -> Rows:
+    """Optimises the whole assembly but the first `locked` parts, by the optimiser that the settings name.
+
+    The paper's own may return fewer parts: those whose existence it gave up.
+    """
+    if settings.optimiser == "adam":
+        from partwright.superfrusta import paper
+
+        index = evidence.training
+        config = paper.PaperConfig()
+        return paper.optimise(
+            rows,
+            evidence.points[index],
+            evidence.distance[index],
+            evidence.weight[index],
+            config=config,
+            seed=settings.seed,
+            locked=locked,
+        ).rows
+    return refine(evidence, rows, stages, settings, np.arange(len(rows)) >= locked)
+
+
 def refine(
     evidence: Evidence,
     rows: Rows,
@@ -57,7 +79,7 @@ def refine(
     moving = np.ones(len(rows), bool) if moving is None else moving
     if not moving.any():
         return rows
-    refined, _, _ = kernel.levenberg_marquardt(
+    refined, _, _ = evidence.kernel.levenberg_marquardt(
         rows,
         evidence.target(evidence.training),
         sharpened(stages, evidence.thickness),

@@ -7,7 +7,7 @@ explains more than stopping early.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Literal
@@ -16,21 +16,25 @@ import numpy as np
 
 from partwright.assembly import Assembly
 from partwright.assembly.rows import parts_from_rows
-from partwright.errors import EmptyShapeError
+from partwright.assembly.rows import rows as rows_of
+from partwright.errors import EmptyShapeError, SettingError
 from partwright.shapes import Shape
+from partwright.superfrusta.curve import with_parents
 from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.growing import grow
-from partwright.superfrusta.merging import merge
-from partwright.superfrusta.objective import score, volume_iou
-from partwright.superfrusta.pruning import cheapest_removal, prune
-from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, refine
+from partwright.superfrusta.merging import cheapest_merger, merge
+from partwright.superfrusta.objective import coverage, score, volume_iou
+from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
+from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimise
 from partwright.superfrusta.settings import Settings
 
 Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"]
 
 # In growth, parts need only pay this; the settings' alpha decides when the assembly is thinned out.
-_GROWTH_ALPHA = 1e-3
-_PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
+GROWTH_ALPHA = 1e-3
+PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
+_SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
+NOTHING: Rows = np.empty((0, 16), np.float32)
 
 
 @dataclass(frozen=True)
@@ -45,58 +49,94 @@ class Progress:
     fraction: float
 
 
-@dataclass
+@dataclass(frozen=True)
+class CurvePoint:
+    """The assembly of one size on the way down: R of the objective, and IoU at the fit's own samples."""
+
+    parts: int
+    score: float
+    iou: float
+    assembly: Assembly
+
+
+@dataclass(frozen=True)
 class Fitted:
-    """A fit's result: the assembly in the shape's own units and place, and how it came about."""
+    """A fit's result: the assembly in the shape's own units and place, and how it came about.
+
+    curve: from many parts to few, where the settings asked for it.
+    """
 
     assembly: Assembly
     outcome: Outcome
     seconds: dict[str, float]
-    history: list[dict[str, float]]
+    history: list[dict[str, float | str]]
+    curve: tuple[CurvePoint, ...] = ()
 
 
 def fit(
-    shape: Shape, settings: Settings | None = None, progress: Callable[[Progress], None] | None = None
+    shape: Shape,
+    settings: Settings | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    start: Assembly | None = None,
+    locked: Sequence[str] = (),
 ) -> Fitted:
     """Fits an assembly of SuperFrusta to a shape.
 
-    Ctrl-C ends the fit with the best assembly so far and the outcome "interrupted".
+    `start` is refined and continued; its parts named in `locked` come first and stay bit for bit. Ctrl-C ends
+    the fit with the best assembly so far and the outcome "interrupted".
 
     Raises:
         EmptyShapeError: nothing could be fitted (the shape is thinner than the samples can see).
+        SettingError: `start` is no union of SuperFrusta, or a locked name is none of its parts.
     """
     settings = settings or Settings()
-    run = Run(settings, progress)
+    rows, fixed = starting_rows(shape, start, locked)
+    run = Run(settings, progress, len(fixed))
     try:
         with run.timed("prepare"):
             evidence = Evidence.of(shape, settings)
-        outcome = run.through(evidence)
+        outcome = run.through(evidence, rows)
     except KeyboardInterrupt:
         if run.best is None:
             raise
         outcome = "interrupted"
+    run.enforce_budget(evidence)
     if run.best is None:
         raise EmptyShapeError(
             f"{shape.name}: no part could be placed; the shape has no volume that {settings.near} samples "
             "can see. Check its thickness, or use --quality high"
         )
-    parts = parts_from_rows(run.best)
-    unit = Assembly(parts, unit=shape.unit)
-    frame = shape.frame
-    assembly = unit.scaled(1 / frame.scale).translated(frame.centre)
-    return Fitted(assembly, outcome, run.seconds, run.history)
+    assembly = _assembly(shape, run.best, fixed)
+    curve: list[CurvePoint] = []
+    for step in run.curve:
+        smaller = curve[-1].assembly if curve else None
+        curve.append(
+            CurvePoint(len(step.rows), step.score, step.iou, _assembly(shape, step.rows, fixed, smaller))
+        )
+    return Fitted(assembly, outcome, run.seconds, run.history, tuple(reversed(curve)))
+
+
+@dataclass(frozen=True)
+class Step:
+    """One size on the way down."""
+
+    rows: Rows
+    score: float
+    iou: float
 
 
 @dataclass
 class Run:
-    """State of one fit."""
+    """State of one fit: the best rows so far, of which the first `locked` never change."""
 
     settings: Settings
-    report: Callable[[Progress], None] | None
+    report: Callable[[Progress], None] | None = None
+    locked: int = 0
     best: Rows | None = None
     best_objective: float = -np.inf
     seconds: dict[str, float] = field(default_factory=dict)
-    history: list[dict[str, float]] = field(default_factory=list)
+    history: list[dict[str, float | str]] = field(default_factory=list)
+    curve: list[Step] = field(default_factory=list)
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -106,26 +146,32 @@ class Run:
         finally:
             self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
 
-    def through(self, evidence: Evidence) -> Outcome:
-        rows, converged = self.growth(evidence)
+    def through(self, evidence: Evidence, start: Rows = NOTHING) -> Outcome:
+        settings = self.settings
+        rows, converged = self.growth(evidence, start)
         if self.best is None:
             return "converged"
-        for cycle in range(self.settings.cycles):
-            rows = self.thinning(evidence, rows, cycle)
+        for cycle in range(settings.cycles):
+            rows = self.thinning(evidence, rows)
             if not self.keep(evidence, rows, "thin", cycle + 1) and cycle:
                 break
-            if cycle + 1 < self.settings.cycles:
+            if cycle + 1 < settings.cycles:
                 rows = self.regrowth(evidence, rows)
-        if self.settings.max_parts is not None and len(self.best) >= self.settings.max_parts:
-            return "budget_reached"
-        if self.settings.min_iou is not None and volume_iou(evidence, self.best) >= self.settings.min_iou:
+        if settings.curve:
+            self.descend(evidence, self.best)
+        if settings.min_iou is not None and volume_iou(evidence, self.best) >= settings.min_iou:
             return "target_reached"
+        if settings.max_parts is not None and len(self.best) >= settings.max_parts:
+            return "budget_reached"
         return "converged" if converged else "budget_reached"
 
-    def growth(self, evidence: Evidence) -> tuple[Rows, bool]:
+    def growth(self, evidence: Evidence, rows: Rows) -> tuple[Rows, bool]:
         """Rounds of growing until the objective saturates; returns the last rows and whether it did."""
         settings = self.settings
-        rows = np.empty((0, 16), np.float32)
+        if len(rows):
+            with self.timed("optimise"):
+                rows = optimise(evidence, rows, FINE, settings, self.locked)
+            self.keep(evidence, rows, "start", 0)
         stale = 0
         for round_ in range(settings.rounds):
             with self.timed("grow"):
@@ -133,30 +179,35 @@ class Run:
             if len(new) == 0:
                 return rows, True
             with self.timed("optimise"):
-                rows = refine(
-                    evidence, np.concatenate([rows, new]), COARSE_TO_FINE if round_ == 0 else FINE, settings
-                )
+                stages = FINE if len(rows) else COARSE_TO_FINE
+                rows = optimise(evidence, np.concatenate([rows, new]), stages, settings, self.locked)
             with self.timed("prune"):
-                rows = prune(evidence, rows, _GROWTH_ALPHA)
+                rows = prune(evidence, rows, min(GROWTH_ALPHA, settings.price), self.locked)
             stale = 0 if self.keep(evidence, rows, "grow", round_ + 1) else stale + 1
             if stale >= settings.patience:
                 return rows, True
+            if settings.min_iou is not None and volume_iou(evidence, rows) > settings.min_iou + _SPARE:
+                return rows, True
         return rows, False
 
-    def thinning(self, evidence: Evidence, rows: Rows, cycle: int) -> Rows:
-        """Removes parts with refits while the objective, the part budget or the target asks for it."""
+    def thinning(self, evidence: Evidence, rows: Rows) -> Rows:
+        """Merges and removes parts while the objective, the part budget or the target asks for it."""
         settings = self.settings
         most = settings.max_parts if settings.max_parts is not None else len(rows)
-        with self.timed("merge"):
-            rows = merge(evidence, rows, settings)
+        if settings.merging:
+            with self.timed("merge"):
+                rows = merge(evidence, rows, settings, self.locked)
         with self.timed("thin"):
-            while len(rows) > 1:
-                thinned, kept, whole = cheapest_removal(evidence, rows, settings)
-                if len(rows) <= most and not self.worthwhile(evidence, thinned, kept, whole):
+            while len(rows) > max(1, self.locked):
+                if len(rows) > most:
+                    rows = self.one_less(evidence, rows)
+                    continue
+                thinned, kept, whole = cheapest_removal(evidence, rows, settings, self.locked)
+                if not self.worthwhile(evidence, thinned, kept, whole):
                     break
                 rows = thinned
         with self.timed("optimise"):
-            return refine(evidence, rows, POLISH, settings)
+            return optimise(evidence, rows, POLISH, settings, self.locked)
 
     def worthwhile(self, evidence: Evidence, thinned: Rows, kept: float, whole: float) -> bool:
         if self.settings.min_iou is not None:
@@ -169,29 +220,88 @@ class Run:
         if len(new) == 0:
             return rows
         with self.timed("optimise"):
-            return refine(evidence, np.concatenate([rows, new]), FINE, self.settings)
+            return optimise(evidence, np.concatenate([rows, new]), FINE, self.settings, self.locked)
+
+    def one_less(self, evidence: Evidence, rows: Rows) -> Rows:
+        """The cheapest way to do with one part less: a removal or a merger."""
+        thinned, kept, _ = cheapest_removal(evidence, rows, self.settings, self.locked, coverage)
+        merged = (
+            cheapest_merger(evidence, rows, self.settings, self.locked) if self.settings.merging else None
+        )
+        return merged[0] if merged is not None and merged[1] > kept else thinned
+
+    def descend(self, evidence: Evidence, rows: Rows) -> None:
+        """The curve: one part less at a time, each size polished; from few parts to many."""
+        with self.timed("curve"):
+            steps = [Step(rows, score(evidence, rows), volume_iou(evidence, rows))]
+            while len(rows) > max(1, self.locked):
+                rows = self.one_less(evidence, rows)
+                rows = optimise(evidence, rows, FINE, self.settings, self.locked)
+                steps.append(Step(rows, score(evidence, rows), volume_iou(evidence, rows)))
+        self.curve = steps[::-1]
+
+    def enforce_budget(self, evidence: Evidence) -> None:
+        """What an interruption or a fit without thinning left over the part budget goes, without refits."""
+        most = self.settings.max_parts
+        if self.best is None or most is None:
+            return
+        while len(self.best) > max(most, self.locked, 1):
+            self.best = drop_least(evidence, self.best, self.locked)
 
     def keep(self, evidence: Evidence, rows: Rows, stage: str, round_: int) -> bool:
         """Records the state and keeps it if it is the best so far; says whether it made progress."""
         settings = self.settings
-        reached = score(evidence, rows)
-        objective = reached - settings.alpha * len(rows)
-        over = settings.max_parts is not None and len(rows) > settings.max_parts
-        progressed = objective > self.best_objective + _PROGRESS
-        if objective > self.best_objective or self.best is None or stage == "thin":
+        reached, iou = score(evidence, rows), volume_iou(evidence, rows)
+        objective = reached - settings.price * len(rows)
+        progressed = objective > self.best_objective + PROGRESS
+        if objective > self.best_objective or self.best is None or self.due(evidence, rows, iou):
             self.best, self.best_objective = rows, objective
-        iou = volume_iou(evidence, rows)
-        self.history.append(
-            {
-                "stage": float(stage == "thin"),
-                "round": round_,
-                "parts": len(rows),
-                "score": reached,
-                "iou": iou,
-            }
-        )
+        entry: dict[str, float | str] = {"stage": stage, "round": round_, "parts": len(rows)}
+        self.history.append(entry | {"score": reached, "iou": iou})
         if self.report is not None:
             total = settings.rounds + settings.cycles
-            done = round_ if stage == "grow" else settings.rounds + round_
+            done = settings.rounds + round_ if stage == "thin" else round_
             self.report(Progress(stage, round_, settings.rounds, len(rows), iou, min(1.0, done / total)))
-        return progressed and not over
+        return progressed
+
+    def due(self, evidence: Evidence, rows: Rows, iou: float) -> bool:
+        """Whether the best so far misses the part budget or the target, or is larger than it need be."""
+        assert self.best is not None
+        most, target = self.settings.max_parts, self.settings.min_iou
+        if most is not None and len(self.best) > most:
+            return len(rows) < len(self.best)
+        if target is None:
+            return False
+        reached = volume_iou(evidence, self.best)
+        return iou > reached if reached < target else iou >= target and len(rows) < len(self.best)
+
+
+def starting_rows(
+    shape: Shape, start: Assembly | None, locked: Sequence[str]
+) -> tuple[Rows, tuple[str, ...]]:
+    """Rows of an assembly in the shape's unit frame, locked parts first, and their names in that order."""
+    if start is None:
+        if locked:
+            raise SettingError("locked parts need an assembly to start from")
+        return NOTHING, ()
+    if start.operation != "union" or start.depth > 1 + len(start.parts):
+        raise SettingError("the start must be a union of parts")
+    parts = start.translated([-c for c in shape.frame.centre]).scaled(shape.frame.scale).parts
+    unknown = set(locked) - {part.name for part in parts}
+    if unknown:
+        names = ", ".join(part.name for part in parts)
+        raise SettingError(f"no part is named {', '.join(sorted(unknown))}; the start has {names}")
+    fixed = [part for part in parts if part.name in locked]
+    moving = [part for part in parts if part.name not in locked]
+    return rows_of(fixed + moving).astype(np.float32), tuple(part.name for part in fixed)
+
+
+def _assembly(
+    shape: Shape, rows: Rows, fixed: Sequence[str] = (), smaller: Assembly | None = None
+) -> Assembly:
+    """Rows as an assembly in the shape's own units; parts name their parent in a smaller assembly."""
+    names = [*fixed, *(f"part_{i + 1:02d}" for i in range(len(fixed), len(rows)))]
+    parts = parts_from_rows(rows, names)
+    whole = Assembly(parts, unit=shape.unit)
+    whole = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
+    return whole if smaller is None else with_parents(whole, smaller)

@@ -8,6 +8,8 @@ from typing import Any, Literal
 
 from partwright.errors import SettingError
 
+_SMALL_PRICE = 2e-4
+
 Quality = Literal["draft", "normal", "high"]
 Optimiser = Literal["newton", "adam"]
 
@@ -29,11 +31,13 @@ class Settings:
         smooth: parts blend into each other (eq. 4); otherwise unions are plain.
 
     Ours:
+        merging: replace touching pairs of parts by one where it explains as much.
         cycles: times that the grown assembly is thinned out, refitted and grown again.
         trials: removals that are tried with a refit before the cheapest is taken.
         patience: rounds without progress before growing stops.
         max_parts: at most so many parts (None: as many as pay for themselves).
         min_iou: stop removing parts where the IoU would fall below, and keep removing above (None: by alpha).
+        curve: thin out down to one part and keep the assembly of every size on the way.
         near, uniform: sample points near the surface and in the box. resolution: grid of the decomposition.
     """
 
@@ -45,6 +49,7 @@ class Settings:
     overlap: float = 0.05
     blending: float = 0.05
     smooth: bool = True
+    merging: bool = True
     cycles: int = 2
     trials: int = 3
     patience: int = 2
@@ -55,7 +60,8 @@ class Settings:
     resolution: int = 96
     seed: int = 0
     threads: int = 0
-    device: str = "cpu"
+    device: str = "auto"
+    curve: bool = False
 
     def __post_init__(self) -> None:
         for name in ("rounds", "regions", "trials", "patience", "near", "uniform"):
@@ -87,6 +93,11 @@ class Settings:
         if unknown:
             raise SettingError(f"unknown settings: {', '.join(sorted(unknown))}")
         return replace(PRESETS[quality], **changes)
+
+    @property
+    def price(self) -> float:
+        """What a part must pay while growing: nothing where a target or a whole curve asks for more parts."""
+        return _SMALL_PRICE if self.curve or self.min_iou is not None else self.alpha
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)

@@ -1,0 +1,83 @@
+"""Where the arithmetic runs: the compiled kernel, or the same functions in PyTorch on an accelerator."""
+
+from __future__ import annotations
+
+from typing import Protocol, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from partwright.errors import MissingDependencyError, SettingError
+from partwright.fields import kernel
+
+NO_PENALTIES = kernel.Penalties()
+DEVICES = ("auto", "cpu", "cuda")
+
+
+class Kernel(Protocol):
+    """What a fit asks of `partwright.fields.kernel`; `TorchKernel` answers it on a device."""
+
+    def evaluate(self, parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> NDArray[np.float32]: ...
+
+    def evaluate_parts(
+        self, parameters: ArrayLike, points: ArrayLike, threads: int = 0
+    ) -> NDArray[np.float32]: ...
+
+    def levenberg_marquardt(
+        self,
+        parameters: ArrayLike,
+        target: kernel.Target,
+        stages: ArrayLike,
+        limits: kernel.Limits,
+        *,
+        free: NDArray[np.bool_] | None = None,
+        tied: NDArray[np.bool_] | None = None,
+        penalties: kernel.Penalties = NO_PENALTIES,
+        threads: int = 0,
+    ) -> tuple[NDArray[np.float32], float, int]: ...
+
+    def fit_starts(
+        self,
+        starts: ArrayLike,
+        ranges: NDArray[np.int64],
+        target: kernel.Target,
+        stages: ArrayLike,
+        limits: kernel.Limits,
+        *,
+        free: NDArray[np.bool_] | None = None,
+        tied: NDArray[np.bool_] | None = None,
+        penalties: kernel.Penalties = NO_PENALTIES,
+        threads: int = 0,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64]]: ...
+
+    def removal_counts(
+        self,
+        parameters: ArrayLike,
+        points: ArrayLike,
+        inside: NDArray[np.bool_],
+        weight: ArrayLike,
+        threads: int = 0,
+    ) -> NDArray[np.float64]: ...
+
+
+def backend(device: str) -> Kernel:
+    """The kernel for "cpu" or "cuda"; "auto" is the compiled kernel, which needs no other package.
+
+    Raises:
+        SettingError: the device is unknown, or there is no such accelerator.
+        MissingDependencyError: PyTorch is not installed.
+    """
+    if device not in DEVICES:
+        raise SettingError(f"device: expected one of {', '.join(DEVICES)}, got {device!r}")
+    if device != "cuda":
+        return cast(Kernel, kernel)
+    try:
+        import torch
+    except ImportError as error:
+        message = 'device "cuda" needs PyTorch: pip install "partwright[torch]"'
+        raise MissingDependencyError(message) from error
+    if not torch.cuda.is_available():
+        raise SettingError('device "cuda": PyTorch finds no CUDA device here; use --device cpu')
+    from partwright.superfrusta.torch_kernel import TorchKernel
+
+    return TorchKernel("cuda")

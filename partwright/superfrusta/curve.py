@@ -1,0 +1,35 @@
+"""How assemblies of different sizes belong together: each part names its parent in the next smaller one."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from partwright.assembly import Assembly, Part
+
+_PER_SIDE = 12
+
+
+def with_parents(larger: Assembly, smaller: Assembly) -> Assembly:
+    """`larger` with each part's `metadata["parent"]`: the part of `smaller` that owns most of its volume.
+
+    A point belongs to the part that it lies deepest in, or nearest to.
+    """
+    names = [part.name for part in smaller.parts]
+    children = []
+    for part in larger.parts:
+        owners = smaller.part_distances(_points_in(part)).argmin(axis=0)
+        parent = names[int(np.bincount(owners, minlength=len(names)).argmax())]
+        children.append(dataclasses.replace(part, metadata={**part.metadata, "parent": parent}))
+    return dataclasses.replace(larger, children=tuple(children))
+
+
+def _points_in(part: Part) -> np.ndarray:
+    """Points (n, 3) inside a part, or all of its box's where it is thinner than the lattice."""
+    low, high = part.bounds()
+    steps = (np.arange(_PER_SIDE) + 0.5) / _PER_SIDE
+    lattice = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = low + lattice * (high - low)
+    inside = Assembly((part,)).distance(points) < 0
+    return points[inside] if inside.any() else points
