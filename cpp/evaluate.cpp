@@ -55,13 +55,15 @@ PW_CLONES void derivatives(const Part& part, const Block& b, float* __restrict o
   for (int i = 0; i < BLOCK; ++i) chain_step(p, scratch + i, out + i, BLOCK);
 }
 
-PW_CLONES void fold(float* __restrict field, const float* __restrict g, float k, float* __restrict weight) {
+PW_CLONES void fold_block(float* __restrict field, const float* __restrict g, float k, float sharp, float* __restrict weight) {
   for (int i = 0; i < BLOCK; ++i) {
-    const float w = smooth_weight(field[i], g[i], k);
+    const float w = smooth_weight(field[i], g[i], sharp);
     weight[i] = w;
     field[i] = smooth_minimum(field[i], g[i], k, w);
   }
 }
+
+void fold(float* field, const float* g, float k, float* weight) { fold_block(field, g, k > 1e-9f ? k : 0.f, sharpness(k), weight); }
 
 PW_CLONES void unfold(float* __restrict carried, const float* __restrict weight, float* __restrict share, float* __restrict blend) {
   for (int i = 0; i < BLOCK; ++i) {

@@ -358,11 +358,11 @@ PW_INLINE void chain_step(const Part& p, const float* s, float* out, int stride)
   out[D_ONION * stride] = p.m * (f_top * p.taper + f_bottom);
 }
 
-// Polynomial smooth minimum of a fold so far and the next part, as weights: dU/da = w, dU/db = 1 - w.
-PW_INLINE float smooth_weight(float a, float b, float k) {
-  const float plain = a <= b ? 1.f : 0.f;
-  return k > 1e-9f ? clamp01(0.5f + (b - a) / (2 * std::max(k, 1e-9f))) : plain;
-}
+// Polynomial smooth minimum of a fold so far and the next part, as weights: dU/da = w, dU/db = 1 - w. The blend
+// comes with sharpness = 1/(2k); a plain minimum is one so sharp that w is 0 or 1 (1/2 where both are equal).
+inline float sharpness(float k) { return k > 1e-9f ? 0.5f / k : 1e30f; }
+
+PW_INLINE float smooth_weight(float a, float b, float sharpness) { return clamp01(0.5f + (b - a) * sharpness); }
 
 PW_INLINE float smooth_minimum(float a, float b, float k, float w) { return b + (a - b) * w - k * w * (1 - w); }
 

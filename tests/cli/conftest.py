@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -46,6 +46,7 @@ class Fitted:
     assembly: Assembly
     outcome: str = "converged"
     seconds: dict[str, float] = field(default_factory=lambda: {"seeding": 0.25})
+    curve: tuple[Any, ...] = ()
 
 
 class BoxMethod(ModuleType):
@@ -55,7 +56,14 @@ class BoxMethod(ModuleType):
     shrink = 1.0
     outcome = "converged"
 
-    def fit(self, shape: Shape, settings: Settings, progress: Callable[[Any], None] | None = None) -> Fitted:
+    def fit(
+        self,
+        shape: Shape,
+        settings: Settings,
+        progress: Callable[[Any], None] | None = None,
+        start: Assembly | None = None,
+        locked: Sequence[str] = (),
+    ) -> Fitted:
         if progress:
             progress(Progress())
         lower, upper = shape.vertices.min(axis=0), shape.vertices.max(axis=0)

@@ -117,7 +117,7 @@ def test_missing_empty_and_folder(tmp_path):
         load_shape(tmp_path / "folder.stl")
 
 
-def test_points_only_needs_a_surface(tmp_path):
+def test_a_few_points_show_no_surface(tmp_path):
     path = tmp_path / "cloud.ply"
     trimesh.PointCloud(np.random.default_rng(0).random((20, 3))).export(path)
     with pytest.raises(NeedsSurfaceError):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -65,7 +67,7 @@ def test_no_more_than_wanted_grow_and_the_best_comes_first(pair: Evidence) -> No
 def test_growing_repeats_at_any_number_of_threads(pair: Evidence) -> None:
     first = grow(pair, NONE, SETTINGS, most=5)
     for threads in (1, 2):
-        again = Evidence(pair.points, pair.distance, pair.weight, pair.near, pair.grid, threads)
+        again = dataclasses.replace(pair, threads=threads)
         changed = Settings.for_quality("draft", threads=threads)
         np.testing.assert_array_equal(grow(again, NONE, changed, most=5), first)
 

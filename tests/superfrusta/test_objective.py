@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from partwright.fields import kernel
 from partwright.shapes.grid import DistanceGrid
+from partwright.superfrusta.backend import backend
 from partwright.superfrusta.evidence import Evidence
 from partwright.superfrusta.objective import occupancy_score, removal_scores, score, volume_iou
 from tests.superfrusta.rows import ball, points_in_box, random_rows
@@ -19,7 +20,13 @@ GRID = DistanceGrid(np.zeros(3), 0.1, np.ones((2, 2, 2), np.float32))
 def evidence(points: np.ndarray, inside: np.ndarray, weight: np.ndarray, near: int) -> Evidence:
     distance = np.where(inside, -0.1, 0.1)
     return Evidence(
-        points.astype(np.float32), distance.astype(np.float32), weight.astype(np.float32), near, GRID, 1
+        points.astype(np.float32),
+        distance.astype(np.float32),
+        weight.astype(np.float32),
+        near,
+        GRID,
+        threads=1,
+        kernel=backend("cpu"),
     )
 
 
