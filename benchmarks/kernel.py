@@ -86,7 +86,7 @@ def best_times(
 ) -> dict[tuple[str, str], float]:
     """Nanoseconds per point and part of each task: the least of so many turns, after one to warm up.
 
-    What runs on one core is timed by its thread's own clock, so that other work on the machine does not count.
+    What runs on one core is timed by its thread's own clock: other work on the machine does not count.
     """
     best = dict.fromkeys(tasks, float("inf"))
     for turn in range(turns + 1):
