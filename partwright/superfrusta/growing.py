@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from partwright.fields import kernel
 from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta.families import held, held_down
 from partwright.superfrusta.objective import occupancy_score
 from partwright.superfrusta.refining import LIMITS, freedom, sharpened
 from partwright.superfrusta.seeding import starts
@@ -105,7 +106,11 @@ def fit_regions(evidence: Evidence, wanted: list[Region], settings: Settings, ov
     """
     views = [_view(evidence, region) for region in wanted]
     spacing = evidence.grid.spacing
-    guesses = [starts(evidence.grid_points[region.voxels], spacing, region.frames) for region in wanted]
+    values = held(settings.family, settings.smooth)
+    guesses = [
+        held_down(starts(evidence.grid_points[region.voxels], spacing, region.frames), values)
+        for region in wanted
+    ]
     owner = np.repeat(np.arange(len(wanted)), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))
     screened, losses = _run(

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from partwright.fields import kernel
 from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta.families import held
 from partwright.superfrusta.settings import Settings
 
 # A side shorter than this is thinner than any wall that the samples can see.
@@ -17,7 +18,6 @@ LIMITS = kernel.Limits(
     step=(0.1,) * 3 + (0.3,) * 3 + (0.2,) * 3 + (0.3, 0.1, 0.3, 0.3, 0.3, 0.05),
 )
 START_BLEND = 0.02
-_BLEND = kernel.DERIVATIVES.index("blend")
 
 # Sharpness of the occupancy sigmoid and iterations, for solids of ordinary thickness.
 COARSE_TO_FINE = ((15.0, 10), (40.0, 10), (100.0, 8))
@@ -39,10 +39,9 @@ def penalties(settings: Settings) -> kernel.Penalties:
 
 
 def freedom(parts: NDArray[np.bool_], settings: Settings) -> NDArray[np.bool_]:
-    """Which parameters (M, 15) may move: all of the marked parts, less the blend where unions are plain."""
+    """Which parameters (M, 15) may move: all of the marked parts, less those held by the family."""
     free = np.repeat(parts[:, None], len(kernel.DERIVATIVES), axis=1)
-    if not settings.smooth:
-        free[:, _BLEND] = False
+    free[:, [kernel.DERIVATIVES.index(name) for name in held(settings.family, settings.smooth)]] = False
     return free
 
 

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 from partwright.errors import SettingError
+from partwright.superfrusta.families import FAMILIES, Family, held
 
 _SMALL_PRICE = 2e-4
 
@@ -29,6 +30,8 @@ class Settings:
         overlap, blending: weights of the quality terms of eq. 8 beside the reconstruction (paper: 1e-2 in a
             mean that is not squared).
         smooth: parts blend into each other (eq. 4); otherwise unions are plain.
+        family: "superfrustum", or less of it: "superprimitive" (no taper, no bulge) or "cuboid" (Table 2).
+            Parts of an assembly to start from keep what they have of the rest.
 
     Ours:
         merging: replace touching pairs of parts by one where it explains as much.
@@ -49,6 +52,7 @@ class Settings:
     overlap: float = 0.05
     blending: float = 0.05
     smooth: bool = True
+    family: Family = "superfrustum"
     merging: bool = True
     cycles: int = 2
     trials: int = 3
@@ -79,6 +83,13 @@ class Settings:
         _check("threads", self.threads, low=0)
         if self.optimiser not in ("newton", "adam"):
             raise SettingError(f'optimiser: expected "newton" or "adam", got {self.optimiser!r}')
+        if self.family not in FAMILIES:
+            raise SettingError(f"family: expected one of {', '.join(FAMILIES)}, got {self.family!r}")
+        if self.optimiser == "adam" and held(self.family, self.smooth):
+            raise SettingError(
+                'optimiser "adam" moves every parameter: it needs family "superfrustum" and smooth unions, '
+                f"got {self.family!r} and smooth={self.smooth}"
+            )
 
     @classmethod
     def for_quality(cls, quality: Quality = "normal", **changes: Any) -> Settings:
