@@ -20,6 +20,7 @@ WRITERS = {
     ".ply": "partwright.export.ply",
     ".stl": "partwright.export.stl",
     ".obj": "partwright.export.obj",
+    ".glsl": "partwright.export.glsl",
 }
 
 __all__ = ["WRITERS", "export"]
@@ -36,12 +37,7 @@ def export(assembly: Assembly, path: str | Path, **options: Any) -> None:
         SettingError: the format has no such option.
         OutputError: the file cannot be written.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in WRITERS:
-        raise UnsupportedFormatError(
-            f"cannot export {Path(path).name}: the suffix {suffix!r} names no format; "
-            f"use one of {', '.join(WRITERS)}"
-        )
+    suffix = _suffix(Path(path))
     write: Callable[..., None] = import_module(WRITERS[suffix]).write
     known = list(inspect.signature(write).parameters)[2:]
     for name in options:
@@ -50,3 +46,14 @@ def export(assembly: Assembly, path: str | Path, **options: Any) -> None:
                 f"{suffix} has no option {name!r}; it has {', '.join(known) if known else 'none'}"
             )
     write(assembly, path, **options)
+
+
+def _suffix(path: Path) -> str:
+    """The key of `WRITERS` with which the name ends: ".blender.py" is one, ".py" is none."""
+    found = next((suffix for suffix in WRITERS if path.name.lower().endswith(suffix)), None)
+    if found is None:
+        raise UnsupportedFormatError(
+            f"cannot export {path.name}: the suffix {path.suffix.lower()!r} names no format; "
+            f"use one of {', '.join(WRITERS)}"
+        )
+    return found

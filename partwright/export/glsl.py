@@ -1,0 +1,90 @@
+"""GLSL: one self-contained `float sdf(vec3 p)`, for GLSL 3.30, GLSL ES 3.00 and later.
+
+The formula (superfrustum.glsl beside this file) is followed by a table of the parts, one constant each, and
+by the tree of operations. All lengths are in the assembly's own unit.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.assembly import Assembly, Node, Part
+from partwright.assembly.rows import as_superfrustum
+from partwright.export.identifiers import comment, identifiers
+from partwright.shapes import canonical_unit
+from partwright.writing import write_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+
+def write(assembly: Assembly, path: str | Path) -> None:
+    """Write the assembly's exact signed distance, blends and all.
+
+    Raises:
+        ParameterError: a part is no SuperFrustum.
+        OutputError: the file cannot be written.
+    """
+    write_bytes(path, to_glsl(assembly).encode())
+
+
+def to_glsl(assembly: Assembly) -> str:
+    """The text of the shader."""
+    constants = [name.upper() for name in identifiers([p.name for p in assembly.parts], ["half_pi"])]
+    head = [
+        f"// {comment(assembly.name) or 'Assembly'}: {len(assembly)} parts. "
+        f"Lengths in {canonical_unit(assembly.unit) if assembly.unit else 'an unknown unit'}.",
+        "// float sdf(vec3 p) is the signed distance, negative inside. Put it after `#version 330` or later, or",
+        "// after `#version 300 es` and `precision highp float;`.",
+        "",
+        files("partwright.export").joinpath("superfrustum.glsl").read_text("utf-8"),
+        "// translation, rotation, size, roundness, dilation, taper, bulge, onion, blend",
+    ]
+    table = [_constant(name, part) for name, part in zip(constants, assembly.parts, strict=True)]
+    functions: list[str] = []
+    _function(assembly, "sdf", iter(constants), (f"group_{i}" for i in count(1)), functions)
+    return "\n".join([*head, *table, "", *functions])
+
+
+def _constant(name: str, part: Part) -> str:
+    w, x, y, z = part.rotation
+    sx, sy, sz, *shape = as_superfrustum(part.field).parameters()
+    vectors = (("vec3", part.translation), ("vec4", (x, y, z, w)), ("vec3", (sx, sy, sz)))
+    values = [f"{kind}({_numbers(v)})" for kind, v in vectors]
+    row = ", ".join((*values, _numbers((*shape, part.blend))))
+    return f"const Part {name} = Part({row});  // {comment(part.name)}"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    """float32 literals in their shortest form."""
+    return ", ".join(str(np.float32(value)) for value in values)
+
+
+def _function(
+    node: Assembly, name: str, constants: Iterator[str], groups: Iterator[str], functions: list[str]
+) -> None:
+    """Append the functions of the node, those it calls first; `constants` are used up leaf by leaf."""
+    lines = [f"float {name}(vec3 p) {{" + (f"  // {comment(node.name)}" if node.name else "")]
+    for i, child in enumerate(node.children):
+        value, blend = _call(child, constants, groups, functions)
+        if i == 0:
+            lines.append(f"    float d = {value};")
+        else:
+            lines.append(f"    d = smooth_{node.operation}(d, {value}, {blend});")
+    functions += [*lines, "    return d;", "}", ""]
+
+
+def _call(
+    child: Node, constants: Iterator[str], groups: Iterator[str], functions: list[str]
+) -> tuple[str, str]:
+    if isinstance(child, Part):
+        constant = next(constants)
+        return f"part_sdf(p, {constant})", f"{constant}.blend"
+    group = next(groups)
+    _function(child, group, constants, groups, functions)
+    return f"{group}(p)", _numbers([child.blend])
