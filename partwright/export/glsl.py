@@ -39,8 +39,8 @@ def to_glsl(assembly: Assembly) -> str:
     head = [
         f"// {comment(assembly.name) or 'Assembly'}: {len(assembly)} parts. "
         f"Lengths in {canonical_unit(assembly.unit) if assembly.unit else 'an unknown unit'}.",
-        "// float sdf(vec3 p) is the signed distance, negative inside. Put it after `#version 330` or later, or",
-        "// after `#version 300 es` and `precision highp float;`.",
+        "// float sdf(vec3 p) is the signed distance, negative inside. Put it after `#version 330` or later,",
+        "// or after `#version 300 es` and `precision highp float;`.",
         "",
         files("partwright.export").joinpath("superfrustum.glsl").read_text("utf-8"),
         "// translation, rotation, size, roundness, dilation, taper, bulge, onion, blend",
