@@ -22,8 +22,8 @@ class Change:
     """One thing that the file holds otherwise than the assembly.
 
     what: names of the parts. to: what stands for them: a solid's kind, "mesh", "nothing".
-    volume_error_ratio: volume in one of the two only, over the assembly's own; max_deviation: of the surfaces,
-    in the assembly's unit. Both None where they were not measured.
+    volume_error_ratio: volume in one of the two only, over the assembly's own.
+    max_deviation: of the surfaces, in the assembly's unit. Both None where they were not measured.
     """
 
     what: tuple[str, ...]

@@ -16,10 +16,11 @@ from itertools import product
 import numpy as np
 
 from partwright.assembly import Part, Similarity
+from partwright.assembly.rows import as_superfrustum, is_superfrustum
 from partwright.assembly.similarity import NO_ROTATION, quaternion_product, rotation_matrix
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export.ellipsoid import Ellipsoid
-from partwright.export.recognise import exact_solid
+from partwright.export.recognise import SAME, exact_solid
 from partwright.fields import Box, Capsule, Cone, Cylinder, Field, Frustum, Sphere, Torus, Tube
 
 SOLIDS: tuple[type[Field], ...] = (Box, Cylinder, Cone, Frustum, Sphere, Capsule, Tube, Torus)
@@ -38,8 +39,8 @@ class Approximation:
     """A solid in a part's stead.
 
     solid: the field. part_with_solid: the part with it, placed; name, blend and metadata are the part's own.
-    volume_error_ratio: volume that is in one of the two only, over the part's. max_deviation: of the surfaces,
-    in the part's unit, to about a 24th of its box.
+    volume_error_ratio: volume that is in one of the two only, over the part's.
+    max_deviation: of the surfaces, in the part's unit, to about a 24th of its box.
     """
 
     solid: Field
@@ -64,11 +65,13 @@ def nearest_solid(part: Part, kinds: Sequence[type[Field]] = SOLIDS) -> Approxim
         return Approximation(exact, dataclasses.replace(part, field=exact), 0.0, 0.0)
     lower, upper = part.field.bounds()
     longest = float((upper - lower).max())
-    if longest <= 0:
+    if longest <= 0 or (
+        is_superfrustum(part.field) and as_superfrustum(part.field).thinnest < SAME * longest
+    ):
         raise NoSurfaceError(f"part {part.name!r} has no volume, so no solid is near it")
     lattice = _Lattice.of(part.field.scaled(1 / longest))
     if lattice.volume <= 0:
-        raise NoSurfaceError(f"part {part.name!r} has no volume, so no solid is near it")
+        raise NoSurfaceError(f"part {part.name!r} is too thin to be measured, so no solid is near it")
     best = _best(lattice, kinds)
     solid = best.field.scaled(longest)
     pose = Similarity(1.0, part.rotation, part.translation)
@@ -258,8 +261,8 @@ def _lengths(field: Field) -> np.ndarray:
 def _of_lengths(kind: type[Field], lengths: Sequence[float] | np.ndarray) -> Field:
     """The solid of these lengths, held to what its kind allows."""
     v = [float(x) for x in np.clip(lengths, 1e-4, 10.0)]
-    if kind in (Box, Ellipsoid):
-        return kind(tuple(v))  # type: ignore[call-arg]
+    if kind is Box or kind is Ellipsoid:
+        return kind((v[0], v[1], v[2]))
     if kind is Frustum:
         v[1] = min(v[1], 2 * v[0])
     if kind in (Tube, Torus):
