@@ -34,7 +34,7 @@ class NotFiniteError(PartwrightError):
 
 
 class NeedsSurfaceError(PartwrightError):
-    """The file holds points without faces where a surface is needed."""
+    """Points without faces that show no surface: too few, too scattered, or too open."""
 
 
 class AssemblyFileError(PartwrightError):
@@ -67,3 +67,7 @@ class NoSurfaceError(PartwrightError):
 
 class OpenShellError(PartwrightError):
     """The surface is an open shell whose openings leave inside and outside undecided."""
+
+
+class GridError(PartwrightError):
+    """A voxel grid has the wrong form, or no surface runs through it."""

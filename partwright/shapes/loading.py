@@ -1,4 +1,4 @@
-"""Files to triangles: named pieces with their transforms applied, and what the file says of units."""
+"""Mesh files to triangles: named pieces with their transforms applied, and what the file says of units."""
 
 from __future__ import annotations
 
@@ -7,19 +7,16 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.errors import (
-    EmptyShapeError,
-    NeedsSurfaceError,
-    UnreadableFileError,
-    UnsupportedFormatError,
-)
+from partwright.errors import EmptyShapeError, UnreadableFileError
+from partwright.shapes.array_files import check_file
+from partwright.shapes.point_cloud import source_of_points
+from partwright.shapes.source import Piece, Source
 from partwright.shapes.units import canonical_unit
 
 if TYPE_CHECKING:
@@ -50,54 +47,44 @@ _PARSER_ERRORS = (
 )
 
 
-@dataclass(frozen=True)
-class Piece:
-    """One named mesh of a file in world coordinates: vertices (V, 3) float64, faces (F, 3) int64."""
+def read_mesh(path: Path) -> Source:
+    """Read a mesh file; an instanced geometry gives one piece an instance. A PLY without faces is points.
 
-    name: str
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Source:
-    """What a file or an object in memory holds, before any repair."""
-
-    name: str
-    pieces: tuple[Piece, ...]
-    unit: str | None
-    up: str | None
-
-
-def read_source(path: Path) -> Source:
-    """Read a mesh file; an instanced geometry gives one piece an instance.
-
-    Raises UnsupportedFormatError, UnreadableFileError, EmptyShapeError or NeedsSurfaceError.
+    Raises UnreadableFileError, EmptyShapeError, or what `source_of_points` raises.
     """
     suffix = path.suffix.lower()
-    if suffix not in MESH_SUFFIXES:
-        raise UnsupportedFormatError(
-            f"{path}: '{suffix}' is not a format that is read; expected one of {', '.join(MESH_SUFFIXES)}. "
-            "Export the shape to one of these (STL or OBJ work for CAD models)"
-        )
     scene = _load_scene(path, suffix)
     pieces = tuple(_unique_names(_pieces(scene, path.stem)))
     if not pieces:
-        if any(len(getattr(g, "vertices", ())) for g in scene.geometry.values()):
-            raise NeedsSurfaceError(
-                f"{path}: holds points without faces; a surface of triangles was expected. "
-                "Reconstruct a mesh from the points first"
-            )
-        raise EmptyShapeError(f"{path}: holds no triangles; export the shape again with its mesh")
+        return _source_without_faces(path.stem, list(scene.geometry.values()))
     is_gltf = suffix in (".glb", ".gltf")
     unit = "m" if is_gltf else canonical_unit(scene.units) if suffix == ".3mf" and scene.units else None
     return Source(path.stem, pieces, unit, "y" if is_gltf else None)
 
 
-def source_of_mesh(mesh: trimesh.Trimesh | tuple[Any, Any]) -> Source:
-    """A Trimesh or (vertices (V, 3), faces (F, 3)) as a source.
+def _source_without_faces(name: str, geometries: list[Any]) -> Source:
+    """The points of a file that holds nothing else, with the normals that a PLY's header names."""
+    clouds = [g for g in geometries if len(getattr(g, "vertices", ()))]
+    if not clouds:
+        raise EmptyShapeError(f"{name}: holds no triangles; export the shape again with its mesh")
+    points = np.concatenate([np.asarray(cloud.vertices, dtype=np.float64) for cloud in clouds])
+    normals = _ply_normals(clouds[0]) if len(clouds) == 1 else None
+    return source_of_points(name, points, normals)
 
-    Raises UnreadableFileError for arrays of another form, EmptyShapeError and NeedsSurfaceError as for files.
+
+def _ply_normals(cloud: Any) -> NDArray[np.float64] | None:
+    """Normals (N, 3) of a PLY's vertices; trimesh keeps them only with the elements as they were read."""
+    elements = cloud.metadata.get("_ply_raw", {}).get("vertex", {}).get("data")
+    try:
+        return np.stack([np.ravel(elements[axis]) for axis in ("nx", "ny", "nz")], axis=1).astype(np.float64)
+    except (TypeError, KeyError, ValueError):  # no such columns
+        return None
+
+
+def source_of_mesh(mesh: trimesh.Trimesh | tuple[Any, Any]) -> Source:
+    """A Trimesh or (vertices (V, 3), faces (F, 3)) as a source; without faces, as points.
+
+    Raises UnreadableFileError for arrays of another form, EmptyShapeError, or what `source_of_points` raises.
     """
     vertices, faces = mesh if isinstance(mesh, tuple) else (mesh.vertices, getattr(mesh, "faces", ()))
     try:
@@ -107,25 +94,20 @@ def source_of_mesh(mesh: trimesh.Trimesh | tuple[Any, Any]) -> Source:
         raise UnreadableFileError(f"vertices and faces must be arrays of numbers: {error}") from error
     if v.size == 0 and f.size == 0:
         raise EmptyShapeError("the mesh has no vertices and no faces")
-    if f.size == 0:
-        raise NeedsSurfaceError(
-            f"{len(v)} points without faces were given; a surface of triangles was expected"
-        )
+    if f.size == 0 and v.ndim == 2 and v.shape[1] == 3:
+        return source_of_points("points", v)
     if v.ndim != 2 or v.shape[1] != 3 or f.ndim != 2 or f.shape[1] != 3:
         raise UnreadableFileError(
             f"vertices {v.shape} and faces {f.shape} were given; "
             "expected (V, 3) coordinates and (F, 3) triangles"
         )
-    return Source("mesh", (Piece("mesh", v, _valid(f, len(v), "the mesh")),), None, None)
+    return Source("mesh", (Piece("mesh", v, _valid(f, len(v), "the mesh")),))
 
 
 def _load_scene(path: Path, suffix: str) -> trimesh.Scene:
     import trimesh
 
-    if not path.is_file():
-        raise UnreadableFileError(f"{path}: no such file; check the path")
-    if path.stat().st_size == 0:
-        raise EmptyShapeError(f"{path}: the file is empty (0 bytes); export the shape again")
+    check_file(path)
     if suffix == ".3mf":
         _refuse_zip_bomb(path)
     # Textures and colours are never used, so they are never decoded: that is faster and safer.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -15,7 +15,7 @@ from partwright.errors import NotFiniteError, PartwrightError, SettingError
 from partwright.shapes.curvature import CurvatureField
 from partwright.shapes.frame import UnitFrame
 from partwright.shapes.grid import DistanceGrid, distance_grid, occupancy_grid
-from partwright.shapes.loading import Piece, read_source, source_of_mesh
+from partwright.shapes.reading import read_source, source_of
 from partwright.shapes.repair import repair
 from partwright.shapes.sampling import (
     NEAR_SIGMA,
@@ -27,6 +27,7 @@ from partwright.shapes.sampling import (
     sample_triangles,
     uniform_box,
 )
+from partwright.shapes.source import Piece, Source
 from partwright.shapes.topology import signed_volumes
 from partwright.shapes.units import canonical_unit, canonical_up
 
@@ -60,12 +61,11 @@ class Shape:
     inside and outside are. Results are cached by their arguments; returned arrays are read-only.
     """
 
-    def __init__(
-        self, name: str, pieces: Sequence[Piece], unit: str | None = None, up: str | None = None
-    ) -> None:
+    def __init__(self, source: Source) -> None:
+        name, pieces = source.name, source.pieces
         offsets = np.cumsum([0] + [len(p.vertices) for p in pieces])
         ends = np.cumsum([0] + [len(p.faces) for p in pieces]).tolist()
-        self.name, self.unit, self.up = name, unit, up
+        self.name, self.unit, self.up = name, source.unit, source.up
         self.input_vertices = np.concatenate([p.vertices for p in pieces])
         self.input_faces = np.concatenate([p.faces + o for p, o in zip(pieces, offsets[:-1], strict=True)])
         self.nodes = tuple(Node(p.name, a, b) for p, a, b in zip(pieces, ends[:-1], ends[1:], strict=True))
@@ -81,7 +81,8 @@ class Shape:
         self._surface = _named(name, lambda: repair(self.frame.to_unit(corners), compact.reshape(-1, 3)))
         self.vertices = self.frame.from_unit(self._surface.vertices)
         self.faces = self._surface.faces
-        self.repairs, self.confidence = self._surface.repairs, self._surface.confidence
+        self.repairs = source.repairs + self._surface.repairs
+        self.confidence = min(source.confidence, self._surface.confidence)
         self._source = self._surface.distance()
         self._cache: dict[tuple[Any, ...], Any] = {}
 
@@ -116,7 +117,7 @@ class Shape:
         for node in self.nodes:
             piece = Piece(node.name, self.input_vertices, self.input_faces[node.start : node.stop])
             try:
-                shapes.append(Shape(node.name, [piece], self.unit, self.up))
+                shapes.append(Shape(Source(node.name, (piece,), self.unit, self.up)))
             except PartwrightError as error:
                 failure = error
                 warnings.warn(f"node left out: {error}", NodeLeftOutWarning, stacklevel=2)
@@ -221,20 +222,21 @@ class Shape:
 
 
 def load_shape(
-    source: str | Path | trimesh.Trimesh | tuple[ArrayLike, ArrayLike],
+    source: str | Path | trimesh.Trimesh | tuple[ArrayLike, ArrayLike] | NDArray[Any],
     unit: str | None = None,
     up: str | None = None,
 ) -> Shape:
-    """Shape of a file, a Trimesh or (vertices (V, 3), faces (F, 3)).
+    """Shape of a file, a Trimesh, (vertices (V, 3), faces (F, 3)), points (N, 3 or 6) or a grid (nx, ny, nz).
 
+    Points and grids become a mesh first; `repairs` says so, and `confidence` how well the points bear it out.
     `unit` and `up` state what the file does not say, or overrule it; the geometry is never scaled or turned.
     Raises UnsupportedFormatError, UnreadableFileError, EmptyShapeError, NeedsSurfaceError, NotFiniteError,
-    FlatShapeError, OpenShellError, or SettingError for an unknown unit or axis.
+    FlatShapeError, OpenShellError, GridError, or SettingError for an unknown unit or axis.
     """
     stated_unit = None if unit is None else canonical_unit(unit)
     stated_up = None if up is None else canonical_up(up)
-    read = read_source(Path(source)) if isinstance(source, (str, Path)) else source_of_mesh(source)
-    return Shape(read.name, read.pieces, stated_unit or read.unit, stated_up or read.up)
+    read = read_source(Path(source)) if isinstance(source, (str, Path)) else source_of(source)
+    return Shape(replace(read, unit=stated_unit or read.unit, up=stated_up or read.up))
 
 
 def _named(name: str, work: Callable[[], _T]) -> _T:
