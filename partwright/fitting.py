@@ -163,7 +163,7 @@ def fit(
         "input": _input(shape, source),
         "seconds": {stage: round(spent, 3) for stage, spent in seconds.items()},
         "parts": len(assembly),
-        "instances": len(assembly),
+        "instances": sum(len(part.copies) for part in assembly.parts),
         "scores": scores.to_dict(),
         "warnings": _warnings(shape, scores),
     }

@@ -8,7 +8,7 @@ import numpy as np
 
 from partwright.assembly.rows import as_superfrustum, is_superfrustum
 from partwright.assembly.similarity import rotation_matrix
-from partwright.assembly.tree import Assembly, Part
+from partwright.assembly.tree import Assembly, Part, operands
 from partwright.fields import SuperFrustum
 
 _AXES = np.vstack([-np.eye(3), np.eye(3)])
@@ -18,19 +18,21 @@ _ROUNDING = 9
 
 def bounds(node: Part | Assembly, level: float = 0.0) -> np.ndarray:
     """(2, 3) lowest and highest corner of where the node's distance is below `level` (>= 0)."""
-    if isinstance(node, Part):
+    if isinstance(node, Part) and not node.instances:
         return _part_bounds(node, level)
-    result = bounds(node.children[0], level)
-    for child in node.children[1:]:
-        if node.operation == "union":
-            result = _union(result, node, child, level)
-        elif node.operation == "intersection":
+    operation = "union" if isinstance(node, Part) else node.operation
+    first, *rest = operands(node)
+    result = bounds(first, level)
+    for child in rest:
+        if operation == "union":
+            result = _union(result, child, level)
+        elif operation == "intersection":
             box = bounds(child, level)
             result = np.array([np.maximum(result[0], box[0]), np.minimum(result[1], box[1])])
     return np.array([np.minimum(result[0], result[1]), result[1]])
 
 
-def _union(box: np.ndarray, node: Assembly, child: Part | Assembly, level: float) -> np.ndarray:
+def _union(box: np.ndarray, child: Part | Assembly, level: float) -> np.ndarray:
     """The smooth minimum lies at most a quarter of the blend below either argument: both grow by that."""
     other = bounds(child, level + child.blend / 4)
     grown = box + np.array([[-1.0], [1.0]]) * child.blend / 4

@@ -7,7 +7,7 @@ so the assembly and the points are first brought to the size and place of the un
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain, groupby
+from itertools import chain, groupby, takewhile
 from typing import Any, cast
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from partwright.assembly.bounds import bounds
 from partwright.assembly.rows import is_superfrustum, rows
 from partwright.assembly.similarity import Similarity, rotation_matrix
-from partwright.assembly.tree import Assembly, Node, Operation, Part
+from partwright.assembly.tree import Assembly, Node, Operation, Part, operands
 from partwright.errors import ParameterError
 from partwright.fields import kernel, smooth_difference, smooth_intersection, smooth_union
 from partwright.fields.operations import is_tensor
@@ -48,8 +48,11 @@ def part_distances(assembly: Assembly, points: np.ndarray) -> np.ndarray:
     """(M, N) signed distance of each leaf alone at points (N, 3)."""
     frame, unit_assembly = assembly._normalised
     points = _checked(points)
-    values = np.stack([d for d, _ in _children(unit_assembly.parts, frame(points).astype(np.float32))])
-    return _back(values, frame, points)
+    copies = [part.copies for part in unit_assembly.parts]
+    flat = tuple(chain.from_iterable(copies))
+    values = np.stack([d for d, _ in _children(flat, frame(points).astype(np.float32))])
+    firsts = np.cumsum([0, *map(len, copies[:-1])])
+    return _back(np.minimum.reduceat(values, firsts, axis=0), frame, points)
 
 
 def _checked(points: Any) -> np.ndarray:
@@ -67,20 +70,23 @@ def _back(values: np.ndarray, frame: Similarity, points: np.ndarray) -> np.ndarr
 
 def _evaluate(node: Node, points: np.ndarray) -> np.ndarray:
     """(N,) float32 by the kernel; the leaves that begin a union are folded in a single call."""
-    if isinstance(node, Part):
-        return next(_children((node,), points))[0]
-    lead = _leading_leaves(node)
-    values = _children(node.children[len(lead) :], points)
+    operation, children = _operation(node), operands(node)
+    lead = _leading_leaves(children) if operation == "union" else []
+    values = _children(children[len(lead) :], points)
     if lead:
         values = chain([(kernel.evaluate(rows(lead), points), 0.0)], values)
-    return _folded(node.operation, values)
+    return _folded(operation, values)
 
 
 def _reference(node: Node, points: Any) -> Any:
     """(N,) by the fields themselves, differentiable where the points are torch tensors."""
-    if isinstance(node, Part):
+    if isinstance(node, Part) and not node.instances:
         return _posed(node, points)
-    return _folded(node.operation, ((_reference(c, points), c.blend) for c in node.children))
+    return _folded(_operation(node), ((_reference(c, points), c.blend) for c in operands(node)))
+
+
+def _operation(node: Node) -> Operation:
+    return "union" if isinstance(node, Part) else node.operation
 
 
 def _folded(operation: Operation, values: Iterator[tuple[Any, float]]) -> Any:
@@ -100,26 +106,25 @@ def _posed(part: Part, points: Any) -> Any:
     return part.field((points - translation) @ rotation)
 
 
-def _leading_leaves(node: Assembly) -> list[Part]:
-    lead: list[Part] = []
-    if node.operation == "union":
-        for child in node.children:
-            if not isinstance(child, Part) or not is_superfrustum(child.field):
-                break
-            lead.append(child)
-    return lead
+def _leading_leaves(children: tuple[Node, ...]) -> list[Part]:
+    return list(cast(Iterator[Part], takewhile(_in_one_row, children)))
+
+
+def _in_one_row(node: Node) -> bool:
+    """Whether one row of the kernel stands for the node."""
+    return isinstance(node, Part) and is_superfrustum(node.field) and not node.instances
 
 
 def _children(children: tuple[Node, ...], points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
     """Each child's distance alone and its blend; neighbouring leaves share a kernel call."""
-    for batched, group in groupby(children, lambda c: isinstance(c, Part) and is_superfrustum(c.field)):
+    for batched, group in groupby(children, _in_one_row):
         if batched:
             leaves = cast(list[Part], list(group))
             values = kernel.evaluate_parts(rows(leaves), points)
             yield from zip(values, (leaf.blend for leaf in leaves), strict=True)
         else:
             for node in group:
-                yield (
-                    (_posed(node, points) if isinstance(node, Part) else _evaluate(node, points)),
-                    node.blend,
-                )
+                if isinstance(node, Part) and not node.instances:
+                    yield _posed(node, points), node.blend
+                else:
+                    yield _evaluate(node, points), node.blend

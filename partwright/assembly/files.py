@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
+from partwright.assembly.similarity import Similarity
 from partwright.assembly.tree import MAX_DEPTH, Assembly, Node, Part
 from partwright.errors import AssemblyFileError, NewerVersionError, ParameterError, UnreadableFileError
 from partwright.fields import from_dict
@@ -21,7 +22,8 @@ VERSION = 1
 MAX_BYTES = 64 * 1024 * 1024
 MAX_PARTS = 100_000
 
-_PART_KEYS = {"name", "field", "translation", "rotation", "blend", "metadata"}
+_PART_KEYS = {"name", "field", "translation", "rotation", "blend", "metadata", "instances"}
+_INSTANCE_KEYS = {"translation", "rotation"}
 _ASSEMBLY_KEYS = {"name", "operation", "blend", "unit", "up", "metadata", "children"}
 
 
@@ -88,6 +90,7 @@ class _Reader:
 
     def __init__(self) -> None:
         self.names: list[tuple[str, str]] = []  # (place, name) of each leaf
+        self.copies = 0
 
     def node(self, data: Any, place: str, depth: int) -> Node:
         if not isinstance(data, dict):
@@ -97,16 +100,29 @@ class _Reader:
     def part(self, data: dict[str, Any], place: str) -> Part:
         _check_keys(data, place, _PART_KEYS, required=("field", "name"))
         self.names.append((place, data["name"]))
-        if len(self.names) > MAX_PARTS:
-            _fail(place, f"more than {MAX_PARTS:,} parts")
+        instances = data.get("instances", [])
+        if not isinstance(instances, list):
+            _fail(f"{place}.instances", f"expected a list, got {_shown(instances)}")
+        self.copies += 1 + len(instances)
+        if self.copies > MAX_PARTS:
+            _fail(place, f"more than {MAX_PARTS:,} parts, counting every instance")
         try:
             values = {**data, "field": from_dict(data["field"])}
         except ParameterError as error:
             raise AssemblyFileError(f"{place}.field: {error}") from error
-        for key in ("translation", "rotation"):
-            if not isinstance(values.get(key, []), list):
-                _fail(f"{place}.{key}", f"expected a list of numbers, got {_shown(values[key])}")
+        _check_lists(values, place)
+        values["instances"] = tuple(
+            self.instance(move, f"{place}.instances[{i}]") for i, move in enumerate(instances)
+        )
         return self.build(Part, values, place)
+
+    def instance(self, data: Any, place: str) -> Similarity:
+        if not isinstance(data, dict):
+            _fail(place, f"expected an object, got {_shown(data)}")
+        _check_keys(data, place, _INSTANCE_KEYS, required=())
+        _check_lists(data, place)
+        result: Similarity = self.build(Similarity, data, place)
+        return result
 
     def assembly(self, data: dict[str, Any], place: str, depth: int) -> Assembly:
         _check_keys(data, place, _ASSEMBLY_KEYS, required=("operation", "children"))
@@ -145,6 +161,12 @@ def _check_keys(data: dict[str, Any], place: str, known: set[str], required: tup
             _fail(_join(place, key[:40]), f"unknown key; expected {', '.join(sorted(known))}")
 
 
+def _check_lists(data: dict[str, Any], place: str) -> None:
+    for key in ("translation", "rotation"):
+        if not isinstance(data.get(key, []), list):
+            _fail(f"{place}.{key}", f"expected a list of numbers, got {_shown(data[key])}")
+
+
 def _assembly_text(node: Assembly, depth: int) -> str:
     pad = " " * depth
     lines = []
@@ -176,9 +198,16 @@ def _part_text(part: Part) -> str:
         "rotation": part.rotation,
         "blend": part.blend,
     }
+    if part.instances:
+        data["instances"] = [instance_dict(move) for move in part.instances]
     if part.metadata:
         data["metadata"] = _sorted(part.metadata)
     return _json(data)
+
+
+def instance_dict(move: Similarity) -> dict[str, list[float]]:
+    """A rigid move as assembly files have it."""
+    return {"translation": list(move.translation), "rotation": list(move.rotation)}
 
 
 def _sorted(metadata: Mapping[str, str | float]) -> dict[str, str | float]:

@@ -30,9 +30,10 @@ def as_superfrustum(field: Field) -> SuperFrustum:
 
 
 def rows(parts: Sequence[Part]) -> np.ndarray:
-    """(M, 16) float64 parameter rows, in the parts' own units."""
+    """(M, 16) float64 parameter rows, in the parts' own units; a repeated part has a row for each copy."""
+    copies = (copy for part in parts for copy in part.copies)
     return np.array(
-        [(*p.translation, *p.rotation, *as_superfrustum(p.field).parameters(), p.blend) for p in parts]
+        [(*p.translation, *p.rotation, *as_superfrustum(p.field).parameters(), p.blend) for p in copies]
     ).reshape(-1, WIDTH)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,12 +92,30 @@ class Similarity:
         back = Similarity(1.0 / self.scale, (w, -x, -y, -z))
         return Similarity(back.scale, back.rotation, tuple(-back(np.array(self.translation))))
 
+    def conjugate(self, move: Similarity) -> Similarity:
+        """What a rigid `move` becomes when everything it moves is taken through this map."""
+        taken = self @ move @ self.inverse()
+        return Similarity(1.0, taken.rotation, taken.translation)
+
     def matrix(self) -> np.ndarray:
         """(4, 4) float64 homogeneous matrix."""
         result = np.eye(4)
         result[:3, :3] = self.scale * rotation_matrix(self.rotation)
         result[:3, 3] = self.translation
         return result
+
+
+def rigid_moves(value: Sequence[Similarity], name: str) -> tuple[Similarity, ...]:
+    """`value` as similarities of scale 1.
+
+    Raises:
+        ParameterError: one of them scales, or is something else.
+    """
+    moves = tuple(value)
+    for i, move in enumerate(moves):
+        if not isinstance(move, Similarity) or move.scale != 1.0:
+            raise ParameterError(f"{name}[{i}]: expected a Similarity of scale 1, got {move!r:.80}")
+    return moves
 
 
 def _quaternion(rotation: np.ndarray) -> Quaternion:

@@ -21,7 +21,13 @@ from partwright.assembly.checks import (
     vector,
 )
 from partwright.assembly.names import unique_names
-from partwright.assembly.similarity import NO_ROTATION, ORIGIN, Similarity, quaternion_product
+from partwright.assembly.similarity import (
+    NO_ROTATION,
+    ORIGIN,
+    Similarity,
+    quaternion_product,
+    rigid_moves,
+)
 from partwright.errors import ParameterError
 from partwright.fields import Field, SuperFrustum
 
@@ -93,9 +99,14 @@ class Part(_Common):
         blend: width over which this part melts into the parts before it; 0 is a sharp edge.
         name: unique within an assembly; the assembly names it if it is empty.
         metadata: what else is known of it, strings and numbers.
+        instances: rigid moves (similarities of scale 1) of the posed part in the assembly's own frame; each
+            makes one further copy. The part itself is always there and is not listed.
+
+    A repeated part is one leaf: the union of its copies, each melting in over `blend` like a part by itself.
 
     Raises:
-        ParameterError: a value is not finite, the rotation has no length, or the blend is negative.
+        ParameterError: a value is not finite, the rotation has no length, the blend is negative, or an
+            instance is no rigid move.
     """
 
     field: Field
@@ -104,22 +115,31 @@ class Part(_Common):
     blend: float = 0.0
     name: str = ""
     metadata: Mapping[str, str | float] = dataclasses.field(default_factory=dict, hash=False)
+    instances: tuple[Similarity, ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.field, Field):
             raise ParameterError(f"field: expected a field such as SuperFrustum, got {self.field!r:.80}")
         object.__setattr__(self, "translation", vector(self.translation, "translation"))
         object.__setattr__(self, "rotation", unit_quaternion(self.rotation, "rotation"))
+        object.__setattr__(self, "instances", rigid_moves(self.instances, "instances"))
         _check_common(self)
 
+    @cached_property
+    def copies(self) -> tuple[Part, ...]:
+        """The part itself and a moved copy an instance, all of the same name, none of them repeated."""
+        alone = dataclasses.replace(self, instances=()) if self.instances else self
+        return (alone, *(alone.transformed(move) for move in self.instances))
+
     def transformed(self, similarity: Similarity) -> Part:
-        """The part turned, scaled and moved."""
+        """The part turned, scaled and moved, with all its copies."""
         return dataclasses.replace(
             self,
             field=self.field if similarity.scale == 1.0 else self.field.scaled(similarity.scale),
             translation=tuple(similarity(np.array(self.translation)).tolist()),
             rotation=quaternion_product(similarity.rotation, self.rotation),
             blend=self.blend * similarity.scale,
+            instances=tuple(similarity.conjugate(move) for move in self.instances),
         )
 
 
@@ -190,7 +210,7 @@ class Assembly(_Common):
         return next(part for part in self.parts if part.name == name)
 
     def part_distances(self, points: np.ndarray) -> np.ndarray:
-        """(M, N) signed distance of each leaf alone, unblended, at points (N, 3)."""
+        """(M, N) signed distance of each leaf alone, unblended, to its nearest copy, at points (N, 3)."""
         from partwright.assembly.distance import part_distances
 
         return part_distances(self, points)
@@ -199,6 +219,11 @@ class Assembly(_Common):
         """The assembly turned, scaled and moved as a whole."""
         children = tuple(child.transformed(similarity) for child in self.children)
         return dataclasses.replace(self, children=children, blend=self.blend * similarity.scale)
+
+    def expanded(self) -> Assembly:
+        """The same solid with every copy of a repeated part as a part of its own (named leg, leg_02 ...)."""
+        nodes = (node.expanded() if isinstance(node, Assembly) else node for node in operands(self))
+        return dataclasses.replace(self, children=tuple(map(_without_instances, nodes)))
 
     def renamed(self, old: str, new: str) -> Assembly:
         """The leaf `old` under a new name.
@@ -252,6 +277,23 @@ class Assembly(_Common):
 
 
 Node: TypeAlias = Part | Assembly
+
+
+def operands(node: Node) -> tuple[Node, ...]:
+    """What the node's operation folds, in order: its children; in a union, repeated parts as their copies."""
+    if isinstance(node, Part):
+        return node.copies
+    if node.operation != "union":
+        return node.children
+    return tuple(
+        one for child in node.children for one in (child.copies if isinstance(child, Part) else (child,))
+    )
+
+
+def _without_instances(node: Node) -> Node:
+    if isinstance(node, Part) and node.instances:
+        return Assembly(node.copies, blend=node.blend)
+    return node
 
 
 def _combine(operation: Operation, a: Any, b: Any) -> Assembly:

@@ -2,12 +2,12 @@
 
 glTF is in metres with Y up, so the root of the scene converts; where the assembly knows no unit or up axis
 its numbers stay as they are, and `asset.extras` says so. Each part is meshed in its own frame and placed by
-its node, so that a far place costs no digits and a node turns about the part's own origin.
+its node, so that a far place costs no digits and a node turns about the part's own origin. The copies of a
+repeated part are nodes below the part's own, named leg/2, leg/3 ..., and share its mesh.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from itertools import count
 from pathlib import Path
@@ -17,8 +17,9 @@ import numpy as np
 
 from partwright import __version__
 from partwright.assembly import Assembly, Node, Part, Similarity
+from partwright.assembly.files import instance_dict
 from partwright.assembly.palette import palette
-from partwright.assembly.similarity import NO_ROTATION, ORIGIN
+from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import NoSurfaceError
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
@@ -71,6 +72,13 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
     colours = dict(zip((p.name for p in assembly.parts), palette(len(assembly)), strict=True))
     taken = {"world", *colours}
 
+    def add_copies(part: Part) -> None:
+        own = Similarity(1.0, part.rotation, part.translation)
+        for i, move in enumerate(part.instances, start=2):
+            copy = _free_name(f"{part.name}/{i}", taken)
+            within = own.inverse().conjugate(move).matrix()
+            scene.graph.update(frame_to=copy, frame_from=part.name, matrix=within, geometry=part.name)
+
     def add(node: Node, parent: str, pose: np.ndarray, role: str) -> None:
         extras: dict[str, Any] = {"role": role} if role else {}
         if isinstance(node, Part):
@@ -81,8 +89,9 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
                 about["note"] = "no surface of its own at this resolution"
                 scene.graph.update(frame_to=node.name, frame_from=parent, matrix=placed, metadata=about)
             else:
-                mesh = _coloured(mesh, colours[node.name])
+                mesh = coloured(mesh, colours[node.name])
                 scene.add_geometry(mesh, node.name, node.name, parent, placed, metadata=about)
+                add_copies(node)
             return
         name = _free_name(node.name or "assembly", taken)
         extras |= {"operation": node.operation, "blend": node.blend}
@@ -97,7 +106,7 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
 def _local_mesh(part: Part, resolution: int) -> trimesh.Trimesh | None:
     """The part in its own frame; None for one without volume, which only shows where it blends."""
     try:
-        return mesh_part(dataclasses.replace(part, translation=ORIGIN, rotation=NO_ROTATION), resolution)
+        return mesh_part(Part(part.field), resolution)
     except NoSurfaceError:
         return None
 
@@ -110,10 +119,13 @@ def _extras(part: Part) -> dict[str, Any]:
         "rotation": list(part.rotation),
         "blend": part.blend,
     }
+    if part.instances:
+        own["instances"] = [instance_dict(move) for move in part.instances]
     return own | ({"metadata": dict(part.metadata)} if part.metadata else {})
 
 
-def _coloured(mesh: trimesh.Trimesh, colour: np.ndarray) -> trimesh.Trimesh:
+def coloured(mesh: trimesh.Trimesh, colour: np.ndarray) -> trimesh.Trimesh:
+    """The mesh with a matt material of this sRGB colour (3,) uint8."""
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial
 

@@ -51,7 +51,7 @@ def mesh_assembly(assembly: Assembly | Part, resolution: int = 128, *, sharp: bo
 
 
 def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimesh.Trimesh:
-    """One part alone, watertight, in its own units and place.
+    """One part alone, watertight, in its own units and place; all copies of a repeated one, each closed.
 
     It is meshed along its own axes. Cells are made shorter where the part is thin, each axis by itself, so
     that walls come out complete, as long as that takes no more than about 100,000 cells.
@@ -75,7 +75,17 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     mesh = mesh_field(distance, -extent / 2, extent / 2, counts, sharp=sharp)
     pose = Similarity(1.0, part.rotation, part.translation) @ frame.inverse()
     mesh.vertices = pose(mesh.vertices)
-    return mesh
+    return _repeated(mesh, part.instances)
+
+
+def _repeated(mesh: trimesh.Trimesh, moves: tuple[Similarity, ...]) -> trimesh.Trimesh:
+    if not moves:
+        return mesh
+    import trimesh
+
+    vertices = [mesh.vertices, *(move(mesh.vertices) for move in moves)]
+    faces = [mesh.faces + i * len(mesh.vertices) for i in range(len(vertices))]
+    return trimesh.Trimesh(np.concatenate(vertices), np.concatenate(faces), process=False)
 
 
 def walls(field: SuperFrustum) -> np.ndarray:

@@ -15,8 +15,9 @@ def overlap(assembly: Assembly, resolution: int = RESOLUTION) -> float:
     """`overlap`: volume in two or more added parts, unblended, over volume in one or more; subtracted parts
     not counted.
 
-    An intersection counts as one part (its leaves are meant to overlap). Volumes are counted at the centres
-    of 128 cells along the longest side of the added parts' bounds; 0 where they hold no cell.
+    Copies of a repeated part count as parts. An intersection counts as one part (its leaves are meant to
+    overlap). Volumes are counted at the centres of 128 cells along the longest side of the added parts'
+    bounds; 0 where they hold no cell.
     """
     added = in_own_frame(Assembly(tuple(added_parts(assembly))))
 
@@ -33,8 +34,10 @@ def overlap(assembly: Assembly, resolution: int = RESOLUTION) -> float:
 
 
 def added_parts(node: Assembly | Part) -> list[Assembly | Part]:
-    """The parts, and intersections as wholes, that add to the solid."""
-    if isinstance(node, Part) or node.operation == "intersection":
+    """The parts (each copy of a repeated one), and intersections as wholes, that add to the solid."""
+    if isinstance(node, Part):
+        return list(node.copies)
+    if node.operation == "intersection":
         return [node]
     children = node.children if node.operation == "union" else node.children[:1]
     return [part for child in children for part in added_parts(child)]

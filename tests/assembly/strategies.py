@@ -32,8 +32,16 @@ SOLIDS = st.one_of(
     st.builds(Capsule, LENGTH, LENGTH),
     st.builds(Torus, st.floats(0.6, 1.0), st.floats(0.1, 0.5)),
 )
+MOVES = st.builds(Similarity, st.just(1.0), ROTATION, VECTOR)
 PARTS = st.builds(
-    Part, SUPERFRUSTA | SOLIDS, VECTOR, ROTATION, blend=st.floats(0.0, 0.3), name=NAME, metadata=METADATA
+    Part,
+    SUPERFRUSTA | SOLIDS,
+    VECTOR,
+    ROTATION,
+    blend=st.floats(0.0, 0.3),
+    name=NAME,
+    metadata=METADATA,
+    instances=st.just(()) | st.lists(MOVES, max_size=2).map(tuple),
 )
 OPERATIONS = st.sampled_from(["union", "intersection", "difference"])
 

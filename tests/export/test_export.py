@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from partwright.assembly import Assembly, Part, load_assembly
+from partwright.assembly import Assembly, Part, Similarity, load_assembly
 from partwright.assembly.palette import palette
 from partwright.errors import OutputError, SettingError, UnsupportedFormatError
 from partwright.export import WRITERS, export
@@ -54,6 +54,22 @@ def test_small_and_far_surfaces_keep_their_digits(
     export(Assembly((Part(Sphere(scale), (place, 0, 0)),)), path, resolution=32)
     vertices = trimesh.load_mesh(path, process=False).vertices - [place, 0, 0]
     assert np.allclose(np.linalg.norm(vertices, axis=1) / scale, 1.0, atol=0.01)
+
+
+def test_glb_copies_share_one_mesh_below_the_part(tmp_path: Path) -> None:
+    turn = Similarity(1.0, (1.0, 0.0, 0.0, 1.0), (0.5, 0.0, 0.0))
+    leg = Part(Cylinder(0.1, 1.0), (1, 0, 0), (1, 1, 0, 0), name="leg", instances=(turn, turn @ turn))
+    export(Assembly((leg, Part(Sphere(0.1), name="leg/2"))), tmp_path / "legs.glb")
+    tree = header(tmp_path / "legs.glb")
+    nodes = {node["name"]: node for node in tree["nodes"]}
+    assert set(nodes) == {"assembly", "leg", "leg/2", "leg/2_02", "leg/3"}
+    assert len({nodes[name]["mesh"] for name in ("leg", "leg/2_02", "leg/3")}) == 1
+    assert [tree["nodes"][i]["name"] for i in nodes["leg"]["children"]] == ["leg/2_02", "leg/3"]
+    assert len(nodes["leg"]["extras"]["instances"]) == 2
+    scene = trimesh.load_scene(tmp_path / "legs.glb")
+    for name, copy in zip(("leg", "leg/2_02", "leg/3"), leg.copies, strict=True):
+        pose, _ = scene.graph.get(name)
+        assert np.allclose(pose, Similarity(1.0, copy.rotation, copy.translation).matrix(), atol=1e-6)
 
 
 def test_glb_has_a_named_coloured_node_with_parameters_for_each_part(tmp_path: Path) -> None:
