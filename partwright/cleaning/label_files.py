@@ -1,0 +1,130 @@
+"""Face labels in and out: label files as they come, and a segmented mesh with its labels beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.assembly.palette import palette
+from partwright.errors import UnreadableFileError, UnsupportedFormatError
+from partwright.export.glb import coloured, to_gltf
+from partwright.writing import write_bytes
+
+if TYPE_CHECKING:
+    from partwright.assembly import Assembly
+    from partwright.shapes import Shape
+
+SUFFIXES = (".ply", ".glb")
+_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3), ("colour", "u1", 3), ("label", "<i4")])
+
+
+def read_labels(path: str | Path) -> NDArray[Any]:
+    """Labels (F,), integers or strings, of a .json, .npy or text file.
+
+    JSON is an array, or an object with `labels` and perhaps `names` as `write_segments` writes it; text has a
+    label a line.
+
+    Raises:
+        UnreadableFileError: the file is missing, or holds no labels.
+    """
+    path = Path(path)
+    try:
+        labels = _read(path)
+    except (OSError, ValueError, IndexError, KeyError, TypeError, EOFError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise UnreadableFileError(
+            f"{path}: cannot be read as face labels ({reason}); expected a JSON array, an NPY array, or text "
+            "with one label a line"
+        ) from error
+    if labels.ndim != 1 or labels.dtype.kind not in "iuU":
+        raise UnreadableFileError(
+            f"{path}: holds {labels.dtype} of shape {labels.shape}; expected one integer or string a face"
+        )
+    return labels
+
+
+def labels_path(path: str | Path) -> Path:
+    """FILE.labels.json beside FILE."""
+    return Path(path).with_name(Path(path).name + ".labels.json")
+
+
+def check_suffix(path: str | Path) -> None:
+    """Raise UnsupportedFormatError unless segments can be written to a file of that name."""
+    if Path(path).suffix.lower() not in SUFFIXES:
+        raise UnsupportedFormatError(
+            f"cannot write segments to {Path(path).name}: use one of {', '.join(SUFFIXES)}"
+        )
+
+
+def write_segments(
+    path: str | Path, shape: Shape, labels: NDArray[Any], names: Sequence[str], assembly: Assembly
+) -> None:
+    """Write the input's faces in one colour a label, and `labels_path` with `labels` and `names`.
+
+    A .ply keeps order and number of the faces, with the label as a property of each; a .glb has a named node
+    label, in metres and Y up as far as the assembly's unit and up axis are known.
+
+    Raises:
+        UnsupportedFormatError: the suffix is another.
+        OutputError: it cannot be written.
+    """
+    check_suffix(path)
+    is_ply = Path(path).suffix.lower() == ".ply"
+    write_bytes(path, _ply(shape, labels, names) if is_ply else _glb(shape, labels, names, assembly))
+    about = {"faces": len(labels), "names": list(names), "labels": labels.tolist()}
+    write_bytes(labels_path(path), (json.dumps(about) + "\n").encode())
+
+
+def _read(path: Path) -> NDArray[Any]:
+    suffix = path.suffix.lower()
+    if suffix == ".npy":
+        return np.load(path, allow_pickle=False)
+    if suffix != ".json":
+        return np.array(path.read_text("utf-8").splitlines())
+    data = json.loads(path.read_text("utf-8"))
+    if not isinstance(data, dict):
+        return np.array(data)
+    labels = np.array(data["labels"])
+    if "names" not in data:
+        return labels
+    if labels.size and labels.min() < 0:
+        raise ValueError("negative labels have no name")
+    return np.array(data["names"], dtype=str)[labels]
+
+
+def _ply(shape: Shape, labels: NDArray[Any], names: Sequence[str]) -> bytes:
+    faces = np.empty(len(labels), dtype=_FACE)
+    faces["count"], faces["corners"], faces["label"] = 3, shape.input_faces, labels
+    faces["colour"] = palette(len(names))[labels]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment unit {shape.unit or 'unknown'}",
+        f"element vertex {len(shape.input_vertices)}",
+        *(f"property double {axis}" for axis in "xyz"),
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        *(f"property uchar {colour}" for colour in ("red", "green", "blue")),
+        "property int label",
+        "end_header\n",
+    ]
+    return "\n".join(header).encode() + shape.input_vertices.astype("<f8").tobytes() + faces.tobytes()
+
+
+def _glb(shape: Shape, labels: NDArray[Any], names: Sequence[str], assembly: Assembly) -> bytes:
+    import trimesh
+    from trimesh.exchange.gltf import export_glb
+
+    scene = trimesh.Scene(base_frame="world")
+    colours = palette(len(names))
+    for label in np.unique(labels):
+        mesh = trimesh.Trimesh(shape.input_vertices, shape.input_faces[labels == label], process=False)
+        mesh.remove_unreferenced_vertices()
+        mesh = coloured(mesh, colours[label])
+        scene.add_geometry(mesh, names[label], names[label], transform=to_gltf(assembly).matrix())
+    return export_glb(scene, include_normals=False)

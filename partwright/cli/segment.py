@@ -1,0 +1,47 @@
+"""`partwright segment`: every face of a shape labelled by its part."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+NODES = "nodes"
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "segment",
+        help="label every face of a shape by its part",
+        description="Labels every face of SHAPE by the part of ASSEMBLY that is nearest to it. Writes the faces "
+        "in a colour a part to FILE (.glb or .ply), and FILE.labels.json.",
+    )
+    command.add_argument("shape", metavar="SHAPE", type=Path, help="the mesh or scene to label")
+    command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    command.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="where to write")
+    command.add_argument(
+        "--within",
+        metavar="LABELS",
+        type=Path,
+        help="labels that parts must not cross: a file with one a face (.json, .npy or text), "
+        f"or {NODES!r} for the nodes of the scene",
+    )
+    command.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from partwright.assembly import load_assembly
+    from partwright.cleaning import segment
+    from partwright.cleaning.label_files import check_suffix, read_labels, write_segments
+    from partwright.cleaning.segmentation import node_labels
+    from partwright.shapes import load_shape
+
+    check_suffix(arguments.output)
+    assembly = load_assembly(arguments.assembly)
+    shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
+    within = None
+    if arguments.within is not None:
+        within = node_labels(shape) if str(arguments.within) == NODES else read_labels(arguments.within)
+    labels, names = segment(shape, assembly, within)
+    write_segments(arguments.output, shape, labels, names, assembly)
+    print(f"{len(labels)} faces, {len(set(labels.tolist()))} labels: {arguments.output}")
+    return 0

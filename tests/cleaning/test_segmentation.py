@@ -1,0 +1,193 @@
+"""Every face has the label of the part that it was made from, and coarse labels are never crossed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from partwright.assembly import Assembly, Part
+from partwright.cleaning import segment
+from partwright.cleaning.label_files import labels_path, read_labels
+from partwright.cleaning.segmentation import node_labels
+from partwright.cli.main import main
+from partwright.errors import SettingError, UnreadableFileError
+from partwright.fields import Box, Cylinder, Sphere
+from partwright.shapes import Shape, load_shape
+
+
+def dumbbell() -> tuple[Shape, Assembly, np.ndarray]:
+    """Two balls and a bar that do not touch, and which face belongs to which."""
+    meshes = [trimesh.creation.icosphere(2, 1.0), trimesh.creation.icosphere(2, 0.6)]
+    meshes.append(trimesh.creation.box((1.5, 0.05, 0.05)))
+    for mesh, x in zip(meshes, (-2.0, 2.0, 0.2), strict=True):
+        mesh.apply_translation((x, 0, 0))
+    parts = (
+        Part(Sphere(1.0), (-2, 0, 0), name="left"),
+        Part(Sphere(0.6), (2, 0, 0), name="right", blend=0.5),
+        Part(Box((1.5, 0.05, 0.05)), (0.2, 0, 0), name="bar"),
+    )
+    truth = np.repeat([0, 1, 2], [len(m.faces) for m in meshes])
+    return load_shape(trimesh.util.concatenate(meshes)), Assembly(parts), truth
+
+
+def drilled() -> tuple[Shape, Assembly]:
+    plate, tool = trimesh.creation.box((2, 2, 0.5)), trimesh.creation.cylinder(0.4, 2.0, sections=64)
+    assembly = Assembly(
+        (Part(Box((2, 2, 0.5)), name="plate"), Part(Cylinder(0.4, 2.0), name="hole")), "difference"
+    )
+    return load_shape(trimesh.boolean.difference([plate, tool])), assembly
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> tuple[Path, Path]:
+    shape, assembly, _ = dumbbell()
+    trimesh.Trimesh(shape.input_vertices, shape.input_faces, process=False).export(tmp_path / "shape.ply")
+    assembly.save(tmp_path / "assembly.json")
+    return tmp_path / "shape.ply", tmp_path / "assembly.json"
+
+
+def test_each_face_has_the_label_of_its_own_part() -> None:
+    shape, assembly, truth = dumbbell()
+    labels, names = segment(shape, assembly)
+    assert names == ("left", "right", "bar")
+    assert labels.tolist() == truth.tolist()
+
+
+@pytest.mark.parametrize(("scale", "place"), [(1e-4, 0.0), (1e3, 1e5)])
+def test_size_and_place_change_nothing(scale: float, place: float) -> None:
+    shape, assembly, truth = dumbbell()
+    vertices = shape.input_vertices * scale + place
+    moved = assembly.scaled(scale).translated((place,) * 3)
+    assert segment(load_shape((vertices, shape.input_faces)), moved)[0].tolist() == truth.tolist()
+
+
+def test_the_wall_of_a_hole_belongs_to_the_part_that_cuts_it() -> None:
+    shape, assembly = drilled()
+    labels, _ = segment(shape, assembly)
+    corners = shape.input_vertices[shape.input_faces]
+    on_wall = (np.abs(np.linalg.norm(corners[..., :2], axis=2) - 0.4) < 1e-3).all(axis=1)
+    upright = np.ptp(corners[..., 2], axis=1) > 0.1
+    assert on_wall.any()
+    assert (labels == (on_wall & upright)).all()
+
+
+def test_long_thin_faces_are_decided_by_their_area_and_not_by_their_centre() -> None:
+    """A face 10 long: the small ball touches its centre, the slab has the rest."""
+    vertices = np.array([[-5, 0, 0], [5, 0, 0], [0, 0.2, 0], [0, 0, -1.0]])
+    shape = load_shape((vertices, [[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]]))
+    slab = Part(Box((12, 2, 1)), (0, 0, -0.55), name="slab")
+    ball = Part(Sphere(0.1), (0, 0.0667, -0.1), name="ball")
+    centre = np.array([[0, 0.0667, 0]])
+    away = np.abs(Assembly((slab, ball)).part_distances(centre))
+    assert away[1] < away[0]
+    assert segment(shape, Assembly((slab, ball)))[0][0] == 0
+
+
+def test_equally_near_parts_give_the_earlier_one() -> None:
+    shape, assembly, _ = dumbbell()
+    twice = Assembly((*assembly.parts, *assembly.parts))
+    assert set(segment(shape, twice)[0].tolist()) == {0, 1, 2}
+
+
+def test_parts_never_cross_given_labels() -> None:
+    shape, assembly, truth = dumbbell()
+    coarse = np.where(shape.input_vertices[shape.input_faces].mean(axis=1)[:, 1] > 0, "upper", "lower")
+    labels, names = segment(shape, assembly, coarse)
+    wanted = [f"{c}/{assembly.parts[t].name}" for c, t in zip(coarse, truth, strict=True)]
+    assert [names[label] for label in labels] == wanted
+    assert len(names) == len(set(wanted)) == 6
+
+
+def test_nodes_of_a_scene_are_labels(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    for z, name in enumerate(("cup", "lid")):
+        place = trimesh.transformations.translation_matrix((0, 0, z))
+        scene.add_geometry(trimesh.creation.box((1, 1, 1)), name, name, transform=place)
+    scene.export(tmp_path / "scene.glb")
+    shape = load_shape(tmp_path / "scene.glb")
+    labels, names = segment(
+        shape, Assembly((Part(Box((1, 1, 2)), (0, 0, 0.5), name="jar"),)), node_labels(shape)
+    )
+    assert names == ("cup/jar", "lid/jar")
+    assert np.bincount(labels).tolist() == [12, 12]
+
+
+@pytest.mark.parametrize(
+    ("within", "message"),
+    [
+        (np.zeros(3, int), "3 labels; the shape has"),
+        (np.zeros(700), "one string or integer a face"),
+        ([[1, 2]], "one string or integer a face"),
+    ],
+)
+def test_labels_that_do_not_fit_the_faces_are_refused(within: object, message: str) -> None:
+    shape, assembly, _ = dumbbell()
+    with pytest.raises(SettingError, match=message):
+        segment(shape, assembly, within)  # type: ignore[arg-type]
+
+
+def test_the_command_writes_coloured_faces_and_labels(files: tuple[Path, Path], tmp_path: Path) -> None:
+    out, truth = tmp_path / "segments.ply", dumbbell()[2]
+    assert main(["segment", *map(str, files), "-o", str(out)]) == 0
+    about = json.loads(labels_path(out).read_text())
+    assert about["names"] == ["left", "right", "bar"]
+    assert about["labels"] == truth.tolist()
+    mesh = trimesh.load_mesh(out, process=False)
+    assert len(np.unique(mesh.visual.face_colors, axis=0)) == 3
+    assert (mesh.visual.face_colors[truth == 0] == mesh.visual.face_colors[0]).all()
+
+
+def test_the_command_reads_its_own_labels_again(files: tuple[Path, Path], tmp_path: Path) -> None:
+    first, second = tmp_path / "a.ply", tmp_path / "b.glb"
+    assert main(["segment", *map(str, files), "-o", str(first)]) == 0
+    within = ["--within", str(labels_path(first))]
+    assert main(["segment", *map(str, files), "-o", str(second), *within]) == 0
+    assert set(trimesh.load_scene(second).geometry) == {"left/left", "right/right", "bar/bar"}
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("l.json", b"[1, 2"),
+        ("l.json", b'{"names": []}'),
+        ("l.json", b'{"labels": [5], "names": ["a"]}'),
+        ("l.json", b'{"labels": [-1], "names": ["a"]}'),
+        ("l.json", b"[[1, 2], [3]]"),
+        ("l.json", b"[0.5]"),
+        ("l.npy", b"\x93NUMPY\x01\x00garbage"),
+        ("l.txt", b"\xff\xfe\x00"),
+    ],
+)
+def test_broken_label_files_are_named(tmp_path: Path, name: str, content: bytes) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(UnreadableFileError, match=name):
+        read_labels(tmp_path / name)
+
+
+def test_label_files_of_every_kind(tmp_path: Path) -> None:
+    np.save(tmp_path / "l.npy", np.array([3, 1]))
+    (tmp_path / "l.txt").write_text("wheel\nbody\n")
+    (tmp_path / "l.json").write_text('["wheel", "body"]')
+    assert read_labels(tmp_path / "l.npy").tolist() == [3, 1]
+    assert read_labels(tmp_path / "l.txt").tolist() == ["wheel", "body"]
+    assert read_labels(tmp_path / "l.json").tolist() == ["wheel", "body"]
+
+
+@pytest.mark.parametrize(("suffix", "words"), [(".obj", "use one of .ply, .glb"), ("", "use one of")])
+def test_other_suffixes_are_refused_before_the_work(
+    files: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], suffix: str, words: str
+) -> None:
+    assert main(["segment", *map(str, files), "-o", str(tmp_path / f"out{suffix}")]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_a_missing_label_file_is_one_line(
+    files: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = [*map(str, files), "-o", str(tmp_path / "o.ply"), "--within", str(tmp_path / "none.txt")]
+    assert main(["segment", *arguments]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
