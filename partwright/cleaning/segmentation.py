@@ -22,10 +22,10 @@ def segment(
 ) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     """Labels (F,) of `shape.input_faces`, and the labels' names: the part of the nearest surface.
 
-    A face is sampled evenly, large faces more often. Each sample votes for the part whose own surface, without
-    blends, is nearest; the most votes win, then the smaller mean distance, then the earlier part. The wall of a
-    hole belongs to the part that cuts it. Without `within`, names are those of all leaves, and label i is
-    leaf i, also where no face has it.
+    A face is sampled evenly, large faces more often. Each sample votes for the part whose own surface,
+    without blends, is nearest; the most votes win, then the smaller mean distance, then the earlier part. The
+    wall of a hole belongs to the part that cuts it. Without `within`, names are those of all leaves, and
+    label i is leaf i, also where no face has it.
 
     within: one coarse label a face, strings or integers. Sub-parts never cross them: every label is then a
     pair "COARSE/PART", and only pairs that occur are listed, in the order of coarse labels and of parts.

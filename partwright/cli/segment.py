@@ -12,8 +12,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
         "segment",
         help="label every face of a shape by its part",
-        description="Labels every face of SHAPE by the part of ASSEMBLY that is nearest to it. Writes the faces "
-        "in a colour a part to FILE (.glb or .ply), and FILE.labels.json.",
+        description="Labels every face of SHAPE by the part of ASSEMBLY that is nearest to it. Writes the "
+        "faces in a colour a part to FILE (.glb or .ply), and FILE.labels.json.",
     )
     command.add_argument("shape", metavar="SHAPE", type=Path, help="the mesh or scene to label")
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
