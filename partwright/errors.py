@@ -71,3 +71,11 @@ class OpenShellError(PartwrightError):
 
 class GridError(PartwrightError):
     """A voxel grid has the wrong form, or no surface runs through it."""
+
+
+class NothingToExportError(PartwrightError):
+    """No part of the assembly can be written in the format."""
+
+
+class UnitError(PartwrightError):
+    """The format cannot say the assembly's length unit."""

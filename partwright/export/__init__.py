@@ -21,6 +21,9 @@ WRITERS = {
     ".stl": "partwright.export.stl",
     ".obj": "partwright.export.obj",
     ".glsl": "partwright.export.glsl",
+    ".mjcf": "partwright.export.mjcf",
+    ".mjcf.xml": "partwright.export.mjcf",
+    ".urdf": "partwright.export.urdf",
 }
 
 __all__ = ["WRITERS", "export"]

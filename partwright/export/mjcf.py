@@ -1,0 +1,126 @@
+"""MJCF, MuJoCo's format: one body, a native geom a part, the assembly's own mass and inertia.
+
+In metres with Z up, as far as unit and up axis are known. Blends cannot be held and are dropped. MuJoCo
+collides the convex hull of a mesh, so where no native geom is near enough the hull itself is written. Mass
+and inertia are those of the blended surface, overlaps counted once, not the sum over the geoms.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as xml
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright import __version__
+from partwright.export.approximation import write_report
+from partwright.export.axes import to_metres_z_up, unknowns
+from partwright.export.ellipsoid import Ellipsoid
+from partwright.export.primitives import TOLERANCE, Geometry, geometries
+from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
+from partwright.meshing.mass import MassProperties, check_density, mass_properties
+from partwright.writing import write_bytes
+
+if TYPE_CHECKING:
+    from partwright.assembly import Assembly
+
+GEOMS: tuple[type[Field], ...] = (Box, Cylinder, Sphere, Capsule, Ellipsoid)
+DENSITY = 1000.0  # kg/m3: water
+
+
+def write(
+    assembly: Assembly,
+    path: str | Path,
+    density: float = DENSITY,
+    tolerance: float = TOLERANCE,
+    free_joint: bool = False,
+    resolution: int = 24,
+) -> None:
+    """Write the model.
+
+    density: in kg/m3. tolerance: how far a geom's surface may lie from its part's, as a share of the longest
+    side, before a mesh stands for it. free_joint: whether the body may move; else it is fixed to the world.
+    resolution: cells along a part that becomes a mesh.
+    """
+    check_density(density)
+    frame = to_metres_z_up(assembly)
+    local = assembly.transformed(frame)
+    geoms, changes = geometries(local, GEOMS, tolerance, resolution, convex=True, length=1 / frame.scale)
+    name = assembly.name or "assembly"
+    root = xml.Element("mujoco", model=name)
+    notes = unknowns(assembly)
+    for text in (f"Partwright {__version__}; density {density:g} kg/m3", *notes):
+        root.append(xml.Comment(f" {text} "))
+    xml.SubElement(root, "compiler", angle="radian")
+    meshes = [geom for geom in geoms if geom.mesh is not None]
+    asset = xml.SubElement(root, "asset") if meshes else root
+    for geom in meshes:
+        _add_mesh(asset, geom)
+    body = xml.SubElement(xml.SubElement(root, "worldbody"), "body", name=name)
+    if free_joint:
+        xml.SubElement(body, "freejoint")
+    properties = mass_properties(local)
+    _add_inertial(body, properties, density)
+    for geom in geoms:
+        _add_geom(body, geom)
+    xml.indent(root)
+    write_bytes(path, xml.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
+    write_report(
+        assembly,
+        path,
+        changes,
+        notes,
+        mass_properties=properties.to_dict("m" if assembly.unit else None, density),
+    )
+
+
+def numbers(values: Iterable[float]) -> str:
+    """As XML attributes hold them."""
+    return " ".join(f"{value:.9g}" for value in values)
+
+
+def _add_inertial(body: xml.Element, properties: MassProperties, density: float) -> None:
+    inertia = properties.inertia * density
+    six = (*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2])
+    mass = numbers([properties.mass(density)])
+    xml.SubElement(body, "inertial", pos=numbers(properties.centre), mass=mass, fullinertia=numbers(six))
+
+
+def _add_mesh(asset: xml.Element, geom: Geometry) -> None:
+    """In the file itself. MuJoCo centres it by its measure as a shell, for a thin hull has no volume."""
+    assert geom.mesh is not None
+    vertices, faces = geom.mesh.vertices.ravel(), geom.mesh.faces.ravel()
+    xml.SubElement(
+        asset,
+        "mesh",
+        name=geom.name,
+        inertia="shell",
+        vertex=numbers(vertices),
+        face=" ".join(map(str, faces.tolist())),
+    )
+
+
+def _add_geom(body: xml.Element, geom: Geometry) -> None:
+    rgba = numbers([*geom.colour, 1.0])
+    if geom.part is None:
+        xml.SubElement(body, "geom", name=geom.name, type="mesh", mesh=geom.name, rgba=rgba)
+        return
+    field = geom.part.field
+    place = {"pos": numbers(geom.part.translation), "quat": numbers(geom.part.rotation)}
+    size = numbers(_size(field))
+    xml.SubElement(body, "geom", {"name": geom.name, "type": field.kind, "size": size, **place, "rgba": rgba})
+
+
+def _size(field: Field) -> tuple[float, ...]:
+    match field:
+        case Box(size=(x, y, z)):
+            return x / 2, y / 2, z / 2
+        case Cylinder(radius=radius, height=height) | Capsule(radius=radius, height=height):
+            return radius, height / 2
+        case Sphere(radius=radius):
+            return (radius,)
+        case Ellipsoid(radii=radii):
+            return radii
+    raise AssertionError(f"{field.kind} is not among GEOMS")
