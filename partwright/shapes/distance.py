@@ -11,12 +11,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from partwright.shapes.winding import winding_grid
+from partwright.shapes.winding import closing_fans, winding_grid
 
 _CHUNK = 262_144  # closest-point queries at once: a query's record takes about 100 bytes
 _INSIDE = 0.5  # generalised winding number above which a point is inside
 _BLOCK = 2
+_FEW_OPEN = 20  # triangles to an open edge, from which the open edges count as few
 _LATTICE = 0.02  # spacing of the sign lattice, unit frame
+_SLACK = 1.0001  # on squared bounds, for their rounding to single precision
 _MANY = 2000  # points from which the lattice pays
 _WITHIN = 1e-3  # barycentric margin for "within a triangle"
 
@@ -24,8 +26,8 @@ _WITHIN = 1e-3  # barycentric margin for "within a triangle"
 class DistanceSource(Protocol):
     """Distances and inside tests in the unit frame."""
 
-    def unsigned(self, points: NDArray[Any]) -> NDArray[np.float32]:
-        """Distance to the surface at points (N, 3)."""
+    def unsigned(self, points: NDArray[Any], within: float = np.inf) -> NDArray[np.float32]:
+        """Distance to the surface at points (N, 3); anything greater than `within` where it is greater."""
 
     def closest(self, points: NDArray[Any]) -> NDArray[np.float32]:
         """Nearest surface point (N, 3) of each of the points (N, 3)."""
@@ -81,9 +83,12 @@ class MeshDistance:
         tree.init(np.ascontiguousarray(self._vertices), np.ascontiguousarray(self._winding_faces))
         return tree
 
-    def unsigned(self, points: NDArray[Any]) -> NDArray[np.float32]:
-        """Distance to the nearest triangle at points (N, 3)."""
-        return np.concatenate([_distances(found) for found in self._find(points)])
+    def unsigned(self, points: NDArray[Any], within: float = np.inf) -> NDArray[np.float32]:
+        """Distance to the nearest triangle at points (N, 3); anything greater than `within` if it is greater.
+
+        A bound makes the search quicker.
+        """
+        return np.concatenate([_distances(found) for found in self._find(points, within)])
 
     def closest(self, points: NDArray[Any]) -> NDArray[np.float32]:
         """Nearest surface point (N, 3) of each of the points (N, 3)."""
@@ -94,13 +99,13 @@ class MeshDistance:
         """Distance to the nearest triangle at points (N, 3), negative inside."""
         found = list(self._find(points))
         distance = np.concatenate([_distances(f) for f in found])
-        if self._embedded and len(points) >= _MANY:
-            inside = self._inside_embedded(points, distance, np.concatenate([_triangles(f) for f in found]))
+        if len(points) >= _MANY:
+            inside = self._inside_by_lattice(points, distance, np.concatenate([_triangles(f) for f in found]))
         else:
             inside = self.inside(points)
         return np.where(inside, -distance, distance)
 
-    def _find(self, points: NDArray[Any]) -> Iterator[Any]:
+    def _find(self, points: NDArray[Any], within: float = np.inf) -> Iterator[Any]:
         """Records of the nearest triangles, chunk by chunk."""
         import fcpw
 
@@ -108,37 +113,48 @@ class MeshDistance:
             chunk = np.asfortranarray(points[start : start + _CHUNK], dtype=np.float32)
             found = fcpw.interaction_3D_list()
             if len(chunk):
-                self._scene.find_closest_points(chunk, np.full(len(chunk), np.inf, np.float32), found, False)
+                bound = np.full(len(chunk), within * within * _SLACK, np.float32)
+                self._scene.find_closest_points(chunk, bound, found, False)
             yield found
 
     @cached_property
-    def _lattice(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Origin and inside flags of points `_LATTICE` apart over the bounding box."""
+    def _lattice(self) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
+        """Origin and inside flags of points `_LATTICE` apart over the bounding box, and where to trust them.
+
+        Where the surface passes through itself or is open, the sign may change where no triangle is: there
+        only points whose neighbours have the same flag are trusted.
+        """
+        from scipy.ndimage import maximum_filter, minimum_filter
+
         corners = self._vertices[self._faces]
         lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         sides = np.ceil((upper - lower) / _LATTICE).astype(int) + 2
         origin = lower - _LATTICE / 2
-        return origin, self.inside_grid(origin, _LATTICE, (int(sides[0]), int(sides[1]), int(sides[2])))
+        flags = self.inside_grid(origin, _LATTICE, (int(sides[0]), int(sides[1]), int(sides[2])))
+        if self._embedded:
+            return origin, flags, np.ones_like(flags)
+        return origin, flags, maximum_filter(flags, 3) == minimum_filter(flags, 3)
 
-    def _inside_embedded(
+    def _inside_by_lattice(
         self, points: NDArray[Any], distance: NDArray[np.float32], triangle: NDArray[np.int32]
     ) -> NDArray[np.bool_]:
-        """Sign without winding numbers for most points of a closed surface that nowhere passes through
-        itself.
+        """Sign without winding numbers for most points.
 
         A ball of radius `distance` around a point is free of surface, so a lattice point in it has the same
         sign. Nearer points whose closest point lies within a triangle are inside exactly when they are behind
         it. What remains (closest to an edge or a corner) goes by winding number.
         """
-        origin, flags = self._lattice
+        origin, flags, trusted = self._lattice
         cell = np.rint((points - origin) / _LATTICE).astype(np.int64)
         within = ((cell >= 0) & (cell < flags.shape)).all(axis=1)
         inside = np.zeros(len(points), dtype=bool)
         inside[within] = flags[tuple(cell[within].T)]
-        near = np.flatnonzero(within & (distance <= _LATTICE))  # half a cell's diagonal is 0.87 of it
+        far = within & (distance > _LATTICE)  # half a cell's diagonal is 0.87 of it
+        near = np.flatnonzero(within & ~far)
+        doubtful = np.flatnonzero(far)[~trusted[tuple(cell[far].T)]]
         side, sure = _side_of_triangle(self._vertices[self._faces[triangle[near]]], points[near])
         sure &= (side < 0) == inside[near]
-        rest = near[~sure]
+        rest = np.concatenate([near[~sure], doubtful])
         inside[rest] = self.inside(points[rest])
         return inside
 
@@ -156,9 +172,45 @@ class MeshDistance:
         self, origin: ArrayLike, spacing: float, shape: tuple[int, int, int]
     ) -> NDArray[np.bool_]:
         """Whether the points origin + spacing * (i, j, k) lie inside: (nx, ny, nz)."""
+        start = np.asarray(origin, dtype=np.float64)
         if self._closed:
-            return winding_grid(self._vertices, self._winding_faces, origin, spacing, shape) > 0
-        return self._inside_grid_open(np.asarray(origin, dtype=np.float64), spacing, shape)
+            return winding_grid(self._vertices, self._winding_faces, start, spacing, shape) > 0
+        vertices, fans = self._fans
+        if len(fans) * _FEW_OPEN <= len(self._winding_faces):
+            return self._inside_grid_ajar(vertices, fans, start, spacing, shape)
+        return self._inside_grid_open(start, spacing, shape)
+
+    @cached_property
+    def _fans(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        return closing_fans(self._vertices, self._winding_faces)
+
+    def _inside_grid_ajar(
+        self,
+        vertices: NDArray[np.float64],
+        fans: NDArray[np.int64],
+        origin: NDArray[np.float64],
+        spacing: float,
+        shape: tuple[int, int, int],
+    ) -> NDArray[np.bool_]:
+        """Flags of a surface with a few open edges: the winding number of the surface closed by fans, less
+        that of the fans, which matters only where it can reach one half. It never does where the fans are
+        farther away than the radius of a half sphere of their area.
+        """
+        import igl
+
+        closed = winding_grid(vertices, np.concatenate([self._winding_faces, fans]), origin, spacing, shape)
+        inside = closed > 0
+        corners = vertices[fans]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        reach = np.sqrt(np.linalg.norm(normal, axis=1).sum() / (4 * np.pi))
+        first = np.clip((corners.min(axis=(0, 1)) - reach - origin) / spacing, 0, shape).astype(int)
+        stop = np.clip((corners.max(axis=(0, 1)) + reach - origin) / spacing + 1, 0, shape).astype(int)
+        box = tuple(slice(a, b) for a, b in zip(first, stop, strict=True))
+        if inside[box].size:
+            places = origin + spacing * (first + grid_indices(inside[box].shape))
+            fan_winding = np.asarray(igl.winding_number(vertices, fans, places)).reshape(inside[box].shape)
+            inside[box] = closed[box] - fan_winding > _INSIDE
+        return inside
 
     def _inside_grid_open(
         self, origin: NDArray[np.float64], spacing: float, shape: tuple[int, int, int]

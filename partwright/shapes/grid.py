@@ -58,12 +58,12 @@ def _near_voxels(
     index = _COARSEST * grid_indices([-(-n // _COARSEST) for n in shape])
     size = _COARSEST
     while size > 1:
-        distance = source.unsigned(origin + spacing * (index + (size - 1) / 2))
-        index = index[distance <= spacing * (_BAND + np.sqrt(3) * (size - 1) / 2)]
+        reach = spacing * (_BAND + np.sqrt(3) * (size - 1) / 2)
+        index = index[source.unsigned(origin + spacing * (index + (size - 1) / 2), reach) <= reach]
         size //= 2
         index = (index[:, None] + size * np.array(list(product((0, 1), repeat=3)))).reshape(-1, 3)
     index = index[(index < shape).all(axis=1)]
-    distance = source.unsigned(origin + spacing * index)
+    distance = source.unsigned(origin + spacing * index, spacing * _BAND)
     close = distance <= spacing * _BAND
     return index[close], distance[close]
 

@@ -49,6 +49,14 @@ class EdgeTable:
         return self._half_edges[order[start[self.valence == 1]]]
 
     @cached_property
+    def unbalanced_half_edges(self) -> NDArray[np.int64]:
+        """The half-edges (B, 2) that outnumber those the other way, each as often as it does."""
+        order, start = self._sorted
+        edge = np.sort(self._half_edges[order[start]], axis=1)
+        edge = np.where(self.balance[:, None] > 0, edge, edge[:, ::-1])
+        return np.repeat(edge, np.abs(self.balance), axis=0)
+
+    @cached_property
     def pairs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Edges (P, 2) with two triangles, and those triangles (P, 2): the first runs along the edge."""
         order, start = self._sorted

@@ -13,6 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from partwright.shapes.topology import EdgeTable, components
+
 _CHUNK = 4_000_000  # (triangle, column) pairs in memory at once
 
 
@@ -36,6 +38,26 @@ def winding_grid(
         np.add.at(steps, column * (nz + 1) + layer, sign)
     below = steps.reshape(nx, ny, nz + 1)[:, :, ::-1].cumsum(axis=2, dtype=np.int32)[:, :, ::-1]
     return below[:, :, 1:]
+
+
+def closing_fans(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Triangles (B, 3) that close a surface, and its vertices with the fans' middles added.
+
+    Each connected set of open edges gets a fan around its middle. A boundary has no boundary, so whatever the
+    edges look like, surface and fans together are closed.
+    """
+    rim = EdgeTable(faces).unbalanced_half_edges
+    if len(rim) == 0:
+        return vertices, np.zeros((0, 3), dtype=np.int64)
+    used, ends = np.unique(rim, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    loop = components(len(used), ends[:, 0], ends[:, 1])
+    size = np.bincount(loop)
+    middle = np.stack([np.bincount(loop, vertices[used, k]) / size for k in range(3)], axis=1)
+    apex = len(vertices) + loop[ends[:, 0]]
+    return np.concatenate([vertices, middle]), np.stack([rim[:, 1], rim[:, 0], apex], axis=1)
 
 
 def _crossings(

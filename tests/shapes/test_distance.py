@@ -12,7 +12,9 @@ from solids import box, box_distance, inverted, sphere, together
 
 from partwright.errors import NotFiniteError, SettingError
 from partwright.shapes import UnitFrame, load_shape
-from partwright.shapes.winding import winding_grid
+from partwright.shapes.distance import MeshDistance
+from partwright.shapes.topology import EdgeTable
+from partwright.shapes.winding import closing_fans, winding_grid
 
 HALF = np.array([0.9, 0.6, 0.3])
 
@@ -143,3 +145,43 @@ def test_a_fold_without_thickness_does_not_turn_signs():
     points = np.random.default_rng(0).uniform(-0.85, 0.85, (5000, 3)) * [1, 1, 0.1]
     assert (shape.unit_distance(points) < 0).all()
     assert shape.volume == pytest.approx(1.8**3)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), dropped=st.integers(1, 40))
+def test_fans_close_any_surface(seed, dropped):
+    rng = np.random.default_rng(seed)
+    mesh = sphere(subdivisions=2)
+    faces = np.asarray(mesh.faces)[rng.permutation(len(mesh.faces))[dropped:]]
+    turned = rng.random(len(faces)) < 0.1
+    faces[turned] = faces[turned, ::-1]
+    vertices, fans = closing_fans(np.asarray(mesh.vertices), faces)
+    assert not EdgeTable(np.concatenate([faces, fans])).balance.any()
+    points = rng.uniform(-1, 1, (200, 3))
+    whole = igl.winding_number(vertices, np.concatenate([faces, fans]), points)
+    np.testing.assert_allclose(whole, np.round(whole), atol=1e-6)
+
+
+def test_a_surface_ajar_is_filled_as_its_winding_number_says():
+    mesh = sphere(subdivisions=4)
+    cut = np.asarray(mesh.faces)[np.r_[3:40, 60 : len(mesh.faces)]]
+    source = MeshDistance(np.asarray(mesh.vertices), cut, cut, closed=False)
+    origin, spacing = np.full(3, -1.11), 0.043
+    grid = source.inside_grid(origin, spacing, (52, 52, 52))
+    places = origin + spacing * np.argwhere(np.ones(grid.shape))
+    winding = igl.winding_number(np.asarray(mesh.vertices), cut, places)
+    clear = np.abs(winding - 0.5) > 1e-6
+    np.testing.assert_array_equal(grid.ravel()[clear], winding[clear] > 0.5)
+    rng = np.random.default_rng(0)
+    points = mesh.triangles_center[rng.integers(0, len(mesh.faces), 4000)] + rng.normal(0, 0.05, (4000, 3))
+    sign = source.signed(points.astype(np.float32)) < 0
+    exact = igl.winding_number(np.asarray(mesh.vertices), cut, points.astype(np.float32).astype(float))
+    clear = np.abs(exact - 0.5) > 0.02  # the fast winding number is good to 0.01
+    np.testing.assert_array_equal(sign[clear], exact[clear] > 0.5)
+
+
+def test_bounded_search_agrees_where_it_reaches(brick):
+    points = np.random.default_rng(0).uniform(-1, 1, (2000, 3))
+    every, near = brick._source.unsigned(points), brick._source.unsigned(points, 0.1)
+    np.testing.assert_array_equal(near[every <= 0.1], every[every <= 0.1])
+    assert (near[every > 0.1] > 0.1).all()
