@@ -21,9 +21,18 @@ WRITERS = {
     ".stl": "partwright.export.stl",
     ".obj": "partwright.export.obj",
     ".glsl": "partwright.export.glsl",
+    ".step": "partwright.export.step",
+    ".stp": "partwright.export.step",
+    ".scad": "partwright.export.openscad",
+    ".build123d.py": "partwright.export.build123d_source",
+    ".blender.py": "partwright.export.blender",
     ".mjcf": "partwright.export.mjcf",
     ".mjcf.xml": "partwright.export.mjcf",
     ".urdf": "partwright.export.urdf",
+    ".3mf": "partwright.export.threemf",
+    ".usda": "partwright.export.usd",
+    ".usdc": "partwright.export.usd",
+    ".usd": "partwright.export.usd",
 }
 
 __all__ = ["WRITERS", "export"]

@@ -1,0 +1,142 @@
+"""OpenSCAD source to go on with by hand: parameters on top, one module a part, the tree at the end.
+
+Named solids are exact, to the facets of `$fn`; other parts become the nearest solid, and blends sharp edges:
+FILE.report.json lists them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from partwright.assembly import Assembly, Node, Part
+from partwright.export.approximation import write_report
+from partwright.export.identifiers import comment
+from partwright.export.solid_source import (
+    MEANING,
+    SourcePart,
+    fixed_axes_angles,
+    number,
+    plain_unions,
+    source_parts,
+)
+from partwright.export.solid_tree import solid_tree
+from partwright.shapes import canonical_unit
+from partwright.writing import write_bytes
+
+_SOLIDS = {
+    "box": "cube({size}, center = true);",
+    "cylinder": "cylinder(r = {radius}, h = {height}, center = true);",
+    "cone": "cylinder(r1 = {radius}, r2 = 0, h = {height}, center = true);",
+    "frustum": "cylinder(r1 = {bottom_radius}, r2 = {top_radius}, h = {height}, center = true);",
+    "sphere": "sphere(r = {radius});",
+    "capsule": "hull() for (end = [-1, 1]) translate([0, 0, end * {height} / 2]) sphere(r = {radius});",
+    "tube": "difference() {{\n"
+    "            cylinder(r = {radius}, h = {height}, center = true);\n"
+    "            cylinder(r = {radius} - {thickness}, h = 2 * {height}, center = true);\n"
+    "        }}",
+    "torus": "rotate_extrude() translate([{major_radius}, 0]) circle(r = {minor_radius});",
+}
+_RESERVED = [
+    "module",
+    "function",
+    "if",
+    "else",
+    "for",
+    "let",
+    "assert",
+    "echo",
+    "each",
+    "true",
+    "false",
+    "undef",
+    "include",
+    "use",
+    "union",
+    "difference",
+    "intersection",
+    "translate",
+    "rotate",
+    "scale",
+    "mirror",
+    "hull",
+    "minkowski",
+    "cube",
+    "sphere",
+    "cylinder",
+    "polyhedron",
+    "circle",
+    "square",
+    "polygon",
+    "text",
+    "color",
+    "offset",
+    "resize",
+    "render",
+    "children",
+    "import",
+    "projection",
+    "surface",
+    "linear_extrude",
+    "rotate_extrude",
+    "multmatrix",
+    "intersection_for",
+    "group",
+    "version",
+    "end",
+]
+
+
+def write(assembly: Assembly, path: str | Path, facets: int = 128) -> None:
+    """Write the source; `facets` is the number of facets of a full circle.
+
+    Raises:
+        NoSurfaceError: nothing to export.
+        SettingError: the assembly's unit is unknown.
+        OutputError: the file cannot be written.
+    """
+    tree, changes = solid_tree(assembly)
+    parts = source_parts(tree.parts, fixed_axes_angles, _RESERVED)
+    unit = canonical_unit(assembly.unit) if assembly.unit else "unknown unit"
+    lines = [
+        f"// {comment(assembly.name) or 'Assembly'}: {len(parts)} parts. "
+        f"Lengths in {unit}, angles in degrees.",
+        "",
+        f"$fn = {facets};  // facets of a full circle",
+        "",
+        *(line for part in parts for line in _table(part, unit)),
+        *_tree(plain_unions(tree), {p.part.name: p.function for p in parts}, ""),
+        "",
+        *(line for part in parts for line in _module(part)),
+    ]
+    write_bytes(path, ("\n".join(lines).rstrip() + "\n").encode())
+    write_report(assembly, path, changes)
+
+
+def _table(part: SourcePart, unit: str) -> Iterator[str]:
+    yield f"// {comment(part.part.name)}: {part.part.field.kind}"
+    for parameter in part.parameters:
+        value = parameter.value
+        text = f"[{', '.join(map(number, value))}]" if isinstance(value, tuple) else number(value)
+        measure = "degrees" if parameter.name == "turn" else unit
+        yield f"{parameter.variable} = {text};  // {measure}: {MEANING[parameter.name]}"
+    yield ""
+
+
+def _module(part: SourcePart) -> Iterator[str]:
+    names = part.variables()
+    yield f"module {part.function}() {{  // {comment(part.part.name)}"
+    yield f"    translate({names['place']}) rotate({names['turn']})"
+    yield f"        {_SOLIDS[part.part.field.kind].format(**names)}"
+    yield "}"
+    yield ""
+
+
+def _tree(node: Node, modules: dict[str, str], indent: str) -> Iterator[str]:
+    if isinstance(node, Part):
+        yield f"{indent}{modules[node.name]}();"
+        return
+    yield f"{indent}{node.operation}() {{" + (f"  // {comment(node.name)}" if node.name else "")
+    for child in node.children:
+        yield from _tree(child, modules, indent + "    ")
+    yield indent + "}"

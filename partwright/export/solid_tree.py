@@ -1,0 +1,76 @@
+"""An assembly as CAD formats can hold it: exact solids, sharp edges, every copy a part of its own.
+
+Parts that are no exact solid become the nearest one, blends are dropped, parts without volume are left out;
+each such change is listed for FILE.report.json.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+from partwright.assembly import Assembly, Node, Part
+from partwright.errors import NoSurfaceError
+from partwright.export.approximation import Change, of_part
+from partwright.export.nearest import nearest_solid
+from partwright.fields import Cone, Cylinder, Field, Frustum
+
+Keep = Callable[[Field], bool]
+
+
+def _keep_none(_: Field) -> bool:
+    return False
+
+
+def solid_tree(assembly: Assembly, keep: Keep = _keep_none) -> tuple[Assembly, list[Change]]:
+    """The assembly of exact solids alone, with no blend, and what was changed for it.
+
+    keep: whether the format holds a field as it is, though it is none of the named solids.
+
+    Raises:
+        NoSurfaceError: no part has a volume, so nothing would be left.
+        ParameterError: a part's field has no solid near it.
+    """
+    changes: list[Change] = []
+    tree = _solid(assembly.expanded(), True, keep, changes)
+    if tree is None:
+        raise NoSurfaceError("nothing to export: no part of the assembly has a volume")
+    return tree, changes  # type: ignore[return-value]  # an assembly stays one
+
+
+def _solid(node: Node, first: bool, keep: Keep, changes: list[Change]) -> Node | None:
+    blend = 0.0 if first else node.blend
+    if isinstance(node, Part):
+        return _leaf(node, blend, keep, changes)
+    if blend:
+        changes.append(Change(tuple(p.name for p in node.parts), "sharp edges", blend_dropped=blend))
+    solids = [_solid(child, i == 0, keep, changes) for i, child in enumerate(node.children)]
+    if solids[0] is None and node.operation == "difference":
+        return None
+    if None in solids and node.operation == "intersection":
+        return None
+    children = tuple(solid for solid in solids if solid is not None)
+    return dataclasses.replace(node, children=children, blend=0.0) if children else None
+
+
+def _leaf(part: Part, blend: float, keep: Keep, changes: list[Change]) -> Part | None:
+    if keep(part.field):
+        if blend:
+            changes.append(Change((part.name,), part.field.kind, blend_dropped=blend))
+        return dataclasses.replace(part, blend=0.0)
+    try:
+        near = nearest_solid(part)
+    except NoSurfaceError:
+        changes.append(Change((part.name,), "nothing", note="it has no volume"))
+        return None
+    changes += filter(None, [of_part(part, near, blend)])
+    return dataclasses.replace(near.part_with_solid, field=_plain(near.solid), blend=0.0)
+
+
+def _plain(solid: Field) -> Field:
+    """A frustum that tapers not at all, or to a point, under its own name: CAD kernels tell them apart."""
+    if isinstance(solid, Frustum) and solid.top_radius == solid.bottom_radius:
+        return Cylinder(solid.bottom_radius, solid.height)
+    if isinstance(solid, Frustum) and solid.top_radius == 0:
+        return Cone(solid.bottom_radius, solid.height)
+    return solid

@@ -1,0 +1,89 @@
+"""STEP (AP214): exact B-rep solids with analytic faces, one named product in the assembly's own unit.
+
+Straight parts that are round, or prisms, are exact, whatever their taper, hole, rounding and dilation; others
+become the nearest solid. Blends become sharp edges. FILE.report.json lists both.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from partwright import __version__
+from partwright.assembly import Assembly
+from partwright.errors import OutputError
+from partwright.export.approximation import write_report
+from partwright.export.brep import combined, is_exact, require_cad
+from partwright.export.solid_tree import solid_tree
+from partwright.shapes import METRES, canonical_unit
+from partwright.writing import replacing
+
+if TYPE_CHECKING:
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.TopoDS import TopoDS_Shape
+
+# OpenCASCADE works in millimetres with an absolute tolerance, so all lengths are brought to them.
+_WORKING = METRES["mm"]
+_UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "km": "KM", "in": "INCH", "ft": "FT"}
+
+
+def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
+    """Write the assembly as one product; with `separate`, each child of its union as one of its own.
+
+    Raises:
+        MissingDependencyError: OpenCASCADE is not installed.
+        NoSurfaceError: nothing to export, or a part is too thin for a B-rep.
+        SettingError: the unit is unknown to STEP.
+        OutputError: the file cannot be written.
+    """
+    require_cad()
+    unit = canonical_unit(assembly.unit) if assembly.unit else None
+    tree, changes = solid_tree(assembly, keep=is_exact)
+    scaled = tree.scaled(METRES[unit] / _WORKING) if unit else tree
+    children = scaled.children if separate and scaled.operation == "union" else (scaled,)
+    names = [child.name or f"assembly_{i:02d}" for i, child in enumerate(children, 1)]
+    if children == (scaled,):
+        names = [assembly.name or Path(path).stem]
+    document = _document([(name, combined(child)) for name, child in zip(names, children, strict=True)])
+    with replacing(path) as temporary:
+        _write(document, temporary, unit or "mm", Path(path))
+    notes = [] if unit else ["the length unit is unknown: the file says millimetres"]
+    write_report(assembly, path, changes, notes)
+
+
+def _document(products: list[tuple[str, TopoDS_Shape]]) -> TDocStd_Document:
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDataStd import TDataStd_Name
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    document = TDocStd_Document(TCollection_ExtendedString("XCAF"))
+    XCAFDoc_DocumentTool.SetLengthUnit_s(document, _WORKING)
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    for name, shape in products:
+        label = shapes.AddShape(shape, False)
+        TDataStd_Name.Set_s(label, TCollection_ExtendedString(name, True))
+    return document
+
+
+def _write(document: TDocStd_Document, path: Path, unit: str, wanted: Path) -> None:
+    from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
+    from OCP.IFSelect import IFSelect_ReturnStatus
+    from OCP.Interface import Interface_Static
+    from OCP.Message import Message, Message_Gravity
+    from OCP.STEPCAFControl import STEPCAFControl_Writer
+    from OCP.STEPControl import STEPControl_StepModelType
+    from OCP.TCollection import TCollection_HAsciiString
+
+    for printer in Message.DefaultMessenger_s().Printers():
+        printer.SetTraceLevel(Message_Gravity.Message_Fail)
+    writer = STEPCAFControl_Writer()
+    writer.SetNameMode(True)
+    Interface_Static.SetCVal_s("write.step.unit", _UNITS[unit])
+    writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs)
+    header = APIHeaderSection_MakeHeader(writer.ChangeWriter().Model())
+    header.SetName(TCollection_HAsciiString(wanted.name.encode("ascii", "replace").decode()))
+    header.SetTimeStamp(TCollection_HAsciiString("1970-01-01T00:00:00"))  # same assembly, same bytes
+    header.SetOriginatingSystem(TCollection_HAsciiString(f"Partwright {__version__}"))
+    if writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
+        raise OutputError(f"cannot write {wanted}; choose another place with -o")

@@ -1,0 +1,185 @@
+"""STEP files to triangles, by OpenCASCADE of the `cad` extra: a named piece a solid, the file's own unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.errors import EmptyShapeError, MissingDependencyError, SettingError, UnreadableFileError
+from partwright.shapes.array_files import check_file
+from partwright.shapes.source import Piece, Source
+from partwright.shapes.units import METRES, canonical_unit
+
+if TYPE_CHECKING:
+    from OCP.TDF import TDF_Label
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS_Shape
+
+STEP_SUFFIXES = (".step", ".stp")
+TOLERANCE = 5e-4  # of the diagonal of the bounding box: how far triangles may lie off the surface
+ANGLE = 0.3  # radians between neighbouring triangles of a curved face
+
+
+def read_step(path: Path) -> Source:
+    """Read a STEP file; each solid, or sheet where there is none, is a piece named after its product.
+
+    Raises:
+        MissingDependencyError: OpenCASCADE is not installed.
+        UnreadableFileError: the file is missing or no STEP file.
+        EmptyShapeError: it holds no faces.
+    """
+    check_file(path)
+    try:
+        import OCP.STEPCAFControl  # noqa: F401
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"{path}: STEP needs OpenCASCADE; install it with: pip install 'partwright[cad]'"
+        ) from error
+    document, unit = _read(path)
+    solids = list(_named_solids(document))
+    _tessellate([solid for _, solid in solids])
+    scale = METRES["mm"] / METRES[unit]  # OpenCASCADE converts to millimetres
+    taken: set[str] = set()
+    pieces = tuple(
+        Piece(_free(name, taken), scale * vertices, faces)
+        for name, solid in solids
+        for vertices, faces in [_triangles(solid)]
+        if len(faces)
+    )
+    if not pieces:
+        raise EmptyShapeError(f"{path}: holds no faces; export the solid again as AP214 or AP242")
+    return Source(path.stem, pieces, unit)
+
+
+def _read(path: Path) -> tuple[TDocStd_Document, str]:
+    """The document, in millimetres, and the unit that the file is written in."""
+    from OCP.collections import Sequence_TCollection_AsciiString as Strings
+    from OCP.IFSelect import IFSelect_ReturnStatus
+    from OCP.Message import Message, Message_Gravity
+    from OCP.STEPCAFControl import STEPCAFControl_Reader
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDocStd import TDocStd_Document
+
+    for printer in Message.DefaultMessenger_s().Printers():
+        printer.SetTraceLevel(Message_Gravity.Message_Fail)
+    reader = STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    document = TDocStd_Document(TCollection_ExtendedString("XCAF"))
+    if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone or not reader.Transfer(document):
+        raise UnreadableFileError(f"{path}: cannot be read as STEP; the file is damaged or of another format")
+    lengths, angles, solid_angles = Strings(), Strings(), Strings()
+    reader.ChangeReader().FileUnits(lengths, angles, solid_angles)
+    return document, _unit(lengths.Value(1).ToCString() if lengths.Length() else "mm")
+
+
+def _unit(stated: str) -> str:
+    """One of `METRES`; a unit that is none of them is read as the millimetres it was converted to."""
+    try:
+        return canonical_unit(stated)
+    except SettingError:
+        return "mm"
+
+
+def _named_solids(document: TDocStd_Document) -> Iterator[tuple[str, TopoDS_Shape]]:
+    from OCP.collections import Sequence_TDF_Label
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
+    free = Sequence_TDF_Label()
+    XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(free)
+    for label in free:
+        yield from _solids_below(label, TopLoc_Location(), "")
+
+
+def _solids_below(label: TDF_Label, place: TopLoc_Location, name: str) -> Iterator[tuple[str, TopoDS_Shape]]:
+    """Solids of a label and of the components of an assembly, each moved to its place."""
+    from OCP.collections import Sequence_TDF_Label
+    from OCP.TDF import TDF_Label
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.XCAFDoc import XCAFDoc_ShapeTool
+
+    name = _name(label) or name
+    if XCAFDoc_ShapeTool.IsAssembly_s(label):
+        components = Sequence_TDF_Label()
+        XCAFDoc_ShapeTool.GetComponents_s(label, components)
+        for component in components:
+            product = TDF_Label()
+            XCAFDoc_ShapeTool.GetReferredShape_s(component, product)
+            there = place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(component))
+            yield from _solids_below(product, there, _name(component) or name)
+        return
+    shape = XCAFDoc_ShapeTool.GetShape_s(label).Moved(place)
+    solids = list(_parts_of(shape, TopAbs_ShapeEnum.TopAbs_SOLID))
+    for solid in solids or [shape]:
+        yield name or "solid", solid
+
+
+def _parts_of(shape: TopoDS_Shape, kind: object) -> Iterator[TopoDS_Shape]:
+    from OCP.TopExp import TopExp_Explorer
+
+    explorer = TopExp_Explorer(shape, kind)
+    while explorer.More():
+        yield explorer.Current()
+        explorer.Next()
+
+
+def _name(label: TDF_Label) -> str:
+    from OCP.TCollection import TCollection_AsciiString
+    from OCP.TDataStd import TDataStd_Name
+
+    attribute = TDataStd_Name()
+    if not label.FindAttribute(TDataStd_Name.GetID_s(), attribute):
+        return ""
+    return TCollection_AsciiString(attribute.Get()).ToCString().strip()
+
+
+def _free(name: str, taken: set[str]) -> str:
+    free = next(n for i in count(1) if (n := name if i == 1 else f"{name}_{i:02d}") not in taken)
+    taken.add(free)
+    return free
+
+
+def _tessellate(solids: list[TopoDS_Shape]) -> None:
+    from OCP.Bnd import Bnd_Box
+    from OCP.BRepBndLib import BRepBndLib
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+
+    box = Bnd_Box()
+    for solid in solids:
+        BRepBndLib.Add_s(solid, box)
+    if box.IsVoid():
+        return
+    deflection = TOLERANCE * float(np.sqrt(box.SquareExtent()))
+    for solid in solids:
+        BRepMesh_IncrementalMesh(solid, deflection, False, ANGLE, False)
+
+
+def _triangles(shape: TopoDS_Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (V, 3) and faces (F, 3) of a tessellated shape; neighbouring faces share the edge's points."""
+    from OCP.BRep import BRep_Tool
+    from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS
+
+    vertices: list[tuple[float, float, float]] = []
+    faces: list[tuple[int, int, int]] = []
+    for face in _parts_of(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+        place = TopLoc_Location()
+        mesh = BRep_Tool.Triangulation_s(TopoDS.Face(face), place)
+        if mesh is None:
+            continue
+        move, first = place.Transformation(), len(vertices) - 1
+        for i in range(1, mesh.NbNodes() + 1):
+            point = mesh.Node(i).Transformed(move)
+            vertices.append((point.X(), point.Y(), point.Z()))
+        flipped = face.Orientation() == TopAbs_Orientation.TopAbs_REVERSED
+        for i in range(1, mesh.NbTriangles() + 1):
+            a, b, c = mesh.Triangle(i).Get()
+            faces.append((a + first, c + first, b + first) if flipped else (a + first, b + first, c + first))
+    points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+    return points, np.array(faces, dtype=np.int64).reshape(-1, 3)
