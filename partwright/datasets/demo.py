@@ -9,64 +9,46 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from partwright.writing import write_bytes
+from partwright.datasets.making import AROUND, ring, to_mesh, write_ply
 
 if TYPE_CHECKING:
     import manifold3d
     import trimesh
 
-_AROUND = 64  # corners of a full circle
 _WALL = 0.7
 
 
 def watering_can() -> trimesh.Trimesh:
     """A can 17 cm high: tapered hollow body with a rolled rim, half a lid, a spout with a rose, a handle."""
-    import trimesh
-
-    made = _can().to_mesh()
-    return trimesh.Trimesh(
-        np.asarray(made.vert_properties, dtype=np.float64)[:, :3], np.asarray(made.tri_verts), process=False
-    )
+    return to_mesh(_can())
 
 
 def write(path: str | Path) -> None:
     """Write the watering can as binary PLY."""
-    from trimesh.exchange.ply import export_ply
-
-    write_bytes(path, export_ply(watering_can()))
+    write_ply(watering_can(), path)
 
 
 def _can() -> manifold3d.Manifold:
     from manifold3d import Manifold
 
     height, bottom, top = 16.0, 8.5, 6.5
-    body = Manifold.cylinder(height, bottom, top, _AROUND)
-    cavity = Manifold.cylinder(height + 1, bottom - _WALL, top - _WALL, _AROUND).translate((0, 0, _WALL))
-    rim = _ring(top, 0.6, 360).translate((0, 0, height))
-    foot = _ring(bottom, 0.5, 360).translate((0, 0, 0.5))
-    lid = Manifold.cylinder(_WALL, top, top, _AROUND).translate((0, 0, height - _WALL))
+    body = Manifold.cylinder(height, bottom, top, AROUND)
+    cavity = Manifold.cylinder(height + 1, bottom - _WALL, top - _WALL, AROUND).translate((0, 0, _WALL))
+    rim = ring(top, 0.6, 360).translate((0, 0, height))
+    foot = ring(bottom, 0.5, 360).translate((0, 0, 0.5))
+    lid = Manifold.cylinder(_WALL, top, top, AROUND).translate((0, 0, height - _WALL))
     half_lid = lid.trim_by_plane((1.0, 0.0, 0.0), 0.5)
 
     start, angle, length = (6.2, 0.0, 4.0), 44.0, 16.5
-    spout = _leaning(Manifold.cylinder(length, 2.1, 1.1, _AROUND), angle, start)
-    bore = _leaning(Manifold.cylinder(length + 4, 1.4, 0.55, _AROUND).translate((0, 0, -1.2)), angle, start)
-    rose = _leaning(Manifold.cylinder(2.2, 1.1, 2.9, _AROUND).translate((0, 0, length - 0.3)), angle, start)
+    spout = _leaning(Manifold.cylinder(length, 2.1, 1.1, AROUND), angle, start)
+    bore = _leaning(Manifold.cylinder(length + 4, 1.4, 0.55, AROUND).translate((0, 0, -1.2)), angle, start)
+    rose = _leaning(Manifold.cylinder(2.2, 1.1, 2.9, AROUND).translate((0, 0, length - 0.3)), angle, start)
 
-    arc = _ring(5.6, 0.85, 230).rotate((90, 0, 0)).rotate((0, -40, 0))
-    handle = arc.scale((1.0, 1.0, 1.05)).translate((-8.2, 0, 9.0)) - Manifold.cylinder(30, 7.4, 6.2, _AROUND)
+    arc = ring(5.6, 0.85, 230).rotate((90, 0, 0)).rotate((0, -40, 0))
+    handle = arc.scale((1.0, 1.0, 1.05)).translate((-8.2, 0, 9.0)) - Manifold.cylinder(30, 7.4, 6.2, AROUND)
 
     outside = body + rim + foot + spout + rose + handle
     return (outside - cavity - bore) + half_lid
-
-
-def _ring(radius: float, thickness: float, degrees: float) -> manifold3d.Manifold:
-    """A round rod bent around z."""
-    from manifold3d import CrossSection, Manifold
-
-    circle = CrossSection.circle(thickness, _AROUND // 3).translate((radius, 0))
-    return Manifold.revolve(circle, _AROUND, degrees)
 
 
 def _leaning(
