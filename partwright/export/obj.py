@@ -7,17 +7,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.meshing import mesh_assembly
+from partwright.export.pieces import surfaces
 from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly
 
 
-def write(assembly: Assembly, path: str | Path, resolution: int = 128) -> None:
-    """Write the watertight surface in the assembly's own units and place."""
-    mesh = mesh_assembly(assembly, resolution)
-    lines = [f"# unit: {assembly.unit or 'unknown'}"]
-    lines += ["v {!r} {!r} {!r}".format(*vertex) for vertex in np.asarray(mesh.vertices).tolist()]
-    lines += ["f {} {} {}".format(*face) for face in (mesh.faces + 1).tolist()]
+def write(assembly: Assembly, path: str | Path, by_part: bool = False, resolution: int | None = None) -> None:
+    """Write the surface, watertight, in the assembly's own units and place.
+
+    by_part: an object (`o NAME`) a part, each closed by itself, instead of one for the blended surface.
+    resolution: cells along the longest side, 128 if not given; with by_part along each part, 32.
+    """
+    lines, first = [f"# unit: {assembly.unit or 'unknown'}"], 1
+    for name, mesh in surfaces(assembly, by_part, resolution):
+        lines += [f"o {name}"] if name else []
+        lines += ["v {!r} {!r} {!r}".format(*vertex) for vertex in np.asarray(mesh.vertices).tolist()]
+        lines += ["f {} {} {}".format(*face) for face in (mesh.faces + first).tolist()]
+        first += len(mesh.vertices)
     write_bytes(path, ("\n".join(lines) + "\n").encode())

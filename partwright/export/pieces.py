@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
@@ -11,6 +13,14 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.names import unique_names
 from partwright.assembly.palette import palette
 from partwright.assembly.tree import operands
+from partwright.errors import NoSurfaceError, NothingToExportError
+from partwright.meshing import mesh_assembly, mesh_part
+
+if TYPE_CHECKING:
+    import trimesh
+
+WHOLE = 64  # cells along the longest side of a difference or intersection
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -52,3 +62,51 @@ def _opened(node: Node, blend: float) -> Iterator[tuple[Node, float]]:
 
 def _name(node: Node) -> str:
     return node.name or (node.parts[0].name if isinstance(node, Assembly) else "")
+
+
+def piece_mesh(piece: Piece, resolution: int) -> trimesh.Trimesh:
+    """A closed mesh of the piece alone; resolution: cells along it, `WHOLE` for a difference or intersection.
+
+    Raises:
+        NoSurfaceError: it has no volume.
+    """
+    node = piece.node
+    return mesh_part(node, resolution) if isinstance(node, Part) else mesh_assembly(node, WHOLE)
+
+
+def piece_meshes(assembly: Assembly, resolution: int) -> list[tuple[Piece, trimesh.Trimesh]]:
+    """Every piece that has a volume, with its mesh, each closed by itself.
+
+    Raises:
+        NothingToExportError: none has.
+    """
+    found = []
+    for piece in pieces(assembly):
+        with suppress(NoSurfaceError):  # it only shows where it blends
+            found.append((piece, piece_mesh(piece, resolution)))
+    return require_some(assembly, found)
+
+
+def require_some(assembly: Assembly, found: list[T]) -> list[T]:
+    """What is to be written, if that is anything."""
+    if not found:
+        raise NothingToExportError(
+            f"none of the {len(assembly)} parts has a volume: there is nothing to export; "
+            "give them a size, or remove those that are empty"
+        )
+    return found
+
+
+def surfaces(assembly: Assembly, by_part: bool, resolution: int | None) -> list[tuple[str, trimesh.Trimesh]]:
+    """Named closed meshes: of each piece, or of the whole blended surface, which has no name."""
+    if by_part:
+        return [(piece.name, mesh) for piece, mesh in piece_meshes(assembly, resolution or 32)]
+    return [("", mesh_assembly(assembly, resolution or 128))]
+
+
+def one_surface(assembly: Assembly, by_part: bool, resolution: int | None) -> trimesh.Trimesh:
+    """The meshes of `surfaces` as one mesh."""
+    import trimesh
+
+    meshes = [mesh for _, mesh in surfaces(assembly, by_part, resolution)]
+    return cast("trimesh.Trimesh", trimesh.util.concatenate(meshes))

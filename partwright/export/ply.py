@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.meshing import mesh_assembly
+from partwright.export.pieces import one_surface
 from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -18,9 +18,13 @@ if TYPE_CHECKING:
 _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 
 
-def write(assembly: Assembly, path: str | Path, resolution: int = 128) -> None:
-    """Write the watertight surface in the assembly's own units and place."""
-    write_mesh(mesh_assembly(assembly, resolution), path, assembly.unit)
+def write(assembly: Assembly, path: str | Path, by_part: bool = False, resolution: int | None = None) -> None:
+    """Write the surface, watertight, in the assembly's own units and place.
+
+    by_part: a shell a part, each closed by itself, in the parts' order, instead of the blended surface.
+    resolution: cells along the longest side, 128 if not given; with by_part along each part, 32.
+    """
+    write_mesh(one_surface(assembly, by_part, resolution), path, assembly.unit)
 
 
 def write_mesh(mesh: trimesh.Trimesh, path: str | Path, unit: str | None = None) -> None:

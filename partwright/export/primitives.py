@@ -9,18 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly import Assembly, Part
-from partwright.errors import NoSurfaceError, NothingToExportError, ParameterError
+from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export.approximation import Change
 from partwright.export.nearest import Approximation, nearest_solid
-from partwright.export.pieces import Piece, pieces
+from partwright.export.pieces import Piece, piece_mesh, pieces, require_some
 from partwright.fields import Field
-from partwright.meshing import mesh_assembly, mesh_part
 
 if TYPE_CHECKING:
     import trimesh
 
 TOLERANCE = 0.05  # of the longest side: how far a solid's surface may lie from its part's
-_WHOLE_CELLS = 64
 
 
 @dataclass(frozen=True)
@@ -74,12 +72,7 @@ def geometries(
             continue
         result.append(Geometry(piece.name, piece.colour, near.part_with_solid, None))
         changes += _change(piece, near, blend, length)
-    if not result:
-        raise NothingToExportError(
-            f"none of the {len(assembly)} parts has a volume: there is nothing to export; "
-            "give them a size, or remove those that are empty"
-        )
-    return result, changes
+    return require_some(assembly, result), changes
 
 
 def _change(piece: Piece, near: Approximation, blend: float, length: float) -> list[Change]:
@@ -91,10 +84,7 @@ def _change(piece: Piece, near: Approximation, blend: float, length: float) -> l
 
 def _mesh(piece: Piece, resolution: int, convex: bool) -> tuple[trimesh.Trimesh, float, float]:
     """The piece's mesh or its convex hull, by how much volume that is more, and how far off at most."""
-    if isinstance(piece.node, Part):
-        mesh = mesh_part(piece.node, resolution)
-    else:
-        mesh = mesh_assembly(piece.node, _WHOLE_CELLS)
+    mesh = piece_mesh(piece, resolution)
     if not convex:
         return mesh, 0.0, 0.0
     hull = mesh.convex_hull

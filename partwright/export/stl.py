@@ -5,15 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from partwright.meshing import mesh_assembly
+from partwright.export.pieces import one_surface
 from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly
 
 
-def write(assembly: Assembly, path: str | Path, resolution: int = 128) -> None:
-    """Write the watertight surface in the assembly's own units and place."""
+def write(assembly: Assembly, path: str | Path, by_part: bool = False, resolution: int | None = None) -> None:
+    """Write the surface, watertight, in the assembly's own units and place.
+
+    by_part: a shell a part, each closed by itself, in the parts' order, instead of the blended surface.
+    resolution: cells along the longest side, 128 if not given; with by_part along each part, 32.
+    """
     from trimesh.exchange.stl import export_stl
 
-    write_bytes(path, export_stl(mesh_assembly(assembly, resolution)))
+    write_bytes(path, export_stl(one_surface(assembly, by_part, resolution)))

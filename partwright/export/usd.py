@@ -1,0 +1,147 @@
+"""USD: an Xform and a Mesh a part under its own name, coloured, its parameters as custom data.
+
+The numbers are the assembly's own; `metersPerUnit` and `upAxis` say what they mean. USD knows Y and Z up
+only: an assembly of another up axis is turned to Z. Subtracted parts are there with the purpose "guide",
+which renderers leave out.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from partwright import __version__
+from partwright.assembly import Assembly, Node, Part, Similarity
+from partwright.assembly.palette import palette
+from partwright.errors import MissingDependencyError, NoSurfaceError
+from partwright.export.axes import to_metres_z_up
+from partwright.meshing import mesh_part
+from partwright.shapes import METRES, canonical_unit, canonical_up
+from partwright.writing import write_bytes
+
+_AXES = {"y": "Y", "z": "Z"}
+
+
+def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
+    """Write .usda as text, .usdc and .usd in binary; resolution: cells along each part.
+
+    Raises:
+        MissingDependencyError: usd-core is not installed.
+    """
+    try:
+        from pxr import Usd, UsdGeom
+    except ImportError as error:
+        raise MissingDependencyError(
+            "USD needs the package usd-core; install it with: pip install 'partwright[usd]'"
+        ) from error
+
+    stage = Usd.Stage.CreateInMemory()
+    up = canonical_up(assembly.up) if assembly.up else "z"
+    UsdGeom.SetStageUpAxis(stage, _AXES.get(up, "Z"))
+    UsdGeom.SetStageMetersPerUnit(stage, METRES[canonical_unit(assembly.unit)] if assembly.unit else 1.0)
+    stage.SetMetadata("comment", f"Partwright {__version__}")
+    _Writer(stage, assembly, resolution).add(assembly, "", subtracted=False)
+    root = stage.GetPrimAtPath("/").GetAllChildren()[0]
+    stage.SetDefaultPrim(root)
+    if up not in _AXES:
+        _place(root, Similarity(rotation=to_metres_z_up(assembly).rotation))
+    # Where USD itself cannot write, it says so in errors of its own: our own file errors are clearer.
+    with tempfile.TemporaryDirectory() as folder:
+        whole = Path(folder) / f"stage{Path(path).suffix.lower()}"
+        stage.GetRootLayer().Export(str(whole))
+        write_bytes(path, whole.read_bytes())
+
+
+class _Writer:
+    """Adds prims to a stage."""
+
+    def __init__(self, stage: Any, assembly: Assembly, resolution: int) -> None:
+        self.stage, self.assembly, self.resolution = stage, assembly, resolution
+        srgb = palette(len(assembly)) / 255.0  # USD's colours are linear
+        linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+        self.colours = dict(zip((p.name for p in assembly.parts), linear, strict=True))
+
+    def add(self, node: Node, parent: str, *, subtracted: bool) -> None:
+        prim = self._xform(parent, node.name or "assembly")
+        if isinstance(node, Part):
+            self._add_part(prim, node, parent, subtracted)
+            return
+        about: dict[str, Any] = {"operation": node.operation, "blend": node.blend, **dict(node.metadata)}
+        if node is self.assembly and node.unit is None:
+            about["note"] = "the length unit is unknown: metersPerUnit is USD's way of saying nothing, 1"
+        prim.SetCustomData({"partwright": _plain(about)})
+        for i, child in enumerate(node.children):
+            taken_away = subtracted or (node.operation == "difference" and i > 0)
+            self.add(child, str(prim.GetPath()), subtracted=taken_away)
+
+    def _add_part(self, prim: Any, part: Part, parent: str, subtracted: bool) -> None:
+        about = {"field": part.field.to_dict(), "blend": part.blend, "metadata": dict(part.metadata)}
+        pose = Similarity(1.0, part.rotation, part.translation)
+        try:
+            mesh = mesh_part(Part(part.field), self.resolution)
+        except NoSurfaceError:
+            mesh, about["note"] = None, "no surface of its own at this resolution"
+        prim.SetCustomData({"partwright": _plain(about)})
+        _place(prim, pose)
+        if mesh is None:
+            return
+        self._add_mesh(f"{prim.GetPath()}/mesh", mesh, self.colours[part.name], subtracted)
+        for i, move in enumerate(part.instances, start=2):
+            copy = self._xform(parent, f"{part.name}_{i}")
+            copy.SetCustomData({"partwright": {"copy_of": part.name}})
+            _place(copy, move @ pose)
+            again = self.stage.DefinePrim(copy.GetPath().AppendChild("mesh"))
+            again.GetReferences().AddInternalReference(f"{prim.GetPath()}/mesh")
+
+    def _xform(self, parent: str, name: str) -> Any:
+        """An Xform under the name, or what of it USD allows, which its display name makes good."""
+        from pxr import Tf, UsdGeom
+
+        stem = plain = Tf.MakeValidIdentifier(name)
+        number = 1
+        while self.stage.GetPrimAtPath(f"{parent}/{plain}"):
+            number += 1
+            plain = f"{stem}_{number:02d}"
+        prim = UsdGeom.Xform.Define(self.stage, f"{parent}/{plain}").GetPrim()
+        if plain != name:
+            prim.SetDisplayName(name)
+        return prim
+
+    def _add_mesh(self, path: str, mesh: Any, colour: np.ndarray, subtracted: bool) -> None:
+        from pxr import UsdGeom, Vt
+
+        points, faces = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
+        prim = UsdGeom.Mesh.Define(self.stage, path)
+        prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+        prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, np.int32)))
+        prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.ravel()))
+        prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+        prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array([points.min(axis=0), points.max(axis=0)])))
+        prim.CreateDisplayColorAttr(Vt.Vec3fArray.FromNumpy(colour[None].astype(np.float32)))
+        if subtracted:
+            prim.CreatePurposeAttr(UsdGeom.Tokens.guide)
+
+
+def _place(prim: Any, pose: Similarity) -> None:
+    from pxr import Gf, UsdGeom
+
+    xform = UsdGeom.Xformable(prim)
+    double = UsdGeom.XformOp.PrecisionDouble
+    xform.AddTranslateOp(double).Set(Gf.Vec3d(*pose.translation))
+    xform.AddOrientOp(double).Set(Gf.Quatd(*pose.rotation))
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """As USD's dictionaries take them: lists of numbers become arrays; what is empty is left out."""
+    from pxr import Vt
+
+    def one(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return _plain(value)
+        return Vt.DoubleArray(value) if isinstance(value, list) else value
+
+    return {key.replace(":", "_"): one(value) for key, value in values.items() if value != {}}
