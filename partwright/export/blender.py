@@ -53,7 +53,7 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
         "",
         f"NAME = {json.dumps(assembly.name or 'Assembly')}",
         f"UNIT = {json.dumps(assembly.unit)}  # of all numbers below",
-        f"SMALLEST_VOXEL = {float(np.ptp(assembly.bounds(), axis=0).max()) / _VOXELS:.6g}  # of the blended skin",
+        f"SMALLEST_VOXEL = {_longest(assembly) / _VOXELS:.6g}  # of the blended skin",
         f"METRES_PER_UNIT = {METRES[canonical_unit(assembly.unit)] if assembly.unit else 1.0!r}",
         "",
         "# Lengths in UNIT; rotation is a quaternion (w, x, y, z); the mesh is in the part's own frame.",
@@ -67,6 +67,10 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
         files("partwright.export").joinpath("blender_scene.txt").read_text("utf-8"),
     ]
     write_bytes(path, "\n".join(lines).encode())
+
+
+def _longest(assembly: Assembly) -> float:
+    return float(np.ptp(assembly.bounds(), axis=0).max())
 
 
 def _entry(part: Part, colour: list[int], resolution: int) -> Iterator[dict[str, Any]]:

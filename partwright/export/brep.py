@@ -82,14 +82,14 @@ def combined(node: Node) -> TopoDS_Shape:
 
 def placed(part: Part) -> TopoDS_Shape:
     """The part's solid in the part's place."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
     from OCP.gp import gp_Quaternion, gp_Trsf, gp_Vec
-    from OCP.TopLoc import TopLoc_Location
 
     w, x, y, z = part.rotation
     pose = gp_Trsf()
     pose.SetRotation(gp_Quaternion(x, y, z, w))
     pose.SetTranslationPart(gp_Vec(*part.translation))
-    return solid_of(part.field).Moved(TopLoc_Location(pose))
+    return BRepBuilderAPI_Transform(solid_of(part.field), pose, True).Shape()
 
 
 def _label(node: Node) -> str:

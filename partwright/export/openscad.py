@@ -37,54 +37,12 @@ _SOLIDS = {
     "        }}",
     "torus": "rotate_extrude() translate([{major_radius}, 0]) circle(r = {minor_radius});",
 }
-_RESERVED = [
-    "module",
-    "function",
-    "if",
-    "else",
-    "for",
-    "let",
-    "assert",
-    "echo",
-    "each",
-    "true",
-    "false",
-    "undef",
-    "include",
-    "use",
-    "union",
-    "difference",
-    "intersection",
-    "translate",
-    "rotate",
-    "scale",
-    "mirror",
-    "hull",
-    "minkowski",
-    "cube",
-    "sphere",
-    "cylinder",
-    "polyhedron",
-    "circle",
-    "square",
-    "polygon",
-    "text",
-    "color",
-    "offset",
-    "resize",
-    "render",
-    "children",
-    "import",
-    "projection",
-    "surface",
-    "linear_extrude",
-    "rotate_extrude",
-    "multmatrix",
-    "intersection_for",
-    "group",
-    "version",
-    "end",
-]
+_RESERVED = (
+    "module function if else for let assert echo each true false undef include use union difference "
+    "intersection translate rotate scale mirror hull minkowski cube sphere cylinder polyhedron circle "
+    "square polygon text color offset resize render children import projection surface linear_extrude "
+    "rotate_extrude multmatrix intersection_for group version end"
+)
 
 
 def write(assembly: Assembly, path: str | Path, facets: int = 128) -> None:
@@ -96,7 +54,7 @@ def write(assembly: Assembly, path: str | Path, facets: int = 128) -> None:
         OutputError: the file cannot be written.
     """
     tree, changes = solid_tree(assembly)
-    parts = source_parts(tree.parts, fixed_axes_angles, _RESERVED)
+    parts = source_parts(tree.parts, fixed_axes_angles, _RESERVED.split())
     unit = canonical_unit(assembly.unit) if assembly.unit else "unknown unit"
     lines = [
         f"// {comment(assembly.name) or 'Assembly'}: {len(parts)} parts. "

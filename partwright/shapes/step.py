@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 STEP_SUFFIXES = (".step", ".stp")
 TOLERANCE = 5e-4  # of the diagonal of the bounding box: how far triangles may lie off the surface
+NO_NAMES = ("", "SOLID", "COMPOUND", "SHELL", "FACE")  # what CAD programs write where there is no name
 ANGLE = 0.3  # radians between neighbouring triangles of a curved face
 
 
@@ -103,7 +104,7 @@ def _solids_below(label: TDF_Label, place: TopLoc_Location, name: str) -> Iterat
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.XCAFDoc import XCAFDoc_ShapeTool
 
-    name = _name(label) or name
+    name = _name(label, name)
     if XCAFDoc_ShapeTool.IsAssembly_s(label):
         components = Sequence_TDF_Label()
         XCAFDoc_ShapeTool.GetComponents_s(label, components)
@@ -111,7 +112,7 @@ def _solids_below(label: TDF_Label, place: TopLoc_Location, name: str) -> Iterat
             product = TDF_Label()
             XCAFDoc_ShapeTool.GetReferredShape_s(component, product)
             there = place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(component))
-            yield from _solids_below(product, there, _name(component) or name)
+            yield from _solids_below(product, there, _name(component, name))
         return
     shape = XCAFDoc_ShapeTool.GetShape_s(label).Moved(place)
     solids = list(_parts_of(shape, TopAbs_ShapeEnum.TopAbs_SOLID))
@@ -128,14 +129,15 @@ def _parts_of(shape: TopoDS_Shape, kind: object) -> Iterator[TopoDS_Shape]:
         explorer.Next()
 
 
-def _name(label: TDF_Label) -> str:
+def _name(label: TDF_Label, otherwise: str) -> str:
     from OCP.TCollection import TCollection_AsciiString
     from OCP.TDataStd import TDataStd_Name
 
     attribute = TDataStd_Name()
     if not label.FindAttribute(TDataStd_Name.GetID_s(), attribute):
-        return ""
-    return TCollection_AsciiString(attribute.Get()).ToCString().strip()
+        return otherwise
+    name = TCollection_AsciiString(attribute.Get()).ToCString().strip()
+    return otherwise if name in NO_NAMES else name
 
 
 def _free(name: str, taken: set[str]) -> str:

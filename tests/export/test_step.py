@@ -1,0 +1,195 @@
+"""STEP read back by OpenCASCADE itself: exact volumes, analytic faces, names, units; and by `load_shape`."""
+
+from __future__ import annotations
+
+import builtins
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from partwright.assembly import Assembly, Part
+from partwright.errors import (
+    EmptyShapeError,
+    MissingDependencyError,
+    NoSurfaceError,
+    OutputError,
+    SettingError,
+    UnreadableFileError,
+)
+from partwright.export import export
+from partwright.fields import Box, Cylinder, Field, Sphere, SuperFrustum, Tube
+from partwright.shapes import load_shape
+from tests.export.trees import SOLIDS, TURNED, flange, lone
+
+pytest.importorskip("OCP.STEPCAFControl", reason="OpenCASCADE is missing: pip install 'partwright[cad]'")
+
+ANALYTIC = {"Plane", "Cylinder", "Cone", "Sphere", "Torus"}
+
+
+def read_back(path: Path) -> tuple[float, Counter[str]]:
+    """Volume in cubic millimetres and the kinds of faces, by OpenCASCADE's plain reader."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+    from OCP.STEPControl import STEPControl_Reader
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    reader = STEPControl_Reader()
+    reader.ReadFile(str(path))
+    reader.TransferRoots()
+    shape = reader.OneShape()
+    assert BRepCheck_Analyzer(shape).IsValid()
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, properties)
+    kinds: Counter[str] = Counter()
+    faces = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    while faces.More():
+        kinds[str(BRepAdaptor_Surface(TopoDS.Face(faces.Current())).GetType()).rsplit("_", 1)[-1]] += 1
+        faces.Next()
+    return properties.Mass(), kinds
+
+
+def counted_volume(field: Field) -> float:
+    """Of the field itself, on cells of equal sides."""
+    lower, upper = field.bounds()
+    cell = float((upper - lower).max()) / 120
+    axes = [np.arange(a + cell / 2, b + cell, cell) for a, b in zip(lower, upper, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3).astype(np.float32)
+    return float(np.clip(0.5 - field(points) / cell, 0, 1).sum()) * cell**3
+
+
+@pytest.mark.parametrize(("field", "volume"), SOLIDS.items(), ids=lambda v: getattr(v, "kind", ""))
+def test_named_solids_are_exact(tmp_path: Path, field: Field, volume: float) -> None:
+    path = tmp_path / "solid.step"
+    export(lone(field, unit="mm"), path)
+    measured, kinds = read_back(path)
+    assert measured == pytest.approx(volume, rel=1e-6)
+    assert set(kinds) <= ANALYTIC
+    assert not (tmp_path / "solid.step.report.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("field", "kinds"),
+    [
+        (SuperFrustum((1, 1, 1), 1, 0.1), {"Plane": 2, "Torus": 2, "Cylinder": 1}),
+        (SuperFrustum((1, 1, 1), 1, 0.1, 0.4), {"Plane": 2, "Torus": 2, "Cone": 1}),
+        (SuperFrustum((1, 1, 1), 1, 0.1, 0.0), {"Plane": 1, "Torus": 1, "Cone": 1, "Sphere": 1}),
+        (SuperFrustum((1, 1, 1), 1, 0.05, 1.7, 0, 0.5), {"Plane": 2, "Torus": 4, "Cone": 2}),
+        (SuperFrustum((1, 1, 0), 1, 0.1, 1, 0, 0.8), {"Plane": 2, "Torus": 4}),
+        (SuperFrustum((1, 2, 1), 0, 0.1), {"Plane": 6, "Cylinder": 12, "Sphere": 8}),
+        (SuperFrustum((1, 2, 1), 0.5), {"Plane": 6, "Cylinder": 4}),
+        (SuperFrustum((1, 2, 1), 0.5, 0.1), {"Plane": 6, "Cylinder": 12, "Torus": 8}),
+        (SuperFrustum((1, 2, 1), 1, 0.1), {"Plane": 4, "Cylinder": 8, "Torus": 8}),
+    ],
+)
+def test_rounded_solids_are_exact(tmp_path: Path, field: SuperFrustum, kinds: dict[str, int]) -> None:
+    path = tmp_path / "solid.step"
+    export(lone(field), path)
+    volume, faces = read_back(path)
+    assert volume == pytest.approx(counted_volume(field), rel=1e-3)
+    assert faces == kinds
+
+
+def test_a_tree_of_operations_with_hostile_names(tmp_path: Path) -> None:
+    assembly, volume = flange()
+    export(assembly, tmp_path / "flange.stp")
+    measured, kinds = read_back(tmp_path / "flange.stp")
+    assert measured == pytest.approx(volume, rel=1e-6)
+    assert set(kinds) == {"Plane", "Cylinder"}
+    assert [node.name for node in load_shape(tmp_path / "flange.stp").nodes] == ["Flansch ä"]
+
+
+@pytest.mark.parametrize(("unit", "millimetres"), [("m", 1000.0), ("in", 25.4), ("um", 1e-3), ("mm", 1.0)])
+def test_the_unit_is_written_and_read(tmp_path: Path, unit: str, millimetres: float) -> None:
+    size = 0.05 if unit == "m" else 5000.0 if unit == "um" else 2.0
+    path = tmp_path / "box.step"
+    export(Assembly((Part(Box((size, size, size)), (size, 0, 0)),), unit=unit), path)
+    assert read_back(path)[0] == pytest.approx((size * millimetres) ** 3)
+    shape = load_shape(path)
+    assert shape.unit == unit
+    assert np.allclose(shape.vertices.min(axis=0) / size, [0.5, -0.5, -0.5])
+    assert np.allclose(shape.vertices.max(axis=0) / size, [1.5, 0.5, 0.5])
+
+
+def test_what_is_approximated_is_reported(tmp_path: Path) -> None:
+    bent = Part(SuperFrustum((1, 1, 4), 0.5, 0.05, bulge=0.3), name="bent")
+    assembly = Assembly((bent, Part(Sphere(1.0), (0, 0, 2), name="ball", blend=0.2)))
+    export(assembly, tmp_path / "a.step")
+    report = json.loads((tmp_path / "a.step.report.json").read_text())
+    bent_entry, ball = report["approximated"]
+    assert bent_entry["parts"] == ["bent"]
+    assert bent_entry["volume_error_ratio"] > 0
+    assert (ball["parts"], ball["to"], ball["blend_dropped"]) == (["ball"], "sphere", 0.2)
+    assert "millimetres" in report["notes"][0]
+
+
+def test_separate_parts_come_back_as_named_nodes(tmp_path: Path) -> None:
+    parts = (Part(Box((1, 1, 1)), name="left"), Part(Tube(1, 0.3, 2), (3, 0, 0), TURNED, name="right"))
+    export(Assembly(parts, unit="cm"), tmp_path / "two.step", separate=True)
+    shape = load_shape(tmp_path / "two.step")
+    assert [node.name for node in shape.nodes] == ["left", "right"]
+    box, tube = shape.split_nodes()
+    assert box.volume == pytest.approx(1.0)
+    assert tube.volume == pytest.approx(np.pi * (1 - 0.49) * 2, rel=5e-3)
+
+
+def test_reading_is_watertight_and_within_the_tolerance(tmp_path: Path) -> None:
+    export(Assembly((Part(Sphere(1.0)), Part(Cylinder(0.5, 4)))), tmp_path / "a.step")
+    shape = load_shape(tmp_path / "a.step")
+    assert shape.confidence == 1.0
+    assembly = Assembly((Part(Sphere(1.0)), Part(Cylinder(0.5, 4))))
+    assert np.abs(assembly.distance(shape.vertices)).max() < 1e-5
+    middle = shape.vertices[shape.faces].mean(axis=1)
+    assert np.abs(assembly.distance(middle)).max() < 0.01
+
+
+def test_the_same_assembly_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        export(flange()[0], tmp_path / name / "x.step")
+    assert (tmp_path / "a" / "x.step").read_bytes() == (tmp_path / "b" / "x.step").read_bytes()
+
+
+def test_nothing_to_export_and_bad_places_are_named(tmp_path: Path) -> None:
+    with pytest.raises(NoSurfaceError, match="no part of the assembly has a volume"):
+        export(Assembly((Part(SuperFrustum((1, 1, 0))),)), tmp_path / "a.step")
+    apart = Assembly((Part(Sphere(1.0)), Part(Sphere(1.0), (5, 0, 0))), "intersection")
+    with pytest.raises(NoSurfaceError, match="empty"):
+        export(apart, tmp_path / "a.step")
+    with pytest.raises(SettingError, match="parsec"):
+        export(lone(Sphere(1.0), unit="parsec"), tmp_path / "a.step")
+    with pytest.raises(OutputError):
+        export(lone(Sphere(1.0)), tmp_path / "no folder" / "a.step")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("content", [b"ISO-10303-21;\nHEADER;", b"\x00\x01garbage", b"solid x\nendsolid x\n"])
+def test_damaged_files_are_named(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "x.step").write_bytes(content)
+    with pytest.raises((UnreadableFileError, EmptyShapeError), match=r"x\.step"):
+        load_shape(tmp_path / "x.step")
+
+
+def test_without_opencascade_the_install_line_is_given(tmp_path: Path, monkeypatch: Any) -> None:
+    export(lone(Sphere(1.0)), tmp_path / "a.step")
+    real = builtins.__import__
+
+    def missing(name: str, *rest: Any, **more: Any) -> Any:
+        if name.startswith("OCP"):
+            raise ImportError(name)
+        return real(name, *rest, **more)
+
+    monkeypatch.setattr(builtins, "__import__", missing)
+    for work in (
+        lambda: export(lone(Sphere(1.0)), tmp_path / "b.step"),
+        lambda: load_shape(tmp_path / "a.step"),
+    ):
+        with pytest.raises(MissingDependencyError, match=r"pip install 'partwright\[cad\]'"):
+            work()
