@@ -8,30 +8,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.shapes.orientation import containers, split_bodies
-from partwright.shapes.topology import EdgeTable, signed_volumes
+from partwright.shapes.topology import EdgeTable, compacted, signed_volumes
 
 
 def unite(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
+) -> tuple[NDArray[np.float64], EdgeTable]:
     """Union of the bodies of a closed surface; the surface itself when nothing overlaps or the union fails.
 
     A cavity (a body that faces inwards) is taken out of the smallest body around it before the union.
     """
-    label = EdgeTable(faces).bodies
+    faces, label = edges.faces, edges.bodies
     bodies = split_bodies(label)
     if len(bodies) == 1:
-        return vertices, faces
+        return vertices, edges
     volume = signed_volumes(vertices, faces, label)
     solids = _with_cavities(vertices, faces, label, bodies, volume)
     if not _boxes_touch(vertices, faces, [bodies[b] for b in np.flatnonzero(volume > 0)]):
         if len(solids) > 1:
             notes.append(f"{len(solids)} separate bodies are kept as they are")
-        return vertices, faces
+        return vertices, edges
     union = _boolean_union([_manifold(vertices, faces[solid]) for solid in solids])
     if union is None:
         notes.append(f"{len(solids)} bodies touch or overlap and could not be united exactly")
-        return vertices, faces
+        return vertices, edges
     notes.append(f"united {len(solids)} bodies that touch or overlap")
     return union
 
@@ -71,15 +71,13 @@ def _boxes_touch(
 def _manifold(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Any:
     import manifold3d
 
-    used, corners = np.unique(faces, return_inverse=True)
-    mesh = manifold3d.Mesh64(
-        np.ascontiguousarray(vertices[used]), np.ascontiguousarray(corners.reshape(-1, 3), dtype=np.uint64)
-    )
+    used, corners = compacted(faces, len(vertices))
+    mesh = manifold3d.Mesh64(np.ascontiguousarray(vertices[used]), corners.astype(np.uint64))
     return manifold3d.Manifold(mesh)
 
 
-def _boolean_union(solids: list[Any]) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
-    """Vertices and faces of the union, or None where a body is not manifold or the result is not closed."""
+def _boolean_union(solids: list[Any]) -> tuple[NDArray[np.float64], EdgeTable] | None:
+    """Vertices and triangles of the union, or None where a body is not manifold or the result is not closed."""
     import manifold3d
 
     if any(solid.status() != manifold3d.Error.NoError for solid in solids):
@@ -88,7 +86,7 @@ def _boolean_union(solids: list[Any]) -> tuple[NDArray[np.float64], NDArray[np.i
     if union.status() != manifold3d.Error.NoError or union.is_empty():
         return None
     mesh = union.to_mesh64()
-    faces = np.asarray(mesh.tri_verts, dtype=np.int64)
-    if EdgeTable(faces).balance.any():
+    edges = EdgeTable(np.asarray(mesh.tri_verts, dtype=np.int64))
+    if edges.balance.any():
         return None
-    return np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3].copy(), faces
+    return np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3].copy(), edges

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.shapes.topology import EdgeTable, components
+from partwright.shapes.topology import EdgeTable, compacted, components
 
 _WELD = 1e-5  # unit frame; only vertices on open edges are welded, so thin walls cannot collapse
 
@@ -19,8 +19,8 @@ def merge_vertices(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Join vertices (V, 3) at exactly the same place and drop those that no triangle uses."""
-    used, faces = np.unique(faces, return_inverse=True)
-    faces, vertices = faces.reshape(-1, 3).astype(np.int64), vertices[used]
+    used, faces = compacted(faces, len(vertices))
+    vertices = vertices[used]
     order = np.lexsort(vertices.T)
     moved = np.r_[True, (np.diff(vertices[order], axis=0) != 0).any(axis=1)]
     if moved.all():
@@ -72,20 +72,21 @@ def drop_doubles(faces: NDArray[np.int64], notes: list[str]) -> NDArray[np.int64
 
 
 def weld_boundary(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
+) -> tuple[NDArray[np.float64], EdgeTable]:
     """Close cracks: join vertices on open edges that lie within 1e-5 of one another."""
     from scipy.spatial import cKDTree
 
-    rim = np.unique(EdgeTable(faces).open_half_edges)
+    rim = np.unique(edges.open_half_edges)
     if len(rim) == 0:
-        return vertices, faces
+        return vertices, edges
     pairs = cKDTree(vertices[rim]).query_pairs(_WELD, output_type="ndarray")
     if len(pairs) == 0:
-        return vertices, faces
+        return vertices, edges
     label = components(len(rim), pairs[:, 0], pairs[:, 1])
     _, first = np.unique(label, return_index=True)
     target = np.arange(len(vertices))
     target[rim] = rim[first[label]]
     notes.append(f"welded {counted(len(rim) - len(first), 'vertex', 'vertices')} along cracks")
-    return merge_vertices(vertices, drop_doubles(target[faces], []), [])
+    vertices, faces = merge_vertices(vertices, drop_doubles(target[edges.faces], []), [])
+    return vertices, EdgeTable(faces)

@@ -14,16 +14,17 @@ _STEP = 1e-4
 
 
 def fill_holes(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
+) -> tuple[NDArray[np.float64], EdgeTable]:
     """Close every opening that a fan from the middle of its rim closes.
 
     The rim of a loose patch that other patches already cover is no opening: there the winding number is near
     0 or 1, not near one half, and the patch stays as it is.
     """
-    loops = boundary_loops(EdgeTable(faces).open_half_edges)
+    faces = edges.faces
+    loops = boundary_loops(edges.open_half_edges)
     if not loops:
-        return vertices, faces
+        return vertices, edges
     source = MeshDistance(vertices, faces, faces, closed=False)
     lids: list[NDArray[np.int64]] = []
     middles: list[NDArray[np.float64]] = []
@@ -36,12 +37,12 @@ def fill_holes(
             lids.append(np.stack([np.roll(loop, -1), loop, number], axis=1))
             middles.append(middle)
     if not lids:
-        return vertices, faces
+        return vertices, edges
     lid = np.concatenate(lids)
     filled = np.concatenate([vertices, middles]), np.concatenate([faces, lid])
     share = _area(filled[0], lid) / _area(*filled)
     notes.append(f"filled {counted(len(lids), 'hole')} ({share:.1%} of the surface)")
-    return filled
+    return filled[0], EdgeTable(filled[1])
 
 
 def _is_opening(source: MeshDistance, rim: NDArray[np.float64], middle: NDArray[np.float64]) -> bool:

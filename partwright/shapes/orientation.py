@@ -13,10 +13,10 @@ _MAJORITY = 0.75  # share of a patch's triangles that must agree before its faci
 _CLEARLY_INWARD = -0.02  # signed volume of an open body over area^1.5; a sphere has +0.094
 
 
-def orient(vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str]) -> NDArray[np.int64]:
-    """Faces (F, 3) with consistent winding, facing outwards; cavities keep facing into the hollow."""
-    faces = _make_consistent(vertices, faces, notes)
-    edges = EdgeTable(faces)
+def orient(vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]) -> EdgeTable:
+    """Triangles with consistent winding, facing outwards; cavities keep facing into the hollow."""
+    edges = _make_consistent(vertices, edges, notes)
+    faces = edges.faces
     volume = signed_volumes(vertices, faces, edges.bodies)
     area = _areas(vertices, faces, edges.bodies)
     inward = edges.open_bodies & (volume < _CLEARLY_INWARD * area**1.5)
@@ -25,25 +25,23 @@ def orient(vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[
     root = outermost(vertices, faces, edges.bodies, closed, volume)
     inward[closed] = volume[root] < 0
     if not inward.any():
-        return faces
+        return edges
     notes.append(
         f"turned {counted(int(np.count_nonzero(inward)), 'inside-out body', 'inside-out bodies')} around"
     )
     faces = faces.copy()
     turned = inward[edges.bodies]
     faces[turned] = faces[turned, ::-1]
-    return faces
+    return EdgeTable(faces)
 
 
-def _make_consistent(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str]
-) -> NDArray[np.int64]:
+def _make_consistent(vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]) -> EdgeTable:
     """Flip triangles so that neighbours agree, following the clear majority in the file, else facing out."""
     import igl
 
-    edges = EdgeTable(faces)
+    faces = edges.faces
     if len(edges.inconsistent_faces) == 0:
-        return faces
+        return edges
     affected = np.isin(edges.bodies, np.unique(edges.bodies[edges.inconsistent_faces]))
     old = np.ascontiguousarray(faces[affected])
     new, patch = igl.bfs_orient(old)
@@ -57,7 +55,7 @@ def _make_consistent(
     notes.append(f"turned {counted(flipped, 'triangle')} to face the same way as their neighbours")
     faces = faces.copy()
     faces[affected] = new
-    return faces
+    return EdgeTable(faces)
 
 
 def _facing(vertices: NDArray[np.float64], a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.float64]:

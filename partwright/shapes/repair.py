@@ -64,20 +64,18 @@ def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Surface:
     faces = drop_doubles(faces, notes)
     if len(faces) == 0:
         raise EmptyShapeError("no triangle has any area; export the shape again with its surface")
-    vertices, faces = weld_boundary(vertices, faces, notes)
-    faces = orient(vertices, faces, notes)
+    vertices, edges = weld_boundary(vertices, EdgeTable(faces), notes)
+    edges = orient(vertices, edges, notes)
     confidence = 1.0
-    is_open = EdgeTable(faces).balance.any()
-    if is_open:
-        confidence = _confidence_of_open(vertices, faces)
-        vertices, faces = fill_holes(vertices, faces, notes)
-        is_open = EdgeTable(faces).balance.any()
-    if is_open:
+    if edges.balance.any():
+        confidence = _confidence_of_open(vertices, edges.faces)
+        vertices, edges = fill_holes(vertices, edges, notes)
+    if edges.balance.any():
         notes.append(
             "the surface stays open; inside and outside are told apart by the generalised winding number"
         )
-        return _surface_of_sheets(vertices, faces, notes, confidence, closed=False)
-    return _surface_of_closed(vertices, faces, notes, confidence)
+        return _surface_of_sheets(vertices, edges.faces, notes, confidence, closed=False)
+    return _surface_of_closed(vertices, edges, notes, confidence)
 
 
 def _refuse_plane(vertices: NDArray[np.float64]) -> None:
@@ -91,9 +89,10 @@ def _refuse_plane(vertices: NDArray[np.float64]) -> None:
 
 
 def _surface_of_closed(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str], confidence: float
+    vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str], confidence: float
 ) -> Surface:
-    vertices, faces = unite(vertices, faces, notes)
+    vertices, edges = unite(vertices, edges, notes)
+    faces = edges.faces
     if abs(signed_volumes(vertices, faces, np.zeros(len(faces), np.int64))[0]) < _NO_VOLUME:
         raise FlatShapeError("the surface is closed but encloses no volume; give the sheet a thickness")
     lower, upper = vertices.min(axis=0), vertices.max(axis=0)
@@ -103,7 +102,7 @@ def _surface_of_closed(
     enclosed = winding[winding != 0]
     odd = float((enclosed != 1).mean()) if enclosed.size else 0.0
     if odd == 0.0:
-        faces = _drop_shared_walls(vertices, faces, notes)
+        faces = _drop_shared_walls(vertices, edges, notes)
         return Surface(vertices, faces, faces, True, True, tuple(notes), confidence)
     notes.append(
         f"the surface passes through itself ({odd:.1%} of what it encloses is enclosed twice or inside out); "
@@ -113,14 +112,14 @@ def _surface_of_closed(
 
 
 def _drop_shared_walls(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], notes: list[str]
+    vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
 ) -> NDArray[np.int64]:
     """Drop walls within the shape, where two bodies meet along common edges.
 
     Edges with more than two triangles cut the surface into patches; a patch is a wall when the inside is on
     both sides of its largest triangles.
     """
-    edges = EdgeTable(faces)
+    faces = edges.faces
     if edges.valence.max() == 2:
         return faces
     patch = components(len(faces), *edges.pairs[1].T)

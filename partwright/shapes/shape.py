@@ -28,7 +28,7 @@ from partwright.shapes.sampling import (
     uniform_box,
 )
 from partwright.shapes.source import Piece, Source
-from partwright.shapes.topology import signed_volumes
+from partwright.shapes.topology import compacted, signed_volumes
 from partwright.shapes.units import canonical_unit, canonical_up
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Shape:
         self.input_vertices = np.concatenate([p.vertices for p in pieces])
         self.input_faces = np.concatenate([p.faces + o for p, o in zip(pieces, offsets[:-1], strict=True)])
         self.nodes = tuple(Node(p.name, a, b) for p, a, b in zip(pieces, ends[:-1], ends[1:], strict=True))
-        used, compact = np.unique(self.input_faces, return_inverse=True)
+        used, compact = compacted(self.input_faces, len(self.input_vertices))
         corners = self.input_vertices[used]  # a vertex that no triangle uses may hold anything
         finite = np.isfinite(corners).all(axis=1)
         if not finite.all():
@@ -78,7 +78,7 @@ class Shape:
                 "coordinate; all coordinates must be finite. Export the shape again"
             )
         self.frame = _named(name, lambda: UnitFrame.of(corners))
-        self._surface = _named(name, lambda: repair(self.frame.to_unit(corners), compact.reshape(-1, 3)))
+        self._surface = _named(name, lambda: repair(self.frame.to_unit(corners), compact))
         self.vertices = self.frame.from_unit(self._surface.vertices)
         self.faces = self._surface.faces
         self.repairs = source.repairs + self._surface.repairs

@@ -88,6 +88,13 @@ class EdgeTable:
         return is_open
 
 
+def compacted(faces: NDArray[np.int64], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The vertices (U,) of `count` that faces (F, 3) use, ascending, and the faces numbered by them."""
+    is_used = np.zeros(count, dtype=bool)
+    is_used[faces] = True
+    return np.flatnonzero(is_used), (np.cumsum(is_used) - 1)[faces]
+
+
 def components(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int64]:
     """Connected component (count,) of each node of the graph with edges a[i]-b[i]."""
     from scipy.sparse import coo_matrix
