@@ -132,13 +132,13 @@ def planned(rows: list[Variant], entries: list[Entry]) -> list[tuple[Variant, En
 
 
 def load(path: Path) -> dict[tuple[str, str, str], Run]:
-    """Runs from earlier, by their key."""
+    """Runs from earlier that worked, by their key."""
     if not path.is_file():
         return {}
     with path.open(encoding="utf-8", newline="") as stream:
         records = list(csv.DictReader(stream))
     runs = [Run(**{k: float(v) if k in NUMBERS else v for k, v in record.items()}) for record in records]
-    return {one.key: one for one in runs}
+    return {one.key: one for one in runs if not one.failure}
 
 
 def save(path: Path, runs: dict[tuple[str, str, str], Run]) -> None:
