@@ -30,7 +30,10 @@ _SOLIDS = {
     "cone": "cylinder(r1 = {radius}, r2 = 0, h = {height}, center = true);",
     "frustum": "cylinder(r1 = {bottom_radius}, r2 = {top_radius}, h = {height}, center = true);",
     "sphere": "sphere(r = {radius});",
-    "capsule": "hull() for (end = [-1, 1]) translate([0, 0, end * {height} / 2]) sphere(r = {radius});",
+    "capsule": "hull() {{\n"
+    "            translate([0, 0, {height} / 2]) sphere(r = {radius});\n"
+    "            translate([0, 0, -{height} / 2]) sphere(r = {radius});\n"
+    "        }}",
     "tube": "difference() {{\n"
     "            cylinder(r = {radius}, h = {height}, center = true);\n"
     "            cylinder(r = {radius} - {thickness}, h = 2 * {height}, center = true);\n"

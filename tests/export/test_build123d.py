@@ -1,0 +1,59 @@
+"""build123d runs the source, and its exact volume is ours."""
+
+from __future__ import annotations
+
+import ast
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from partwright.assembly import Assembly, Part
+from partwright.errors import NoSurfaceError, SettingError, UnsupportedFormatError
+from partwright.export import export
+from partwright.fields import Field, Sphere, SuperFrustum
+from tests.export.trees import SOLIDS, flange, lone
+
+
+def run(path: Path):  # type: ignore[no-untyped-def]
+    pytest.importorskip("build123d", reason="build123d is missing: pip install build123d")
+    return runpy.run_path(str(path))["assembly"]
+
+
+@pytest.mark.parametrize(("field", "volume"), SOLIDS.items(), ids=lambda v: getattr(v, "kind", ""))
+def test_named_solids_are_exact(tmp_path: Path, field: Field, volume: float) -> None:
+    assembly = lone(field)
+    export(assembly, tmp_path / "a.build123d.py")
+    solid = run(tmp_path / "a.build123d.py")
+    assert solid.is_valid
+    assert solid.volume == pytest.approx(volume, rel=1e-6)
+    corners = np.array([[tuple(v)] for v in solid.vertices()], dtype=float).reshape(-1, 3)
+    assert np.abs(assembly.distance(corners)).max(initial=0) < 1e-5
+
+
+def test_a_tree_with_hostile_names(tmp_path: Path) -> None:
+    assembly, volume = flange()
+    export(assembly, tmp_path / "flange.build123d.py")
+    assert run(tmp_path / "flange.build123d.py").volume == pytest.approx(volume, rel=1e-6)
+
+
+def test_the_source_reads_well(tmp_path: Path) -> None:
+    export(flange()[0], tmp_path / "flange.build123d.py")
+    text = (tmp_path / "flange.build123d.py").read_text("ascii")
+    functions = [node.name for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)]
+    assert len(functions) == 5
+    assert "BOSS_RADIUS = 0.5  # mm: radius\n" in text
+    assert "unit=bd.Unit.MM" in text
+
+
+def test_a_plain_python_file_is_no_format(tmp_path: Path) -> None:
+    with pytest.raises(UnsupportedFormatError, match=r"'.py' names no format"):
+        export(flange()[0], tmp_path / "flange.py")
+
+
+def test_nothing_to_export_and_unknown_units_are_named(tmp_path: Path) -> None:
+    with pytest.raises(NoSurfaceError, match="nothing to export"):
+        export(Assembly((Part(SuperFrustum((1, 1, 0))),)), tmp_path / "a.build123d.py")
+    with pytest.raises(SettingError, match="parsec"):
+        export(lone(Sphere(1.0), unit="parsec"), tmp_path / "a.build123d.py")
