@@ -28,6 +28,7 @@ from partwright.writing import write_bytes
 if TYPE_CHECKING:
     import trimesh
 
+_VERTICES, _INDICES = 34962, 34963  # glTF's targets of buffer views
 _HALF = math.sqrt(0.5)
 # up axis -> the rotation that turns it to +Y
 _TO_Y_UP = {
@@ -47,9 +48,19 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
     def describe(tree: dict[str, Any]) -> None:
         tree["asset"]["generator"] = f"Partwright {__version__}"
         tree["asset"]["extras"] = _about(assembly)
+        _say_targets(tree)
 
     data = export_glb(_scene(assembly, resolution), include_normals=False, tree_postprocessor=describe)
     write_bytes(path, data)
+
+
+def _say_targets(tree: dict[str, Any]) -> None:
+    """Which buffer views hold vertices and which indices: the glTF validator asks for it."""
+    for primitive in (one for mesh in tree.get("meshes", ()) for one in mesh["primitives"]):
+        accessors = {_VERTICES: primitive["attributes"].values(), _INDICES: (primitive["indices"],)}
+        for target, indices in accessors.items():
+            for index in indices:
+                tree["bufferViews"][tree["accessors"][index]["bufferView"]]["target"] = target
 
 
 def to_gltf(assembly: Assembly) -> Similarity:
@@ -77,7 +88,10 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
         for i, move in enumerate(part.instances, start=2):
             copy = _free_name(f"{part.name}/{i}", taken)
             within = own.inverse().conjugate(move).matrix()
-            scene.graph.update(frame_to=copy, frame_from=part.name, matrix=within, geometry=part.name)
+            extras = {"role": "copy"}
+            scene.graph.update(
+                frame_to=copy, frame_from=part.name, matrix=within, geometry=part.name, metadata=extras
+            )
 
     def add(node: Node, parent: str, pose: np.ndarray, role: str) -> None:
         extras: dict[str, Any] = {"role": role} if role else {}

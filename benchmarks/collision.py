@@ -1,0 +1,249 @@
+"""Collision bodies of one shape, side by side: fitted primitives, CoACD's hulls, and one box a hull.
+
+    python benchmarks/collision.py --shapes FOLDER --names ur5e/forearm,ur5e/wrist_1
+
+Needs MuJoCo and CoACD: pip install mujoco coacd. Each body is dropped five times over onto a plane. The table
+goes to benchmarks/results/collision.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import coacd
+import mujoco
+import numpy as np
+import trimesh
+
+import partwright as pw
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.export.axes import to_metres_z_up
+from partwright.export.mjcf import DENSITY, GEOMS
+from partwright.export.primitives import TOLERANCE, geometries
+from partwright.fields import Box
+from partwright.meshing.mass import MassProperties, mass_properties
+from partwright.shapes import Shape
+from partwright.writing import write_bytes
+
+HERE = Path(__file__).parent
+OWN_SHAPES = HERE.parent / "examples" / "shapes"
+COPIES, STEPS, POINTS = 5, 1000, 200_000
+Inside = Callable[[np.ndarray], np.ndarray]  # points (N, 3), metres -> (N,) bool
+
+
+@dataclass(frozen=True)
+class Body:
+    """Something to collide: `inside` says what it fills, `add` puts its geoms into a MuJoCo body."""
+
+    kind: str
+    pieces: int
+    seconds: float
+    inside: Inside
+    add: Callable[[mujoco.MjSpec, mujoco.MjsBody], None]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One body of one shape. missing, extra: volume that it lacks or adds, over the shape's."""
+
+    shape: str
+    kind: str
+    pieces: int
+    missing: float
+    extra: float
+    step: float
+    contacts: float
+    seconds: float
+    solidity: float
+
+
+def fitted(shape: Shape, max_parts: int | None) -> Body:
+    """Our parts, as the MJCF export has them."""
+    start = time.perf_counter()
+    assembly = pw.fit(shape, max_parts=max_parts, seed=0).assembly
+    local = assembly.transformed(to_metres_z_up(assembly))
+    found, _ = geometries(local, GEOMS, TOLERANCE, 24, convex=True)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "body.mjcf.xml"
+        pw.export(assembly, path)
+        seconds = time.perf_counter() - start
+        spec = mujoco.MjSpec.from_file(str(path))
+
+    def add(target: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
+        for mesh in spec.meshes:
+            target.add_mesh(
+                name=mesh.name, uservert=mesh.uservert, userface=mesh.userface, inertia=mesh.inertia
+            )
+        for geom in spec.geoms:
+            own = {"type": geom.type, "size": geom.size, "pos": geom.pos, "quat": geom.quat}
+            body.add_geom(**own, meshname=geom.meshname)
+
+    tests = [_in_part(g.part) if g.part else _in_hull(g.mesh) for g in found]
+    return Body("primitives", len(found), seconds, _any(tests), add)
+
+
+def hulls(mesh: trimesh.Trimesh) -> tuple[Body, list[trimesh.Trimesh]]:
+    """CoACD's decomposition with its defaults."""
+    start = time.perf_counter()
+    pieces = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces))
+    parts = [trimesh.Trimesh(*piece).convex_hull for piece in pieces]
+    seconds = time.perf_counter() - start
+
+    def add(target: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
+        for i, part in enumerate(parts):
+            shell = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+            vertices, faces = part.vertices.ravel(), part.faces.ravel()
+            target.add_mesh(name=f"hull{i}", uservert=vertices, userface=faces, inertia=shell)
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"hull{i}")
+
+    body = Body("CoACD hulls", len(parts), seconds, _any([_in_hull(part) for part in parts]), add)
+    return body, parts
+
+
+def boxes(parts: list[trimesh.Trimesh], seconds: float) -> Body:
+    """The smallest box around each hull."""
+    start = time.perf_counter()
+    placed = []
+    for part in parts:
+        to_origin, extents = trimesh.bounds.oriented_bounds(part)
+        pose = Similarity.from_matrix(np.linalg.inv(to_origin))
+        x, y, z = extents
+        placed.append(Part(Box((x, y, z)), pose.translation, pose.rotation))
+    seconds += time.perf_counter() - start
+
+    def add(_: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
+        for box in placed:
+            size = np.array(box.field.size) / 2
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=size, pos=box.translation, quat=box.rotation)
+
+    return Body("a box per hull", len(placed), seconds, _any([_in_part(box) for box in placed]), add)
+
+
+def _in_part(part: Part) -> Inside:
+    return lambda points: part.distance(points) < 0
+
+
+def _in_hull(hull: trimesh.Trimesh) -> Inside:
+    normals, origins = hull.face_normals, hull.triangles_center
+    offsets = np.einsum("ij,ij->i", normals, origins)
+
+    def inside(points: np.ndarray) -> np.ndarray:
+        near = ((points > hull.bounds[0]) & (points < hull.bounds[1])).all(axis=1)
+        near[near] = (points[near] @ normals.T < offsets).all(axis=1)
+        return near
+
+    return inside
+
+
+def _any(tests: list[Inside]) -> Inside:
+    return lambda points: np.any([test(points) for test in tests], axis=0)
+
+
+def volume_errors(body: Body, target: Inside, bounds: np.ndarray) -> tuple[float, float]:
+    """Missing and extra volume over the target's, at random points of a box a third larger than its own."""
+    room = np.ptp(bounds, axis=0) / 6
+    points = np.random.default_rng(0).uniform(bounds[0] - room, bounds[1] + room, (POINTS, 3))
+    inside, ours = target(points), body.inside(points)
+    return float((inside & ~ours).sum() / inside.sum()), float((ours & ~inside).sum() / inside.sum())
+
+
+def simulate(body: Body, properties: MassProperties, height: float) -> tuple[float, float]:
+    """Microseconds a step and contacts, means over copies that fall onto a plane and one another."""
+    link = mujoco.MjSpec()
+    root = link.worldbody.add_body(name="link")
+    root.add_freejoint()
+    root.explicitinertial, root.mass = True, properties.mass(DENSITY)
+    root.ipos = properties.centre
+    inertia = properties.inertia * DENSITY
+    root.fullinertia = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    body.add(link, root)
+    scene = mujoco.MjSpec()
+    scene.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 0.1])
+    for i in range(COPIES):
+        frame = scene.worldbody.add_frame(pos=[0.1 * height * (i % 2), 0, 0.1 + (i + 0.6) * height])
+        scene.attach(link.copy(), prefix=f"{i}/", frame=frame)
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    contacts, start = 0, time.perf_counter()
+    for _ in range(STEPS):
+        mujoco.mj_step(model, data)
+        contacts += data.ncon
+    seconds = time.perf_counter() - start
+    if not np.isfinite(data.qpos).all():
+        raise SystemExit(f"{body.kind}: the simulation blew up")
+    return 1e6 * seconds / STEPS, contacts / STEPS
+
+
+def measure(path: Path, name: str, unit: str, max_parts: int | None) -> Iterator[Row]:
+    shape = pw.load_shape(path, unit=unit, up="z")
+    frame = to_metres_z_up(Assembly((Part(Box((1, 1, 1))),), unit=unit, up="z"))
+    mesh = trimesh.Trimesh(frame(shape.vertices), shape.faces, process=False)
+
+    def target(points: np.ndarray) -> np.ndarray:
+        return shape.signed_distance(frame.inverse()(points)) < 0
+
+    ours, (decomposed, parts) = fitted(shape, max_parts), hulls(mesh)
+    height = float(np.linalg.norm(mesh.extents))
+    for body in (ours, decomposed, boxes(parts, decomposed.seconds)):
+        missing, extra = volume_errors(body, target, mesh.bounds)
+        step, contacts = simulate(body, mass_properties(mesh), height)
+        solidity = mesh.volume / mesh.convex_hull.volume
+        yield Row(name, body.kind, body.pieces, missing, extra, step, contacts, body.seconds, solidity)
+
+
+def document(rows: list[Row], command: str) -> str:
+    lines = [
+        "# Collision bodies in MuJoCo",
+        "",
+        f"`{command}`; MuJoCo {mujoco.__version__}, CoACD with its defaults.",
+        "",
+        "Missing and extra: volume that the body lacks or adds, in % of the shape's own. Step time and",
+        f"contacts: means over {STEPS} steps of {COPIES} copies that fall onto a plane and one another.",
+        "Seconds: to make the body from the mesh. Solidity: the shape's volume over its hull's.",
+        "",
+        "| shape | solidity | body | pieces | missing % | extra % | step us | contacts | seconds |",
+        "|---|---:|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for r in rows:
+        volumes = f"{100 * r.missing:.1f} | {100 * r.extra:.1f}"
+        costs = f"{r.step:.0f} | {r.contacts:.1f} | {r.seconds:.1f}"
+        lines.append(f"| {r.shape} | {r.solidity:.2f} | {r.kind} | {r.pieces} | {volumes} | {costs} |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    option = parser.add_argument
+    option("--shapes", type=Path, default=OWN_SHAPES, metavar="FOLDER", help="a folder of PLY meshes")
+    option("--names", default="", metavar="A,B", help="paths within it, without suffix; all if not given")
+    option("--unit", default="m", help="length unit of the meshes (default: %(default)s)")
+    option("--max-parts", type=int, metavar="N", help="of the fit")
+    options = parser.parse_args()
+    paths = {str(p.relative_to(options.shapes).with_suffix("")): p for p in options.shapes.rglob("*.ply")}
+    names = options.names.split(",") if options.names else sorted(paths)
+    if missing := set(names) - set(paths):
+        raise SystemExit(f"{options.shapes} holds no mesh called {', '.join(sorted(missing))}")
+    coacd.set_log_level("error")
+    command = " ".join(
+        ["python benchmarks/collision.py --shapes", options.shapes.name, "--names", ",".join(names)]
+    )
+    command += f" --max-parts {options.max_parts}" if options.max_parts else ""
+    rows: list[Row] = []
+    for name in names:
+        rows += measure(paths[name], name, options.unit, options.max_parts)
+        target = HERE / "results" / "collision.md"
+        write_bytes(target, document(rows, command).encode())
+    print(document(rows, command))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
