@@ -104,6 +104,7 @@ def fit(
     start: Assembly | None = None,
     locked: Sequence[str] = (),
     per_node: bool = False,
+    symmetry: bool = True,
     seed: int = 0,
     device: str = "auto",
     threads: int = 0,
@@ -119,6 +120,7 @@ def fit(
         curve: also keep the assembly of every size from the result's down to one part (`Result.curve`).
         start: an assembly to refine and continue. locked: names of its parts that stay as they are.
         per_node: fit each node of a scene by itself; the assembly's children are named after the nodes.
+        symmetry: where the shape has a mirror plane or a rotation, parts come as repeats (`Part.instances`).
         seed: the same seed gives the same assembly, at any number of threads.
         device: "cpu", "cuda", or "auto": the compiled kernel on the CPU, which needs no other package.
         threads: 0 means one per core.
@@ -141,6 +143,7 @@ def fit(
         max_parts=max_parts,
         min_iou=min_iou,
         curve=curve,
+        symmetry=symmetry,
         seed=seed,
         threads=threads,
         device=device,

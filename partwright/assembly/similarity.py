@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -106,16 +106,16 @@ class Similarity:
 
 
 def rigid_moves(value: Sequence[Similarity], name: str) -> tuple[Similarity, ...]:
-    """`value` as similarities of scale 1.
+    """`value` as similarities of scale 1, but for rounding.
 
     Raises:
         ParameterError: one of them scales, or is something else.
     """
     moves = tuple(value)
     for i, move in enumerate(moves):
-        if not isinstance(move, Similarity) or move.scale != 1.0:
+        if not isinstance(move, Similarity) or abs(move.scale - 1.0) > 1e-9:
             raise ParameterError(f"{name}[{i}]: expected a Similarity of scale 1, got {move!r:.80}")
-    return moves
+    return tuple(move if move.scale == 1.0 else replace(move, scale=1.0) for move in moves)
 
 
 def _quaternion(rotation: np.ndarray) -> Quaternion:

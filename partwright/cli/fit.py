@@ -38,6 +38,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option("--start", metavar="ASSEMBLY", type=Path, help="refine and continue this assembly")
     option("--lock", metavar="NAMES", help="parts of the start that stay as they are, separated by commas")
     option("--per-node", action="store_true", help="fit each node of a scene by itself")
+    option(
+        "--symmetry",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="where the shape is symmetric, parts come as repeats (default: on)",
+    )
     option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
     option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
     option(
@@ -79,6 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
             start=load_assembly(arguments.start) if arguments.start else None,
             locked=[name for name in (arguments.lock or "").split(",") if name],
             per_node=arguments.per_node,
+            symmetry=arguments.symmetry,
             seed=arguments.seed,
             device=arguments.device,
             threads=arguments.threads,

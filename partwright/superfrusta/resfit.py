@@ -9,16 +9,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
-from partwright.assembly import Assembly
+from partwright.assembly import Assembly, Similarity
 from partwright.assembly.rows import parts_from_rows
 from partwright.assembly.rows import rows as rows_of
 from partwright.errors import EmptyShapeError, SettingError
 from partwright.shapes import Shape
+from partwright.superfrusta.constrained import Leaf, expanded
 from partwright.superfrusta.curve import with_parents
 from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.growing import grow
@@ -26,7 +27,9 @@ from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
 from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
 from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimise
+from partwright.superfrusta.repeats import repeat
 from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.symmetry import symmetries
 
 Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"]
 
@@ -96,6 +99,8 @@ def fit(
         with run.timed("prepare"):
             evidence = Evidence.of(shape, settings)
         outcome = run.through(evidence, rows)
+        if settings.symmetry and run.best is not None:
+            run.find_repeats(shape, evidence)
     except KeyboardInterrupt:
         if run.best is None:
             raise
@@ -106,7 +111,10 @@ def fit(
             f"{shape.name}: no part could be placed; the shape has no volume that {settings.near} samples "
             "can see. Check its thickness, or use --quality high"
         )
-    assembly = _assembly(shape, run.best, fixed)
+    leaves = run.leaves or [Leaf(row) for row in run.best]
+    assembly = _assembly(
+        shape, np.stack([leaf.row for leaf in leaves]), fixed, moves=[leaf.moves for leaf in leaves]
+    )
     curve: list[CurvePoint] = []
     for step in run.curve:
         smaller = curve[-1].assembly if curve else None
@@ -137,6 +145,7 @@ class Run:
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
     curve: list[Step] = field(default_factory=list)
+    leaves: list[Leaf] = field(default_factory=list)
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -240,6 +249,16 @@ class Run:
                 steps.append(Step(rows, score(evidence, rows), volume_iou(evidence, rows)))
         self.curve = steps[::-1]
 
+    def find_repeats(self, shape: Shape, evidence: Evidence) -> None:
+        self.enforce_budget(evidence)
+        assert self.best is not None
+        with self.timed("symmetry"):
+            found = symmetries(shape, self.settings)
+            self.leaves = repeat(evidence, self.best, found, self.settings, self.locked)
+            rows = expanded(self.leaves)
+        reached, iou = score(evidence, rows), volume_iou(evidence, rows)
+        self.tell("symmetry", self.settings.rounds, len(self.leaves), reached, iou, 1.0)
+
     def enforce_budget(self, evidence: Evidence) -> None:
         """What an interruption or a fit without thinning left over the part budget goes, without refits."""
         most = self.settings.max_parts
@@ -256,13 +275,16 @@ class Run:
         progressed = objective > self.best_objective + PROGRESS
         if objective > self.best_objective or self.best is None or self.due(evidence, rows, iou):
             self.best, self.best_objective = rows, objective
-        entry: dict[str, float | str] = {"stage": stage, "round": round_, "parts": len(rows)}
+        total = settings.rounds + settings.cycles
+        done = settings.rounds + round_ if stage == "thin" else round_
+        self.tell(stage, round_, len(rows), reached, iou, min(1.0, done / total))
+        return progressed
+
+    def tell(self, stage: str, round_: int, parts: int, reached: float, iou: float, fraction: float) -> None:
+        entry: dict[str, float | str] = {"stage": stage, "round": round_, "parts": parts}
         self.history.append(entry | {"score": reached, "iou": iou})
         if self.report is not None:
-            total = settings.rounds + settings.cycles
-            done = settings.rounds + round_ if stage == "thin" else round_
-            self.report(Progress(stage, round_, settings.rounds, len(rows), iou, min(1.0, done / total)))
-        return progressed
+            self.report(Progress(stage, round_, self.settings.rounds, parts, iou, fraction))
 
     def due(self, evidence: Evidence, rows: Rows, iou: float) -> bool:
         """Whether the best so far misses the part budget or the target, or is larger than it need be."""
@@ -291,17 +313,26 @@ def starting_rows(
     if unknown:
         names = ", ".join(part.name for part in parts)
         raise SettingError(f"no part is named {', '.join(sorted(unknown))}; the start has {names}")
-    fixed = [part for part in parts if part.name in locked]
+    fixed = [copy for part in parts if part.name in locked for copy in part.copies]
     moving = [part for part in parts if part.name not in locked]
     return rows_of(fixed + moving).astype(np.float32), tuple(part.name for part in fixed)
 
 
 def _assembly(
-    shape: Shape, rows: Rows, fixed: Sequence[str] = (), smaller: Assembly | None = None
+    shape: Shape,
+    rows: Rows,
+    fixed: Sequence[str] = (),
+    smaller: Assembly | None = None,
+    moves: Sequence[tuple[Similarity, ...]] = (),
 ) -> Assembly:
-    """Rows as an assembly in the shape's own units; parts name their parent in a smaller assembly."""
+    """Rows as an assembly in the shape's own units; parts name their parent in a smaller assembly.
+
+    moves: those of each part's further copies, if any.
+    """
     names = [*fixed, *(f"part_{i + 1:02d}" for i in range(len(fixed), len(rows)))]
     parts = parts_from_rows(rows, names)
+    if moves:
+        parts = tuple(replace(part, instances=m) for part, m in zip(parts, moves, strict=True))
     whole = Assembly(parts, unit=shape.unit)
     whole = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
     return whole if smaller is None else with_parents(whole, smaller)

@@ -74,7 +74,7 @@ def test_the_same_seed_gives_the_same_bytes_at_any_number_of_threads(tmp_path) -
 @pytest.mark.parametrize("most", [1, 3])
 def test_no_more_parts_than_asked_for(table_shape: Shape, most: int) -> None:
     fitted = draft(table_shape, max_parts=most)
-    assert len(fitted.assembly) == most
+    assert len(fitted.assembly) <= most
     assert fitted.outcome == "budget_reached"
     assert reached(fitted.assembly, table_shape) > {1: 0.4, 3: 0.7}[most]
 

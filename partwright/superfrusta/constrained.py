@@ -1,0 +1,156 @@
+"""Least squares over repeated parts: the copies of a leaf move together, as its isometries say."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.assembly import Similarity
+from partwright.fields import kernel
+from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta.refining import LIMITS, Stages, freedom, penalties, sharpened
+from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.symmetry import Isometry
+
+Floats = NDArray[np.float64]
+
+_WIDTH = len(kernel.DERIVATIVES)
+_SX, _SZ, _BULGE = (kernel.COLUMNS.index(name) for name in ("sx", "sz", "bulge"))
+# A SuperFrustum is symmetric in its local y: a mirrored one is the same field in another rigid pose.
+_FLIP = np.diag([1.0, -1.0, 1.0])
+_SETTLED = 3e-4  # relative fall of the loss that ends a stage
+_DAMPING, _CALM, _HARSH = 1e-2, 0.3, 5.0
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """A parameter row (16,) and the isometries that make its further copies."""
+
+    row: NDArray[np.float32]
+    isometries: tuple[Isometry, ...] = ()
+
+    @property
+    def rows(self) -> Rows:
+        """(1 + copies, 16), the leaf itself first."""
+        return np.stack([self.row, *(image(self.row, isometry) for isometry in self.isometries)])
+
+    @property
+    def moves(self) -> tuple[Similarity, ...]:
+        """The copies' rigid moves: what `Part.instances` holds."""
+        return tuple(rigid(self.row, isometry) for isometry in self.isometries)
+
+
+def rigid(row: NDArray[np.float32], isometry: Isometry) -> Similarity:
+    """The rigid move that takes a part to its image; an improper isometry is made up for by a local flip."""
+    pose = _pose(row)
+    linear = isometry.linear
+    if isometry.improper:
+        turn = pose.matrix()[:3, :3]
+        linear = linear @ turn @ _FLIP @ turn.T
+    place = np.array(pose.translation)
+    moved = isometry(place[None])[0]
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = linear, moved - linear @ place
+    return Similarity.from_matrix(matrix)
+
+
+def image(row: NDArray[np.float32], isometry: Isometry) -> NDArray[np.float32]:
+    """The row (16,) of a part's image."""
+    placed = rigid(row, isometry) @ _pose(row)
+    return np.array([*placed.translation, *placed.rotation, *row[7:]], dtype=np.float32)
+
+
+def expanded(leaves: Sequence[Leaf]) -> Rows:
+    """Rows of all copies, leaf by leaf."""
+    return np.concatenate([leaf.rows for leaf in leaves])
+
+
+def refit(
+    evidence: Evidence, leaves: Sequence[Leaf], stages: Stages, settings: Settings, locked: int = 0
+) -> list[Leaf]:
+    """Minimises the losses of `refine` over the leaves, all copies of each moving as one.
+
+    The kernel's normal equations of all copies are projected onto the leaves' parameters; the damped steps
+    are those of Levenberg and Marquardt. The first `locked` leaves stay.
+    """
+    leaves = list(leaves)
+    target = evidence.target(evidence.training)
+    moving = np.arange(len(leaves)) >= locked
+    free = freedom(moving, settings).ravel()
+    damping, quality, threads = _DAMPING, penalties(settings), settings.threads
+    for beta, iterations in sharpened(stages, evidence.thickness):
+        for _ in range(int(iterations)):
+            rows = expanded(leaves)
+            loss, gradient, matrix = kernel.normal_equations(rows, target, float(beta), quality, threads)
+            gradient, matrix = _projected(leaves, gradient, matrix)
+            step = _damped(gradient, matrix, free, damping)
+            moved = [
+                _moved(leaf, s) if moves else leaf
+                for leaf, s, moves in zip(leaves, step, moving, strict=True)
+            ]
+            fallen = loss - kernel.loss(expanded(moved), target, float(beta), quality, threads)
+            if fallen <= 0:
+                damping *= _HARSH
+                continue
+            leaves, damping = moved, max(damping * _CALM, 1e-6)
+            if fallen < _SETTLED * loss:
+                break
+    return leaves
+
+
+def _projected(leaves: Sequence[Leaf], gradient: Floats, matrix: Floats) -> tuple[Floats, Floats]:
+    """P^T g and P^T H P, where P takes steps of the leaves to steps of their copies."""
+    count = sum(1 + len(leaf.isometries) for leaf in leaves)
+    lift = np.zeros((count, _WIDTH, len(leaves), _WIDTH))
+    at = 0
+    for i, leaf in enumerate(leaves):
+        for block in [np.eye(_WIDTH), *(_lifted(isometry) for isometry in leaf.isometries)]:
+            lift[at, :, i] = block
+            at += 1
+    flat = lift.reshape(count * _WIDTH, -1)
+    return flat.T @ gradient, flat.T @ matrix @ flat
+
+
+def _lifted(isometry: Isometry) -> Floats:
+    """(15, 15) a copy's step by the leaf's: the place moves in the world, the turn is about local axes."""
+    block = np.eye(_WIDTH)
+    block[:3, :3] = isometry.linear
+    if isometry.improper:
+        block[3:6, 3:6] = -_FLIP  # exp(v) becomes F exp(v) F = exp(det(F) F v)
+    return block
+
+
+def _damped(gradient: Floats, matrix: Floats, free: NDArray[np.bool_], damping: float) -> Floats:
+    """Steps (L, 15)."""
+    index = np.flatnonzero(free)
+    damped = matrix[np.ix_(index, index)]
+    damped[np.diag_indices_from(damped)] += damping * (np.diagonal(damped) + 1e-6) + 1e-9
+    step = np.zeros(len(gradient))
+    step[index] = np.linalg.solve(damped, -gradient[index])
+    return step.reshape(-1, _WIDTH)
+
+
+def _moved(leaf: Leaf, step: Floats) -> Leaf:
+    """The leaf after a step (15,), clipped, within bounds."""
+    lower, upper, longest = LIMITS.array().astype(np.float64)
+    step = np.clip(step, -longest, longest)
+    row = leaf.row.astype(np.float64)
+    row[:3] += step[:3]
+    angle = float(np.linalg.norm(step[3:6]))
+    half = np.sinc(angle / (2 * math.pi)) / 2
+    turn = Similarity(1.0, (math.cos(angle / 2), *(half * step[3:6]).tolist()))
+    row[3:7] = (_pose(leaf.row) @ turn).rotation
+    row[7:] = np.clip(row[7:] + step[6:], lower[6:], upper[6:])
+    # An arc tighter than half the section's width folds through its own centre.
+    tightest = math.asin(min(1.0, row[_SZ] / max(row[_SX], 1e-6))) / (math.pi / 2)
+    row[_BULGE] = min(row[_BULGE], tightest)
+    return Leaf(row.astype(np.float32), leaf.isometries)
+
+
+def _pose(row: NDArray[np.float32]) -> Similarity:
+    values = [float(v) for v in row[:7]]
+    return Similarity(1.0, (values[3], values[4], values[5], values[6]), (values[0], values[1], values[2]))

@@ -1,0 +1,121 @@
+"""Repeats: parts that a symmetry of the shape takes to one another become one leaf with several instances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.superfrusta.constrained import Leaf, expanded, image, refit
+from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta.objective import score, volume_iou
+from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.symmetry import Isometry, Symmetry, groups
+
+_EVERY = 6  # samples that matching looks at
+_SELF = 0.5  # IoU from which a part and its image are the same place
+_COVERED = 0.6  # share of a part within the images of another from which they replace it
+_TRIED = 24  # repeats that are scored
+_LOSS = 0.01  # of R: a repeat that costs more before a refit is not tried
+_TOLERANCE = 2e-3  # of R, and of IoU, that all repeats together may cost
+_REFIT = ((100.0, 12),)
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """Part `base` with its images in place of the parts `replaced`."""
+
+    base: int
+    isometries: tuple[Isometry, ...]
+    replaced: frozenset[int]
+
+
+def repeat(
+    evidence: Evidence, rows: Rows, found: Sequence[Symmetry], settings: Settings, locked: int = 0
+) -> list[Leaf]:
+    """The assembly as leaves, of which those that repeat under the symmetries are one each.
+
+    Repeats that replace the most parts come first. Together they cost at most 2e-3 of R and of IoU: where
+    they cost more, the copies of each leaf are refitted as one, and if that is not enough the costliest
+    repeats are given up. An IoU that the settings ask for is kept. The first `locked` rows stay leaves of
+    their own.
+    """
+    reached = _measures(evidence, rows)
+    least = reached - _TOLERANCE
+    if settings.min_iou is not None:
+        least[1] = max(least[1], min(reached[1], settings.min_iou))
+
+    def good(leaves: list[Leaf]) -> bool:
+        return bool((_measures(evidence, expanded(leaves)) >= least).all())
+
+    wanted = candidates(evidence, rows, groups(found), locked)
+    chosen = _chosen(evidence, rows, wanted)
+    leaves = _leaves(rows, chosen)
+    if good(leaves):
+        return leaves
+    leaves = refit(evidence, leaves, _REFIT, settings, locked)
+    if good(leaves):
+        return leaves
+    kept: list[Repeat] = []
+    for one in chosen:
+        if good(_leaves(rows, [*kept, one])):
+            kept.append(one)
+    return _leaves(rows, kept)
+
+
+def _measures(evidence: Evidence, rows: Rows) -> NDArray[np.float64]:
+    return np.array([score(evidence, rows), volume_iou(evidence, rows)])
+
+
+def candidates(
+    evidence: Evidence, rows: Rows, found: Sequence[tuple[Isometry, ...]], locked: int
+) -> list[Repeat]:
+    """Repeats that would replace parts, those that replace the most first."""
+    points = evidence.points[::_EVERY]
+    parts = evidence.parts_of(rows, points) < 0
+    sizes = np.maximum(parts.sum(axis=1), 1)
+    result = []
+    for group in found:
+        for base in range(locked, len(rows)):
+            images = evidence.parts_of(np.stack([image(rows[base], g) for g in group]), points) < 0
+            distinct = _distinct(parts[base], images)
+            covered = images[distinct].any(axis=0) if distinct else np.zeros(len(points), bool)
+            share = (parts & covered).sum(axis=1) / sizes
+            share[:locked] = share[base] = 0
+            replaced = frozenset(np.flatnonzero(share > _COVERED).tolist())
+            if replaced:
+                result.append(Repeat(base, tuple(group[i] for i in distinct), replaced))
+    return sorted(result, key=lambda r: (-len(r.replaced), len(r.isometries)))
+
+
+def _distinct(base: NDArray[np.bool_], images: NDArray[np.bool_]) -> list[int]:
+    """Images (K, N) that are neither where the part itself is nor where an earlier one is."""
+    kept: list[int] = []
+    for i, one in enumerate(images):
+        others = np.concatenate([base[None], images[kept]])
+        both, either = (others & one).sum(axis=1), (others | one).sum(axis=1)
+        if (both < _SELF * either).all():
+            kept.append(i)
+    return kept
+
+
+def _chosen(evidence: Evidence, rows: Rows, wanted: list[Repeat]) -> list[Repeat]:
+    """Repeats that get along, those first that cost least of R before a refit."""
+    whole = score(evidence, rows)
+    priced = [(whole - score(evidence, expanded(_leaves(rows, [one]))), one) for one in wanted[:_TRIED]]
+    chosen: list[tuple[float, Repeat]] = []
+    taken: set[int] = set()
+    for cost, one in sorted(priced, key=lambda entry: (-len(entry[1].replaced), entry[0])):
+        involved = {one.base, *one.replaced}
+        if cost <= _LOSS and not taken & involved:
+            chosen.append((cost, one))
+            taken |= involved
+    return [one for _, one in sorted(chosen, key=lambda entry: entry[0])]
+
+
+def _leaves(rows: Rows, repeats: Sequence[Repeat]) -> list[Leaf]:
+    gone = frozenset[int]().union(*(r.replaced for r in repeats))
+    isometries = {r.base: r.isometries for r in repeats}
+    return [Leaf(row, isometries.get(i, ())) for i, row in enumerate(rows) if i not in gone]

@@ -1,0 +1,237 @@
+"""Mirror planes and rotation axes of a shape, found in its distance grid and verified by its own distance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.shapes import Shape
+from partwright.shapes.grid import DistanceGrid
+from partwright.superfrusta.settings import Settings
+
+Floats = NDArray[np.float64]
+
+TOLERANCE = 3e-3  # unit lengths: mean distance from the surface to its own image
+_PROMISING = 0.06  # mean distance before refinement
+_ORDERS = range(2, 13)
+_SAMPLES, _VERIFY_EVERY = 400, 4
+_EXACT = 1e-3  # mean distance that needs no refinement
+_STEPS, _WIDTH = 3, 0.01  # of Gauss-Newton; its difference quotients, about half a voxel
+_ALIKE = 0.15  # relative difference of second moments under which their axes are arbitrary
+_ACROSS = 0.1  # cosine
+_FAN = 12  # mirror planes through such an axis that are tried
+_SAME = 0.03  # difference of matrices and shifts under which two isometries count as one
+
+
+@dataclass(frozen=True)
+class Isometry:
+    """The map p -> linear @ p + shift, linear (3, 3) orthogonal: rigid or, at determinant -1, mirroring."""
+
+    linear: Floats
+    shift: Floats
+
+    def __call__(self, points: NDArray[np.floating]) -> Floats:
+        """Points (N, 3) moved, in float64."""
+        return np.asarray(np.einsum("ij,nj->ni", self.linear, points) + self.shift)
+
+    def __matmul__(self, first: Isometry) -> Isometry:
+        """`first`, then this one."""
+        return Isometry(self.linear @ first.linear, self.linear @ first.shift + self.shift)
+
+    def inverse(self) -> Isometry:
+        return Isometry(self.linear.T, -self.linear.T @ self.shift)
+
+    @property
+    def improper(self) -> bool:
+        return bool(np.linalg.det(self.linear) < 0)
+
+    def near(self, other: Isometry) -> bool:
+        """Whether both do the same, but for what a refinement may leave."""
+        apart = max(np.abs(self.linear - other.linear).max(), np.abs(self.shift - other.shift).max())
+        return bool(apart < _SAME)
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """A mirror plane, or an axis of rotation by 1/order of a turn; unit frame.
+
+    axis: the plane's normal or the direction of the axis, unit length. centre: a point on it. error: mean
+    distance from the shape's surface to its image.
+    """
+
+    kind: Literal["mirror", "rotation"]
+    order: int
+    isometry: Isometry
+    error: float
+
+    @property
+    def axis(self) -> Floats:
+        eigenvalue = -1.0 if self.kind == "mirror" else 1.0
+        _, _, v = np.linalg.svd(self.isometry.linear - eigenvalue * np.eye(3))
+        return np.asarray(v[2])
+
+    @property
+    def centre(self) -> Floats:
+        return _fixed_point(self.isometry)
+
+
+def symmetries(shape: Shape, settings: Settings, tolerance: float = TOLERANCE) -> tuple[Symmetry, ...]:
+    """The shape's symmetries in the unit frame, the most exact first; none where it has none.
+
+    Candidates are the principal axes and the world's axes and diagonals through the centre of volume; each is
+    refined by Gauss-Newton on the distances of the moved surface samples.
+    """
+    grid = shape.unit_grid(settings.resolution)
+    points = shape.unit_surface(_SAMPLES, settings.seed).points.astype(np.float64)
+    inside = grid.points()[grid.values.ravel() < 0]
+    if not len(inside):
+        return ()
+    centre = inside.mean(axis=0)
+    moments, principal = np.linalg.eigh(np.einsum("ni,nj->ij", inside - centre, inside - centre))
+    axes = _axes(principal)
+    found: list[Symmetry] = []
+
+    def consider(kind: Literal["mirror", "rotation"], order: int, candidate: Isometry) -> Isometry | None:
+        if _error(grid, candidate, points) > _PROMISING:
+            return None
+        refined = _refined(grid, candidate, points)
+        if any(s.isometry.near(refined) for s in found):
+            return refined
+        if _error(grid, refined, points) > 2 * tolerance:
+            return None
+        image = refined(points[::_VERIFY_EVERY]).astype(np.float32)
+        error = float(np.abs(shape.unit_distance(image)).mean())
+        if error > tolerance:
+            return None
+        found.append(Symmetry(kind, order, refined, error))
+        return refined
+
+    for normal in axes:
+        consider("mirror", 2, mirror(normal, centre))
+    for fan in _fans(moments, principal):
+        if not any(s.kind == "mirror" and abs(s.axis @ fan[0]) < _ACROSS for s in found):
+            # One of them is enough: products with rotations are the others.
+            next((m for n in fan[1:] if (m := consider("mirror", 2, mirror(n, centre)))), None)
+    for axis in axes:
+        through = centre
+        for order in _ORDERS:
+            accepted = consider("rotation", order, rotation(axis, 2 * math.pi / order, through))
+            if accepted is not None:
+                through = _fixed_point(accepted, near=centre)
+    return tuple(sorted(found, key=lambda s: s.error))
+
+
+def mirror(normal: Floats, point: Floats) -> Isometry:
+    """Reflection in the plane through `point` with a unit normal."""
+    return Isometry(np.eye(3) - 2 * np.outer(normal, normal), 2 * normal * (normal @ point))
+
+
+def rotation(axis: Floats, angle: float, point: Floats) -> Isometry:
+    """Rotation by `angle` about the unit axis through `point` (Rodrigues)."""
+    linear = _turn(axis * angle)
+    return Isometry(linear, point - linear @ point)
+
+
+def groups(found: Sequence[Symmetry], most: int = 24) -> list[tuple[Isometry, ...]]:
+    """Sets of isometries under which a part may repeat: what all mirrors generate together, and what each
+    symmetry does alone. Sets of more than `most` are left out, and so is the identity."""
+    cyclic = [_generated([s.isometry], most) for s in found]
+    mirrors = [s.isometry for s in found if s.kind == "mirror"]
+    together = [_generated(mirrors, most)] if len(mirrors) > 1 else []
+    return [group for group in [*together, *cyclic] if group]
+
+
+def _generated(generators: list[Isometry], most: int) -> tuple[Isometry, ...]:
+    """All products but the identity; none if there are more than `most`."""
+    elements = [Isometry(np.eye(3), np.zeros(3))]
+    for element in elements:  # grows on the way
+        for generator in generators:
+            product = generator @ element
+            if not any(product.near(known) for known in elements):
+                elements.append(product)
+        if len(elements) > most:
+            return ()
+    return tuple(elements[1:])
+
+
+def _axes(principal: Floats) -> list[Floats]:
+    """Unit directions (3,): principal axes, the world's axes and the diagonals between them, none twice."""
+    world = np.eye(3)
+    diagonals = [
+        (world[i] + sign * world[j]) / math.sqrt(2) for i, j in ((0, 1), (1, 2), (0, 2)) for sign in (1, -1)
+    ]
+    kept: list[Floats] = []
+    for direction in [*world, *principal.T, *diagonals]:
+        if all(abs(direction @ other) < math.cos(math.radians(2)) for other in kept):
+            kept.append(np.asarray(direction))
+    return kept
+
+
+def _fans(moments: Floats, principal: Floats) -> Iterator[Floats]:
+    """Where principal axes are arbitrary, as across an axis of revolution: (1 + K, 3) that axis, and
+    directions across it."""
+    for i, j, along in ((0, 1, 2), (1, 2, 0)):
+        if moments[j] - moments[i] < _ALIKE * moments[j]:
+            angle = np.arange(_FAN)[:, None] * math.pi / _FAN
+            across = np.cos(angle) * principal[:, i] + np.sin(angle) * principal[:, j]
+            yield np.concatenate([principal[None, :, along], across])
+
+
+def _error(grid: DistanceGrid, isometry: Isometry, points: Floats) -> float:
+    return float(np.abs(_sampled(grid, isometry(points))).mean())
+
+
+def _sampled(grid: DistanceGrid, points: Floats) -> Floats:
+    """Distance (N,) interpolated in the grid; beyond it, at least the way there."""
+    from scipy.ndimage import map_coordinates
+
+    cell = (points - grid.origin) / grid.spacing
+    within = np.clip(cell, 0, np.array(grid.values.shape) - 1)
+    values = map_coordinates(grid.values, within.T, order=1, mode="nearest")
+    return np.asarray(values + grid.spacing * np.linalg.norm(cell - within, axis=1), np.float64)
+
+
+def _refined(grid: DistanceGrid, isometry: Isometry, points: Floats) -> Isometry:
+    """The conjugate E T E^-1 under a small rigid motion E that brings the image of the surface closest to it.
+
+    Conjugation keeps what T is: a mirror stays one, a rotation keeps its angle.
+    """
+    for _ in range(_STEPS):
+        residual = _sampled(grid, isometry(points))
+        if np.abs(residual).mean() < _EXACT:
+            break
+        nudged = [_conjugated(isometry, _WIDTH * unit) for unit in np.eye(6)]
+        jacobian = np.stack([(_sampled(grid, n(points)) - residual) / _WIDTH for n in nudged], axis=1)
+        step = np.linalg.lstsq(jacobian, -residual, rcond=0.05)[0]
+        better = _conjugated(isometry, np.clip(step, -0.1, 0.1))
+        if np.abs(_sampled(grid, better(points))).mean() >= np.abs(residual).mean():
+            break
+        isometry = better
+    return isometry
+
+
+def _conjugated(isometry: Isometry, twist: Floats) -> Isometry:
+    motion = Isometry(_turn(twist[:3]), twist[3:])
+    return motion @ isometry @ motion.inverse()
+
+
+def _turn(vector: Floats) -> Floats:
+    """Rotation matrix (3, 3) of a rotation vector."""
+    angle = float(np.linalg.norm(vector))
+    if angle < 1e-12:
+        return np.eye(3)
+    x, y, z = vector / angle
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)
+
+
+def _fixed_point(isometry: Isometry, near: Floats | None = None) -> Floats:
+    """The fixed point nearest to `near` (the origin)."""
+    start = np.zeros(3) if near is None else near
+    missing = isometry.shift - (start - isometry.linear @ start)
+    return np.asarray(start + np.linalg.pinv(np.eye(3) - isometry.linear, rcond=1e-6) @ missing)
