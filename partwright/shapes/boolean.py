@@ -77,7 +77,7 @@ def _manifold(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Any:
 
 
 def _boolean_union(solids: list[Any]) -> tuple[NDArray[np.float64], EdgeTable] | None:
-    """Vertices and triangles of the union, or None where a body is not manifold or the result is not closed."""
+    """Vertices and triangles of the union, or None where a body is not manifold or the result is open."""
     import manifold3d
 
     if any(solid.status() != manifold3d.Error.NoError for solid in solids):

@@ -103,7 +103,7 @@ def test_unit_aliases(name, short):
 
 def test_unknown_suffix_lists_what_is_read(tmp_path):
     with pytest.raises(UnsupportedFormatError, match=r"\.obj, \.ply"):
-        load_shape(tmp_path / "part.step")
+        load_shape(tmp_path / "part.dwg")
 
 
 def test_missing_empty_and_folder(tmp_path):
