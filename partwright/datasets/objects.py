@@ -31,24 +31,22 @@ def table_lamp() -> trimesh.Trimesh:
 
 
 def chair() -> trimesh.Trimesh:
-    """88 cm high: four splayed tapered legs, a soft seat, and a leaning back of three slats under a rail."""
+    """88 cm high: four splayed tapered legs, a soft seat, and a leaning ladder back."""
     leg = rod(47, 1.5, 2.6).translate((0, 0, -47)).rotate((-6, 6, 0)).translate((17, 17, 45))
     leg = leg.trim_by_plane((0, 0, 1), 0)
     side = leg + leg.mirror((0, 1, 0))
     seat = pebble(46, 46, 5, 2.2).translate((0, 0, 46))
     post = rod(40, 1.9, 1.5).translate((17.5, 0, 0))
-    slat = bar(4.2, 1.3, 36).translate((0, 0, 20))
+    slat = bar(36, 1.5, 5)
     rail = pebble(42, 3.4, 9, 1.6).translate((0, 0, 38))
-    back = (
-        post + post.mirror((1, 0, 0)) + slat + slat.translate((9, 0, 0)) + slat.translate((-9, 0, 0)) + rail
-    )
+    back = post + post.mirror((1, 0, 0)) + slat.translate((0, 0, 13)) + slat.translate((0, 0, 24)) + rail
     return to_mesh(side + side.mirror((1, 0, 0)) + seat + back.rotate((-10, 0, 0)).translate((0, 18, 46)))
 
 
 def mug() -> trimesh.Trimesh:
     """A mug of 0.3 l, hollow, with a rolled rim and a round handle on the right."""
     body = (
-        rod(9.5, 3.9, 4.3) + ring(4.12, 0.27).translate((0, 0, 9.5)) + ring(3.75, 0.4).translate((0, 0, 0.4))
+        rod(9.5, 3.9, 4.3) + ring(4.12, 0.36).translate((0, 0, 9.5)) + ring(3.75, 0.4).translate((0, 0, 0.4))
     )
     cavity = rod(9.6, 3.45, 3.85).translate((0, 0, 0.6))
     handle = ring(2.6, 0.62).rotate((90, 0, 0)).scale((1, 1, 1.18)).translate((4.7, 0, 4.9))
@@ -75,15 +73,18 @@ def toy_robot() -> trimesh.Trimesh:
 
 
 def bracket() -> trimesh.Trimesh:
-    """A shaft bracket 12 cm wide: a base plate with two bolt holes, a bored boss on a wall, and two ribs."""
-    base = plate(12, 6, 1.2, 1.4)
-    bolt = rod(3, 0.55).translate((4.6, 0, -1)) + rod(1, 1.0).translate((4.6, 0, 0.9))
+    """A shaft bracket 14 cm wide: a base with an eye at either end, a bored boss on a wall, and two ribs."""
+    base = plate(9.6, 5.4, 1.2, 0.6)
+    eye = rod(1.6, 1.9).translate((5.2, 0, 0))
+    hole = rod(9, 0.85).translate((5.2, 0, -1))
     wall = bar(5.2, 1.6, 6).translate((0, 0, 4)) + _forward(rod(1.6, 2.6)).translate((0, 0.8, 7))
     boss = _forward(rod(4.4, 1.9)).translate((0, 2.2, 7))
     bore = _forward(rod(8, 1.15)).translate((0, 4, 7))
     rib = (bar(0.9, 4, 4).rotate((45, 0, 0)) ^ bar(1, 5, 3).translate((0, 0, 1.5))).translate((0, 0, 1.2))
     ribs = rib.translate((1.8, 0, 0)) + rib.translate((-1.8, 0, 0))
-    return to_mesh(base + wall + boss + ribs - bolt - bolt.mirror((1, 0, 0)) - bore)
+    return to_mesh(
+        base + eye + eye.mirror((1, 0, 0)) + wall + boss + ribs - hole - hole.mirror((1, 0, 0)) - bore
+    )
 
 
 def _forward(solid: Manifold) -> Manifold:
