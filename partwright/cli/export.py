@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.export import WRITERS
+
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
         "export",
         help="write an assembly in another format",
-        description="Writes an assembly in the format of FILE's suffix: .json, .glb, .ply, .stl, .obj.",
+        description=f"Writes an assembly in the format of FILE's suffix: {', '.join(WRITERS)}.",
     )
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     command.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="where to write")

@@ -7,7 +7,6 @@ modifier each; where parts blend, a remesh modifier skins it and a smooth modifi
 
 from __future__ import annotations
 
-import json
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,14 +25,12 @@ from partwright.writing import write_bytes
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    import trimesh
-
-_DIGITS = 6  # of mesh coordinates, relative to the part's size
+_DIGITS = 6  # of mesh coordinates
 _VOXELS = 256  # of a blended skin along the longest side
-_ENTRIES = ("size", "roundness", "dilation", "taper", "bulge", "onion")
+_PARAMETERS = ("size", "roundness", "dilation", "taper", "bulge", "onion")
 
 
-def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
+def write(assembly: Assembly, path: str | Path, resolution: int = 24) -> None:
     """Write the script; `resolution` is the number of cells along each part's mesh.
 
     Raises:
@@ -43,28 +40,35 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
     """
     expanded = assembly.expanded()
     colours = dict(zip((part.name for part in expanded.parts), palette(len(expanded)).tolist(), strict=True))
-    parts = [entry for part in expanded.parts for entry in _entry(part, colours[part.name], resolution)]
-    if not parts:
+    meshes = {part.name: mesh for part in expanded.parts for mesh in _mesh(part, resolution)}
+    if not meshes:
         raise NoSurfaceError("nothing to export: no part has a surface at this resolution")
-    there = {entry["name"] for entry in parts}
+    parts = [_entry(part, colours[part.name]) for part in expanded.parts if part.name in meshes]
     lines = [
         f"# {comment(assembly.name) or 'Assembly'}: {len(parts)} parts, for Blender 3.4 or later.",
         "# Run it by: blender -P FILE, or from Blender's text editor.",
         "",
-        f"NAME = {json.dumps(assembly.name or 'Assembly')}",
-        f"UNIT = {json.dumps(assembly.unit)}  # of all numbers below",
+        f"NAME = {_literal(assembly.name or 'Assembly')}",
+        f"UNIT = {_literal(assembly.unit)}  # of all numbers below",
         f"SMALLEST_VOXEL = {_longest(assembly) / _VOXELS:.6g}  # of the blended skin",
         f"METRES_PER_UNIT = {METRES[canonical_unit(assembly.unit)] if assembly.unit else 1.0!r}",
         "",
-        "# Lengths in UNIT; rotation is a quaternion (w, x, y, z); the mesh is in the part's own frame.",
+        "# Lengths in UNIT; rotation is a quaternion (w, x, y, z). Meshes, in the parts' own frames, are last.",
         "PARTS = [",
         *(f"    {_literal(entry)}," for entry in parts),
         "]",
         "",
         "# (operation, children): a child is a part's name, or a pair like this one.",
-        f"TREE = {_literal(_tree(expanded, there))}",
+        f"TREE = {_literal(_tree(expanded, set(meshes)))}",
         "",
         files("partwright.export").joinpath("blender_scene.txt").read_text("utf-8"),
+        "# name: (vertices, faces)",
+        "MESHES = {",
+        *(f"    {_literal(name)}: {_literal(mesh)}," for name, mesh in meshes.items()),
+        "}",
+        "",
+        "main()",
+        "",
     ]
     write_bytes(path, "\n".join(lines).encode())
 
@@ -73,28 +77,28 @@ def _longest(assembly: Assembly) -> float:
     return float(np.ptp(assembly.bounds(), axis=0).max())
 
 
-def _entry(part: Part, colour: list[int], resolution: int) -> Iterator[dict[str, Any]]:
-    """Nothing for a part without volume, which only shows where it blends."""
+def _mesh(part: Part, resolution: int) -> Iterator[tuple[list[list[float]], list[list[int]]]]:
+    """Vertices and faces in the part's own frame; nothing for a part without volume, which only blends."""
     try:
         mesh = mesh_part(Part(part.field), resolution)
     except NoSurfaceError:
         return
+    digits = f".{_DIGITS}g"
+    vertices = [[float(format(x, digits)) for x in vertex] for vertex in mesh.vertices.tolist()]
+    yield vertices, mesh.faces.tolist()
+
+
+def _entry(part: Part, colour: list[int]) -> dict[str, Any]:
     f = as_superfrustum(part.field)
-    yield {
+    return {
         "name": part.name,
         "colour": [round(channel / 255, 4) for channel in colour],
         "location": list(part.translation),
         "rotation": list(part.rotation),
         "kind": part.field.kind,
         "blend": part.blend,
-        **{name: list(v) if isinstance(v := getattr(f, name), tuple) else v for name in _ENTRIES},
-        "vertices": _vertices(mesh),
-        "faces": mesh.faces.tolist(),
+        **{name: list(v) if isinstance(v := getattr(f, name), tuple) else v for name in _PARAMETERS},
     }
-
-
-def _vertices(mesh: trimesh.Trimesh) -> list[list[float]]:
-    return [[float(f"{x:.{_DIGITS}g}") for x in vertex] for vertex in mesh.vertices.tolist()]
 
 
 def _tree(node: Node, there: set[str]) -> Any:

@@ -51,11 +51,12 @@ def test_the_script_is_plain_python_that_needs_no_other_file(tmp_path: Path) -> 
     assert data["NAME"] == "Flansch ä"
 
 
-def test_blender_builds_the_solid(tmp_path: Path) -> None:
+@pytest.mark.parametrize("unit", ["mm", None])
+def test_blender_builds_the_solid(tmp_path: Path, unit: str | None) -> None:
     blender = shutil.which("blender")
     if blender is None:
         pytest.skip("blender is missing (Debian: blender)")
-    assembly, volume = flange()
+    assembly, volume = flange(unit)
     export(assembly, tmp_path / "a.blender.py", resolution=48)
     (tmp_path / "measure.py").write_text(_MEASURE)
     command = [blender, "-b", "--factory-startup", "--python-exit-code", "3"]
