@@ -52,10 +52,10 @@ def panels(name: str) -> list[np.ndarray]:
 
 def main() -> int:
     options = parser().parse_args()
-    images = [image for name in SHAPES for image in panels(name)]
-    page = Image.fromarray(sheet(images, columns=3 * COLUMNS))
-    small = page.quantize(256, dither=Image.Dither.NONE)
-    write(options.output, lambda name: small.save(name, format="PNG", optimize=True))
+    page = sheet([image for name in SHAPES for image in panels(name)], columns=3 * COLUMNS)
+    heads = [((i + 0.5) * PANEL, 14, text) for i, text in enumerate(("input", "parts", "surface") * COLUMNS)]
+    picture = Image.fromarray(draw_text(page, heads, size=15, colour=SOFT_INK))
+    write(options.output, lambda name: picture.save(name, format="PNG", optimize=True))
     return 0
 
 

@@ -36,7 +36,7 @@ DOCS = HERE.parent / "docs"
 COUNT = 12
 PANEL = (300, 300)
 LARGEST = 150_000  # bytes a picture
-STEPS, FARTHEST = 120, 0.36  # along which a wall's far side is looked for, unit frame
+STEPS = np.geomspace(0.002, 0.36, 120)  # along which a wall's far side is looked for, unit frame
 
 
 @dataclass(frozen=True)
@@ -87,10 +87,9 @@ def worst_by_fitting(entries: list[Entry]) -> list[Entry]:
 def wall_thickness(shape: Shape) -> float:
     """Straight inwards from the surface to the other side: what 5 % of it stay under, unit frame."""
     surface = shape.unit_surface(2_000, 0)
-    steps = np.linspace(0, FARTHEST, STEPS + 1)[1:]
-    ray = surface.points[:, None] - surface.normals[:, None] * steps[:, None]
-    outside = shape.unit_distance(ray.reshape(-1, 3).astype(np.float32)).reshape(-1, STEPS) > 0
-    through = np.where(outside.any(axis=1), steps[outside.argmax(axis=1)], FARTHEST)
+    ray = surface.points[:, None] - surface.normals[:, None] * STEPS[:, None]
+    outside = shape.unit_distance(ray.reshape(-1, 3).astype(np.float32)).reshape(len(ray), -1) > 0
+    through = np.where(outside.any(axis=1), STEPS[outside.argmax(axis=1)], STEPS[-1])
     return float(np.quantile(through, 0.05))
 
 
