@@ -1,0 +1,162 @@
+"""Symmetries that are found and those that are not there; parts that repeat under them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.rows import parts_from_rows, rows
+from partwright.fields import SuperFrustum, kernel
+from partwright.shapes import load_shape
+from partwright.superfrusta.constrained import Leaf, expanded, image, refit, rigid
+from partwright.superfrusta.evidence import Evidence
+from partwright.superfrusta.objective import score
+from partwright.superfrusta.repeats import repeat
+from partwright.superfrusta.resfit import fit
+from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.symmetry import Isometry, Symmetry, groups, mirror, rotation, symmetries
+from tests.assembly.strategies import ROTATION, SUPERFRUSTA, VECTOR
+from tests.superfrusta.meshes import box, table, union
+
+DRAFT = replace(Settings.for_quality("draft"), near=6000, uniform=6000, resolution=48)
+POINTS = np.random.default_rng(0).uniform(-2, 2, (300, 3)).astype(np.float32)
+AXIS = np.array([0.0, 0.6, 0.8])
+CENTRE = np.array([0.1, -0.2, 0.3])
+ISOMETRIES = [mirror(AXIS, CENTRE), rotation(AXIS, 1.0, CENTRE)]
+
+
+def star(arms: int, seed: int = 0) -> trimesh.Trimesh:
+    """A plate with arms around z and a knob on top of each, turned and moved somewhere."""
+    parts = [trimesh.creation.cylinder(0.4, 0.3, sections=60 * arms)]
+    for i in range(arms):
+        turn = trimesh.transformations.rotation_matrix(2 * np.pi * i / arms, (0, 0, 1))
+        parts += [box((0.9, 0.15, 0.2), (0.5, 0, 0)).apply_transform(turn)]
+        parts += [box((0.12, 0.12, 0.4), (0.85, 0, 0.1)).apply_transform(turn)]
+    made = union(*parts)
+    return made.apply_transform(
+        trimesh.transformations.random_rotation_matrix(np.random.default_rng(seed).random(3))
+    )
+
+
+def kinds(found: tuple[Symmetry, ...]) -> list[tuple[str, int]]:
+    return sorted((s.kind, s.order) for s in found)
+
+
+@settings(max_examples=40, deadline=None)
+@given(SUPERFRUSTA, VECTOR, ROTATION, st.sampled_from(ISOMETRIES))
+def test_the_image_of_a_part_has_the_moved_field(field, translation, turn, isometry: Isometry) -> None:
+    row = rows([Part(field, translation, turn)])[0].astype(np.float32)
+    there = isometry(POINTS).astype(np.float32)
+    expected = kernel.evaluate(row[None], POINTS)
+    assert np.allclose(kernel.evaluate(image(row, isometry)[None], there), expected, atol=2e-5)
+    move = rigid(row, isometry)
+    copy = parts_from_rows(row[None])[0].transformed(move)
+    assert np.allclose(copy.distance(there), expected, atol=2e-5)
+
+
+def test_symmetries_know_their_axis_and_centre() -> None:
+    for kind, isometry in zip(("mirror", "rotation"), ISOMETRIES, strict=True):
+        symmetry = Symmetry(kind, 2, isometry, 0.0)
+        assert abs(symmetry.axis @ AXIS) == pytest.approx(1.0)
+        assert np.allclose(isometry(symmetry.centre[None])[0], symmetry.centre)
+
+
+def test_a_table_has_two_planes_and_half_a_turn() -> None:
+    found = symmetries(load_shape(table()), DRAFT)
+    assert kinds(found) == [("mirror", 2), ("mirror", 2), ("rotation", 2)]
+    assert all(s.error < 1e-4 for s in found)
+    assert [s.error for s in found] == sorted(s.error for s in found)
+    assert len(groups(found)[0]) == 3
+
+
+@pytest.mark.parametrize("arms", [3, 5])
+def test_turned_stars_keep_their_symmetries(arms: int) -> None:
+    mesh = star(arms)
+    found = symmetries(load_shape(mesh), DRAFT)
+    assert ("rotation", arms) in kinds(found)
+    assert any(s.kind == "mirror" for s in found)
+    assert {s.order for s in found if s.kind == "rotation"} == {arms}
+    assert max(len(group) for group in groups(found)) >= arms - 1
+
+
+def test_no_symmetry_where_there_is_none() -> None:
+    lopsided = union(
+        box((2, 1, 0.3)), box((0.3, 0.4, 1.5), (-0.85, 0.3, 0.6)), box((0.5, 0.5, 0.5), (0.6, -0.3, 0.3))
+    )
+    assert symmetries(load_shape(lopsided), DRAFT) == ()
+
+
+def test_groups_too_large_are_left_out() -> None:
+    odd = [
+        Symmetry("mirror", 2, mirror(np.array([np.cos(a), np.sin(a), 0]), np.zeros(3)), 0) for a in (0, 0.1)
+    ]
+    assert [len(group) for group in groups(odd)] == [1, 1]
+
+
+def known_table() -> tuple[Evidence, np.ndarray, tuple[Symmetry, ...]]:
+    """Evidence of the table, exact rows of its five parts, and its symmetries, in the unit frame."""
+    shape = load_shape(table())
+    boxes = [((2, 1.2, 0.15), (0, 0, 1.0))]
+    boxes += [((0.15, 0.15, 1.05), (x, y, 0.5)) for x in (-0.85, 0.85) for y in (-0.5, 0.5)]
+    parts = Assembly(tuple(Part(SuperFrustum(size), place, blend=0.001) for size, place in boxes))
+    unit = parts.translated([-c for c in shape.frame.centre]).scaled(shape.frame.scale)
+    return Evidence.of(shape, DRAFT), rows(unit.parts).astype(np.float32), symmetries(shape, DRAFT)
+
+
+def test_legs_of_a_table_become_one_leaf() -> None:
+    evidence, exact, found = known_table()
+    leaves = repeat(evidence, exact, found, DRAFT)
+    assert [len(leaf.rows) for leaf in leaves] == [1, 4]
+    assert score(evidence, expanded(leaves)) == pytest.approx(score(evidence, exact), abs=1e-6)
+
+
+def test_locked_parts_and_missing_symmetries_change_nothing() -> None:
+    evidence, exact, found = known_table()
+    assert [len(leaf.rows) for leaf in repeat(evidence, exact, (), DRAFT)] == [1] * 5
+    locked = repeat(evidence, exact, found, DRAFT, locked=5)
+    assert np.array_equal(expanded(locked), exact)
+
+
+def test_repeats_that_would_hurt_are_refused() -> None:
+    evidence, exact, found = known_table()
+    shifted = [
+        Symmetry(s.kind, s.order, Isometry(s.isometry.linear, s.isometry.shift + 0.06), 0) for s in found
+    ]
+    leaves = repeat(evidence, exact, shifted, DRAFT)
+    assert score(evidence, expanded(leaves)) >= score(evidence, exact) - 2e-3 - 1e-9
+
+
+X, Z, ORIGIN = np.eye(3)[0], np.eye(3)[2], np.zeros(3)
+
+
+@pytest.mark.parametrize(
+    ("isometry", "others"), [(mirror(X, ORIGIN), [0, 2, 4]), (rotation(Z, np.pi, ORIGIN), [0, 2, 3])]
+)
+def test_copies_are_refitted_as_one(isometry: Isometry, others: list[int]) -> None:
+    evidence, exact, _ = known_table()
+    leg = exact[1].copy()
+    leg[:3] += (0.02, -0.015, 0.01)
+    leg[3:7] = Similarity(1.0, (1.0, 0.02, 0.02, 0.05)).rotation
+    leg[7:9] *= 1.15
+    fixed = [Leaf(row) for row in exact[others]]
+    before = [*fixed, Leaf(leg, (isometry,))]
+    after = refit(evidence, before, ((100.0, 15),), DRAFT, locked=len(fixed))
+    assert np.array_equal(expanded(after)[:3], exact[others])
+    assert score(evidence, expanded(before)) < 0.97
+    assert score(evidence, expanded(after)) > 0.995
+
+
+def test_a_fit_repeats_parts_only_if_asked() -> None:
+    shape = load_shape(table())
+    on, off = (fit(shape, replace(DRAFT, symmetry=flag)).assembly for flag in (True, False))
+    assert len(on) < len(off)
+    assert sum(len(part.copies) for part in on.parts) >= 5
+    assert not any(part.instances for part in off.parts)
+    again = fit(shape, DRAFT, start=on, locked=[on.parts[-1].name])
+    assert again.assembly.parts[0].instances == ()  # a locked part's copies stay as parts of their own
