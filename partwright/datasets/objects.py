@@ -37,9 +37,9 @@ def chair() -> trimesh.Trimesh:
     side = leg + leg.mirror((0, 1, 0))
     seat = pebble(46, 46, 5, 2.2).translate((0, 0, 46))
     post = rod(40, 1.9, 1.5).translate((17.5, 0, 0))
-    slat = bar(36, 1.5, 5)
+    slat = bar(36, 2, 4)
     rail = pebble(42, 3.4, 9, 1.6).translate((0, 0, 38))
-    back = post + post.mirror((1, 0, 0)) + slat.translate((0, 0, 13)) + slat.translate((0, 0, 24)) + rail
+    back = post + post.mirror((1, 0, 0)) + slat.translate((0, 0, 12)) + slat.translate((0, 0, 24)) + rail
     return to_mesh(side + side.mirror((1, 0, 0)) + seat + back.rotate((-10, 0, 0)).translate((0, 18, 46)))
 
 
@@ -74,7 +74,7 @@ def toy_robot() -> trimesh.Trimesh:
 
 def bracket() -> trimesh.Trimesh:
     """A shaft bracket 14 cm wide: a base with an eye at either end, a bored boss on a wall, and two ribs."""
-    base = plate(9.6, 5.4, 1.2, 0.6)
+    base = plate(8.5, 5.4, 1.2, 0.6)
     eye = rod(1.6, 1.9).translate((5.2, 0, 0))
     hole = rod(9, 0.85).translate((5.2, 0, -1))
     wall = bar(5.2, 1.6, 6).translate((0, 0, 4)) + _forward(rod(1.6, 2.6)).translate((0, 0.8, 7))
