@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright import __version__
+from partwright.errors import UnitError
 from partwright.export.approximation import write_report
 from partwright.export.axes import to_metres_z_up, unknowns
 from partwright.export.ellipsoid import Ellipsoid
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from partwright.assembly import Assembly
 
 GEOMS: tuple[type[Field], ...] = (Box, Cylinder, Sphere, Capsule, Ellipsoid)
+SMALLEST_INERTIA = 1e-14  # kg m2; MuJoCo's own limit is mjMINVAL, 1e-15
 DENSITY = 1000.0  # kg/m3: water
 
 
@@ -62,6 +64,7 @@ def write(
     if free_joint:
         xml.SubElement(body, "freejoint")
     properties = mass_properties(local)
+    _check_size(properties, density)
     _add_inertial(body, properties, density)
     for geom in geoms:
         _add_geom(body, geom)
@@ -79,6 +82,16 @@ def write(
 def numbers(values: Iterable[float]) -> str:
     """As XML attributes hold them."""
     return " ".join(f"{value:.9g}" for value in values)
+
+
+def _check_size(properties: MassProperties, density: float) -> None:
+    """MuJoCo refuses what hardly resists being turned."""
+    smallest = float(np.linalg.eigvalsh(properties.inertia).min()) * density
+    if smallest < SMALLEST_INERTIA:
+        raise UnitError(
+            f"the assembly is too small for MuJoCo: its inertia is {smallest:.2g} kg m2, expected at least "
+            f"{SMALLEST_INERTIA:g}; is its unit right? If it is, scale the assembly up"
+        )
 
 
 def _add_inertial(body: xml.Element, properties: MassProperties, density: float) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export.approximation import Change
 from partwright.export.nearest import Approximation, nearest_solid
@@ -87,7 +87,18 @@ def _mesh(piece: Piece, resolution: int, convex: bool) -> tuple[trimesh.Trimesh,
     mesh = piece_mesh(piece, resolution)
     if not convex:
         return mesh, 0.0, 0.0
-    hull = mesh.convex_hull
-    places = hull.subdivide().subdivide().triangles_center
-    deviation = float(np.abs(piece.node.distance(places)).max())
-    return hull, float(hull.volume / mesh.volume - 1), deviation
+    return _hull(mesh, piece.node)
+
+
+def _hull(mesh: trimesh.Trimesh, node: Node) -> tuple[trimesh.Trimesh, float, float]:
+    """Found at a size of 1: the hulls of meshes in micrometres would lose their triangles in metres."""
+    import trimesh
+
+    lower, upper = mesh.bounds
+    middle, side = (lower + upper) / 2, float((upper - lower).max())
+    unit = trimesh.Trimesh((mesh.vertices - middle) / side, mesh.faces, process=False)
+    hull = unit.convex_hull
+    places = hull.subdivide().subdivide().triangles_center * side + middle
+    deviation = float(np.abs(node.distance(places)).max())
+    placed = trimesh.Trimesh(hull.vertices * side + middle, hull.faces, process=False)
+    return placed, float(hull.volume / unit.volume - 1), deviation

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.errors import NothingToExportError, ParameterError, SettingError
+from partwright.errors import NothingToExportError, ParameterError, SettingError, UnitError
 from partwright.export import export
 from partwright.export.approximation import report_path
 from partwright.export.axes import to_metres_z_up
@@ -136,6 +136,8 @@ def test_bad_input(tmp_path: Path) -> None:
     path = tmp_path / "a.mjcf"
     with pytest.raises(NothingToExportError, match="nothing to export"):
         export(Assembly((Part(SuperFrustum((1, 1, 1), onion=1.0)),)), path)
+    with pytest.raises(UnitError, match="too small for MuJoCo"):
+        export(Assembly((Part(Sphere(1)),), unit="um"), path)
     with pytest.raises(ParameterError, match="density"):
         export(natives(), path, density=0.0)
     with pytest.raises(ParameterError, match="tolerance"):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -114,6 +115,14 @@ def check_angles(rotation: np.ndarray) -> None:
     halves = [(np.cos(a / 2), np.eye(3)[i] * np.sin(a / 2)) for i, a in enumerate((r, p, y))]
     x, z, around = (rotation_matrix((c, *axis)) for c, axis in (halves[0], halves[2], halves[1]))
     assert np.allclose(z @ around @ x, rotation, atol=1e-6)
+
+
+@pytest.mark.parametrize("unit", ["um", "km"])
+def test_sizes_from_micrometres_to_kilometres(tmp_path: Path, unit: str) -> None:
+    export(Assembly(awkward().children, unit=unit, up="z"), tmp_path / "a.urdf")
+    mesh = trimesh.load_mesh(tmp_path / "a_spike.stl", process=False)
+    metres = {"um": 1e-6, "km": 1e3}[unit]
+    assert np.allclose(mesh.extents / metres, (0.6, 0.6, 0.9), rtol=0.02)
 
 
 def test_bad_input(tmp_path: Path) -> None:

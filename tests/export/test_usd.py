@@ -82,7 +82,7 @@ def test_every_up_axis_is_up(tmp_path: Path, axis: str, told: str) -> None:
     stage = opened(Assembly((ball,), unit="m", up=axis), tmp_path / "a.usdc")
     assert UsdGeom.GetStageUpAxis(stage) == told
     middle = bounds(stage).mean(axis=0)
-    assert np.allclose(middle, (0, 5, 0) if told == "Y" else (0, 0, 5), atol=0.1)
+    assert np.allclose(middle, np.array([0.0, 5.0, 0.0] if told == "Y" else [0.0, 0.0, 5.0]), atol=0.1)
 
 
 def test_subtracted_parts_are_guides_and_copies_are_in_place(tmp_path: Path) -> None:
