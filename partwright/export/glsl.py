@@ -34,7 +34,8 @@ def write(assembly: Assembly, path: str | Path) -> None:
 
 
 def to_glsl(assembly: Assembly) -> str:
-    """The text of the shader."""
+    """The text of the shader; each copy of a repeated part is a constant of its own."""
+    assembly = assembly.expanded()
     constants = [name.upper() for name in identifiers([p.name for p in assembly.parts], ["half_pi"])]
     head = [
         f"// {comment(assembly.name) or 'Assembly'}: {len(assembly)} parts. "
