@@ -137,11 +137,12 @@ def numbers(hard: Hard) -> str:
 
 def document(done: list[Hard], of: int) -> str:
     reasons = tomllib.loads((HERE / "hardest.toml").read_text(encoding="utf-8"))
+    which = f"The last {len(done)} of {of} benchmark shapes" if len(done) < of else f"{of} hard shapes"
     lines = [
         "# The hardest shapes",
         "",
-        f"The {len(done)} of {of} benchmark shapes with the lowest mean of IoU and bi-surface IoU,",
-        "worst first, at default settings. Pictures show input, parts, surface, error: red where the result",
+        f"{which} by the mean of IoU and bi-surface IoU, worst first, at",
+        "default settings. Pictures show input, parts, surface and error: red where the result",
         "covers the input's surface, blue where it misses it. Lengths without a unit are of the unit frame,",
         "whose longest side is 1.8. Made by `python benchmarks/hardest.py`.",
     ]
