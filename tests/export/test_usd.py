@@ -94,7 +94,7 @@ def test_subtracted_parts_are_guides_and_copies_are_in_place(tmp_path: Path) -> 
     meshes = {str(p.GetPath()): UsdGeom.Mesh(p) for p in stage.Traverse() if p.IsA(UsdGeom.Mesh)}
     purposes = {path.split("/")[-2]: mesh.GetPurposeAttr().Get() for path, mesh in meshes.items()}
     assert purposes == {"block": "default", "hole": "guide", "leg": "default", "leg_2": "default"}
-    assert np.allclose(bounds(stage), [[-1, -1, -1], [4.2, 1, 1]], atol=0.03)
+    assert np.allclose(bounds(stage), [[-1.0, -1.0, -1.0], [4.2, 1.0, 1.0]], atol=0.03)
 
 
 def test_a_part_without_volume_is_an_xform_without_mesh_and_units_unknown_are_said(tmp_path: Path) -> None:
