@@ -53,7 +53,7 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 24) -> None:
         f"SMALLEST_VOXEL = {_longest(assembly) / _VOXELS:.6g}  # of the blended skin",
         f"METRES_PER_UNIT = {METRES[canonical_unit(assembly.unit)] if assembly.unit else 1.0!r}",
         "",
-        "# Lengths in UNIT; rotation is a quaternion (w, x, y, z). Meshes, in the parts' own frames, are last.",
+        "# Lengths in UNIT; rotation is a quaternion (w, x, y, z). The meshes are last.",
         "PARTS = [",
         *(f"    {_literal(entry)}," for entry in parts),
         "]",
