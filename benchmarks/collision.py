@@ -84,7 +84,7 @@ def fitted(shape: Shape, max_parts: int | None) -> Body:
             own = {"type": geom.type, "size": geom.size, "pos": geom.pos, "quat": geom.quat}
             body.add_geom(**own, meshname=geom.meshname)
 
-    tests = [_in_part(g.part) if g.part else _in_hull(g.mesh) for g in found]
+    tests = [_in_part(g.part) for g in found if g.part] + [_in_hull(g.mesh) for g in found if g.mesh]
     return Body("primitives", len(found), seconds, _any(tests), add)
 
 
@@ -119,7 +119,7 @@ def boxes(parts: list[trimesh.Trimesh], seconds: float) -> Body:
 
     def add(_: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
         for box in placed:
-            size = np.array(box.field.size) / 2
+            size = box.field.bounds()[1]
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=size, pos=box.translation, quat=box.rotation)
 
     return Body("a box per hull", len(placed), seconds, _any([_in_part(box) for box in placed]), add)
