@@ -197,6 +197,7 @@ def variants() -> list[Variant]:
         Variant(SEARCH, "no merging", default, replace(BASE, merging=False)),
         Variant(SEARCH, "no thinning (0 cycles)", default, replace(BASE, cycles=0)),
         Variant(SEARCH, "one start", default, BASE, single_starts),
+        Variant(SEARCH, "no symmetry", default, replace(BASE, symmetry=False)),
         Variant(OPTIMISERS, short, short, SHORT, few=True),
         Variant(OPTIMISERS, "the paper's, 300 steps", short, descent, few=True),
         Variant(TERMS, quick, quick, descent, quick_adam(), few=True),
