@@ -20,6 +20,7 @@ from statistics import mean
 import numpy as np
 
 import partwright as pw
+from partwright.assembly import Assembly
 from partwright.metrics import owners, purity, stability
 from partwright.metrics.purity import COUNT
 from partwright.shapes import MeshDistance, Shape
@@ -32,12 +33,12 @@ HEADERS = (
     "IoU, N = labels", "purity", "completeness", "nesting", "longest plateau",
 )  # fmt: skip
 NOTES = f"""\
-`purity`: share of {COUNT:,} points of the surface whose label is the most frequent one of their part.
-`floor`: what a single part would have. `completeness`: share whose part is the most frequent one of their
-label. The columns from `IoU, N = labels` on are of the curve's assembly with as many parts as labels.
-`nesting`: volume that keeps to its parent from one size to the next. `longest plateau`: the count of parts
-that is the fewest over the widest factor of tolerance, and that factor. They need labels, but no network:
-they stand in for the paper's IntraPrim and InterPrim, and do not compare with their numbers."""
+`purity`: share of {COUNT:,} points of the surface whose label is the most frequent one of their part; each
+instance of a part counts as one. `floor`: what a single part would have. `completeness`: share whose part is
+the most frequent one of their label. The columns from `IoU, N = labels` on are of the curve's assembly with as
+many parts as labels. `nesting`: volume that keeps to its parent from one size to the next. `longest plateau`:
+the count of parts that is the fewest over the widest factor of tolerance, and that factor. They need labels,
+but no network: they stand in for the paper's IntraPrim and InterPrim, and do not compare with their numbers."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,9 @@ def measure(folder: Path) -> Row:
     result = pw.fit(shape)
     curve = pw.fit(shape, quality="draft", curve=True, start=result.assembly).curve
     matched = next(point for point in curve if point.parts <= count)
-    whole = purity(owners(result.assembly, points), label)
+    # Mirrored wheels are one part with two instances, and two labels.
+    copies = Assembly(tuple(copy for part in result.assembly.parts for copy in part.copies))
+    whole = purity(owners(copies, points), label)
     there = purity(owners(matched.assembly, points), label)
     lasting = stability([point.assembly for point in curve], [point.iou for point in curve])
     return Row(
