@@ -19,7 +19,7 @@ _SELF = 0.5  # IoU from which a part and its image are the same place
 _COVERED = 0.6  # share of a part within the images of another from which they replace it
 _TRIED = 24  # repeats that are scored
 _LOSS = 0.01  # of R: a repeat that costs more before a refit is not tried
-_TOLERANCE = 2e-3  # of R, and of IoU, that all repeats together may cost
+_TOLERANCE = np.array([2e-3, 1e-3])  # of R and of IoU, that all repeats together may cost
 _REFIT = ((100.0, 12),)
 
 
@@ -37,8 +37,8 @@ def repeat(
 ) -> list[Leaf]:
     """The assembly as leaves, of which those that repeat under the symmetries are one each.
 
-    Repeats that replace the most parts come first. Together they cost at most 2e-3 of R and of IoU: where
-    they cost more, the copies of each leaf are refitted as one, and if that is not enough the costliest
+    Repeats that replace the most parts come first. Together they cost at most 2e-3 of R and 1e-3 of IoU:
+    where they cost more, the copies of each leaf are refitted as one, and if that is not enough the costliest
     repeats are given up. An IoU that the settings ask for is kept. The first `locked` rows stay leaves of
     their own.
     """
