@@ -34,11 +34,11 @@ HEADERS = (
 )  # fmt: skip
 NOTES = f"""\
 `purity`: share of {COUNT:,} points of the surface whose label is the most frequent one of their part; each
-instance of a part counts as one. `floor`: what a single part would have. `completeness`: share whose part is
-the most frequent one of their label. The columns from `IoU, N = labels` on are of the curve's assembly with as
+instance of a part counts as one. `floor`: what a single part has. `completeness`: share whose part is
+the most frequent one of their label. The columns from `IoU, N = labels` on: of the curve's assembly with as
 many parts as labels. `nesting`: volume that keeps to its parent from one size to the next. `longest plateau`:
-the count of parts that is the fewest over the widest factor of tolerance, and that factor. They need labels,
-but no network: they stand in for the paper's IntraPrim and InterPrim, and do not compare with their numbers."""
+the count of parts that is the fewest over the widest factor of tolerance, and that factor. These need no
+network, only labels: they stand in for the paper's IntraPrim and InterPrim, and compare with neither."""
 
 
 @dataclass(frozen=True)
