@@ -71,7 +71,7 @@ def _measures(evidence: Evidence, rows: Rows) -> NDArray[np.float64]:
     occupied = evidence.distance_of(rows, evidence.grid_points[::_GRID_EVERY]) < 0
     inside = evidence.grid.values.ravel()[::_GRID_EVERY] < 0
     both, either = np.count_nonzero(occupied & inside), np.count_nonzero(occupied | inside)
-    return np.array([score(evidence, rows), both / max(either, 1)])
+    return np.array([score(evidence, rows), both / np.maximum(either, 1)])
 
 
 def candidates(
