@@ -4,8 +4,8 @@
 
 Every mesh is turned into 30,000 points with and without normals and into 128^3 grids of occupancy and of
 signed distance, each written to a file and read back. All of them are fitted, and the assemblies scored
-against the mesh. The table goes to benchmarks/results/inputs.md. Exits with 1 if a median IoU over the seeds falls more
-than 0.02 short of the mesh's own.
+against the mesh. The table goes to benchmarks/results/inputs.md. Exits with 1 if a median IoU over the seeds
+falls more than 0.02 short of the mesh's own.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def document(rows: list[list[str]], command: str, seeds: list[int]) -> str:
         f"`{command}`",
         "",
         f"{POINTS:,} points on the surface, grids of {RESOLUTION}^3. IoU is with the mesh: of the surface",
-        f"made of the input, and of the assembly fitted to it (medians of {len(seeds)} seeds). `lost` is what",
+        f"made of the input, and of the assembly fitted to it (median over seeds {seeds}). `lost` is what",
         "the fit falls short of the fit to the mesh itself.",
         "",
         "| " + " | ".join(HEADERS) + " |",
