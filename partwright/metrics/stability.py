@@ -33,7 +33,7 @@ class Plateau:
 @dataclass(frozen=True)
 class Stability:
     """nesting: mean share of volume that keeps to its parent. plateaus: from few parts to many. longest: the
-    one of the largest factor: its count of parts is the least a matter of tolerance."""
+    one of the largest factor, single parts aside: its count is the least a matter of tolerance."""
 
     nesting: float
     plateaus: tuple[Plateau, ...]
@@ -58,7 +58,8 @@ def stability(assemblies: Sequence[Assembly], ious: Sequence[float]) -> Stabilit
     steps = [(assemblies[a], assemblies[b]) for a, b in pairwise(order)]
     # A single part is everybody's parent: that step says nothing.
     shares = [nesting(larger, smaller) for smaller, larger in steps if len(smaller) > 1]
-    longest = max(flat, key=lambda plateau: plateau.factor)
+    structured = [plateau for plateau in flat if plateau.parts > 1] or list(flat)
+    longest = max(structured, key=lambda plateau: plateau.factor)
     return Stability(float(np.mean(shares)) if shares else 1.0, flat, longest)
 
 

@@ -68,11 +68,14 @@ def test_the_longest_plateau_names_the_structure() -> None:
     whole = Assembly((bar("all", 0, 8),))
     found = stability([QUARTERS, HALVES, whole], [0.95, 0.94, 0.4])
     assert found.nesting == 1.0
+    assert [plateau.parts for plateau in found.plateaus] == [1, 2, 4]
     assert found.longest.parts == 2
     assert found.longest.factor == pytest.approx(10.0)
 
 
 def test_a_curve_of_one_says_nothing_against_it() -> None:
     assert stability([Assembly((bar("all", 0, 8),))], [0.4]).nesting == 1.0
+    assert stability([HALVES, whole := Assembly((bar("all", 0, 8),))], [0.6, 0.55]).longest.parts == 2
+    assert stability([whole], [0.55]).longest.parts == 1
     with pytest.raises(SettingError, match="an IoU for each"):
         stability([HALVES], [])
