@@ -130,6 +130,8 @@ def fit(
     Raises:
         SettingError: an option has a value that cannot be used.
     """
+    from partwright.meshing.mass import mass_properties
+
     started = time.perf_counter()
     if method not in METHODS:
         raise SettingError(f"unknown method {method!r}; expected one of {', '.join(METHODS)}")
@@ -168,6 +170,7 @@ def fit(
         "parts": len(assembly),
         "instances": sum(len(part.copies) for part in assembly.parts),
         "scores": scores.to_dict(),
+        "mass_properties": mass_properties(surface).to_dict(assembly.unit),
         "warnings": _warnings(shape, scores),
     }
     points = tuple(fitted[0].curve)

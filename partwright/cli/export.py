@@ -7,6 +7,8 @@ from pathlib import Path
 
 from partwright.export import WRITERS
 
+OPTIONS = ("density", "tolerance", "free_joint", "by_part", "resolution")
+
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
@@ -16,12 +18,30 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     command.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="where to write")
+    option = command.add_argument
+    option("--density", metavar="D", type=float, help="mass per cubed length unit (MJCF, URDF)")
+    option(
+        "--tolerance", metavar="T", type=float, help="what a native solid may be off before a mesh is written"
+    )
+    option("--free-joint", action="store_true", default=None, help="let the body move (MJCF)")
+    option("--by-part", action="store_true", default=None, help="each part by itself (OBJ, PLY, STL, 3MF)")
+    option("--resolution", metavar="N", type=int, help="cells along the longest side of what is meshed")
     command.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
+    from partwright.cli.tables import warn
     from partwright.export import export
+    from partwright.export.approximation import report_path
 
-    export(load_assembly(arguments.assembly), arguments.output)
+    given = {name: getattr(arguments, name) for name in OPTIONS}
+    options = {name: value for name, value in given.items() if value is not None}
+    export(load_assembly(arguments.assembly), arguments.output, **options)
+    if report_path(arguments.output).exists():
+        warn(
+            [
+                f"this format cannot hold all of it: {report_path(arguments.output)} says what is off and by how much"
+            ]
+        )
     return 0

@@ -150,10 +150,12 @@ def test_json_is_the_assembly_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", list(WRITERS))
 def test_same_assembly_same_bytes_and_nothing_left_behind(tmp_path: Path, suffix: str) -> None:
-    export(pair(), tmp_path / f"a{suffix}")
-    export(pair(), tmp_path / f"b{suffix}")
-    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
-    assert len(list(tmp_path.iterdir())) == 2
+    paths = [tmp_path / folder / f"a{suffix}" for folder in ("first", "second")]
+    for path in paths:
+        path.parent.mkdir()
+        export(pair(), path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    assert all(list(path.parent.iterdir()) == [path] for path in paths)
 
 
 @pytest.mark.parametrize("suffix", list(WRITERS))
@@ -163,8 +165,8 @@ def test_a_missing_folder_is_named(tmp_path: Path, suffix: str) -> None:
 
 
 def test_unknown_suffixes_and_options(tmp_path: Path) -> None:
-    with pytest.raises(UnsupportedFormatError, match=r"'.step' .*\.json, \.glb, \.ply, \.stl, \.obj"):
-        export(pair(), tmp_path / "a.step")
+    with pytest.raises(UnsupportedFormatError, match=r"'.dwg' .*\.json, \.glb, \.ply, \.stl, \.obj"):
+        export(pair(), tmp_path / "a.dwg")
     with pytest.raises(SettingError, match=r"\.json has no option 'resolution'; it has none"):
         export(pair(), tmp_path / "a.json", resolution=3)
     assert not list(tmp_path.iterdir())
