@@ -39,9 +39,6 @@ def run(arguments: argparse.Namespace) -> int:
     options = {name: value for name, value in given.items() if value is not None}
     export(load_assembly(arguments.assembly), arguments.output, **options)
     if report_path(arguments.output).exists():
-        warn(
-            [
-                f"this format cannot hold all of it: {report_path(arguments.output)} says what is off and by how much"
-            ]
-        )
+        report = report_path(arguments.output)
+        warn([f"this format cannot hold all of it: {report} says what is off and by how much"])
     return 0

@@ -41,10 +41,10 @@ __all__ = ["WRITERS", "export"]
 def export(assembly: Assembly, path: str | Path, **options: Any) -> None:
     """Write the assembly in the format that the path's suffix names.
 
-    Options, where the format has them: `resolution` of what is meshed (cells along the longest side), `by_part`
-    (each part closed by itself: OBJ, PLY, STL, 3MF), `density`, `tolerance` and `free_joint` (MJCF, URDF),
-    `separate` (STEP: one product a part). Parts that the format cannot hold become the nearest that it can, and
-    FILE.report.json says which and how far off.
+    Options, where the format has them: `resolution` of what is meshed (cells along the longest side),
+    `by_part` (each part closed by itself: OBJ, PLY, STL, 3MF), `density`, `tolerance` and `free_joint` (MJCF,
+    URDF), `separate` (STEP: one product a part). Parts that the format cannot hold become the nearest that it
+    can, and FILE.report.json says which and how far off.
 
     Raises:
         UnsupportedFormatError: the suffix names no known format.

@@ -160,7 +160,7 @@ def test_export(method: BoxMethod, block: Path, tmp_path: Path) -> None:
         (["fit", "{block}", "--max-parts", "0"], "max_parts: expected at least 1, got 0"),
         (["evaluate", "{block}", "{block}"], "not UTF-8"),
         (["export", "missing.json", "-o", "a.glb"], "missing.json"),
-        (["export", "{assembly}", "-o", "a.step"], "use one of .json, .glb"),
+        (["export", "{assembly}", "-o", "a.dwg"], "use one of .json, .glb"),
         (["export", "{assembly}", "-o", "{assembly}/a.glb"], "cannot write"),
     ],
 )
