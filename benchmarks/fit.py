@@ -56,6 +56,7 @@ class Run:
     chamfer: float | None = None
     chamfer_floor: float | None = None
     parts: float | None = None
+    instances: float | None = None
     overlap: float | None = None
     deviation: float | None = None
     seconds: float = 0.0
@@ -72,6 +73,7 @@ COLUMNS: dict[str, Callable[[Run], str]] = {
     "Chamfer x1e3": lambda r: _number(r.chamfer, 3, 1e3),
     "floor": lambda r: _number(r.chamfer_floor, 3, 1e3),
     "parts": lambda r: _number(r.parts, 1).removesuffix(".0"),
+    "instances": lambda r: _number(r.instances, 1).removesuffix(".0"),
     "overlap": lambda r: _number(r.overlap, 3),
     "max deviation %": lambda r: _number(r.deviation, 2),
     "seconds": lambda r: _number(r.seconds, 1),
@@ -128,11 +130,11 @@ def fit_once(entry: Entry, seed: int, options: list[str]) -> Run:
             return Run(entry.set, entry.name, seed, failure, **cost)
         report = json.loads((out / "report.json").read_text(encoding="utf-8"))
     scores = report["scores"]
-    measured = {name: scores[name] for name in SCORES if name not in ("parts", "deviation")}
+    measured = {name: scores[name] for name in SCORES if name not in ("parts", "instances", "deviation")}
     deviation = 100 * scores["max_deviation"] / longest_side(entry.path)
     return Run(
         entry.set, entry.name, seed, report["outcome"],
-        **measured, parts=report["parts"], deviation=deviation, **cost,
+        **measured, parts=report["parts"], instances=report["instances"], deviation=deviation, **cost,
     )  # fmt: skip
 
 
