@@ -16,7 +16,7 @@ from partwright.assembly import Assembly
 from partwright.assembly.checks import MAX_NAME
 from partwright.errors import SettingError
 from partwright.shapes import Shape
-from partwright.writing import replacing_files, write_bytes
+from partwright.writing import finishing, replacing_files, write_bytes
 
 if TYPE_CHECKING:
     import trimesh
@@ -72,7 +72,7 @@ class Result:
         from partwright.export.ply import write_mesh
         from partwright.render import preview
 
-        with replacing_files(folder) as staging:
+        with finishing(), replacing_files(folder) as staging:
             self.assembly.save(staging / "assembly.json")
             export(self.assembly, staging / "parts.glb")
             write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
@@ -156,7 +156,8 @@ def fit(
     fitted = _fit_pieces(module, pieces, settings, progress, start, locked)
     assembly = _assembled(shape, pieces, fitted, per_node, source)
     seconds = _seconds(fitted)
-    scores, surface = _scored(shape, assembly, seed, seconds)
+    with finishing():
+        scores, surface = _scored(shape, assembly, seed, seconds)
     seconds["all"] = time.perf_counter() - started
     outcome = next(o for o in OUTCOMES if any(one.outcome == o for one in fitted))
     report = {

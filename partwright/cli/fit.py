@@ -14,7 +14,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "report.json and preview.png.",
     )
     option = command.add_argument
-    option("shape", metavar="SHAPE", type=Path, help="mesh or scene: OBJ, PLY, STL, OFF, GLB, glTF, 3MF")
+    option("shape", metavar="SHAPE", type=Path, help="mesh, scene, points, grid or STEP file")
     option(
         "-o",
         "--output",
