@@ -49,7 +49,7 @@ def write_bytes(path: str | Path, data: bytes) -> None:
 
 @contextmanager
 def finishing() -> Iterator[None]:
-    """Ctrl-C in the block is left unheard: scoring and writing take seconds, and what they finish took longer.
+    """Ctrl-C in the block is left unheard: what scoring and writing finish took longer than they do.
 
     Only the main thread hears Ctrl-C, so elsewhere this does nothing.
     """

@@ -23,8 +23,7 @@ def test_afterwards_ctrl_c_works_again() -> None:
     with finishing():
         pass
     with pytest.raises(KeyboardInterrupt):
-        os.kill(os.getpid(), signal.SIGINT)
-        signal.pause()
+        signal.raise_signal(signal.SIGINT)
 
 
 def test_other_threads_may_finish_too() -> None:
