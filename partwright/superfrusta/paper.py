@@ -19,7 +19,7 @@ from partwright.errors import SettingError
 from partwright.fields import reference
 from partwright.fields.kernel import Rows, Target, _rows
 from partwright.superfrusta.refining import LIMITS
-from partwright.superfrusta.torch_kernel import BULGE, SX, SZ, tightest_bulge
+from partwright.superfrusta.torch_equations import BULGE, SX, SZ, tightest_bulge
 
 BLOCKS = (3, 4, 3, 1, 1, 3, 1)  # columns that share a learning rate, in the order of `PaperConfig.rates`
 

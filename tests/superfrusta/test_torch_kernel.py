@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from partwright.fields import kernel, reference
-from partwright.superfrusta.torch_kernel import TorchKernel, damped_step
+from partwright.superfrusta.torch_equations import damped_step
+from partwright.superfrusta.torch_kernel import TorchKernel
 
 LIMITS = kernel.Limits(
     lower=(-2.0,) * 3 + (-9.0,) * 3 + (0.004,) * 3 + (0.0, 0.0, 0.0, 0.0, 0.0, 1e-3),
