@@ -19,11 +19,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     command.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="where to write")
     option = command.add_argument
-    option("--density", metavar="D", type=float, help="mass per cubed length unit (MJCF, URDF)")
+    option("--density", metavar="D", type=float, help="in kg/m3 (MJCF, URDF; default: water)")
     option(
         "--tolerance", metavar="T", type=float, help="what a native solid may be off before a mesh is written"
     )
-    option("--free-joint", action="store_true", default=None, help="let the body move (MJCF)")
+    option("--free-joint", action="store_true", default=None, help="let the body move (MJCF, URDF)")
     option("--by-part", action="store_true", default=None, help="each part by itself (OBJ, PLY, STL, 3MF)")
     option("--resolution", metavar="N", type=int, help="cells along the longest side of what is meshed")
     command.set_defaults(run=run)

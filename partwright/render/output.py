@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from partwright.errors import OutputError
+from partwright.writing import replacing
 
 
 def write(path: str | Path, save: Callable[[Path], None]) -> None:
@@ -16,15 +15,8 @@ def write(path: str | Path, save: Callable[[Path], None]) -> None:
 
     Raises OutputError where the folder is missing or cannot be written to.
     """
-    target = Path(path)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
+    with replacing(path) as temporary:
         save(temporary)
-        os.replace(temporary, target)
-    except OSError as error:
-        raise OutputError(f"Cannot write {target}: {error.strerror or error}; give another place.") from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def write_png(path: str | Path, image: np.ndarray) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from partwright.errors import SettingError
@@ -111,9 +111,6 @@ class Settings:
     def price(self) -> float:
         """What a part must pay while growing: nothing where a target or a whole curve asks for more parts."""
         return _SMALL_PRICE if self.curve or self.min_iou is not None else self.alpha
-
-    def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def _check(name: str, value: float, low: float, high: float = math.inf) -> None:
