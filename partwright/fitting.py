@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from partwright import __version__
-from partwright.assembly import Assembly
+from partwright.assembly import Assembly, Similarity
 from partwright.assembly.checks import MAX_NAME
 from partwright.errors import SettingError
-from partwright.shapes import Shape
+from partwright.shapes import METRES, Shape
 from partwright.writing import finishing, replacing_files, write_bytes
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ CURVE_SIZES = (1, 2, 4, 8, 16, 32, 64)
 POOR_IOU = 0.85
 POOR_DEVIATION = 0.1  # of the longest side
 UNSURE = 0.5
+SAME_VOLUME = 0.01  # of the input's triangles and of its inside: then no surface runs through it twice
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,7 @@ def fit(
     threads: int = 0,
     progress: Callable[[Any], None] | None = None,
     source: str | None = None,
+    density: float | None = None,
 ) -> Result:
     """Fit an assembly to a shape.
 
@@ -126,12 +129,12 @@ def fit(
         threads: 0 means one per core.
         progress: called with the method's progress: .stage .round .rounds .parts .iou .fraction.
         source: the file's name, for the report.
+        density: in kg/m3; the report then has the mass and its inertia, too.
 
     Raises:
         SettingError: an option has a value that cannot be used.
     """
-    from partwright.meshing.mass import mass_properties
-
+    _check_density(density, shape.unit)
     started = time.perf_counter()
     if method not in METHODS:
         raise SettingError(f"unknown method {method!r}; expected one of {', '.join(METHODS)}")
@@ -171,7 +174,7 @@ def fit(
         "parts": len(assembly),
         "instances": sum(len(part.copies) for part in assembly.parts),
         "scores": scores.to_dict(),
-        "mass_properties": mass_properties(surface).to_dict(assembly.unit),
+        "mass_properties": _mass(surface, shape, density),
         "warnings": _warnings(shape, scores),
     }
     points = tuple(fitted[0].curve)
@@ -243,6 +246,36 @@ def _input(shape: Shape, source: str | None) -> dict[str, Any]:
         "repairs": list(shape.repairs),
         "confidence": shape.confidence,
     }
+
+
+def _check_density(density: float | None, unit: str | None) -> None:
+    from partwright.meshing.mass import check_density
+
+    if density is None:
+        return
+    check_density(density)
+    if unit is None:
+        raise SettingError("density: the shape's length unit is unknown, so it has no mass; state it by --unit")
+
+
+def _mass(surface: trimesh.Trimesh, shape: Shape, density: float | None) -> dict[str, Any]:
+    """Mass properties of the fitted surface and, where it encloses one volume, of the input's own.
+
+    In metres and kilograms where a density is given, else in the shape's unit and per density.
+    """
+    import trimesh
+
+    from partwright.meshing.mass import mass_properties
+
+    given = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
+    simple = math.isclose(given.volume, shape.volume, rel_tol=SAME_VOLUME)
+    to_metres = Similarity(METRES[shape.unit]) if density is not None and shape.unit else Similarity()
+    unit = shape.unit if density is None else "m"
+    fitted, *asked = (
+        mass_properties(mesh).transformed(to_metres).to_dict(unit, density)
+        for mesh in ([surface, given] if simple else [surface])
+    )
+    return fitted | ({"input": asked[0]} if asked else {})
 
 
 def _scored(

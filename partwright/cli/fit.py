@@ -45,6 +45,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="where the shape is symmetric, parts come as repeats (default: on)",
     )
     option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
+    option("--density", metavar="D", type=float, help="in kg/m3: the report then has mass and inertia")
     option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
     option(
         "--device",
@@ -91,6 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
             threads=arguments.threads,
             progress=display.show,
             source=arguments.shape.name,
+            density=arguments.density,
         )
         display.stage("writing")
         result.save(folder)

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import trimesh
 
@@ -71,6 +72,18 @@ def test_fit_writes_five_files(method: BoxMethod, block: Path, tmp_path: Path, c
     assert f"written to {folder}" in captured.out
     assert "optimising: round 1/2  1 parts  IoU 0.500  50%" in captured.err
     assert "warning" not in captured.err
+
+
+def test_density_gives_the_mass_in_kilograms(method: BoxMethod, block: Path, tmp_path: Path) -> None:
+    options = ["-o", str(tmp_path / "out"), "--unit", "cm", "--density", "2700"]
+    assert main(["fit", str(block), *options]) == 0
+    masses = json.loads((tmp_path / "out" / "report.json").read_text())["mass_properties"]
+    assert masses["unit"] == masses["input"]["unit"] == "m"
+    assert masses["input"]["mass"] == pytest.approx(2700 * 8e-6)
+    assert masses["mass"] == pytest.approx(2700 * 8e-6, rel=1e-3)
+    assert np.allclose(masses["input"]["centre"], (0.1, 0.2, 0.3))
+    assert np.allclose(masses["inertia"], masses["input"]["inertia"], rtol=5e-3, atol=1e-10)
+    assert masses["input"]["inertia"][0][0] == pytest.approx(2700 * 8e-6 * 0.02**2 / 6)
 
 
 def test_an_existing_folder_keeps_its_other_files(method: BoxMethod, block: Path, tmp_path: Path) -> None:
@@ -158,6 +171,8 @@ def test_export(method: BoxMethod, block: Path, tmp_path: Path) -> None:
         (["fit", "{block}", "-o", "{block}"], "is a file"),
         (["fit", "{block}", "--unit", "parsec"], "parsec"),
         (["fit", "{block}", "--max-parts", "0"], "max_parts: expected at least 1, got 0"),
+        (["fit", "{block}", "--density", "2700"], "state it by --unit"),
+        (["fit", "{block}", "--unit", "mm", "--density", "-1"], "density: expected a positive number"),
         (["evaluate", "{block}", "{block}"], "not UTF-8"),
         (["export", "missing.json", "-o", "a.glb"], "missing.json"),
         (["export", "{assembly}", "-o", "a.dwg"], "use one of .json, .glb"),
