@@ -255,7 +255,9 @@ def _check_density(density: float | None, unit: str | None) -> None:
         return
     check_density(density)
     if unit is None:
-        raise SettingError("density: the shape's length unit is unknown, so it has no mass; state it by --unit")
+        raise SettingError(
+            "density: the shape's length unit is unknown, so it has no mass; state it by --unit"
+        )
 
 
 def _mass(surface: trimesh.Trimesh, shape: Shape, density: float | None) -> dict[str, Any]:

@@ -83,7 +83,9 @@ def test_density_gives_the_mass_in_kilograms(method: BoxMethod, block: Path, tmp
     assert masses["mass"] == pytest.approx(2700 * 8e-6, rel=1e-3)
     assert np.allclose(masses["input"]["centre"], (0.1, 0.2, 0.3))
     assert np.allclose(masses["inertia"], masses["input"]["inertia"], rtol=5e-3, atol=1e-10)
-    assert masses["input"]["inertia"][0][0] == pytest.approx(2700 * 8e-6 * 0.02**2 / 6)
+    assert masses["input"]["inertia"][0][0] == pytest.approx(
+        2700 * 8e-6 * (0.02**2 + 0.01**2) / 12
+    )  # 4 x 2 x 1 cm
 
 
 def test_an_existing_folder_keeps_its_other_files(method: BoxMethod, block: Path, tmp_path: Path) -> None:
