@@ -79,3 +79,11 @@ class NothingToExportError(PartwrightError):
 
 class UnitError(PartwrightError):
     """The format cannot say the assembly's length unit."""
+
+
+class FamilyError(PartwrightError):
+    """A family of shapes cannot be prepared, or a prepared one is incomplete, damaged, or of another form."""
+
+
+class LabelError(PartwrightError):
+    """Labels do not match the faces, or the part names, that they are for."""
