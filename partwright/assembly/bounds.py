@@ -1,4 +1,7 @@
-"""Axis-aligned boxes around parts and assemblies: exact for straight parts, but for 0.5 % of the dilation."""
+"""Axis-aligned boxes around parts and assemblies: exact for straight parts, but for 0.5 % of the dilation.
+
+Assemblies of quadrics are bounded by `enclosure`; where they do not end, their bounds are infinite.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,11 @@ import math
 
 import numpy as np
 
+from partwright.assembly.enclosure import enclosing_box
 from partwright.assembly.rows import as_superfrustum, is_superfrustum
 from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Assembly, Part, operands
-from partwright.fields import SuperFrustum
+from partwright.fields import Quadric, SuperFrustum
 
 _AXES = np.vstack([-np.eye(3), np.eye(3)])
 _STATIONS = 33
@@ -20,6 +24,8 @@ def bounds(node: Part | Assembly, level: float = 0.0) -> np.ndarray:
     """(2, 3) lowest and highest corner of where the node's distance is below `level` (>= 0)."""
     if isinstance(node, Part) and not node.instances:
         return _part_bounds(node, level)
+    if isinstance(node, Assembly) and any(isinstance(part.field, Quadric) for part in node.parts):
+        return enclosing_box(node, level)
     operation = "union" if isinstance(node, Part) else node.operation
     first, *rest = operands(node)
     result = bounds(first, level)
@@ -43,6 +49,12 @@ def _part_bounds(part: Part, level: float) -> np.ndarray:
     directions = _AXES @ rotation_matrix(part.rotation)
     if is_superfrustum(part.field):
         reach = _support(as_superfrustum(part.field), directions, level).reshape(2, 3)
+    elif isinstance(part.field, Quadric):
+        if level:
+            return enclosing_box(part, level)
+        reach = part.field.support(directions).reshape(2, 3)
+        if np.isneginf(reach).any():  # nothing is inside
+            reach = np.zeros((2, 3))
     else:
         lower, upper = part.field.bounds()
         reach = np.maximum(directions * lower, directions * upper).sum(axis=1).reshape(2, 3) + level

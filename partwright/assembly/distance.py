@@ -21,16 +21,26 @@ from partwright.fields import kernel, smooth_difference, smooth_intersection, sm
 from partwright.fields.operations import is_tensor
 
 _UNIT_SIDE = 1.8
+_ROUNDING = 1e-14  # of the place: what is smaller has no size
 _FOLD = {"union": smooth_union, "intersection": smooth_intersection, "difference": smooth_difference}
 
 
 def unit_similarity(node: Node) -> Similarity:
-    """The map that centres the box around all leaves at 0 and makes its longest side 1.8."""
+    """The map that centres the box around all leaves at 0 and makes its longest side 1.8.
+
+    Leaves without end do not count; where all are, the node's own box does, if it ends.
+    """
     parts = (node,) if isinstance(node, Part) else node.parts
     boxes = np.array([bounds(part) for part in parts])
+    boxes = boxes[np.isfinite(boxes).all(axis=(1, 2))]
+    if len(boxes) < len(parts):
+        whole = bounds(node)
+        boxes = np.array([*boxes, whole]) if np.isfinite(whole).all() else boxes
+    if not len(boxes):
+        return Similarity()
     lower, upper = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     longest = float((upper - lower).max())
-    scale = _UNIT_SIDE / longest if longest > 0 else 1.0
+    scale = _UNIT_SIDE / longest if longest > _ROUNDING * float(np.abs(boxes).max()) else 1.0
     return Similarity(scale, translation=tuple(-scale * (lower + upper) / 2))
 
 

@@ -11,6 +11,8 @@ from partwright.fields.operations import (
     smooth_union,
     union,
 )
+from partwright.fields.quadric import Quadric
+from partwright.fields.quadric_forms import NormalForm, normal_form
 from partwright.fields.registry import KINDS, from_dict
 from partwright.fields.solids import Box, Capsule, Cone, Cylinder, Frustum, Solid, Sphere, Torus, Tube
 from partwright.fields.superfrustum import SuperFrustum
@@ -23,6 +25,8 @@ __all__ = [
     "Cylinder",
     "Field",
     "Frustum",
+    "NormalForm",
+    "Quadric",
     "Solid",
     "Sphere",
     "SuperFrustum",
@@ -31,6 +35,7 @@ __all__ = [
     "difference",
     "from_dict",
     "intersection",
+    "normal_form",
     "smooth_difference",
     "smooth_intersection",
     "smooth_union",

@@ -73,7 +73,7 @@ class Field(ABC):
 
 def number(owner: Field, name: str, low: float, high: float, *, above: bool = False) -> float:
     """The parameter `name` of a field as a float in [low, high], or in (low, high] with `above`."""
-    return _checked(f"{owner.kind}: {name}", getattr(owner, name), low, high, above)
+    return checked(f"{owner.kind}: {name}", getattr(owner, name), low, high, above)
 
 
 def vector(owner: Field, name: str, low: float, high: float) -> tuple[float, float, float]:
@@ -81,11 +81,11 @@ def vector(owner: Field, name: str, low: float, high: float) -> tuple[float, flo
     given = getattr(owner, name)
     if not isinstance(given, (tuple, list, np.ndarray)) or len(given) != 3:
         raise ParameterError(f"{owner.kind}: {name} is {brief(given)}; expected three numbers x, y, z")
-    x, y, z = (_checked(f"{owner.kind}: {name}", value, low, high, False) for value in given)
+    x, y, z = (checked(f"{owner.kind}: {name}", value, low, high, False) for value in given)
     return x, y, z
 
 
-def normalise(owner: Field, **values: float | tuple[float, float, float]) -> None:
+def normalise(owner: Field, **values: float | tuple[float, ...]) -> None:
     """Store checked values in a frozen dataclass from its __post_init__."""
     for name, value in values.items():
         object.__setattr__(owner, name, value)
@@ -93,7 +93,7 @@ def normalise(owner: Field, **values: float | tuple[float, float, float]) -> Non
 
 def scale_lengths(field: Any, factor: float, names: tuple[str, ...]) -> Any:
     """A copy of a dataclass field with the named lengths (numbers or triples) times `factor`."""
-    factor = _checked(f"{field.kind}: scale factor", factor, 0.0, LARGEST, True)
+    factor = checked(f"{field.kind}: scale factor", factor, 0.0, LARGEST, True)
 
     def scaled(value: Any) -> Any:
         return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
@@ -101,7 +101,8 @@ def scale_lengths(field: Any, factor: float, names: tuple[str, ...]) -> Any:
     return replace(field, **{name: scaled(getattr(field, name)) for name in names})
 
 
-def _checked(what: str, given: Any, low: float, high: float, above: bool) -> float:
+def checked(what: str, given: Any, low: float, high: float, above: bool = False) -> float:
+    """`given` as a float in [low, high], or in (low, high] with `above`; raises ParameterError otherwise."""
     allowed = f"{low:g} < value <= {high:g}" if above else f"{low:g} <= value <= {high:g}"
     if isinstance(given, bool) or not isinstance(given, NUMBERS):
         raise ParameterError(f"{what} is {brief(given)}, which is no number; expected {allowed}")

@@ -18,17 +18,17 @@ SHARP = 1e-9
 
 def union(a: Array, b: Array) -> Array:
     """Distance to A or B: min(a, b)."""
-    return _library(a).minimum(a, b)
+    return library(a).minimum(a, b)
 
 
 def intersection(a: Array, b: Array) -> Array:
     """Distance to A and B: max(a, b); a lower bound outside."""
-    return _library(a).maximum(a, b)
+    return library(a).maximum(a, b)
 
 
 def difference(a: Array, b: Array) -> Array:
     """Distance to A without B: max(a, -b); a lower bound outside."""
-    return _library(a).maximum(a, -b)
+    return library(a).maximum(a, -b)
 
 
 def smooth_union(a: Array, b: Array, k: float | Array) -> Array:
@@ -37,13 +37,13 @@ def smooth_union(a: Array, b: Array, k: float | Array) -> Array:
     min(a, b) - max(k - |a - b|, 0)^2 / (4 k), which equals mix(b, a, w) - k w (1 - w) with
     w = clamp(1/2 + (b - a) / (2 k), 0, 1) but keeps its gradient accurate for small k.
     """
-    library = _library(a)
+    xp = library(a)
     radius = _like(a, k)
     blended = radius > SHARP
-    safe = library.where(blended, radius, library.ones_like(radius))
-    shared = library.maximum(safe - abs(a - b), library.zeros_like(a))
+    safe = xp.where(blended, radius, xp.ones_like(radius))
+    shared = xp.maximum(safe - abs(a - b), xp.zeros_like(a))
     fillet = shared * shared / (4 * safe)
-    return library.minimum(a, b) - library.where(blended, fillet, library.zeros_like(fillet))
+    return xp.minimum(a, b) - xp.where(blended, fillet, xp.zeros_like(fillet))
 
 
 def smooth_intersection(a: Array, b: Array, k: float | Array) -> Array:
@@ -62,7 +62,8 @@ def is_tensor(value: Any) -> bool:
     return torch is not None and isinstance(value, torch.Tensor)
 
 
-def _library(value: Any) -> Any:
+def library(value: Any) -> Any:
+    """The module, torch or numpy, whose functions take the value."""
     return sys.modules["torch"] if is_tensor(value) else np
 
 

@@ -8,11 +8,13 @@ from typing import Any
 
 from partwright.errors import ParameterError
 from partwright.fields.base import Field
+from partwright.fields.quadric import Quadric
 from partwright.fields.solids import Box, Capsule, Cone, Cylinder, Frustum, Sphere, Torus, Tube
 from partwright.fields.superfrustum import SuperFrustum
 
 KINDS: dict[str, type[Field]] = {
-    field.kind: field for field in (SuperFrustum, Box, Cylinder, Cone, Frustum, Sphere, Capsule, Tube, Torus)
+    field.kind: field
+    for field in (SuperFrustum, Box, Cylinder, Cone, Frustum, Sphere, Capsule, Tube, Torus, Quadric)
 }
 
 

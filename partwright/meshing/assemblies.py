@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.assembly.rows import as_superfrustum
+from partwright.assembly.rows import as_superfrustum, is_superfrustum
 from partwright.errors import NoSurfaceError
 from partwright.meshing.dust import without_dust
 from partwright.meshing.marching import mesh_field
@@ -40,7 +40,8 @@ def mesh_assembly(assembly: Assembly | Part, resolution: int = 128, *, sharp: bo
     lower, upper = assembly.bounds()
     frame, longest = _frame(lower, upper), float((upper - lower).max())
     parts = assembly.parts if isinstance(assembly, Assembly) else (assembly,)
-    thinnest = np.array([walls(as_superfrustum(part.field)).min() for part in parts]) / longest
+    thin = [walls(as_superfrustum(part.field)).min() for part in parts if is_superfrustum(part.field)]
+    thinnest = np.array(thin) / longest
     wanted = _ACROSS / np.maximum(thinnest, 1e-9)
     counts = int(np.ceil(wanted[wanted <= _FINEST * resolution].max(initial=resolution)))
     local = assembly.transformed(frame)
