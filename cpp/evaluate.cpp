@@ -55,22 +55,36 @@ PW_CLONES void derivatives(const Part& part, const Block& b, float* __restrict o
   for (int i = 0; i < BLOCK; ++i) chain_step(p, scratch + i, out + i, BLOCK);
 }
 
-PW_CLONES void fold_block(float* __restrict field, const float* __restrict g, float k, float sharp, float* __restrict weight) {
+// F - G is the complement of (not F) + G, so that a sign before and after the smooth minimum makes both.
+PW_CLONES void fold_block(float* __restrict field, const float* __restrict g, float k, float sharp, float sign, float* __restrict weight) {
   for (int i = 0; i < BLOCK; ++i) {
-    const float w = smooth_weight(field[i], g[i], sharp);
+    const float before = sign * field[i], w = smooth_weight(before, g[i], sharp);
     weight[i] = w;
-    field[i] = smooth_minimum(field[i], g[i], k, w);
+    field[i] = sign * smooth_minimum(before, g[i], k, w);
   }
 }
 
-void fold(float* field, const float* g, float k, float* weight) { fold_block(field, g, k > 1e-9f ? k : 0.f, sharpness(k), weight); }
+void fold(float* field, const float* g, const Part& part, float* weight) {
+  fold_block(field, g, part.blend > 1e-9f ? part.blend : 0.f, sharpness(part.blend), part.sign, weight);
+}
 
-PW_CLONES void unfold(float* __restrict carried, const float* __restrict weight, float* __restrict share, float* __restrict blend) {
+PW_CLONES void unfold(float* __restrict carried, const float* __restrict weight, float sign, float* __restrict share, float* __restrict blend) {
   for (int i = 0; i < BLOCK; ++i) {
-    share[i] = carried[i] * (1 - weight[i]);
+    share[i] = sign * carried[i] * (1 - weight[i]);
     blend[i] = -share[i] * weight[i];
     carried[i] *= weight[i];
   }
+}
+
+// The fold of no parts: farther than any point, and small enough for sums to stay finite.
+constexpr float FAR = 1e6f;
+
+// What the first part of a fold leaves, nothing where it is subtracted.
+void begin(float* field, const float* g, const Part& part) {
+  if (part.sign > 0)
+    std::memcpy(field, g, BLOCK * sizeof(float));
+  else
+    std::fill_n(field, BLOCK, FAR);
 }
 
 // exp by the polynomial of the base-2 fraction; relative error 2e-7, no library call in the loop.
@@ -209,17 +223,18 @@ void forward(const std::vector<Part>& parts, const float* background, Workspace&
     float* g = w.g.data() + m * BLOCK;
     values(parts[m], w.block, g);
     if (m == 0 && !background) {
-      std::memcpy(w.field, g, sizeof w.field);
-      std::fill_n(w.weight.data(), BLOCK, 0.f);
+      begin(w.field, g, parts[m]);
+      std::fill_n(w.weight.data(), BLOCK, parts[m].sign > 0 ? 0.f : 1.f);
     } else {
-      fold(w.field, g, parts[m].blend, w.weight.data() + m * BLOCK);
+      fold(w.field, g, parts[m], w.weight.data() + m * BLOCK);
     }
   }
 }
 
 // dF/dg and dF/dk of every part from the fold weights; `carried` starts as the upstream derivative.
-void backward(size_t parts, Workspace& w) {
-  for (size_t m = parts; m-- > 0;) unfold(w.carried, &w.weight[m * BLOCK], &w.share[m * BLOCK], &w.blend[m * BLOCK]);
+void backward(const std::vector<Part>& parts, Workspace& w) {
+  for (size_t m = parts.size(); m-- > 0;)
+    unfold(w.carried, &w.weight[m * BLOCK], parts[m].sign, &w.share[m * BLOCK], &w.blend[m * BLOCK]);
 }
 
 PW_CLONES void add(float* __restrict total, const float* __restrict v) {
@@ -282,6 +297,7 @@ double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t fi
     else
       std::fill_n(w.total, BLOCK, 0.f);
     for (size_t m = 0; m < parts.size(); ++m) {
+      if (parts[m].sign < 0) continue;
       occupancy(&w.g[m * BLOCK], beta, &w.occ[m * BLOCK]);
       add(w.total, &w.occ[m * BLOCK]);
     }
@@ -307,8 +323,11 @@ void evaluate(const std::vector<Part>& parts, const float* points, int64_t count
     for (int64_t b = item * batch; b < std::min(blocks, (item + 1) * batch); ++b) {
       const int n = load(points, b * BLOCK, count, block);
       for (size_t m = 0; m < parts.size(); ++m) {
-        values(parts[m], block, m ? g : field);
-        if (m) fold(field, g, parts[m].blend, weight);
+        values(parts[m], block, g);
+        if (m)
+          fold(field, g, parts[m], weight);
+        else
+          begin(field, g, parts[m]);
       }
       std::memcpy(out + b * BLOCK, field, size_t(n) * sizeof(float));
     }
@@ -344,7 +363,7 @@ void gradients(const std::vector<Part>& parts, const float* points, const float*
       const int n = load(points, b * BLOCK, count, w.block);
       forward(parts, nullptr, w);
       for (int i = 0; i < BLOCK; ++i) w.carried[i] = i < n ? upstream[b * BLOCK + i] : 0.f;
-      backward(parts.size(), w);
+      backward(parts, w);
       for (size_t m = 0; m < parts.size(); ++m) {
         const float *share = &w.share[m * BLOCK], *blend = &w.blend[m * BLOCK];
         if (largest(share) == 0 && largest(blend) == 0) continue;
@@ -376,7 +395,7 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
     for (int64_t b = first; b < last; ++b) {
       sum.loss += sample_block(parts, samples, b * BLOCK, beta, penalties, w, r);
       std::fill_n(w.carried, BLOCK, 1.f);
-      backward(parts.size(), w);
+      backward(parts, w);
       // Each point has up to three residuals, and each residual that moves with some part is a column of the
       // block's Jacobian. Saturated points, most of them where beta is large, have none.
       const bool over = penalties.overlap > 0 && largest(r.over) > 0;
@@ -395,7 +414,8 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
         float top = 0;
         for (int kind = 0; kind < KINDS; ++kind) {
           if (!used[kind]) continue;
-          by_part(by_field[kind], &w.share[m * BLOCK], by_occupancy[kind], &w.occ[m * BLOCK], beta, c + kind * BLOCK);
+          const float* by_added = parts[m].sign > 0 ? by_occupancy[kind] : none;
+          by_part(by_field[kind], &w.share[m * BLOCK], by_added, &w.occ[m * BLOCK], beta, c + kind * BLOCK);
           top = std::max(top, largest(c + kind * BLOCK));
         }
         if (top < least) continue;
@@ -487,8 +507,14 @@ void removal_counts(const std::vector<Part>& parts, const float* points, const u
                     int64_t total, double* out, int threads) {
   const size_t m = parts.size(), size = 2 * (m + 1);
   std::vector<double> sums(PIECES * size, 0.0);
+  const bool carved = std::any_of(parts.begin(), parts.end(), [](const Part& p) { return p.sign < 0; });
   parallel_for(PIECES, threads, [&](int64_t piece) {
     Workspace w(m);
+    // Near the wall of a hole the field is that of the hole, and yet a part that holds the point matters.
+    const auto matters = [&](size_t i) {
+      const float* g = &w.g[i * BLOCK];
+      return largest(&w.share[i * BLOCK]) > 0 || (carved && *std::min_element(g, g + BLOCK) < 0);
+    };
     double* counts = &sums[size_t(piece) * size];
     alignas(64) float in[BLOCK], weights[BLOCK], both[BLOCK], either[BLOCK], field[BLOCK], dropped[BLOCK];
     const auto [first, last] = piece_range(total, piece);
@@ -502,20 +528,20 @@ void removal_counts(const std::vector<Part>& parts, const float* points, const u
       count(w.field, in, weights, both, either);
       const double base_both = sum(both), base_either = sum(either);
       std::fill_n(w.carried, BLOCK, 1.f);
-      backward(m, w);
+      backward(parts, w);
       for (size_t i = 0; i <= m; ++i) {
         double now_both = base_both, now_either = base_either;
-        if (i < m && largest(&w.share[i * BLOCK]) > 0) {
+        if (i < m && matters(i)) {
           bool empty = true;
           for (size_t j = 0; j < m; ++j) {
             if (j == i) continue;
             if (empty)
-              std::memcpy(field, &w.g[j * BLOCK], sizeof field);
+              begin(field, &w.g[j * BLOCK], parts[j]);
             else
-              fold(field, &w.g[j * BLOCK], parts[j].blend, dropped);
+              fold(field, &w.g[j * BLOCK], parts[j], dropped);
             empty = false;
           }
-          if (empty) std::fill_n(field, BLOCK, 1.f);
+          if (empty) std::fill_n(field, BLOCK, FAR);
           count(field, in, weights, both, either);
           now_both = sum(both);
           now_either = sum(either);

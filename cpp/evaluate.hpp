@@ -15,7 +15,8 @@ constexpr int BLOCK = 128;
 // Sums run over this many fixed pieces whatever the number of threads, so that they always round alike.
 constexpr int PIECES = 16;
 
-// Signed distances of the folded assembly at N points (N, 3).
+// Signed distances of the folded assembly at N points (N, 3). The fold goes from first to last: a part that is
+// added joins what came before it, one that is subtracted is taken from it and from nothing that comes later.
 void evaluate(const std::vector<Part>& parts, const float* points, int64_t count, float* out, int threads);
 
 // Signed distances of each part alone: (M, N).
@@ -35,7 +36,8 @@ struct Samples {
   int64_t count;
 };
 
-// Weights of the residuals that accompany the reconstruction (eq. 7): overlap and smooth-union consistency.
+// Weights of the residuals that accompany the reconstruction (eq. 7): overlap and smooth-union consistency. Both
+// look at the parts that are added, for eq. 8 knows no others.
 struct Penalties {
   float overlap;
   float blending;

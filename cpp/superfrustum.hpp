@@ -17,9 +17,10 @@
 
 namespace partwright {
 
-// One row of the parameter array: pose, shape, and the blend with which the part joins the fold.
+// One row of the parameter array: pose, shape, the blend with which the part joins the fold, and whether it is
+// added (+1) or subtracted (-1) there.
 enum Column {
-  TX, TY, TZ, QW, QX, QY, QZ, SX, SY, SZ, ROUNDNESS, DILATION, TAPER, BULGE, ONION, BLEND, COLUMNS
+  TX, TY, TZ, QW, QX, QY, QZ, SX, SY, SZ, ROUNDNESS, DILATION, TAPER, BULGE, ONION, BLEND, SIGN, COLUMNS
 };
 
 // Derivatives are taken with respect to: translation (3), a local rotation vector w with R <- R exp(w) (3),
@@ -42,7 +43,7 @@ struct Part {
   float e, inner_top, inner_bottom;
   float outer_inverse, inner_inverse, outer_length_inverse, inner_length_inverse, inner_run;
   float share_x, share_y;  // dm/dsx and dm/dsy
-  float blend;
+  float blend, sign;
   bool bent, hollow;
 };
 
@@ -65,7 +66,8 @@ inline Part prepare(const float* row) {
   p.share_x = sx < sy ? 0.5f : sx > sy ? 0.f : 0.25f;
   p.share_y = 0.5f - p.share_x;
   p.roundness = row[ROUNDNESS]; p.round_radius = float(row[ROUNDNESS] * m);
-  p.dilation = row[DILATION]; p.taper = float(t); p.onion = float(o); p.blend = row[BLEND];
+  p.dilation = row[DILATION]; p.taper = float(t); p.onion = float(o);
+  p.blend = row[BLEND]; p.sign = row[SIGN] < 0 ? -1.f : 1.f;
 
   const double chord = std::max(h, double(MIN_CHORD));
   const double theta = std::max(double(row[BULGE]) * (PI / 2), 1e-20);

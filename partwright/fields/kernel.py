@@ -1,8 +1,9 @@
 """The C++ kernel's face: SuperFrusta over many points, their derivatives, and least-squares fits of them.
 
 A *parameter row* holds one part: translation (3), rotation quaternion w, x, y, z (local to world), size
-(3), roundness, dilation, taper, bulge, onion, and the blend with which it joins the fold (unused in the first
-row).
+(3), roundness, dilation, taper, bulge, onion, the blend with which it joins the fold (unused in the first
+row), and its sign: +1 where it is added to what came before it, -1 where it is subtracted from that. The sign
+may be left out of all rows (M, 16): then every part is added.
 Derivatives are ordered: translation (3), a local rotation vector w with R <- R exp(w) (3), size (3),
 roundness, dilation, taper, bulge, onion, blend. `partwright.fields.reference` is the slow form that tests
 compare with.
@@ -20,19 +21,29 @@ from numpy.typing import ArrayLike, NDArray
 from partwright import _kernel
 
 COLUMNS = ("tx", "ty", "tz", "qw", "qx", "qy", "qz", "sx", "sy", "sz",
-           "roundness", "dilation", "taper", "bulge", "onion", "blend")  # fmt: skip
+           "roundness", "dilation", "taper", "bulge", "onion", "blend", "sign")  # fmt: skip
 DERIVATIVES = ("tx", "ty", "tz", "wx", "wy", "wz", "sx", "sy", "sz",
                "roundness", "dilation", "taper", "bulge", "onion", "blend")  # fmt: skip
+
+UNSIGNED = len(COLUMNS) - 1
 
 Rows = NDArray[np.float32]
 Floats = NDArray[np.float32]
 
 
 def _rows(parameters: ArrayLike) -> Rows:
+    """The rows (M, 17) with their signs."""
     rows = np.ascontiguousarray(parameters, dtype=np.float32)
-    if rows.ndim != 2 or rows.shape[1] != len(COLUMNS) or len(rows) == 0:
-        raise ValueError(f"parameter rows must be (M, {len(COLUMNS)}) with M > 0, got {rows.shape}")
+    if rows.ndim != 2 or rows.shape[1] not in (UNSIGNED, UNSIGNED + 1) or len(rows) == 0:
+        raise ValueError(f"parameter rows must be (M, {UNSIGNED} or {UNSIGNED + 1}), M > 0, got {rows.shape}")
+    if rows.shape[1] == UNSIGNED:
+        return np.concatenate([rows, np.ones((len(rows), 1), np.float32)], axis=1)
     return rows
+
+
+def like(rows: Rows, given: ArrayLike) -> Rows:
+    """Rows with signs, or without where the rows given had none."""
+    return rows[:, : np.shape(given)[1]]
 
 
 def _points(points: ArrayLike) -> Floats:
@@ -43,7 +54,7 @@ def _points(points: ArrayLike) -> Floats:
 
 
 def evaluate(parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> Floats:
-    """Distances (N,) of the smooth union of M parts, folded first to last (SuperFrusta, eq. 4)."""
+    """Distances (N,) of M parts, folded first to last: smooth unions (SuperFrusta, eq. 4) and differences."""
     return _kernel.evaluate(_rows(parameters), _points(points), threads)
 
 
@@ -153,11 +164,12 @@ def levenberg_marquardt(
     rows = _rows(parameters)
     free = np.ones((len(rows), len(DERIVATIVES)), bool) if free is None else free
     tied = np.zeros(len(rows), bool) if tied is None else tied
-    return _kernel.levenberg_marquardt(
+    fitted, loss, iterations = _kernel.levenberg_marquardt(
         rows, free.astype(np.uint8), tied.astype(np.uint8), *target.arrays(),
         np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(),
         threads,
     )  # fmt: skip
+    return like(fitted, parameters), loss, iterations
 
 
 def fit_starts(
@@ -172,16 +184,17 @@ def fit_starts(
     penalties: Penalties = Penalties(),
     threads: int = 0,
 ) -> tuple[Rows, NDArray[np.float64]]:
-    """One single-part fit per start (B, 16), on the samples `ranges[b, 0]:ranges[b, 1]`; rows and losses."""
+    """One single-part fit per start (B, 17), on the samples `ranges[b, 0]:ranges[b, 1]`; rows and losses."""
     rows = _rows(starts)
     free = np.ones((len(rows), len(DERIVATIVES)), bool) if free is None else free
     tied = np.zeros(len(rows), bool) if tied is None else tied
     first, last = (np.ascontiguousarray(column, np.int64) for column in np.asarray(ranges).T)
-    return _kernel.fit_starts(
+    fitted, losses = _kernel.fit_starts(
         rows, first, last, free.astype(np.uint8), tied.astype(np.uint8), *target.arrays(),
         np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(),
         threads,
     )  # fmt: skip
+    return like(fitted, starts), losses
 
 
 def removal_counts(

@@ -13,10 +13,12 @@ import math
 import torch
 from torch import Tensor
 
-from partwright.fields.operations import smooth_union
+from partwright.fields.operations import smooth_difference, smooth_union
 
 # Added to the half height: the chord of the bend and the edges of the profile never have length zero.
 HEIGHT_FLOOR = 1e-12
+# The fold of no parts: farther than any point.
+FAR = 1e6
 # Squared lengths below this count as zero (its inverse and its root are finite in float32).
 SQUARE_FLOOR = 1e-30
 # Where sin(x)/x and atan(x)/x turn into their series: 0/0 at zero, and cancellation in the gradient near it.
@@ -148,23 +150,28 @@ def part_distance(
     return superfrustum(local, size, roundness, dilation, taper, bulge, onion)
 
 
-def fold(distances: Tensor, blends: Tensor) -> Tensor:
-    """Smooth union (N,) of distances (M, N) from first to last; blends (M,), that of the first unused."""
-    result = distances[0]
-    for distance, blend in zip(distances[1:], blends[1:], strict=True):
-        result = smooth_union(result, distance, blend)
+def fold(distances: Tensor, blends: Tensor, signs: Tensor | None = None) -> Tensor:
+    """Distances (M, N) joined from first to last; blends (M,), that of the first unused.
+
+    Parts of a negative sign (M,) are subtracted from what came before them, all others added to it.
+    """
+    subtracted = [False] * len(distances) if signs is None else [bool(sign < 0) for sign in signs]
+    result = torch.full_like(distances[0], FAR) if subtracted[0] else distances[0]
+    for distance, blend, minus in zip(distances[1:], blends[1:], subtracted[1:], strict=True):
+        result = (smooth_difference if minus else smooth_union)(result, distance, blend)
     return result
 
 
 def evaluate_parts(parameters: Tensor, points: Tensor) -> Tensor:
-    """Distances (M, N) of each part alone; rows (M, 16) as in `fields.kernel`, points (N, 3)."""
+    """Distances (M, N) of each part alone; rows (M, 16 or 17) as in `fields.kernel`, points (N, 3)."""
     translation, rotation, size = parameters[:, 0:3], parameters[:, 3:7], parameters[:, 7:10]
     return part_distance(points, translation, rotation, size, *parameters[:, 10:15].unbind(-1))
 
 
 def evaluate(parameters: Tensor, points: Tensor) -> Tensor:
-    """Distance (N,) of the whole: the parts folded by smooth union. Rows (M, 16), points (N, 3)."""
-    return fold(evaluate_parts(parameters, points), parameters[:, 15])
+    """Distance (N,) of the whole: the parts folded as their signs say. Rows (M, 16 or 17), points (N, 3)."""
+    signs = parameters[:, 16] if parameters.shape[1] > 16 else None
+    return fold(evaluate_parts(parameters, points), parameters[:, 15], signs)
 
 
 def _edge(q: Tensor, z: Tensor, bottom: Tensor, top: Tensor, h: Tensor) -> tuple[Tensor, Tensor]:

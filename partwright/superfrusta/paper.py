@@ -17,7 +17,7 @@ from torch import Tensor
 
 from partwright.errors import SettingError
 from partwright.fields import reference
-from partwright.fields.kernel import Rows, Target, _rows
+from partwright.fields.kernel import UNSIGNED, Rows, Target, _rows, like
 from partwright.superfrusta.refining import LIMITS
 from partwright.superfrusta.torch_equations import BULGE, SX, SZ, tightest_bulge
 
@@ -130,7 +130,7 @@ def optimise(
     locked: int = 0,
     device: str | torch.device = "cpu",
 ) -> Optimised:
-    """Minimises eq. 8 from rows (M, 16) against distances (N,) with weights (N,) at points (N, 3).
+    """Minimises eq. 8 from rows (M, 17), all added, against distances (N,) with weights (N,) at points (N, 3).
 
     The first `locked` rows stay bit for bit and always exist. Parts whose existence probability ends below
     0.5 are dropped; if that were all, the likeliest stays.
@@ -138,20 +138,22 @@ def optimise(
     Raises:
         ValueError: arrays do not match in shape, or `locked` is not a number of rows.
     """
-    start = _rows(rows)
+    start = _rows(rows)[:, :UNSIGNED]
     if not 0 <= locked <= len(start):
         raise ValueError(f"locked must be from 0 to the number of rows, {len(start)}, got {locked}")
     arrays = Target(*(np.asarray(a, np.float32) for a in (points, distance, weight))).arrays()[:3]
     samples = Samples(*(torch.as_tensor(array, device=device) for array in arrays))
     if locked == len(start) or len(samples.points) == 0:
-        return Optimised(start.copy(), np.ones(len(start), bool), np.ones(len(start), np.float32))
+        return Optimised(
+            like(_rows(rows).copy(), rows), np.ones(len(start), bool), np.ones(len(start), np.float32)
+        )
     moved, probability = _descend(torch.as_tensor(start, device=device), samples, config, locked, seed)
     existence = probability.cpu().numpy()
     kept = existence >= 0.5
     kept[existence.argmax()] = True
-    result = start.copy()
-    result[locked:] = moved.cpu().numpy()
-    return Optimised(result[kept], kept, existence)
+    result = _rows(rows).copy()
+    result[locked:, :UNSIGNED] = moved.cpu().numpy()
+    return Optimised(like(result[kept], rows), kept, existence)
 
 
 def losses(rows: Tensor, existence: Tensor, samples: Samples, beta: float, config: PaperConfig) -> Losses:

@@ -1,6 +1,6 @@
 """The equations of a batch of fits in PyTorch: folds, residuals, derivatives, steps, and moves in bounds.
 
-Rows are (B, M, 16): B assemblies of M parts, each with P samples. `torch_kernel` runs them on a device; the
+Rows are (B, M, 17): B assemblies of M parts, each with P samples. `torch_kernel` runs them on a device; the
 compiled counterparts are cpp/evaluate.cpp and cpp/optimise.cpp.
 """
 
@@ -16,17 +16,16 @@ from torch import Tensor
 from partwright.fields import reference
 from partwright.fields.kernel import DERIVATIVES, Penalties
 from partwright.fields.operations import SHARP
+from partwright.fields.reference import FAR
 
 # A pair whose residuals move less than this per unit of distance takes no part in a step.
 NEGLIGIBLE = 1e-6
-# Farther than any point: the fold of no parts.
-FAR = 1e6
 # As in cpp/optimise.cpp.
 DAMPING_FLOOR, RIDGE = 1e-3, 1e-9
 
 WIDTH = len(DERIVATIVES)
 D_SX, D_SY, D_BULGE = (DERIVATIVES.index(name) for name in ("sx", "sy", "bulge"))
-SX, SY, SZ, BULGE, BLEND = 7, 8, 9, 13, 15  # columns of a row
+SX, SY, SZ, BULGE, BLEND, SIGN = 7, 8, 9, 13, 15, 16  # columns of a row
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class Samples:
 class Problem:
     """B assemblies in the course of a fit.
 
-    rows (B, M, 16) change in place. free (B, M, 15) and tied (B, M) as in the kernel; `parts` (L,) is the
+    rows (B, M, 17) change in place. free (B, M, 15) and tied (B, M) as in the kernel; `parts` (L,) is the
     index of those that move in any assembly; limits (3, 15): lower and upper bounds, longest steps.
     """
 
@@ -72,7 +71,7 @@ class Problem:
     def variables(self, gradient: Tensor) -> Tensor:
         """Entries (B, 15 L) that the next step may move: at a bound, only those that want back inside."""
         lower, upper, _ = self.limits[:, D_SX:]
-        value = self.rows[:, self.parts, SX:]
+        value = self.rows[:, self.parts, SX:SIGN]
         slope = gradient.view(len(self.rows), len(self.parts), WIDTH)[..., D_SX:]
         leaving = ((value <= lower) & (slope > 0)) | ((value >= upper) & (slope < 0))
         variable = self.free[:, self.parts].clone()
@@ -81,7 +80,7 @@ class Problem:
         return variable.flatten(1)
 
     def moved(self, which: Tensor, step: Tensor, variable: Tensor) -> Tensor:
-        """Rows (n, M, 16) of the assemblies of that index after steps (n, 15 L), clipped, within bounds.
+        """Rows (n, M, 17) of the assemblies of that index after steps (n, 15 L), clipped, within bounds.
 
         Entries that are not `variable` (n, 15 L) keep their bits.
         """
@@ -92,10 +91,11 @@ class Problem:
         moving[:, self.parts] = variable.view(len(which), -1, WIDTH)
         lower, upper, longest = self.limits
         clipped = delta.clamp(-longest.double(), longest.double())
-        shape = (rows[..., SX:] + clipped[..., D_SX:].float()).clamp(lower[D_SX:], upper[D_SX:])
-        shape = torch.where(moving[..., D_SX:], shape, rows[..., SX:])
+        old = rows[..., SX:SIGN]
+        shape = (old + clipped[..., D_SX:].float()).clamp(lower[D_SX:], upper[D_SX:])
+        shape = torch.where(moving[..., D_SX:], shape, old)
         rotation = turned(rows[..., 3:7], clipped[..., 3:6])
-        moved = torch.cat([rows[..., :3] + clipped[..., :3].float(), rotation, shape], -1)
+        moved = torch.cat([rows[..., :3] + clipped[..., :3].float(), rotation, shape, rows[..., SIGN:]], -1)
         together = self.tied[which] & moving[..., D_SX]
         moved[..., SY] = torch.where(together, moved[..., SX], moved[..., SY])
         bulge = torch.minimum(moved[..., BULGE], tightest_bulge(moved[..., SX], moved[..., SZ]))
@@ -144,7 +144,7 @@ def damped_step(matrix: Tensor, gradient: Tensor, variable: Tensor, damping: Ten
 
 
 def local_points(rows: Tensor, points: Tensor) -> Tensor:
-    """Points (B, P, 3) in the frame of each part of rows (B, M, 16): (B, M, P, 3)."""
+    """Points (B, P, 3) in the frame of each part of rows (B, M, 17): (B, M, P, 3)."""
     return reference.rotate_to_local(points[:, None], rows[..., :3], rows[..., 3:7])
 
 
@@ -153,45 +153,54 @@ def distances(rows: Tensor, local: Tensor) -> Tensor:
     return reference.superfrustum(local, rows[..., SX:10], *rows[..., 10:BLEND].unbind(-1))
 
 
-def fold_step(field: Tensor, g: Tensor, blend: Tensor) -> tuple[Tensor, Tensor]:
-    """Smooth minimum of the fold so far and the next part, and dU/dfield; dU/dg is 1 less that."""
+def fold_step(field: Tensor, g: Tensor, blend: Tensor, sign: Tensor) -> tuple[Tensor, Tensor]:
+    """The fold so far joined with the next part as its sign says, and the weight of what came before.
+
+    That is the derivative by the fold so far; the one by g is the sign times what is left of 1.
+    """
+    before = sign * field
     radius = blend.clamp(min=SHARP)
-    smooth = (0.5 + (g - field) / (2 * radius)).clamp(0, 1)
-    weight = torch.where(blend > SHARP, smooth, (field <= g).to(g))
-    return g + (field - g) * weight - blend * weight * (1 - weight), weight
+    smooth = (0.5 + (g - before) / (2 * radius)).clamp(0, 1)
+    weight = torch.where(blend > SHARP, smooth, (before <= g).to(g))
+    return sign * (g + (before - g) * weight - blend * weight * (1 - weight)), weight
 
 
-def fold(g: Tensor, blends: Tensor, background: Tensor | None) -> tuple[Tensor, Tensor]:
-    """Smooth union (B, P) of distances (B, M, P) after the background, if any.
+def fold(g: Tensor, rows: Tensor, background: Tensor | None) -> tuple[Tensor, Tensor]:
+    """Distances (B, M, P) of parts (B, M, 17) joined, after the background, if any: (B, P).
 
     Also the weights (B, M, P) with which what came before each part goes on.
     """
-    field = g[:, 0] if background is None else background
+    blends, signs = rows[..., BLEND, None], rows[..., SIGN, None]
     weights = torch.zeros_like(g)
+    field = background
+    if field is None:
+        field = torch.where(signs[:, 0] > 0, g[:, 0], FAR)
+        weights[:, 0] = (signs[:, 0] < 0).to(g)
     for part in range(background is None, g.shape[1]):
-        field, weights[:, part] = fold_step(field, g[:, part], blends[:, part, None])
+        field, weights[:, part] = fold_step(field, g[:, part], blends[:, part], signs[:, part])
     return field, weights
 
 
-def fold_without(g: Tensor, blends: Tensor) -> Tensor:
-    """Smooth unions (M + 1, n) of distances (M, n) without each part in turn, and of all of them."""
+def fold_without(g: Tensor, rows: Tensor) -> Tensor:
+    """Distances (M + 1, n) of the fold of (M, n) without each of the parts (M, 17) in turn, and of all."""
     parts = len(g)
     field = torch.full((parts + 1, g.shape[1]), FAR, dtype=g.dtype, device=g.device)
     for part in range(parts):
-        joined, _ = fold_step(field, g[part], blends[part])
+        joined, _ = fold_step(field, g[part], rows[part, BLEND], rows[part, SIGN])
         empty = field == FAR
-        joined = torch.where(empty, g[part], joined)
+        joined = torch.where(empty, torch.where(rows[part, SIGN] > 0, g[part], FAR), joined)
         joined[part] = field[part]
         field = joined
     return field
 
 
 def residuals(
-    field: Tensor, g: Tensor, samples: Samples, beta: float, penalties: Penalties
+    field: Tensor, g: Tensor, added: Tensor, samples: Samples, beta: float, penalties: Penalties
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Residuals (B, S, P), their derivatives by the assembly's distance, and by the occupancy of any part.
 
-    The reconstruction against a soft target (eq. 7), then the penalties of eq. 8 that weigh anything.
+    The reconstruction against a soft target (eq. 7), then the penalties of eq. 8 that weigh anything. Those
+    look at parts that are `added` (B, M), and so does the derivative by the occupancy.
     """
     root = samples.weight.sqrt()
     whole = torch.sigmoid(-beta * field)
@@ -199,7 +208,7 @@ def residuals(
     none = torch.zeros_like(root)
     kinds = [(root * (whole - torch.sigmoid(-beta * samples.distance)), root * slope, none)]
     if penalties.overlap > 0 or penalties.blending > 0:
-        total = torch.sigmoid(-beta * g).sum(1)
+        total = (torch.sigmoid(-beta * g) * added[..., None]).sum(1)
         if samples.background is not None:
             total = total + torch.sigmoid(-beta * samples.background)
     if penalties.overlap > 0:
@@ -219,14 +228,15 @@ def linearised(
     """Residuals (B, S P) and their Jacobian (B, S P, 15 L) by the L parts of that index."""
     local = local_points(rows, samples.points)
     g = distances(rows, local)
-    field, weights = fold(g, rows[..., BLEND], samples.background)
-    residual, by_field, by_part = residuals(field, g, samples, beta, penalties)
+    field, weights = fold(g, rows, samples.background)
+    added = rows[..., SIGN] > 0
+    residual, by_field, by_part = residuals(field, g, added, samples, beta, penalties)
 
     later = torch.cat([weights[:, 1:], torch.ones_like(weights[:, :1])], 1).flip(1).cumprod(1).flip(1)
-    share = ((1 - weights) * later)[:, parts]  # dF/dg
+    share = (rows[..., SIGN, None] * (1 - weights) * later)[:, parts]  # dF/dg
     by_blend = -share * weights[:, parts]
     occupancy = torch.sigmoid(-beta * g[:, parts])
-    slope = beta * occupancy * (1 - occupancy)
+    slope = beta * occupancy * (1 - occupancy) * added[:, parts, None]
     by_distance = by_field[:, :, None] * share[:, None] - by_part[:, :, None] * slope[:, None]  # (B, S, L, P)
 
     batch, kinds, points = residual.shape
@@ -239,7 +249,7 @@ def linearised(
 
 
 def derivatives(rows: Tensor, local: Tensor) -> Tensor:
-    """Derivatives (K, 14) of the distances of K parts (K, 16), each at one local point (K, 3).
+    """Derivatives (K, 14) of the distances of K parts (K, 17), each at one local point (K, 3).
 
     Every pair owns its leaves, so that one reverse pass over the sum gives all of them.
     """

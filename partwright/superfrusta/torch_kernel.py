@@ -23,11 +23,11 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
-from partwright.fields.kernel import Floats, Limits, Penalties, Rows, Target, _points, _rows
+from partwright.fields.kernel import Floats, Limits, Penalties, Rows, Target, _points, _rows, like
 from partwright.superfrusta.torch_equations import (
-    BLEND,
     D_SX,
     D_SY,
+    SIGN,
     WIDTH,
     Problem,
     Samples,
@@ -60,9 +60,9 @@ class TorchKernel:
 
     @torch.no_grad()
     def evaluate(self, parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> Floats:
-        """Distances (N,) of the smooth union of M parts, folded first to last (SuperFrusta, eq. 4)."""
+        """Distances (N,) of M parts folded first to last: smooth unions (SuperFrusta, eq. 4), differences."""
         rows = self._tensor(_rows(parameters))[None]
-        folded = [fold(g, rows[..., BLEND], None)[0][0] for g in self._distances(rows, points)]
+        folded = [fold(g, rows, None)[0][0] for g in self._distances(rows, points)]
         return _numpy(torch.cat(folded))
 
     @torch.no_grad()
@@ -91,7 +91,7 @@ class TorchKernel:
         first = 0
         for g in self._distances(rows, points):
             span = slice(first, first + g.shape[2])
-            occupied = fold_without(g[0], rows[0, :, BLEND]) < 0
+            occupied = fold_without(g[0], rows[0]) < 0
             both, either = occupied & solid[span], occupied | solid[span]
             counts += torch.stack([(both * mass[span]).sum(1), (either * mass[span]).sum(1)], 1)
             first = span.stop
@@ -146,7 +146,7 @@ class TorchKernel:
         rows = _rows(parameters)
         problem = self._problem(rows[None], self._samples(target), limits, free, tied, penalties)
         fitted, losses, iterations = self._minimise(problem, stages)
-        return _numpy(fitted[0]), float(losses[0]), int(iterations[0])
+        return like(_numpy(fitted[0]), parameters), float(losses[0]), int(iterations[0])
 
     @torch.no_grad()
     def fit_starts(
@@ -162,14 +162,14 @@ class TorchKernel:
         penalties: Penalties = Penalties(),  # noqa: B008
         threads: int = 0,
     ) -> tuple[Rows, NDArray[np.float64]]:
-        """One single-part fit per start (B, 16), each on the samples `ranges[b, 0]:ranges[b, 1]`.
+        """One single-part fit per start (B, 17), each on the samples `ranges[b, 0]:ranges[b, 1]`.
 
         Returns rows and losses. All starts run as one batch; shorter ranges are padded with weight 0.
         """
         rows = _rows(starts)
         problem = self._problem(rows[:, None], self._ranges(target, ranges), limits, free, tied, penalties)
         fitted, losses, _ = self._minimise(problem, stages)
-        return _numpy(fitted[:, 0]), losses.cpu().numpy()
+        return like(_numpy(fitted[:, 0]), starts), losses.cpu().numpy()
 
     def _tensor(self, array: NDArray) -> Tensor:
         return torch.as_tensor(array, device=self.device)
@@ -208,7 +208,7 @@ class TorchKernel:
         tied: NDArray[np.bool_] | None,
         penalties: Penalties,
     ) -> Problem:
-        """`free` and `tied` as given by the caller, over all parts of all assemblies of `rows` (B, M, 16)."""
+        """`free` and `tied` as given by the caller, over all parts of all assemblies of `rows` (B, M, 17)."""
         batch = rows.shape[:2]
         free = np.ones((*batch, WIDTH), bool) if free is None else free.reshape(*batch, WIDTH)
         tied = np.zeros(batch, bool) if tied is None else tied.reshape(batch)
@@ -229,8 +229,8 @@ class TorchKernel:
         total = torch.zeros(len(rows), dtype=torch.float64, device=self.device)
         for piece in samples.pieces(self._span(rows.shape[0] * rows.shape[1], FORWARD_BYTES)):
             g = distances(rows, local_points(rows, piece.points))
-            field, _ = fold(g, rows[..., BLEND], piece.background)
-            residual, _, _ = residuals(field, g, piece, beta, penalties)
+            field, _ = fold(g, rows, piece.background)
+            residual, _, _ = residuals(field, g, rows[..., SIGN] > 0, piece, beta, penalties)
             total += 0.5 * (residual * residual).sum((1, 2), dtype=torch.float64)
         return total
 
@@ -251,7 +251,7 @@ class TorchKernel:
         return loss, gradient, matrix
 
     def _minimise(self, problem: Problem, stages: ArrayLike) -> tuple[Tensor, Tensor, Tensor]:
-        """Rows (B, M, 16), losses (B,) and iterations (B,) after all stages of Levenberg-Marquardt."""
+        """Rows (B, M, 17), losses (B,) and iterations (B,) after all stages of Levenberg-Marquardt."""
         loss = torch.zeros(len(problem.rows), dtype=torch.float64, device=self.device)
         iterations = torch.zeros(len(problem.rows), dtype=torch.int64, device=self.device)
         for beta, most in np.asarray(stages, np.float32):

@@ -28,6 +28,13 @@ def random_rows(generator: np.random.Generator, parts: int) -> np.ndarray:
     return np.hstack([translation, rotation, shape]).astype(np.float32)
 
 
+def signed(rows: np.ndarray) -> np.ndarray:
+    """The rows with every other part, and the last, subtracted: nested differences."""
+    signs = np.where(np.arange(len(rows)) % 2, -1.0, 1.0)
+    signs[-1] = -1.0 if len(rows) > 1 else 1.0
+    return np.hstack([rows, signs[:, None]]).astype(np.float32)
+
+
 def inner_rows(generator: np.random.Generator, parts: int) -> np.ndarray:
     """Rows away from the ends of the ranges, where every gradient exists, and away from sx = sy."""
     rows = random_rows(generator, parts)
@@ -68,6 +75,36 @@ def test_values_equal_the_reference(seed: int) -> None:
         )
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_subtracted_parts_equal_the_reference(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    rows, points = signed(random_rows(generator, 5)), random_points(generator, 1000)
+    smooth = well_conditioned(rows, points)
+    values = kernel.evaluate(rows, points)
+    np.testing.assert_allclose(values[smooth], exact(rows, points)[smooth], rtol=0, atol=1e-5)
+
+
+def test_subtraction_takes_from_what_came_before_and_from_nothing_else() -> None:
+    def cube(side: float, sign: float) -> list[float]:
+        return [0, 0, 0, 1, 0, 0, 0, side, side, side, 0, 0, 1, 0, 0, 0, sign]
+
+    centre, wall = np.zeros((1, 3), np.float32), np.full((1, 3), 0.4, np.float32)
+    hollow = np.array([cube(1, 1), cube(0.5, -1)])
+    assert kernel.evaluate(hollow, centre) > 0 > kernel.evaluate(hollow, wall)
+    filled = np.array([cube(1, 1), cube(0.5, -1), cube(0.2, 1)])
+    assert kernel.evaluate(filled, centre) < 0
+    nothing = np.array([cube(1, -1)])
+    assert kernel.evaluate(nothing, centre) > 1
+    np.testing.assert_allclose(kernel.evaluate(np.array([cube(0.5, -1), cube(1, 1)]), centre), -0.5)
+
+
+def test_without_signs_every_part_is_added() -> None:
+    generator = np.random.default_rng(0)
+    rows, points = random_rows(generator, 4), random_points(generator, 200)
+    added = np.hstack([rows, np.ones((4, 1), np.float32)])
+    np.testing.assert_array_equal(kernel.evaluate(rows, points), kernel.evaluate(added, points))
+
+
 def test_parts_alone_equal_the_reference() -> None:
     generator = np.random.default_rng(0)
     rows, points = random_rows(generator, 6), random_points(generator, 300)
@@ -90,13 +127,16 @@ def moved(rows: torch.Tensor, change: torch.Tensor) -> torch.Tensor:
         ],
         -1,
     )
-    return torch.cat([rows[..., :3] + change[..., :3], turned, rows[..., 7:] + change[..., 6:]], -1)
+    shape = rows[..., 7:16] + change[..., 6:]
+    return torch.cat([rows[..., :3] + change[..., :3], turned, shape, rows[..., 16:]], -1)
 
 
 def folded(rows: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
-    """Distance (N,) of each point (N, 3) to its own copy of the assembly: rows (M, N, 16)."""
+    """Distance (N,) of each point (N, 3) to its own copy of the assembly: rows (M, N, 16 or 17)."""
     pose, shape = (rows[..., :3], rows[..., 3:7]), (rows[..., 7:10], *rows[..., 10:15].unbind(-1))
-    return reference.fold(reference.part_distance(points[:, None], *pose, *shape)[..., 0], rows[..., 15])
+    signs = rows[:, 0, 16] if rows.shape[-1] > 16 else None
+    alone = reference.part_distance(points[:, None], *pose, *shape)[..., 0]
+    return reference.fold(alone, rows[..., 15], signs)
 
 
 def central_difference(
@@ -126,8 +166,9 @@ def reference_gradients(rows: np.ndarray, points: np.ndarray) -> tuple[np.ndarra
 @pytest.mark.parametrize(("seed", "parts"), [(0, 1), (1, 1), (2, 2), (3, 3)])
 def test_gradients_equal_the_reference_away_from_kinks(seed: int, parts: int, bulge: float | None) -> None:
     generator = np.random.default_rng(seed)
-    for _ in range(3):
+    for turn in range(3):
         rows, points = inner_rows(generator, parts), random_points(generator, 100)
+        rows = signed(rows) if turn and bulge is None else rows
         if bulge is not None:  # a straight part has to feel which way to bend
             rows[:, 13] = bulge
         expected, smooth = reference_gradients(rows, points)

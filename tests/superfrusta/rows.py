@@ -26,6 +26,12 @@ def row(
     return np.array([*centre, *unit, *size, roundness, dilation, taper, bulge, onion, blend], np.float32)
 
 
+def subtracting(rows: np.ndarray, *which: int) -> np.ndarray:
+    """The rows with their signs (M, 17), those of these indices subtracted."""
+    signs = np.where(np.isin(np.arange(len(rows)), which), -1.0, 1.0)
+    return np.hstack([rows, signs[:, None]]).astype(np.float32)
+
+
 def ball(radius: float, centre=(0.0, 0.0, 0.0)) -> np.ndarray:
     """A ball, made the way the fit could make it: almost no core, all dilation."""
     return row(centre, size=(0.004, 0.004, 0.004), roundness=1.0, dilation=radius - 0.002, blend=1e-3)

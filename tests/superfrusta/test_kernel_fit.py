@@ -10,7 +10,15 @@ from scipy.spatial.transform import Rotation
 
 from partwright.fields import kernel
 from partwright.superfrusta.refining import LIMITS
-from tests.superfrusta.rows import TURNED, disturbed, exact_target, points_in_box, random_rows, row
+from tests.superfrusta.rows import (
+    TURNED,
+    disturbed,
+    exact_target,
+    points_in_box,
+    random_rows,
+    row,
+    subtracting,
+)
 
 STAGES = ((15.0, 20), (40.0, 20), (100.0, 30))
 BOTH = kernel.Penalties(overlap=0.3, blending=0.2)
@@ -86,9 +94,12 @@ def test_a_perfect_start_stays_bit_for_bit() -> None:
     np.testing.assert_array_equal(found, rows)
 
 
+@pytest.mark.parametrize("minus", [(), (2,), (1,)], ids=["added", "subtracted", "nested"])
 @pytest.mark.parametrize("penalties", [kernel.Penalties(), BOTH], ids=["reconstruction", "penalties"])
-def test_the_gradient_is_the_derivative_of_the_loss(penalties: kernel.Penalties) -> None:
-    target, rows, beta = exact_target(random_rows(3, 1), 20_000), random_rows(3, 2), 12.0
+def test_the_gradient_is_the_derivative_of_the_loss(
+    penalties: kernel.Penalties, minus: tuple[int, ...]
+) -> None:
+    target, rows, beta = exact_target(random_rows(3, 1), 20_000), subtracting(random_rows(3, 2), *minus), 12.0
     loss, gradient, _ = kernel.normal_equations(rows, target, beta, penalties)
     assert loss == pytest.approx(kernel.loss(rows, target, beta, penalties), rel=1e-12)
     gradient = gradient.reshape(3, -1)
@@ -129,6 +140,33 @@ def test_the_matrix_is_symmetric_and_positive_semidefinite(seed: int, beta: floa
     np.testing.assert_array_equal(matrix, matrix.T)
     values = np.linalg.eigvalsh(matrix)
     assert values.min() >= -1e-5 * values.max()
+
+
+def test_a_subtracted_part_is_found_again() -> None:
+    """A block with a bore, both disturbed."""
+    true = subtracting(np.stack([row(size=(1.2, 0.9, 0.5)), row(size=(0.4, 0.4, 0.8), roundness=1.0)]), 1)
+    start = true.copy()
+    start[:, :3] += 0.04
+    start[:, 7:9] *= 0.9
+    free = np.ones((2, 15), bool)
+    free[:, BLEND - 5 : BLEND] = False  # sharp and straight: a length and the dilation would share the work
+    target = exact_target(true)
+    found, loss, _ = kernel.levenberg_marquardt(start, target, STAGES, LIMITS, free=free, threads=1)
+    assert loss < 1e-7
+    np.testing.assert_allclose(found[0, 7:10], true[0, 7:10], atol=5e-3)
+    np.testing.assert_allclose(found[1, 7:9], true[1, 7:9], atol=5e-3)
+    np.testing.assert_array_equal(found[:, 16], (1, -1))
+
+
+def test_only_parts_that_are_added_overlap() -> None:
+    """A bore through two blocks side by side: the penalty is what it is without the bore."""
+    blocks = np.stack([row((-0.3, 0, 0), size=(0.6, 0.6, 0.6)), row((0.3, 0, 0), size=(0.6, 0.6, 0.6))])
+    bore = row(size=(0.2, 0.2, 2.0), roundness=1.0)
+    rows = subtracting(np.stack([*blocks, bore]), 2)
+    target, quality = exact_target(rows), kernel.Penalties(overlap=1.0)
+    without = exact_target(blocks)
+    penalty = kernel.loss(rows, target, 40.0, quality) - kernel.loss(rows, target, 40.0)
+    assert penalty == pytest.approx(kernel.loss(blocks, without, 40.0, quality), rel=1e-6)
 
 
 def test_parts_in_the_background_count_as_if_they_were_there() -> None:
@@ -242,10 +280,11 @@ def test_starts_are_fitted_each_to_its_own_samples() -> None:
 
 
 @settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 1000), parts=st.integers(1, 6))
-def test_removal_counts_equal_counting_again(seed: int, parts: int) -> None:
+@given(seed=st.integers(0, 1000), parts=st.integers(1, 6), minus=st.sets(st.integers(0, 5)))
+def test_removal_counts_equal_counting_again(seed: int, parts: int, minus: set[int]) -> None:
     generator = np.random.default_rng(seed)
-    rows, points = random_rows(parts, seed), points_in_box(1000, seed)
+    rows = subtracting(random_rows(parts, seed), *(i for i in minus if i < parts))
+    points = points_in_box(1000, seed)
     inside = generator.random(1000) < 0.4
     weight = generator.integers(1, 9, 1000) / 8  # sums of eighths are exact in any order
     expected = []

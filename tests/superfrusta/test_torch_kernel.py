@@ -11,6 +11,7 @@ import torch
 from partwright.fields import kernel, reference
 from partwright.superfrusta.torch_equations import damped_step
 from partwright.superfrusta.torch_kernel import TorchKernel
+from tests.superfrusta.rows import subtracting
 
 LIMITS = kernel.Limits(
     lower=(-2.0,) * 3 + (-9.0,) * 3 + (0.004,) * 3 + (0.0, 0.0, 0.0, 0.0, 0.0, 1e-3),
@@ -79,13 +80,19 @@ def test_distances_equal_the_compiled_kernel(torch_kernel: TorchKernel, parts: i
 @pytest.mark.parametrize("penalties", [kernel.Penalties(), kernel.Penalties(0.1, 0), BOTH])
 @pytest.mark.parametrize("background", [False, True])
 @pytest.mark.parametrize(("parts", "beta"), [(1, 15.0), (4, 40.0), (4, 100.0)])
+@pytest.mark.parametrize("minus", [(), (1,)])
 def test_normal_equations_equal_the_compiled_kernel(
-    torch_kernel: TorchKernel, parts: int, beta: float, background: bool, penalties: kernel.Penalties
+    torch_kernel: TorchKernel,
+    minus: tuple[int, ...],
+    parts: int,
+    beta: float,
+    background: bool,
+    penalties: kernel.Penalties,
 ) -> None:
     generator = np.random.default_rng(7)
     truth = random_rows(generator, parts)
     target = target_of(truth, generator)
-    rows = perturbed(truth, generator)
+    rows = subtracting(perturbed(truth, generator), *minus)
     if background:
         behind = kernel.evaluate(random_rows(generator, 1), target.points)
         target = kernel.Target(target.points, target.distance, target.weight, behind)
@@ -110,15 +117,16 @@ def exact_gradient(
     rotation = [w - x * a - y * b - z * c, x + w * a + y * c - z * b, y + w * b + z * a - x * c]
     rotation.append(z + w * c + x * b - y * a)  # q (1, w/2): R exp(w) to first order
     moved = torch.cat(
-        [start[:, :3] + change[:, :3], torch.stack(rotation, 1), start[:, 7:] + change[:, 6:]], 1
+        [start[:, :3] + change[:, :3], torch.stack(rotation, 1), start[:, 7:16] + change[:, 6:]], 1
     )
     points, distance, weight, background = (torch.tensor(array).double() for array in target.arrays())
     alone = reference.evaluate_parts(moved, points)
-    blends = moved[:, 15]
+    blends, signs = moved[:, 15], start[:, 16]
     if len(background):
-        alone, blends = torch.cat([background[None], alone]), torch.cat([blends[:1], blends])
-    whole = torch.sigmoid(-beta * reference.fold(alone, blends))
-    total = torch.sigmoid(-beta * alone).sum(0)
+        alone = torch.cat([background[None], alone])
+        blends, signs = torch.cat([blends[:1], blends]), torch.cat([torch.ones(1), signs])
+    whole = torch.sigmoid(-beta * reference.fold(alone, blends, signs))
+    total = torch.sigmoid(-beta * alone[signs > 0]).sum(0)
     squares = (whole - torch.sigmoid(-beta * distance)) ** 2
     squares = squares + penalties.overlap * (total - 1).clamp(min=0) ** 2
     squares = squares + penalties.blending * (whole - total.clamp(max=1)).clamp(min=0) ** 2
@@ -129,13 +137,19 @@ def exact_gradient(
 @pytest.mark.parametrize("penalties", [kernel.Penalties(), BOTH])
 @pytest.mark.parametrize("background", [False, True])
 @pytest.mark.parametrize(("parts", "beta"), [(1, 15.0), (4, 40.0), (4, 100.0)])
+@pytest.mark.parametrize("minus", [(), (1,), (3,)])
 def test_the_gradient_is_exact(
-    torch_kernel: TorchKernel, parts: int, beta: float, background: bool, penalties: kernel.Penalties
+    torch_kernel: TorchKernel,
+    minus: tuple[int, ...],
+    parts: int,
+    beta: float,
+    background: bool,
+    penalties: kernel.Penalties,
 ) -> None:
     generator = np.random.default_rng(11)
     truth = random_rows(generator, parts)
     target = target_of(truth, generator)
-    rows = perturbed(truth, generator)
+    rows = subtracting(perturbed(truth, generator), *minus)
     if background:
         behind = kernel.evaluate(random_rows(generator, 1), target.points)
         target = kernel.Target(target.points, target.distance, target.weight, behind)
@@ -320,10 +334,13 @@ def test_a_background_is_part_of_what_is_explained(torch_kernel: TorchKernel) ->
     assert losses == pytest.approx(expected, rel=0.02, abs=1e-7)
 
 
+@pytest.mark.parametrize("minus", [(), (0,), (1, 3)])
 @pytest.mark.parametrize("parts", [1, 4])
-def test_removal_counts_equal_the_compiled_kernel(torch_kernel: TorchKernel, parts: int) -> None:
+def test_removal_counts_equal_the_compiled_kernel(
+    torch_kernel: TorchKernel, parts: int, minus: tuple[int, ...]
+) -> None:
     generator = np.random.default_rng(9)
-    rows = random_rows(generator, parts)
+    rows = subtracting(random_rows(generator, parts), *minus)
     points = generator.uniform(-1, 1, (5000, 3)).astype(np.float32)
     inside = generator.random(5000) < 0.4
     weight = generator.uniform(0.5, 1.5, 5000).astype(np.float32)
