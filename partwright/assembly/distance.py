@@ -56,13 +56,24 @@ def distance(node: Node, points: Any) -> Any:
 
 def part_distances(assembly: Assembly, points: np.ndarray) -> np.ndarray:
     """(M, N) signed distance of each leaf alone at points (N, 3)."""
-    frame, unit_assembly = assembly._normalised
     points = _checked(points)
+    return _back(_leaves(assembly, points), assembly._normalised[0], points)
+
+
+def nearest_parts(assembly: Assembly, points: np.ndarray) -> np.ndarray:
+    """(N,) which leaf points (N, 3) lie deepest in or nearest to."""
+    return np.asarray(_leaves(assembly, _checked(points)).argmin(axis=0))
+
+
+def _leaves(assembly: Assembly, points: np.ndarray) -> np.ndarray:
+    """(M, N) float32 distance of each leaf to its nearest copy, in the unit frame, at points in own units."""
+    frame, unit_assembly = assembly._normalised
     copies = [part.copies for part in unit_assembly.parts]
     flat = tuple(chain.from_iterable(copies))
     values = np.stack([d for d, _ in _children(flat, frame(points).astype(np.float32))])
-    firsts = np.cumsum([0, *map(len, copies[:-1])])
-    return _back(np.minimum.reduceat(values, firsts, axis=0), frame, points)
+    if len(values) == len(copies):
+        return values
+    return np.asarray(np.minimum.reduceat(values, np.cumsum([0, *map(len, copies[:-1])]), axis=0))
 
 
 def _checked(points: Any) -> np.ndarray:

@@ -76,8 +76,10 @@ class Similarity:
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Map points (N, 3) or one point (3,), in float64."""
-        turned = np.asarray(points, dtype=np.float64) @ rotation_matrix(self.rotation).T
-        return self.scale * turned + np.array(self.translation)
+        result = np.asarray(points, dtype=np.float64)
+        if self.rotation != NO_ROTATION:
+            result = result @ rotation_matrix(self.rotation).T
+        return self.scale * result + np.array(self.translation)
 
     def __matmul__(self, first: Similarity) -> Similarity:
         """`first`, then this one."""

@@ -215,6 +215,12 @@ class Assembly(_Common):
 
         return part_distances(self, points)
 
+    def nearest_parts(self, points: np.ndarray) -> np.ndarray:
+        """(N,) index into `parts` of the leaf that each point (N, 3) lies deepest in or nearest to."""
+        from partwright.assembly.distance import nearest_parts
+
+        return nearest_parts(self, points)
+
     def transformed(self, similarity: Similarity) -> Assembly:
         """The assembly turned, scaled and moved as a whole."""
         children = tuple(child.transformed(similarity) for child in self.children)

@@ -34,7 +34,7 @@ class Purity:
 
 def owners(assembly: Assembly, points: np.ndarray) -> np.ndarray:
     """(N,) index into assembly.parts of the part that each point (N, 3) lies deepest in, or nearest to."""
-    return np.asarray(assembly.part_distances(points).argmin(axis=0))
+    return assembly.nearest_parts(points)
 
 
 def purity(owner: np.ndarray, label: np.ndarray, weight: np.ndarray | None = None) -> Purity:

@@ -40,7 +40,7 @@ def curve_sheet(
     images = []
     for assembly, scene in zip(assemblies, scenes, strict=True):
         seen = look(scene, camera, view, *panel)
-        nearest = assembly.part_distances(seen.hits.point).argmin(axis=0)
+        nearest = assembly.nearest_parts(seen.hits.point)
         images.append(seen.image(palette(len(assembly))[nearest]))
     page = sheet(images, captions, title=title)
     if path is not None:

@@ -53,7 +53,7 @@ def preview(
         views = pool.map(lambda scene: look(scene, camera, view, width, height), (given, made))
         input_view, result_view = views
 
-    nearest = assembly.part_distances(result_view.hits.point).argmin(axis=0)
+    nearest = assembly.nearest_parts(result_view.hits.point)
     deviation = -assembly.distance(input_view.hits.point)
     limit = round_limit(deviation)
     error = input_view.image(deviation_colours(deviation, limit))

@@ -19,7 +19,7 @@ def with_parents(larger: Assembly, smaller: Assembly) -> Assembly:
     names = [part.name for part in smaller.parts]
     children = []
     for part in larger.parts:
-        owners = smaller.part_distances(_points_in(part)).argmin(axis=0)
+        owners = smaller.nearest_parts(_points_in(part))
         parent = names[int(np.bincount(owners, minlength=len(names)).argmax())]
         children.append(dataclasses.replace(part, metadata={**part.metadata, "parent": parent}))
     return dataclasses.replace(larger, children=tuple(children))

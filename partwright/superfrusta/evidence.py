@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,16 +18,19 @@ from partwright.superfrusta.settings import Settings
 
 Rows = NDArray[np.float32]
 
-_REACH = 1.2  # half the side of the cube that guards fill
+_REACH = 1.2  # half the side of the cube that guards and probes fill
 _LOUDEST = 3.0
+_PROBES = 48  # along a side of that cube
+_STRAY = 0.05  # an assembly that reaches further than this from the shape is astray
 _FAR, _FEW = 0.1, 400
 
 
-@dataclass(frozen=True)
+@dataclass
 class Evidence:
     """Samples (the first `near` lie near the surface, the rest fills the box and more) and the grid.
 
     points (N, 3), distance (N,), weight (N,) = 1 + sigmoid(curvature) near the surface (eq. 7), 1 in the box.
+    measure: signed distance (n,) of the shape at points (n, 3). `learn` adds samples.
     """
 
     points: NDArray[np.float32]
@@ -36,6 +40,8 @@ class Evidence:
     grid: DistanceGrid
     threads: int
     kernel: Kernel
+    measure: Callable[[NDArray[np.float32]], NDArray[np.float32]]
+    density: float = 0.0  # of the samples in the box, per unit volume
 
     @classmethod
     def of(cls, shape: Shape, settings: Settings) -> Evidence:
@@ -50,7 +56,48 @@ class Evidence:
             grid,
             settings.threads,
             backend(settings.device),
+            shape.unit_distance,
+            settings.uniform / float(np.prod(grid.spacing * np.array(grid.values.shape))),
         )
+
+    def learn(self, rows: Rows) -> bool:
+        """Adds samples where an assembly is astray, well outside the shape; says whether there were any.
+
+        A thin part that shoots out of the shape passes between random samples. The probes are a lattice fine
+        enough to meet it; those that do become samples, with the weight of the volume that they stand for.
+        """
+        hit = np.flatnonzero(self.distance_of(rows, self._probes) < 0)
+        distance = self.measure(self._probes[hit])
+        hit, distance = hit[distance > _STRAY], distance[distance > _STRAY]
+        if len(hit) == 0:
+            return False
+        self.points = np.concatenate([self.points, self._probes[hit]])
+        self.distance = np.concatenate([self.distance, distance.astype(np.float32)])
+        self.weight = np.concatenate([self.weight, np.full(len(hit), self._probe_weight, np.float32)])
+        self._probes = np.delete(self._probes, hit, axis=0)
+        for name in ("inside", "voxel", "training", "outskirts"):
+            self.__dict__.pop(name, None)
+        return True
+
+    def astray(self, rows: Rows) -> NDArray[np.float64]:
+        """Weight (M,) of the probes that each part alone covers, as `learn` would give it to them."""
+        hits = (self.parts_of(rows, self._probes) < 0).sum(axis=1)
+        return np.asarray(hits * self._probe_weight, dtype=np.float64)
+
+    @property
+    def _probe_weight(self) -> float:
+        return self.density * (2 * _REACH / _PROBES) ** 3
+
+    @cached_property
+    def _probes(self) -> NDArray[np.float32]:
+        """Lattice points (n, 3), each moved within its cell, that may lie well outside the shape."""
+        cell = 2 * _REACH / _PROBES
+        corner = np.stack(np.meshgrid(*[np.arange(_PROBES)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+        within = np.random.default_rng(0).uniform(0.1, 0.9, corner.shape)
+        points = (cell * (corner + within) - _REACH).astype(np.float32)
+        values = self.grid.values.ravel()[self._voxel_of(points)]
+        nearest = self.grid_points[self._voxel_of(points)]
+        return points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
@@ -64,8 +111,11 @@ class Evidence:
     @cached_property
     def voxel(self) -> NDArray[np.int64]:
         """Index into grid.values.ravel() of the voxel that each sample lies in (or is nearest to)."""
+        return self._voxel_of(self.points)
+
+    def _voxel_of(self, points: NDArray[np.float32]) -> NDArray[np.int64]:
         shape = np.array(self.grid.values.shape)
-        cell = np.rint((self.points - self.grid.origin) / self.grid.spacing).astype(np.int64)
+        cell = np.rint((points - self.grid.origin) / self.grid.spacing).astype(np.int64)
         return np.ravel_multi_index(tuple(np.clip(cell, 0, shape - 1).T), tuple(shape))
 
     @cached_property

@@ -127,6 +127,8 @@ def fit_regions(evidence: Evidence, wanted: list[Region], settings: Settings, ov
     fitted, losses = _run(
         evidence, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings
     )
+    # A thin part that shoots out of the shape passes between the few samples out there.
+    losses += evidence.astray(fitted) / np.array([len(view.index) for view in views])[owner[kept]]
     return fitted[np.concatenate([_best(losses, owner[kept], i, 1) for i in range(len(wanted))])]
 
 

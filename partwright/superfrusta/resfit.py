@@ -216,7 +216,10 @@ class Run:
                     break
                 rows = thinned
         with self.timed("optimise"):
-            return optimise(evidence, rows, POLISH, settings, self.locked)
+            rows = optimise(evidence, rows, POLISH, settings, self.locked)
+            if evidence.learn(rows):
+                rows = optimise(evidence, rows, POLISH, settings, self.locked)
+        return rows
 
     def worthwhile(self, evidence: Evidence, thinned: Rows, kept: float, whole: float) -> bool:
         if self.settings.min_iou is not None:
@@ -270,6 +273,8 @@ class Run:
     def keep(self, evidence: Evidence, rows: Rows, stage: str, round_: int) -> bool:
         """Records the state and keeps it if it is the best so far; says whether it made progress."""
         settings = self.settings
+        if evidence.learn(rows) and self.best is not None:
+            self.best_objective = score(evidence, self.best) - settings.price * len(self.best)
         reached, iou = score(evidence, rows), volume_iou(evidence, rows)
         objective = reached - settings.price * len(rows)
         progressed = objective > self.best_objective + PROGRESS

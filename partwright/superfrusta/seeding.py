@@ -9,11 +9,12 @@ from scipy.spatial.transform import Rotation
 from partwright.superfrusta.evidence import Rows
 from partwright.superfrusta.refining import START_BLEND
 
-Frame = NDArray[np.float64]  # columns are the part's axes
-
 _ENOUGH = 600  # points that describe a region well enough for its extents
 _NONE = np.empty((0, 4), np.float32)
 _TRIM = 3.0  # percent at either end of an extent that do not count
+_DILATION = 0.005
+_BOXY, _ROUND = 0.2, 0.9
+_BENT = [(turn, bulge) for turn in range(4) for bulge in (0.4, 0.9)]  # quarter turns about the axis, bulge
 
 
 def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float32] = _NONE) -> Rows:
@@ -28,31 +29,40 @@ def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float
     centre = points.mean(axis=0)
     local = points - centre
     _, axes = np.linalg.eigh(local.T @ local / len(local) + 1e-8 * np.eye(3))
+    principal = [_along(axes, axis) for axis in range(3)]
+    given = Rotation.from_quat(frames, scalar_first=True).as_matrix() if len(frames) else []
+    straight = [*principal, *(_along(np.eye(3), axis) for axis in range(3)), *given]
+    quarters = Rotation.from_euler("z", 90 * np.arange(4)[:, None], degrees=True).as_matrix()
 
-    def start(frame: Frame, roundness: float, bulge: float = 0.0, onion: float = 0.0) -> list[float]:
-        low, high = np.percentile(local @ frame, [_TRIM, 100 - _TRIM], axis=0)
-        size = np.maximum((high - low) / (1 - 0.02 * _TRIM) + 0.5 * spacing, 0.8 * spacing)
-        middle = centre + frame @ ((low + high) / 2)
-        x, y, z, w = Rotation.from_matrix(frame).as_quat()
-        return [*middle, w, x, y, z, *size, roundness, 0.005, 1.0, bulge, onion, START_BLEND]
+    # frame, roundness, bulge, onion of each start
+    guesses = [(frame, roundness, 0.0, 0.0) for frame in straight for roundness in (_BOXY, _ROUND)]
+    guesses += [(frame, _ROUND, 0.0, 0.75) for frame in principal]
+    guesses += [(principal[2] @ quarters[turn], 0.8, bulge, 0.0) for turn, bulge in _BENT]
 
-    rows = []
-    for basis in (axes, np.eye(3)):
-        for axis in range(3):
-            frame = _along(basis, axis)
-            rows += [start(frame, 0.2), start(frame, 0.9)]
-    for w, x, y, z in frames:
-        frame = Rotation.from_quat([x, y, z, w]).as_matrix()
-        rows += [start(frame, 0.2), start(frame, 0.9)]
-    rows += [start(_along(axes, axis), 0.9, onion=0.75) for axis in range(3)]
-    longest = _along(axes, 2)
-    for turn in range(4):
-        rolled = longest @ Rotation.from_euler("z", 90 * turn, degrees=True).as_matrix()
-        rows += [start(rolled, 0.8, bulge=bulge) for bulge in (0.4, 0.9)]
-    return np.array(rows, dtype=np.float32)
+    turned = np.stack([frame for frame, *_ in guesses])
+    low, high = _extents(local, turned)
+    size = np.maximum((high - low) / (1 - 0.02 * _TRIM) + 0.5 * spacing, 0.8 * spacing)
+    rows = np.empty((len(guesses), 16), np.float32)
+    rows[:, :3] = centre + np.einsum("kij,kj->ki", turned, (low + high) / 2)
+    rows[:, 3:7] = Rotation.from_matrix(turned).as_quat(scalar_first=True)
+    rows[:, 7:10] = size
+    rows[:, 10:] = [
+        (roundness, _DILATION, 1.0, bulge, onion, START_BLEND) for _, roundness, bulge, onion in guesses
+    ]
+    return rows
 
 
-def _along(basis: Frame, axis: int) -> Frame:
+def _extents(
+    local: NDArray[np.float64], frames: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Ends (K, 3) of the points along the columns of the frames (K, 3, 3), outliers trimmed."""
+    last = len(local) - 1
+    below = int(last * _TRIM / 100)
+    along = np.partition(frames.transpose(0, 2, 1) @ local.T, (below, last - below), axis=-1)
+    return along[..., below], along[..., last - below]
+
+
+def _along(basis: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
     """A right-handed frame whose z is the given column of the basis."""
     x, z = basis[:, (axis + 1) % 3], basis[:, axis]
     return np.stack([x, np.cross(z, x), z], axis=1)

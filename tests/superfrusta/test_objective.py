@@ -27,6 +27,7 @@ def evidence(points: np.ndarray, inside: np.ndarray, weight: np.ndarray, near: i
         GRID,
         threads=1,
         kernel=backend("cpu"),
+        measure=lambda points: np.ones(len(points), np.float32),
     )
 
 
