@@ -1,9 +1,10 @@
-"""Fields to triangles: sparse marching cubes that is closed for every field."""
+"""Fields to triangles: exact booleans where they can be had, else marching cubes closed for every field."""
 
 from __future__ import annotations
 
 from partwright.meshing.assemblies import mesh_assembly, mesh_part
+from partwright.meshing.csg import has_exact_mesh, mesh_csg
 from partwright.meshing.marching import mesh_field
 from partwright.meshing.occupancy import occupancy_grid
 
-__all__ = ["mesh_assembly", "mesh_field", "mesh_part", "occupancy_grid"]
+__all__ = ["has_exact_mesh", "mesh_assembly", "mesh_csg", "mesh_field", "mesh_part", "occupancy_grid"]

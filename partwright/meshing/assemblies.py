@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,8 @@ import numpy as np
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.rows import as_superfrustum, is_superfrustum
 from partwright.errors import NoSurfaceError
+from partwright.fields import Quadric
+from partwright.meshing.csg import has_exact_mesh, mesh_csg
 from partwright.meshing.dust import without_dust
 from partwright.meshing.marching import mesh_field
 
@@ -22,21 +25,30 @@ _ACROSS, _ACROSS_PART = 2.0, 3.0
 _FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin walls
 _PART_CELLS = 120_000  # a part's surface is given at most this many cells
 _MOST = 1024.0  # cells along one axis of a part
+_CHORDS = 32  # a chord of an exact mesh is this part of a cell from its surface at most
 _TIP = 0.25  # of a wall that tapers to nothing, the part that is looked at
 _ROOM = 1e-3  # of the longest side, around the bounds
 
 
-def mesh_assembly(assembly: Assembly | Part, resolution: int = 128, *, sharp: bool = True) -> trimesh.Trimesh:
+def mesh_assembly(
+    assembly: Assembly | Part, resolution: int = 128, *, sharp: bool = True, exact: bool | None = None
+) -> trimesh.Trimesh:
     """The whole blended surface, watertight, in the assembly's own units and place.
+
+    exact: by booleans of the leaves' own surfaces (see `csg`), chords within 1/32 of a cell; None does so
+    where all leaves are quadrics or named solids without blends. Otherwise by marching cubes:
 
     resolution: cells along the longest side; up to twice as many where that is enough to put two cells across
     a thin wall. Walls that are thinner still may come out with holes through them (the mesh is closed all the
     same), and crumbs of them that are shorter than three cells are left out.
 
-    Raises NoSurfaceError where nothing is left of the assembly, as when a difference takes all away.
+    Raises NoSurfaceError where nothing is left of the assembly, as when a difference takes all away, or where
+    it does not end; ParameterError where it has no exact mesh, but one is asked for.
     """
     import trimesh
 
+    if exact or (exact is None and has_exact_mesh(assembly)):
+        return _exact(assembly, resolution)
     lower, upper = assembly.bounds()
     frame, longest = _frame(lower, upper), float((upper - lower).max())
     parts = assembly.parts if isinstance(assembly, Assembly) else (assembly,)
@@ -54,11 +66,14 @@ def mesh_assembly(assembly: Assembly | Part, resolution: int = 128, *, sharp: bo
 def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimesh.Trimesh:
     """One part alone, watertight, in its own units and place; all copies of a repeated one, each closed.
 
+    A quadric's mesh is exact, see `mesh_assembly`.
     It is meshed along its own axes. Cells are made shorter where the part is thin, each axis by itself, so
     that walls come out complete, as long as that takes no more than about 100,000 cells.
 
-    Raises NoSurfaceError for a part without volume.
+    Raises NoSurfaceError for a part without volume, or without end, as most quadrics are.
     """
+    if isinstance(part.field, Quadric):
+        return _repeated(_exact(replace(part, instances=()), resolution), part.instances)
     field = as_superfrustum(part.field)
     lower, upper = field.bounds()
     frame = _frame(lower, upper)
@@ -77,6 +92,12 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     pose = Similarity(1.0, part.rotation, part.translation) @ frame.inverse()
     mesh.vertices = pose(mesh.vertices)
     return _repeated(mesh, part.instances)
+
+
+def _exact(node: Assembly | Part, resolution: int) -> trimesh.Trimesh:
+    box = node.bounds()
+    finite = np.isfinite(box).all()
+    return mesh_csg(node, float(np.ptp(box, axis=0).max()) / (_CHORDS * resolution) if finite else None)
 
 
 def _repeated(mesh: trimesh.Trimesh, moves: tuple[Similarity, ...]) -> trimesh.Trimesh:

@@ -101,9 +101,9 @@ def test_thin_wall_in_an_assembly() -> None:
 def test_crumbs_are_left_out_and_bodies_kept() -> None:
     ball = Part(Sphere(0.5))
     crumb, pebble = (Part(Sphere(r), translation=(0.9, 0.0, 0.0)) for r in (0.01, 0.1))
-    assert mesh_assembly(ball | crumb, 32).body_count == 1
-    assert mesh_assembly(ball | pebble, 32).body_count == 2
-    assert mesh_assembly(ball | crumb, 32).is_volume
+    assert mesh_assembly(ball | crumb, 32, exact=False).body_count == 1
+    assert mesh_assembly(ball | pebble, 32, exact=False).body_count == 2
+    assert mesh_assembly(ball | crumb, 32, exact=False).is_volume
 
 
 def test_nothing_left_is_named() -> None:

@@ -1,0 +1,128 @@
+"""Exact meshes of trees of quadrics and named solids: booleans of closed meshes (manifold3d).
+
+Edges are sharp where surfaces meet. Flat faces are exact; curved ones are tessellated to a tolerance, with
+their corners on the surface.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.assembly import Part
+from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.tree import Node, operands
+from partwright.errors import NoSurfaceError, ParameterError
+from partwright.fields import Quadric, Solid, normal_form
+from partwright.meshing.named_solids import named_solid
+from partwright.meshing.quadric_solids import half_space, quadric_solid
+
+if TYPE_CHECKING:
+    import trimesh
+    from manifold3d import Manifold
+
+TOLERANCE = 2.5e-4  # of the longest side
+_ROOM = 0.02  # of the longest side, around the bounds
+
+
+def has_exact_mesh(node: Node) -> bool:
+    """Whether all leaves are quadrics or named solids, and none of them is blended."""
+    if isinstance(node, Part):
+        return isinstance(node.field, Quadric | Solid) and not (node.instances and node.blend)
+    blended = any(child.blend for child in node.children[1:])
+    return not blended and all(has_exact_mesh(child) for child in node.children)
+
+
+def mesh_csg(node: Node, tolerance: float | None = None) -> trimesh.Trimesh:
+    """The solid's surface, closed, with sharp edges, in own units and place.
+
+    tolerance: how far a chord may lie from its curved surface, in own units; 1/4000 of the longest side if
+    not given.
+
+    Raises:
+        NoSurfaceError: nothing is left, or the solid does not end.
+        ParameterError: a leaf is neither a quadric nor a named solid, or is blended.
+    """
+    import trimesh
+
+    mesh = solid_of(node, tolerance).to_mesh64()
+    vertices = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]
+    return trimesh.Trimesh(vertices, np.asarray(mesh.tri_verts, dtype=np.int64), process=False)
+
+
+def solid_of(node: Node, tolerance: float | None = None) -> Manifold:
+    """As `mesh_csg`, the manifold3d solid; it knows its volume, area and genus."""
+    if not has_exact_mesh(node):
+        raise ParameterError("the exact mesh needs leaves that are quadrics or named solids, without blends")
+    box = node.bounds()
+    if not np.isfinite(box).all():
+        axes = ", ".join(axis for axis, low, high in zip("xyz", *box, strict=True) if not high - low < np.inf)
+        raise NoSurfaceError(f"the solid does not end along {axes}; intersect it with what bounds it")
+    longest = float(np.ptp(box, axis=0).max())
+    if longest <= 0:
+        raise NoSurfaceError("nothing is left of the solid: its parts have no point in common")
+    room = _ROOM * longest
+    grown = box + np.array([[-room], [room]])
+    solid = _Builder(grown, tolerance or TOLERANCE * longest).solid(node)
+    lower, upper = np.reshape(solid.bounding_box(), (2, 3)) if not solid.is_empty() else grown
+    if (lower < box[0] - room / 2).any() or (upper > box[1] + room / 2).any():
+        solid = solid ^ _cuboid(grown)
+    if solid.is_empty():
+        raise NoSurfaceError("nothing is left of the solid: its parts have no point in common")
+    return solid
+
+
+class _Builder:
+    """Solids that are right within a box, at one tolerance."""
+
+    def __init__(self, box: np.ndarray, tolerance: float) -> None:
+        self.box, self.tolerance = box, tolerance
+
+    def solid(self, node: Node) -> Manifold:
+        from manifold3d import Manifold, OpType
+
+        if isinstance(node, Part) and not node.instances:
+            return self.leaf(node)
+        operation = "union" if isinstance(node, Part) else node.operation
+        children = operands(node)
+        if operation == "intersection":
+            return self.intersection(children)
+        solids = [self.solid(child) for child in children]
+        return Manifold.batch_boolean(solids, OpType.Add if operation == "union" else OpType.Subtract)
+
+    def intersection(self, children: tuple[Node, ...]) -> Manifold:
+        """The box cut by the planes one by one, which is exact and fast, then by the others."""
+        from manifold3d import Manifold, OpType
+
+        region, others = _cuboid(self.box), []
+        for child in children:
+            plane = _plane(child)
+            if plane is None:
+                others.append(self.solid(child))
+            else:
+                region = half_space(region, *plane)
+        return Manifold.batch_boolean([region, *others], OpType.Intersect) if others else region
+
+    def leaf(self, part: Part) -> Manifold:
+        turn, place = rotation_matrix(part.rotation), np.array(part.translation)
+        if isinstance(part.field, Quadric):
+            return quadric_solid(part.field.moved(turn, place), self.box, self.tolerance)
+        assert isinstance(part.field, Solid)
+        return named_solid(part.field, self.tolerance).transform(np.column_stack([turn, place]))
+
+
+def _plane(node: Node) -> tuple[np.ndarray, np.ndarray] | None:
+    """Normal and a point, both (3,), of a leaf that is a half-space."""
+    if not isinstance(node, Part) or node.instances or not isinstance(node.field, Quadric):
+        return None
+    if any(node.field.coefficients[:3]) or any(node.field.coefficients[7:]):
+        return None
+    form = normal_form(node.field.moved(rotation_matrix(node.rotation), np.array(node.translation)))
+    return form.axes[:, 2] * (-1.0 if form.complement else 1.0), form.centre
+
+
+def _cuboid(box: np.ndarray) -> Manifold:
+    from manifold3d import Manifold
+
+    return Manifold.cube(tuple((box[1] - box[0]).tolist())).translate(tuple(box[0].tolist()))

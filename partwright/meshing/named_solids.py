@@ -1,0 +1,60 @@
+"""Named solids as closed meshes whose chords are within a tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from manifold3d import Manifold
+
+from partwright.fields import Box, Capsule, Cone, Cylinder, Frustum, Solid, Sphere, Torus, Tube
+from partwright.meshing.turned import corners_of_circle, turned
+
+
+def named_solid(solid: Solid, tolerance: float) -> Manifold:
+    """The solid in its own frame."""
+    if isinstance(solid, Box):
+        return Manifold.cube(solid.size, True)
+    profile = _PROFILES[type(solid)](solid, tolerance)
+    return turned(profile, corners_of_circle(float(profile[:, 0].max()), tolerance))
+
+
+def _frustum(bottom: float, top: float, height: float) -> np.ndarray:
+    corners = [(0.0, -height / 2), (bottom, -height / 2), (top, height / 2), (0.0, height / 2)]
+    return np.array(corners if top > 0 else corners[:2] + corners[3:])
+
+
+def _arc(radius: float, start: float, end: float, tolerance: float) -> np.ndarray:
+    """(K, 2) from one angle to another, in quarter turns from the horizontal."""
+    count = max(1, round(corners_of_circle(radius, tolerance) * abs(end - start) / 4))
+    angle = np.linspace(start, end, count + 1) * (np.pi / 2)
+    return radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _capsule(radius: float, height: float, tolerance: float) -> np.ndarray:
+    """From pole to pole; a sphere where the height is 0."""
+    rise = np.array([0.0, height / 2])
+    lower = _arc(radius, -1.0, 0.0, tolerance) - rise
+    upper = _arc(radius, 0.0, 1.0, tolerance) + rise
+    profile = np.concatenate([lower, upper if height else upper[1:]])
+    profile[[0, -1], 0] = 0.0
+    return profile
+
+
+def _tube(solid: Tube, _: float) -> np.ndarray:
+    outer, inner, half = solid.radius, solid.radius - solid.thickness, solid.height / 2
+    return np.array([(outer, -half), (outer, half), (inner, half), (inner, -half)])
+
+
+_PROFILES: dict[type[Solid], Callable[[Any, float], np.ndarray]] = {
+    Cylinder: lambda s, _: _frustum(s.radius, s.radius, s.height),
+    Cone: lambda s, _: _frustum(s.radius, 0.0, s.height),
+    Frustum: lambda s, _: _frustum(s.bottom_radius, s.top_radius, s.height),
+    Sphere: lambda s, tolerance: _capsule(s.radius, 0.0, tolerance),
+    Capsule: lambda s, tolerance: _capsule(s.radius, s.height, tolerance),
+    Torus: lambda s, tolerance: (
+        _arc(s.minor_radius, 0.0, 4.0, tolerance)[:-1] + np.array([s.major_radius, 0.0])
+    ),
+    Tube: _tube,
+}
