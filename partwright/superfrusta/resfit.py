@@ -102,9 +102,10 @@ def fit(
         if settings.symmetry and run.best is not None:
             run.find_repeats(shape, evidence)
     except KeyboardInterrupt:
-        if run.best is None:
+        if run.best is None and run.earlier is None:
             raise
         outcome = "interrupted"
+        run.choose(evidence)
     run.enforce_budget(evidence)
     if run.best is None:
         raise EmptyShapeError(
@@ -142,6 +143,8 @@ class Run:
     locked: int = 0
     best: Rows | None = None
     best_objective: float = -np.inf
+    attempt: int = 0
+    earlier: Rows | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
     curve: list[Step] = field(default_factory=list)
@@ -157,15 +160,12 @@ class Run:
 
     def through(self, evidence: Evidence, start: Rows = NOTHING) -> Outcome:
         settings = self.settings
-        rows, converged = self.growth(evidence, start)
+        converged = True
+        for self.attempt in range(settings.attempts):
+            converged = self.once(evidence, start) and converged
+            self.choose(evidence)
         if self.best is None:
             return "converged"
-        for cycle in range(settings.cycles):
-            rows = self.thinning(evidence, rows)
-            if not self.keep(evidence, rows, "thin", cycle + 1) and cycle:
-                break
-            if cycle + 1 < settings.cycles:
-                rows = self.regrowth(evidence, rows)
         if settings.curve:
             self.descend(evidence, self.best)
         if settings.min_iou is not None and volume_iou(evidence, self.best) >= settings.min_iou:
@@ -173,6 +173,29 @@ class Run:
         if settings.max_parts is not None and len(self.best) >= settings.max_parts:
             return "budget_reached"
         return "converged" if converged else "budget_reached"
+
+    def once(self, evidence: Evidence, start: Rows) -> bool:
+        """Grown and thinned out from the start, beside earlier attempts; says whether growth converged."""
+        if self.best is not None:
+            self.earlier = self.best
+            self.best, self.best_objective = None, -np.inf
+        rows, converged = self.growth(evidence, start)
+        for cycle in range(self.settings.cycles if self.best is not None else 0):
+            rows = self.thinning(evidence, rows)
+            if not self.keep(evidence, rows, "thin", cycle + 1) and cycle:
+                break
+            if cycle + 1 < self.settings.cycles:
+                rows = self.regrowth(evidence, rows)
+        return converged
+
+    def choose(self, evidence: Evidence) -> None:
+        """Goes back to the earlier attempts' best where this one's is no better."""
+        if self.earlier is None:
+            return
+        latest, self.best, self.earlier = self.best, self.earlier, None
+        self.best_objective = self.objective(evidence, self.best)
+        if latest is not None and self.better(evidence, latest):
+            self.best, self.best_objective = latest, self.objective(evidence, latest)
 
     def growth(self, evidence: Evidence, rows: Rows) -> tuple[Rows, bool]:
         """Rounds of growing until the objective saturates; returns the last rows and whether it did."""
@@ -184,7 +207,7 @@ class Run:
         stale = 0
         for round_ in range(settings.rounds):
             with self.timed("grow"):
-                new = grow(evidence, rows, settings, settings.regions)
+                new = grow(evidence, rows, replace(settings, regions=self.regions), self.regions)
             if len(new) == 0:
                 return rows, True
             with self.timed("optimise"):
@@ -225,6 +248,12 @@ class Run:
         if self.settings.min_iou is not None:
             return volume_iou(evidence, thinned) >= self.settings.min_iou
         return kept + self.settings.alpha >= whole
+
+    @property
+    def regions(self) -> int:
+        """Regions a round: each further attempt takes fewer or more, which leads it to other assemblies."""
+        aside = (self.attempt + 1) // 2 * (2 if self.attempt % 2 == 0 else -2)
+        return max(1, self.settings.regions + aside)
 
     def regrowth(self, evidence: Evidence, rows: Rows) -> Rows:
         with self.timed("grow"):
@@ -274,16 +303,25 @@ class Run:
         """Records the state and keeps it if it is the best so far; says whether it made progress."""
         settings = self.settings
         if evidence.learn(rows) and self.best is not None:
-            self.best_objective = score(evidence, self.best) - settings.price * len(self.best)
-        reached, iou = score(evidence, rows), volume_iou(evidence, rows)
-        objective = reached - settings.price * len(rows)
+            self.best_objective = self.objective(evidence, self.best)
+        objective = self.objective(evidence, rows)
         progressed = objective > self.best_objective + PROGRESS
-        if objective > self.best_objective or self.best is None or self.due(evidence, rows, iou):
+        if self.better(evidence, rows):
             self.best, self.best_objective = rows, objective
         total = settings.rounds + settings.cycles
-        done = settings.rounds + round_ if stage == "thin" else round_
-        self.tell(stage, round_, len(rows), reached, iou, min(1.0, done / total))
+        done = min(1.0, (settings.rounds + round_ if stage == "thin" else round_) / total)
+        reached, iou = score(evidence, rows), volume_iou(evidence, rows)
+        self.tell(stage, round_, len(rows), reached, iou, (self.attempt + done) / settings.attempts)
         return progressed
+
+    def objective(self, evidence: Evidence, rows: Rows) -> float:
+        return score(evidence, rows) - self.settings.price * len(rows)
+
+    def better(self, evidence: Evidence, rows: Rows) -> bool:
+        """Whether these rows take the place of the best so far."""
+        if self.best is None or self.objective(evidence, rows) > self.best_objective:
+            return True
+        return self.due(evidence, rows, volume_iou(evidence, rows))
 
     def tell(self, stage: str, round_: int, parts: int, reached: float, iou: float, fraction: float) -> None:
         entry: dict[str, float | str] = {"stage": stage, "round": round_, "parts": parts}

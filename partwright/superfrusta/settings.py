@@ -35,6 +35,7 @@ class Settings:
 
     Ours:
         merging: replace touching pairs of parts by one where it explains as much.
+        attempts: times that the shape is fitted from the start, each with other regions; the best is kept.
         cycles: times that the grown assembly is thinned out, refitted and grown again.
         trials: removals that are tried with a refit before the cheapest is taken.
         patience: rounds without progress before growing stops.
@@ -55,6 +56,7 @@ class Settings:
     smooth: bool = True
     family: Family = "superfrustum"
     merging: bool = True
+    attempts: int = 1
     cycles: int = 2
     trials: int = 3
     patience: int = 2
@@ -70,7 +72,7 @@ class Settings:
     symmetry: bool = True
 
     def __post_init__(self) -> None:
-        for name in ("rounds", "regions", "trials", "patience", "near", "uniform"):
+        for name in ("rounds", "regions", "attempts", "trials", "patience", "near", "uniform"):
             _check(name, getattr(self, name), low=1)
         _check("cycles", self.cycles, low=0)
         _check("resolution", self.resolution, low=24, high=512)
@@ -123,5 +125,5 @@ def _check(name: str, value: float, low: float, high: float = math.inf) -> None:
 PRESETS: dict[str, Settings] = {
     "draft": Settings(rounds=2, cycles=1, trials=1, near=12_000, uniform=12_000, resolution=72),
     "normal": Settings(),
-    "high": Settings(cycles=5, trials=6, patience=3, near=60_000, uniform=60_000, resolution=128),
+    "high": Settings(attempts=3, cycles=3, alpha=2e-3, near=45_000, uniform=45_000),
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -12,6 +14,8 @@ from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import iou
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Fitted, Progress, Settings, fit
+from partwright.superfrusta.evidence import Evidence
+from partwright.superfrusta.resfit import Run
 from tests.superfrusta.meshes import box, bracket, corner_tie, half_torus, pipe, table, union
 
 OUTCOMES = {"converged", "budget_reached", "target_reached", "interrupted"}
@@ -156,3 +160,34 @@ def test_settings_that_cannot_be_used_are_named() -> None:
             Settings.for_quality("draft", **changes)
     with pytest.raises(SettingError, match="quality: expected one of draft, normal, high"):
         Settings.for_quality("best")
+
+
+def test_of_several_attempts_the_best_is_kept(table_shape: Shape) -> None:
+    settings = Settings.for_quality("draft", threads=1)
+    evidence = Evidence.of(table_shape, settings)
+    single, several = Run(settings), Run(replace(settings, attempts=3))
+    single.through(evidence)
+    seen: list[float] = []
+    several.report = lambda step: seen.append(step.fraction)
+    several.through(evidence)
+    assert single.best is not None
+    assert several.best is not None
+    assert several.objective(evidence, several.best) >= single.objective(evidence, single.best)
+    assert several.best_objective == several.objective(evidence, several.best)
+    assert seen == sorted(seen)
+    assert len([entry for entry in several.history if entry["stage"] == "thin"]) == 3
+    assert [Run(settings, attempt=i).regions for i in range(5)] == [7, 5, 9, 3, 11]
+
+
+def test_an_interruption_in_a_later_attempt_keeps_the_earlier_ones_result(table_shape: Shape) -> None:
+    settings = Settings.for_quality("draft", threads=1, attempts=2, symmetry=False)
+    alone = fit(table_shape, replace(settings, attempts=1))
+
+    def stop(step: Progress) -> None:
+        if step.fraction > 0.5:
+            raise KeyboardInterrupt
+
+    stopped = fit(table_shape, settings, stop)
+    assert stopped.outcome == "interrupted"
+    assert len(stopped.assembly) <= len(alone.assembly)
+    assert reached(stopped.assembly, table_shape) > reached(alone.assembly, table_shape) - 0.01
