@@ -87,3 +87,7 @@ class FamilyError(PartwrightError):
 
 class LabelError(PartwrightError):
     """Labels do not match the faces, or the part names, that they are for."""
+
+
+class ModelError(PartwrightError):
+    """A trained model is needed and not here, is damaged, or belongs to another family."""

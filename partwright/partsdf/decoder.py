@@ -1,0 +1,133 @@
+"""The cross-part decoder (PartSDF, section 3.2): latents and local points to the distance of every part.
+
+Layout: (B, P, N, D) for B shapes, P parts, N points, D features, so that the parts of all shapes share one
+matrix product a layer, and a cross-part layer is one product over the part axis of (B, P, N * D).
+`partwright.partsdf.reference` is the plain form that tests compare with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
+
+import torch
+from torch import Tensor, nn
+
+from partwright.partsdf.config import DecoderSettings
+
+
+class Conditioned(Protocol):
+    """A decoder with its weights folded and its latents taken in: local points (B, P, N, 3) to distances
+    (B, P, N), unit frame."""
+
+    def __call__(self, local: Tensor) -> Tensor: ...
+
+
+class WeightNorm(nn.Module):
+    """A linear map's weight (out, in) = g v / |v|, row by row (Salimans & Kingma 2016)."""
+
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.direction = nn.Parameter(torch.empty(outputs, inputs))
+        nn.init.uniform_(self.direction, -(inputs**-0.5), inputs**-0.5)  # as nn.Linear
+        self.length = nn.Parameter(self.direction.detach().norm(dim=1, keepdim=True))
+
+    def folded(self) -> Tensor:
+        return self.direction * (self.length / self.direction.norm(dim=1, keepdim=True))
+
+
+class SinglePart(nn.Module):
+    """h_sp (eq. 3) without its activation: W x + b + W_z z_p + b_p.
+
+    modulated: whether the latent enters; biased: whether each part has a bias of its own, at first 0.
+    """
+
+    def __init__(
+        self, inputs: int, outputs: int, parts: int, latent: int, modulated: bool, biased: bool
+    ) -> None:
+        super().__init__()
+        self.weight = WeightNorm(inputs, outputs)
+        self.bias = nn.Parameter(torch.empty(outputs).uniform_(-(inputs**-0.5), inputs**-0.5))
+        self.modulation = WeightNorm(latent, outputs) if modulated else None
+        self.part_bias = nn.Parameter(torch.zeros(parts, outputs)) if biased else None
+
+    def folded(self, latents: Tensor) -> tuple[Tensor, Tensor]:
+        """The weight (in, out), and all that is added (B, P, out), of latents (B, P, Z)."""
+        offset = self.bias.expand(*latents.shape[:2], -1)
+        if self.modulation is not None:
+            offset = offset + latents @ self.modulation.folded().T
+        if self.part_bias is not None:
+            offset = offset + self.part_bias
+        return self.weight.folded().T, offset
+
+
+class CrossPart(nn.Module):
+    """h_cp with its skip (eq. 4): x + ReLU(W x + b) over the part axis, the same for all features."""
+
+    def __init__(self, parts: int) -> None:
+        super().__init__()
+        self.weight = nn.Parameter(torch.empty(parts, parts).uniform_(-(parts**-0.5), parts**-0.5))
+        self.bias = nn.Parameter(torch.empty(parts).uniform_(-(parts**-0.5), parts**-0.5))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Features (B, P, K) to (B, P, K)."""
+        weight = self.weight.expand(len(x), -1, -1)
+        return x + torch.baddbmm(self.bias[:, None], weight, x).relu_()
+
+
+class Decoder(nn.Module):
+    """f_theta (eq. 2): single-part layers with a cross-part layer after each hidden activation."""
+
+    def __init__(self, parts: int, settings: DecoderSettings) -> None:
+        super().__init__()
+        self.parts, self.settings = parts, settings
+        widths = [3, *[settings.width] * (settings.layers - 1), 1]
+        last = settings.layers - 1
+        self.single = nn.ModuleList(
+            SinglePart(i, o, parts, settings.latent, settings.modulation or n == 0, biased=n < last)
+            for n, (i, o) in enumerate(pairwise(widths))
+        )
+        crossing = last if settings.cross_part else 0
+        self.cross = nn.ModuleList(CrossPart(parts) for _ in range(crossing))
+
+    def condition(self, latents: Tensor) -> Conditioned:
+        """Weight norm folded and latents (B, P, Z) taken in, once for any number of points."""
+        layers = tuple(layer.folded(latents) for layer in self.single)  # type: ignore[operator]
+        return _Layers(layers, tuple(self.cross))
+
+    def forward(self, latents: Tensor, local: Tensor) -> Tensor:
+        """Distances (B, P, N) of latents (B, P, Z) at local points (B, P, N, 3)."""
+        return self.condition(latents)(local)
+
+
+@dataclass(frozen=True)
+class _Layers:
+    layers: tuple[tuple[Tensor, Tensor], ...]
+    cross: tuple[nn.Module, ...]
+
+    def __call__(self, local: Tensor) -> Tensor:
+        shape = local.shape[:3]
+        x = _precise(self.layers[0], local.flatten(0, 1)).relu_()
+        for number, layer in enumerate(self.layers[1:-1]):
+            x = _linear(layer, self._crossed(number, x, shape)).relu_()
+        return _precise(self.layers[-1], self._crossed(-1, x, shape)).view(shape)
+
+    def _crossed(self, number: int, x: Tensor, shape: torch.Size) -> Tensor:
+        if not self.cross:
+            return x
+        return self.cross[number](x.view(shape[0], shape[1], -1)).view(x.shape)
+
+
+def _linear(layer: tuple[Tensor, Tensor], x: Tensor) -> Tensor:
+    """x (B P, N, in) to (B P, N, out): the product and the sum in one pass."""
+    weight, offset = layer
+    return torch.baddbmm(offset.flatten(0, 1)[:, None], x, weight.expand(len(x), -1, -1))
+
+
+def _precise(layer: tuple[Tensor, Tensor], x: Tensor) -> Tensor:
+    """The first and last layer in full precision: half would round coordinates and distances to 1/256."""
+    weight, offset = layer
+    with torch.autocast(x.device.type, enabled=False):
+        kind = torch.promote_types(x.dtype, torch.float32)
+        return _linear((weight.to(kind), offset.to(kind)), x.to(kind))

@@ -1,0 +1,197 @@
+"""Neural shapes to meshes, coarse to fine: the decoder is asked only where a surface can be.
+
+A cube whose centre is farther from zero than `slope` times its half diagonal holds no surface, so it is left
+out with the sign of its centre; the others are halved. `slope` was measured in training, not proved, so the
+last level also grows: wherever a corner's sign is not the one that its neighbour was left out with, the
+neighbour is looked at, too. All parts are decoded in one pass, and each keeps what any of them needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.errors import NoSurfaceError, SettingError
+from partwright.meshing.cells import cell_polygons
+from partwright.meshing.tables import CORNERS
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.poses import rotation_matrices
+
+if TYPE_CHECKING:
+    import trimesh
+
+Distances = Callable[[np.ndarray], np.ndarray]
+
+COARSEST = 8  # cells along a cube of the first level
+FINEST = 2  # cells along a cube whose corners are evaluated
+MOST = 1024  # cells along the box
+_ROOM = 1.25  # a part's surface may leave its cuboid by so much
+
+
+_LATTICE = np.stack(np.meshgrid(*[np.arange(FINEST + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+_STEPS = np.concatenate([np.eye(3, dtype=np.int64), -np.eye(3, dtype=np.int64)])
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """whole: the shape's mesh; parts: each part's own, by name, without those that have no surface.
+    evaluations: points at which the decoder was asked; dense: points of the full grid."""
+
+    whole: trimesh.Trimesh
+    parts: dict[str, trimesh.Trimesh]
+    evaluations: int
+    dense: int
+
+
+def mesh_shape(shape: NeuralShape, resolution: int = 128, parts: bool = True) -> Surfaces:
+    """Mesh a neural shape in the unit frame.
+
+    resolution: cells along [-1, 1], a multiple of 8. parts: also mesh each part alone.
+
+    Raises:
+        SettingError: the resolution cannot be used.
+        NoSurfaceError: there is no surface at all, or it is thinner than a cell.
+    """
+    names = shape.names()
+
+    def distances(points: np.ndarray) -> np.ndarray:
+        """(1 + Q, N) or (1, N): the whole shape, then its parts."""
+        each = shape.part_distances(points)
+        whole = shape.whole(each)[None]
+        return np.concatenate([whole, each]) if parts else whole
+
+    lattice = SparseLattice(distances, box(shape), _checked(resolution), shape.model.slope)
+    meshes = lattice.meshes()
+    if meshes[0] is None:
+        raise NoSurfaceError(
+            f"the shape of {shape.model.name} has no surface, or it is thinner than a cell at resolution "
+            f"{resolution}; take a finer one"
+        )
+    found = {n: m for n, m in zip(names, meshes[1:], strict=False) if m is not None}
+    return Surfaces(meshes[0], found, lattice.evaluations, lattice.dense)
+
+
+def box(shape: NeuralShape) -> float:
+    """Half the side of a cube around the origin that holds [-1, 1]^3 and every part's cuboid."""
+    turned = rotation_matrices(shape.poses.rotation).abs() @ shape.poses.scale[..., None]
+    reach = shape.poses.translation.abs() + _ROOM * turned.squeeze(-1)
+    return max(1.0, float(reach[shape.present].max()) if shape.model.config.poses else 1.0)
+
+
+def _checked(resolution: int) -> int:
+    if not COARSEST <= resolution <= MOST or resolution % COARSEST:
+        raise SettingError(
+            f"resolution is {resolution}; expected a multiple of {COARSEST} from {COARSEST} to {MOST}"
+        )
+    return resolution
+
+
+class SparseLattice:
+    """K fields on the cells of a cube around the origin that their surfaces can enter."""
+
+    def __init__(self, distances: Distances, half: float, resolution: int, slope: float) -> None:
+        self._distances, self._slope = distances, slope
+        self.cell = 2.0 / resolution
+        count = COARSEST * int(np.ceil(half / (COARSEST * self.cell)))  # so that the lattice holds that of 1
+        self.origin, self.cells = -count * self.cell, 2 * count
+        self.evaluations, self.dense = 0, (self.cells + 1) ** 3
+        kept, self._inside = self._refined()
+        self._corners, self._values, self._cubes = self._grown(kept)
+
+    def _evaluate(self, lattice: np.ndarray) -> np.ndarray:
+        """(K, N) at lattice coordinates (N, 3), which may lie between corners; beyond the box is empty."""
+        self.evaluations += len(lattice)
+        beyond = self.cell * (np.abs(lattice - self.cells / 2).max(axis=1) - (self.cells - 1) / 2)
+        points = (self.origin + self.cell * lattice).astype(np.float32)
+        return np.maximum(self._distances(points), beyond.astype(np.float32))
+
+    def _refined(self) -> tuple[np.ndarray, np.ndarray]:
+        """Cubes (C, 3) of FINEST cells that a surface may enter, and the side (K, G, G, G) of all others."""
+        axis = np.arange(self.cells // COARSEST)
+        cubes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+        size, inside = COARSEST, None
+        while True:
+            values = self._evaluate((cubes + 0.5) * size)
+            if inside is None:
+                inside = np.zeros((len(values), *[len(axis)] * 3), dtype=bool)
+            inside[:, cubes[:, 0], cubes[:, 1], cubes[:, 2]] = values < 0
+            reach = self._slope * size * self.cell * 3**0.5 / 2
+            cubes = cubes[(np.abs(values) <= reach).any(axis=0)]
+            if size == FINEST:
+                return cubes, inside
+            size //= 2
+            cubes = (2 * cubes[:, None] + CORNERS).reshape(-1, 3)
+            for d in (1, 2, 3):
+                inside = inside.repeat(2, axis=d)
+
+    def _grown(self, newest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Keys (N,) of corners, sorted, their values (K, N), and all cubes (C, 3) whose corners they are."""
+        seen = np.zeros(self._inside.shape[1:], dtype=bool)
+        seen[tuple(newest.T)] = True
+        corners = np.empty(0, dtype=np.int64)
+        values = np.empty((len(self._inside), 0), dtype=np.float32)
+        cubes = newest
+        while len(newest):
+            keys = np.setdiff1d(self._keys(newest), corners)
+            corners = np.concatenate([corners, keys])
+            order = np.argsort(corners)
+            values = np.concatenate([values, self._evaluate(self._lattice(keys))], axis=1)[:, order]
+            corners = corners[order]
+            newest = self._missed(newest, corners, values, seen)
+            cubes = np.concatenate([cubes, newest])
+        return corners, values, cubes
+
+    def _missed(
+        self, cubes: np.ndarray, corners: np.ndarray, values: np.ndarray, seen: np.ndarray
+    ) -> np.ndarray:
+        """Neighbours (M, 3) of cubes that were left out with another side than a corner they share has."""
+        found = []
+        inside = values[:, np.searchsorted(corners, self._keys(cubes))] < 0
+        inside = inside.reshape(len(values), len(cubes), -1)
+        for step in _STEPS:
+            axis = int(np.abs(step).argmax())
+            shared = _LATTICE[:, axis] == (FINEST if step[axis] > 0 else 0)
+            other = cubes + step
+            there = ((other >= 0) & (other < len(seen))).all(axis=1)
+            there[there] = ~seen[tuple(other[there].T)]
+            other = other[there]
+            side = self._inside[:, other[:, 0], other[:, 1], other[:, 2]]
+            differs = (inside[:, there][..., shared] != side[..., None]).any(axis=(0, 2))
+            found.append(other[differs])
+        fresh = np.unique(np.concatenate(found), axis=0)
+        seen[tuple(fresh.T)] = True
+        return fresh
+
+    def _keys(self, cubes: np.ndarray) -> np.ndarray:
+        """(C * 27,) one number a corner of cubes (C, 3)."""
+        x, y, z = (cubes[:, None] * FINEST + _LATTICE).reshape(-1, 3).T
+        return np.asarray((x * (self.cells + 1) + y) * (self.cells + 1) + z)
+
+    def _lattice(self, keys: np.ndarray) -> np.ndarray:
+        side = self.cells + 1
+        return np.stack([keys // side**2, keys // side % side, keys % side], axis=1)
+
+    def meshes(self) -> list[trimesh.Trimesh | None]:
+        """Each field's zero level as a closed mesh, None where it has none; the box cuts what reaches it."""
+        rows = np.searchsorted(self._corners, self._keys(self._cubes)).reshape(len(self._cubes), -1)
+        return [self._mesh(values, rows) for values in self._values]
+
+    def _mesh(self, values: np.ndarray, rows: np.ndarray) -> trimesh.Trimesh | None:
+        import trimesh
+
+        inside = values[rows] < 0
+        crossed = inside.any(axis=1) & ~inside.all(axis=1)
+        cubes, rows = self._cubes[crossed], rows[crossed]
+        if not len(cubes):
+            return None
+        local = _LATTICE[(_LATTICE < FINEST).all(axis=1)]
+        corner = (local[:, None] + CORNERS) @ (FINEST + 1) ** np.arange(2, -1, -1)  # (8 cells, 8 corners)
+        cells = (cubes[:, None] * FINEST + local).reshape(-1, 3)
+        polygons = cell_polygons(cells, values[rows[:, corner]].reshape(-1, 8))
+        if not len(polygons):
+            return None
+        vertices = self.origin + self.cell * polygons.vertices
+        return trimesh.Trimesh(vertices, polygons.triangles(), process=False)

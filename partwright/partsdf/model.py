@@ -1,0 +1,222 @@
+"""A trained model: the decoder, the shapes it was trained on as latents and poses, and its file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from partwright.errors import ModelError, NewerVersionError, SettingError, UnreadableFileError
+from partwright.partsdf.config import Config, DecoderSettings, config_from
+from partwright.partsdf.decoder import Conditioned, Decoder
+from partwright.partsdf.losses import aggregate
+from partwright.partsdf.poses import PoseTensors, local_points
+from partwright.partsdf.transformer import TransformerDecoder
+from partwright.writing import write_bytes
+
+FORMAT, VERSION = "partwright-partsdf", 1
+SUFFIX = ".safetensors"
+SHIPPED = Path(__file__).parent / "models"
+FOLDERS = "PARTWRIGHT_MODELS"  # environment variable: folders, separated as PATH is
+_DECODERS: dict[str, type[nn.Module]] = {"mlp": Decoder, "transformer": TransformerDecoder}
+
+
+@dataclass(frozen=True)
+class Model:
+    """A decoder with the shapes that it was trained on.
+
+    parts: names of the P parts. latents (S, P, Z), poses (S, P, ...), present (S, P) bool of the S training
+    shapes, named `shapes`; average_pose: P rows, of parts that are missing. slope: the steepest change of a
+    part's distance per length that was measured near the training shapes, with a margin. hash: of the file.
+    """
+
+    config: Config
+    parts: tuple[str, ...]
+    decoder: nn.Module
+    latents: Tensor
+    poses: PoseTensors
+    present: Tensor
+    average_pose: PoseTensors
+    shapes: tuple[str, ...]
+    slope: float
+    hash: str = ""
+
+    @property
+    def name(self) -> str:
+        return self.config.name
+
+    @cached_property
+    def mean_latent(self) -> Tensor:
+        """(P, Z) over the training shapes that have the part."""
+        weight = self.present.float()[..., None]
+        return (weight * self.latents).sum(0) / weight.sum(0).clamp(min=1)
+
+    @cached_property
+    def absent_latent(self) -> Tensor:
+        """(P, Z) over the training shapes that miss the part; where all have it, the mean latent."""
+        weight = (~self.present).float()[..., None]
+        mean = (weight * self.latents).sum(0) / weight.sum(0).clamp(min=1)
+        return torch.where(weight.sum(0) > 0, mean, self.mean_latent)
+
+    def index(self, part: str) -> int:
+        """The number of a part; raises SettingError for another name."""
+        if part not in self.parts:
+            raise SettingError(f"{self.name} has no part {part!r}; its parts are {', '.join(self.parts)}")
+        return self.parts.index(part)
+
+    def condition(self, latents: Tensor) -> Conditioned:
+        """The decoder with latents (B, P, Z) taken in."""
+        return self.decoder.condition(latents)  # type: ignore[operator]
+
+    def part_distances(self, latents: Tensor, poses: PoseTensors, points: Tensor) -> Tensor:
+        """(P, N) at points (N, 3) of one shape with latents (P, Z) and poses (P, ...), unit frame."""
+        return self.condition(latents[None])(local_points(points, poses)[None])[0]
+
+    def distances(self, latents: Tensor, poses: PoseTensors, points: Tensor) -> Tensor:
+        """(N,) of the whole shape; arguments as in `part_distances`."""
+        return aggregate(self.part_distances(latents, poses, points)[None], self.config.decoder)[0]
+
+    def to_bytes(self, half: bool = False) -> bytes:
+        """The model's file; with `half`, weights and latents are rounded to float16."""
+        from safetensors.torch import save
+
+        kind = torch.float16 if half else torch.float32
+        tensors = {f"decoder.{k}": v.to(kind) for k, v in self.decoder.state_dict().items()}
+        tensors |= {"latents": self.latents.to(kind), "present": self.present.to(torch.uint8)}
+        for prefix, poses in (("poses", self.poses), ("average_pose", self.average_pose)):
+            tensors |= {f"{prefix}.{k}": v for k, v in poses._asdict().items()}
+        about = {
+            "format": FORMAT,
+            "version": VERSION,
+            "config": asdict(self.config),
+            "parts": self.parts,
+            "shapes": self.shapes,
+            "slope": self.slope,
+        }
+        tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
+        return save(tensors, {"partwright": json.dumps(about)})
+
+    def save(self, path: str | Path, half: bool = False) -> Model:
+        """Write the model's file, and return the model as it was written, with its hash.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        data = self.to_bytes(half)
+        write_bytes(path, data)
+        return _remembered(model_from_bytes(data, str(path)))
+
+
+def load_model(source: str | Path) -> Model:
+    """A model by its file, or by the name of one that ships or lies in a folder of $PARTWRIGHT_MODELS.
+
+    Raises:
+        ModelError: no such model, or a file of another form.
+        UnreadableFileError: the file cannot be read.
+        NewerVersionError: a newer Partwright wrote it.
+    """
+    path = Path(source)
+    if path.suffix != SUFFIX:
+        path = _named(str(source))
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise UnreadableFileError(f"cannot read the model {path}: {error.strerror or error}") from error
+    return _remembered(model_from_bytes(data, str(path)))
+
+
+def find_model(name: str, hash: str) -> Model:
+    """The model of this name and hash: one that was loaded before, ships, or lies in a models' folder.
+
+    Raises:
+        ModelError: there is none; the message says where one would be looked for.
+    """
+    if hash in _loaded:
+        return _loaded[hash]
+    for path in _candidates():
+        if path.stem == name or path.parent.name == name:
+            model = load_model(path)
+            if model.hash == hash:
+                return model
+    raise ModelError(
+        f"the parts need the model {name!r} with hash {hash[:12]}, which is not here; load it first "
+        f"(--model FILE, or partwright.partsdf.load_model), or name its folder in ${FOLDERS}"
+    )
+
+
+def model_from_bytes(data: bytes, where: str) -> Model:
+    """The model of a file's bytes; raises as `load_model`."""
+    from safetensors import SafetensorError
+    from safetensors.torch import load
+
+    try:
+        tensors = load(data)
+        about = about_file(data)
+        if about.get("format") != FORMAT:
+            raise ModelError(f"{where}: holds no PartSDF model; expected one that `parts train` wrote")
+        if about["version"] > VERSION:
+            raise NewerVersionError(f"{where}: version {about['version']}; upgrade Partwright to open it")
+        return replace(_model(about, tensors), hash=hashlib.sha256(data).hexdigest())
+    except (SafetensorError, KeyError, ValueError, TypeError, RuntimeError, SettingError) as error:
+        raise ModelError(f"{where}: damaged, or no PartSDF model ({error!s:.200})") from error
+
+
+def make_decoder(parts: int, settings: DecoderSettings) -> nn.Module:
+    return _DECODERS[settings.architecture](parts, settings)
+
+
+_loaded: dict[str, Model] = {}
+
+
+def _remembered(model: Model) -> Model:
+    return _loaded.setdefault(model.hash, model)
+
+
+def _model(about: dict[str, Any], tensors: dict[str, Tensor]) -> Model:
+    config = config_from(about["config"])
+    parts = tuple(about["parts"])
+    decoder = make_decoder(len(parts), config.decoder)
+    prefix = "decoder."
+    decoder.load_state_dict({k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)})
+    decoder.requires_grad_(False).eval()
+    latents = tensors["latents"].float()
+    if latents.shape[1:] != (len(parts), config.decoder.latent):
+        raise ValueError(f"latents of shape {tuple(latents.shape)}")
+    stored = (PoseTensors(*(tensors[f"{key}.{k}"] for k in PoseTensors._fields))
+              for key in ("poses", "average_pose"))  # fmt: skip
+    poses, average = stored
+    shapes, slope = tuple(about["shapes"]), float(about["slope"])
+    return Model(config, parts, decoder, latents, poses, tensors["present"].bool(), average, shapes, slope)
+
+
+def about_file(data: bytes) -> dict[str, Any]:
+    """The line that a safetensors file carries: its header is JSON behind eight bytes of length."""
+    size = int.from_bytes(data[:8], "little")
+    return dict(json.loads(json.loads(data[8 : 8 + size])["__metadata__"]["partwright"]))
+
+
+def _named(name: str) -> Path:
+    paths = [p for p in _candidates() if p.stem == name or (p.stem == "model" and p.parent.name == name)]
+    if not paths:
+        known = ", ".join(sorted({p.stem for p in _candidates() if p.stem != "model"})) or "none"
+        raise ModelError(
+            f"no model is named {name!r}; here are: {known}. Give a model's file ({SUFFIX}), "
+            f"or name its folder in ${FOLDERS}"
+        )
+    return paths[0]
+
+
+def _candidates() -> Sequence[Path]:
+    """Files that may be models: those that ship, and those in the user's folders or one below."""
+    folders = [Path(f) for f in os.environ.get(FOLDERS, "").split(os.pathsep) if f]
+    patterns = (f"*{SUFFIX}", f"*/model{SUFFIX}")
+    own = [path for folder in folders for pattern in patterns for path in sorted(folder.glob(pattern))]
+    return [*sorted(SHIPPED.glob(f"*{SUFFIX}")), *own]

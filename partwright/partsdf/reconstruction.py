@@ -1,0 +1,216 @@
+"""Shapes that the model has not seen: latents, and poses where they are unknown, that decode to them.
+
+With known parts the poses are given and every sample knows its nearest part (section 4.1). Part-agnostic, a
+plain surface is all there is: latents and poses, rotations included, start from the training shape that fits
+best as it is, and all of them move (section 3.4, without the encoder).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from partwright.datasets.prepared import PreparedShape
+from partwright.errors import ModelError, SettingError
+from partwright.partsdf.config import LossSettings
+from partwright.partsdf.data import pose_tensors, present_parts
+from partwright.partsdf.losses import aggregate, clamped_error, latent_penalty, terms
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.poses import PoseTensors, local_points
+from partwright.shapes import Shape
+
+STARTS = ("nearest", "mean")
+Progress = Callable[[int, int, float], None]
+
+
+@dataclass(frozen=True)
+class ReconstructionSettings:
+    """iterations, points a step, rate of Adam: the paper takes 800, 8,000 (all that it samples), 5e-3; the
+    rate falls by `decay` at half time, when the whole shape's loss joins in. start: "nearest" training shape,
+    or the "mean" of all (poses unknown only). pose_rate: of poses; pose_delay: the share of the iterations
+    for which they wait until latents have found the rough form. seed: of the points drawn.
+    """
+
+    iterations: int = 400
+    points: int = 2048
+    rate: float = 5e-3
+    decay: float = 0.1
+    start: str = "nearest"
+    pose_rate: float = 2e-3
+    pose_delay: float = 0.1
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("iterations", "points"):
+            if getattr(self, name) < 1:
+                raise SettingError(f"{name} is {getattr(self, name)}; expected 1 or more")
+        if self.start not in STARTS:
+            raise SettingError(f"start is {self.start!r}; expected one of {', '.join(STARTS)}")
+
+
+@dataclass(frozen=True)
+class Target:
+    """Samples of one shape, unit frame: points (N, 3), sdf (N,), and the nearest part (N,) where known."""
+
+    points: Tensor
+    sdf: Tensor
+    part: Tensor | None = None
+
+    @classmethod
+    def of_shape(cls, shape: Shape, count: int = 40_000, seed: int = 0) -> Target:
+        """Of any shape that comes in: near its surface with the paper's two variances, and around it."""
+        samples = shape.samples(round(0.95 * count), round(0.05 * count), seed, NEAR)
+        return cls(torch.tensor(samples.points), torch.tensor(samples.distance))
+
+    def halves(self) -> tuple[Tensor, Tensor]:
+        """Rows that lie inside and outside; each draw takes half of its points from either."""
+        inside = self.sdf < 0
+        return inside.nonzero().squeeze(1), (~inside).nonzero().squeeze(1)
+
+
+LEAST = 1e-3
+NEAR = (0.005**0.5, 0.0005**0.5)  # section B.4 gives variances
+
+
+def reconstruct(
+    model: Model,
+    shape: Shape | PreparedShape,
+    settings: ReconstructionSettings = ReconstructionSettings(),
+    progress: Progress | None = None,
+) -> NeuralShape:
+    """The latents and poses that decode to a shape. A prepared shape has known parts, another has not.
+
+    progress: told iteration, iterations and loss.
+
+    Raises:
+        ModelError: the prepared shape has other parts than the model.
+    """
+    if isinstance(shape, Shape):
+        return reconstruct_unknown(model, Target.of_shape(shape, seed=settings.seed), settings, progress)
+    count = 1 if model.config.one_part else len(shape.present)
+    if count != len(model.parts):
+        raise ModelError(
+            f"{shape.name} has {count} parts, but {model.name} knows {len(model.parts)}: "
+            f"{', '.join(model.parts)}; take the model of its family"
+        )
+    part = torch.zeros(len(shape.part)) if model.config.one_part else torch.tensor(shape.part)
+    target = Target(torch.tensor(shape.points), torch.tensor(shape.sdf), part.long())
+    start = NeuralShape.mean(model, present_parts(shape, model.config))
+    # Latents start at N(0, 0.01^2), as the authors': near the centre of their prior.
+    noise = torch.Generator().manual_seed(settings.seed)
+    latents = 0.01 * torch.randn(start.latents.shape, generator=noise)
+    start = replace(start, latents=latents, poses=pose_tensors(shape, model.config))
+    return _optimised(start, target, settings, progress, move_poses=False)
+
+
+def reconstruct_unknown(
+    model: Model,
+    target: Target,
+    settings: ReconstructionSettings = ReconstructionSettings(),
+    progress: Progress | None = None,
+) -> NeuralShape:
+    """Latents and poses, without knowing which part a sample belongs to."""
+    start = nearest_trained(model, target) if settings.start == "nearest" else NeuralShape.mean(model)
+    everything = replace(start, present=torch.ones_like(start.present))
+    found = _optimised(everything, target, settings, progress, move_poses=model.config.poses)
+    return replace(found, present=_filling(found, target))
+
+
+@torch.no_grad()
+def _filling(shape: NeuralShape, target: Target) -> Tensor:
+    """(P,) parts that fill at least `LEAST` of the target's inside: what is less is a crumb of a part that
+    should not be there (section 5)."""
+    inside = target.points[target.sdf < 0]
+    if not len(inside):
+        return shape.present
+    owner = shape.part_distances(inside.numpy()).argmin(axis=0)
+    share = torch.from_numpy(np.bincount(owner, minlength=len(shape.present)) / len(inside))
+    return share >= LEAST
+
+
+@torch.no_grad()
+def nearest_trained(model: Model, target: Target, count: int = 512) -> NeuralShape:
+    """The training shape whose distances differ least from the target's, at `count` of its samples."""
+    rows = torch.linspace(0, len(target.sdf) - 1, count).long()
+    points, sdf = target.points[rows], target.sdf[rows]
+    errors = []
+    for chunk in range(0, len(model.latents), 16):
+        some = slice(chunk, chunk + 16)
+        poses = model.poses.map(lambda t, some=some: t[some])
+        each = model.condition(model.latents[some])(local_points(points, poses))
+        whole = aggregate(each, model.config.decoder)
+        errors.append(clamped_error(whole, sdf.expand_as(whole), model.config.losses).mean(dim=1))
+    return NeuralShape.trained(model, str(int(torch.cat(errors).argmin())))
+
+
+def _optimised(
+    start: NeuralShape,
+    target: Target,
+    settings: ReconstructionSettings,
+    progress: Progress | None,
+    move_poses: bool,
+) -> NeuralShape:
+    """Adam on the latents, and on the poses if they are to move; Ctrl-C keeps what was found."""
+    losses = start.model.config.losses
+    latents = start.latents.clone().requires_grad_()
+    poses = start.poses.map(lambda t: t.clone().requires_grad_(move_poses))
+    # Half-lengths move by their logarithm: they stay positive, and long and short sides alike.
+    size = start.poses.scale.log().requires_grad_(move_poses)
+    groups = [{"params": [latents], "lr": settings.rate}]
+    if move_poses:
+        groups.append({"params": [poses.translation, poses.rotation, size], "lr": settings.pose_rate})
+    optimiser = torch.optim.Adam(groups)
+    generator = torch.Generator().manual_seed(settings.seed)
+    halves = target.halves()
+    try:
+        for i in range(settings.iterations):
+            if i == settings.iterations // 2:
+                for group in optimiser.param_groups:
+                    group["lr"] *= settings.decay
+            moved = move_poses and i >= settings.pose_delay * settings.iterations
+            now = poses._replace(scale=size.exp()) if moved else start.poses
+            rows = _drawn(halves, settings.points, generator)
+            late = 2 * i >= settings.iterations
+            loss = _loss(start, latents, now, target, rows, losses, late)
+            optimiser.zero_grad()
+            loss.backward()
+            optimiser.step()
+            if progress:
+                progress(i + 1, settings.iterations, float(loss.detach()))
+    except KeyboardInterrupt:
+        pass
+    final = PoseTensors(poses.translation, poses.rotation, size.exp()) if move_poses else start.poses
+    unit = final.rotation / final.rotation.norm(dim=-1, keepdim=True)
+    return replace(start, latents=latents.detach(), poses=final._replace(rotation=unit).map(Tensor.detach))
+
+
+def _loss(
+    shape: NeuralShape,
+    latents: Tensor,
+    poses: PoseTensors,
+    target: Target,
+    rows: Tensor,
+    losses: LossSettings,
+    late: bool,
+) -> Tensor:
+    """Eq. 6 at some samples; with known parts the whole shape's loss waits for the second half."""
+    each = shape.model.condition(latents[None])(local_points(target.points[rows], poses)[None])
+    sdf = target.sdf[rows][None]
+    known = target.part is not None
+    part = target.part[rows][None] if target.part is not None else torch.zeros_like(sdf).long()
+    found = terms(each, sdf, part, losses, shape.model.config.decoder)
+    weights = losses if late or not known else replace(losses, whole=0.0)
+    return found.total(weights, known) + latent_penalty(latents, losses, losses.ramp)
+
+
+def _drawn(halves: tuple[Tensor, Tensor], count: int, generator: torch.Generator) -> Tensor:
+    """`count` rows, half of them inside as far as there are any."""
+    some = [half for half in halves if len(half)]
+    return torch.cat(
+        [half[torch.randint(len(half), (count // len(some),), generator=generator)] for half in some]
+    )

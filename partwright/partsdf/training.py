@@ -1,0 +1,258 @@
+"""Training: auto-decoding on CPU, one GPU or several (section 3.3, appendix B.2), by Lightning Fabric.
+
+Every step depends on the seed and its own number alone, so a training that is stopped at any point and goes
+on from its last checkpoint ends with the same weights, to the bit on the same device and number of threads.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from partwright.datasets.prepared import PreparedFamily
+from partwright.errors import MissingDependencyError, SettingError
+from partwright.partsdf.autodecoder import AutoDecoder
+from partwright.partsdf.checkpoints import Progress, load_checkpoint, save_checkpoint
+from partwright.partsdf.config import Config
+from partwright.partsdf.data import Samples, check_training_shapes, load_samples, part_names
+from partwright.partsdf.logs import Log
+from partwright.partsdf.losses import Terms, latent_penalty, terms
+from partwright.partsdf.model import Model
+from partwright.partsdf.poses import PoseTensors, identity
+from partwright.partsdf.slope import measured_slope
+from partwright.partsdf.validation import Validation
+from partwright.writing import check_folder
+
+MODEL, CHECKPOINT = "model.safetensors", "checkpoint.safetensors"
+_DROPS = (0.8, 0.9)
+
+
+@dataclass(frozen=True)
+class Report:
+    """What `progress` is told after each epoch: losses are means over it, unweighted."""
+
+    epoch: int
+    epochs: int
+    whole: float
+    part: float
+    inter: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Trained:
+    """model: as written to `path`. outcome: "converged" where all epochs are done, else "interrupted"."""
+
+    model: Model
+    path: Path
+    outcome: str
+
+
+def train(config: Config, folder: str | Path, progress: Callable[[Report], None] | None = None) -> Trained:
+    """Train on a prepared family, or go on where a training in `folder` was stopped.
+
+    Writes model.safetensors, checkpoint.safetensors, log.csv, validation pictures and a TensorBoard log into
+    `folder`. Ctrl-C ends after the running step, with a checkpoint and the model as it is.
+
+    Raises:
+        FamilyError: fewer than two shapes, or a part that no shape has.
+        ModelError, SettingError: `folder` holds a checkpoint of another family, or of other settings.
+        MissingDependencyError: Lightning Fabric is not installed.
+    """
+    check_folder(folder)
+    fabric = _fabric(config)
+    family = PreparedFamily(config.family)
+    splits = ("train", "validation") if config.training.validation else ("train",)
+    chosen = family.split(*splits)
+    chosen = chosen[: config.training.shapes] if config.training.shapes else chosen
+    samples = load_samples(family, chosen, config) if chosen else None
+    if samples is None:
+        raise SettingError(f"{config.family}: no shape is in the split {' or '.join(splits)}")
+    check_training_shapes(family, samples, config)
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    return Trainer(config, family, samples, Path(folder), fabric).run(progress)
+
+
+class Trainer:
+    """One training: what `train` runs."""
+
+    def __init__(
+        self, config: Config, family: PreparedFamily, samples: Samples, folder: Path, fabric: Any
+    ) -> None:
+        self.config, self.family, self.folder, self.fabric = config, family, folder, fabric
+        self.settings, self.parts = config.training, part_names(family, config)
+        torch.manual_seed(self.settings.seed)
+        self.plain = AutoDecoder(len(samples), len(self.parts), config.decoder)
+        optimiser = torch.optim.Adam(
+            [
+                {"params": self.plain.decoder.parameters(), "lr": self.settings.rate},
+                {"params": [self.plain.latents], "lr": self.settings.latent_rate},
+            ]
+        )
+        self.model, self.optimiser = fabric.setup(self.plain, optimiser)
+        self.samples = samples.to(fabric.device)
+        self.generator = torch.Generator(device=fabric.device)
+        self.progress = Progress(0, torch.zeros(3, device=fabric.device))
+        if (folder / CHECKPOINT).exists():
+            self.progress = load_checkpoint(
+                folder / CHECKPOINT, config, samples.names, self.plain, self.optimiser.optimizer
+            )
+        self.share = self.settings.batch // fabric.world_size
+        self.steps = -(-len(samples) // self.settings.batch)  # an epoch
+
+    def run(self, report: Callable[[Report], None] | None) -> Trained:
+        log = Log(self.folder, self.epoch) if self.fabric.is_global_zero else None
+        validation = Validation(self.config, self.family, self.folder) if log else None
+        saved, started = time.monotonic(), time.monotonic() - self.progress.seconds
+        with _stopping() as stop:
+            while self.progress.step < self.settings.epochs * self.steps and not stop():
+                self._set_rates()
+                self._step()
+                self.progress.seconds = time.monotonic() - started
+                if self.progress.step % self.steps == 0:
+                    self._end_epoch(log, validation, report)
+                if time.monotonic() - saved > 60 * self.settings.checkpoint:
+                    self._save()
+                    saved = time.monotonic()
+            self._save()
+        done = self.progress.step >= self.settings.epochs * self.steps
+        path = self.folder / MODEL
+        model = self.trained()
+        if self.fabric.is_global_zero:
+            model = model.save(path)
+        self.fabric.barrier()
+        return Trained(model, path, "converged" if done else "interrupted")
+
+    @property
+    def epoch(self) -> int:
+        return self.progress.step // self.steps
+
+    def _step(self) -> None:
+        shapes = self._shapes()
+        step = self.progress.step * self.fabric.world_size + self.fabric.global_rank
+        self.generator.manual_seed((self.settings.seed << 32) + step)
+        points, sdf, part = self.samples.draw(shapes, self.settings.points, self.generator)
+        poses = self.samples.poses.map(lambda t: t[shapes])
+        distances, latents = self.model(shapes, points, poses)
+        found = terms(distances, sdf, part, self.config.losses, self.config.decoder)
+        penalty = latent_penalty(latents, self.config.losses, self.epoch)
+        self.optimiser.zero_grad()
+        self.fabric.backward(found.total(self.config.losses) + penalty)
+        self.optimiser.step()
+        self.plain.limit_latents()
+        self.progress.sums += torch.stack(Terms(*(t.detach() for t in found)))
+        self.progress.step += 1
+
+    def _shapes(self) -> Tensor:
+        """This device's share of the step's shapes (B,): an epoch goes through all in an order of its own."""
+        order = torch.Generator().manual_seed((self.settings.seed << 32) + self.epoch)
+        shuffled = torch.randperm(len(self.samples), generator=order)
+        place = self.progress.step % self.steps
+        batch = shuffled[place * self.settings.batch :][: self.settings.batch]
+        mine = batch[self.fabric.global_rank :: self.fabric.world_size]
+        # A last batch that is too small for all devices is shared by them.
+        return (mine if len(mine) else batch[:1]).to(self.fabric.device)
+
+    def _set_rates(self) -> None:
+        done = self.progress.step / (self.settings.epochs * self.steps)
+        factor = self.settings.decay ** sum(done >= drop for drop in _DROPS)
+        rates = (self.settings.rate, self.settings.latent_rate)
+        for group, rate in zip(self.optimiser.param_groups, rates, strict=True):
+            group["lr"] = factor * rate
+
+    def _end_epoch(
+        self, log: Log | None, validation: Validation | None, report: Callable[[Report], None] | None
+    ) -> None:
+        whole, part, inter = (self.progress.sums / self.steps).tolist()
+        self.progress.sums.zero_()
+        if log is None or validation is None:
+            return
+        row: dict[str, float] = {"whole": whole, "part": part, "inter": inter}
+        row["latent_norm"] = float(self.plain.latents.detach().norm(dim=-1).mean())
+        row["rate"], row["seconds"] = self.optimiser.param_groups[0]["lr"], self.progress.seconds
+        every = self.settings.validate
+        if every and (self.epoch % every == 0 or self.epoch == self.settings.epochs):
+            scores, picture = validation.run(self.trained(), self.epoch)
+            row |= scores
+            log.picture(self.epoch, picture)
+        log.row(self.epoch, row)
+        if report:
+            report(Report(self.epoch, self.settings.epochs, whole, part, inter, self.progress.seconds))
+
+    def _save(self) -> None:
+        if self.fabric.is_global_zero:
+            path, names = self.folder / CHECKPOINT, self.samples.names
+            save_checkpoint(path, self.config, names, self.plain, self.optimiser.optimizer, self.progress)
+
+    def trained(self) -> Model:
+        """The model as it is now, on the CPU."""
+        import copy
+
+        decoder = copy.deepcopy(self.plain.decoder).cpu().requires_grad_(False).eval()
+        samples = self.samples.to("cpu")
+        average = PoseTensors.of(self.family.average_pose)
+        if self.config.one_part or not self.config.poses:
+            average = identity(len(self.parts))
+        model = Model(
+            config=replace(self.config, family=self.family.name),
+            parts=self.parts,
+            decoder=decoder,
+            latents=self.plain.latents.detach().cpu().clone(),
+            poses=samples.poses,
+            present=samples.present,
+            average_pose=average,
+            shapes=samples.names,
+            slope=1.0,
+        )
+        return replace(model, slope=measured_slope(model, samples))
+
+
+def _fabric(config: Config) -> Any:
+    try:
+        from lightning_fabric import Fabric
+    except ImportError as error:
+        raise MissingDependencyError(
+            'training needs Lightning Fabric: pip install "partwright[train]"'
+        ) from error
+    settings = config.training
+    if settings.accelerator == "cuda" and not torch.cuda.is_available():
+        raise SettingError('training.accelerator is "cuda", but PyTorch finds no CUDA device; take "cpu"')
+    if settings.threads:
+        torch.set_num_threads(settings.threads)
+    strategy = "ddp" if settings.devices > 1 else "auto"
+    fabric = Fabric(
+        accelerator=settings.accelerator,
+        devices=settings.devices,
+        strategy=strategy,
+        precision=settings.precision,  # type: ignore[arg-type]
+    )
+    fabric.launch()
+    return fabric
+
+
+@contextmanager
+def _stopping() -> Iterator[Callable[[], bool]]:
+    """Ctrl-C is kept until it is asked for; a second one ends at once. Only the main thread hears it."""
+    heard = threading.Event()
+
+    def note(number: int, frame: Any) -> None:
+        heard.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield heard.is_set
+        return
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield heard.is_set
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,103 @@
+"""The decoder against the paper's plain form, its size, and what its options change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from partwright.partsdf.config import DecoderSettings
+from partwright.partsdf.decoder import Decoder
+from partwright.partsdf.reference import ReferenceDecoder
+from partwright.partsdf.transformer import TransformerDecoder
+
+SMALL = DecoderSettings(latent=6, width=16, layers=5)
+
+
+def filled(decoder: torch.nn.Module) -> torch.nn.Module:
+    """No parameter left at a value that hides a mistake."""
+    generator = torch.Generator().manual_seed(1)
+    with torch.no_grad():
+        for parameter in decoder.parameters():
+            parameter += 0.2 * torch.randn(parameter.shape, generator=generator, dtype=parameter.dtype)
+    return decoder
+
+
+def inputs(parts: int, latent: int, dtype: torch.dtype = torch.float64) -> tuple[torch.Tensor, torch.Tensor]:
+    generator = torch.Generator().manual_seed(2)
+    shape = (3, parts, latent), (3, parts, 7, 3)
+    z, x = (torch.randn(s, generator=generator, dtype=dtype, requires_grad=True) for s in shape)
+    return z, x
+
+
+@pytest.mark.parametrize("parts", [1, 4])
+def test_values_and_gradients_are_those_of_the_plain_form(parts: int) -> None:
+    decoder = filled(Decoder(parts, SMALL).double())
+    plain = ReferenceDecoder(parts, SMALL).double().load(decoder)
+    z, x = inputs(parts, SMALL.latent)
+    fast, slow = decoder(z, x), plain(z, x)
+    torch.testing.assert_close(fast, slow, rtol=1e-12, atol=1e-12)
+    weight = torch.linspace(-1, 2, fast.numel(), dtype=torch.float64).view(fast.shape)
+    mine = torch.autograd.grad((weight * fast).sum(), [z, x, *decoder.parameters()])
+    theirs = torch.autograd.grad((weight * slow).sum(), [z, x, *plain.parameters()])
+    torch.testing.assert_close(mine[0], theirs[0])
+    torch.testing.assert_close(mine[1], theirs[1])
+    assert sum(g.abs().sum() for g in mine) == pytest.approx(float(sum(g.abs().sum() for g in theirs)), 1e-9)
+
+
+def test_gradients_agree_with_finite_differences() -> None:
+    decoder = filled(Decoder(3, SMALL).double())
+    z, x = inputs(3, SMALL.latent)
+    assert torch.autograd.gradcheck(decoder, (z, x[:, :, :3].detach().requires_grad_()))
+    first = decoder.single[1].weight.length
+
+    def of_weight(length: torch.Tensor) -> torch.Tensor:
+        return torch.func.functional_call(decoder, {"single.1.weight.length": length}, (z, x))
+
+    assert torch.autograd.gradcheck(of_weight, (first.detach().clone().requires_grad_(),))
+
+
+def test_size_is_the_papers() -> None:
+    """2.52 M parameters at four parts; a cross-part layer adds P^2 + P."""
+    whole = sum(p.numel() for p in Decoder(4, DecoderSettings()).parameters())
+    without = sum(p.numel() for p in Decoder(4, DecoderSettings(cross_part=False)).parameters())
+    assert whole == 2_517_903
+    assert whole - without == 7 * (4 * 4 + 4)
+
+
+def test_parts_hear_of_one_another_only_through_cross_part_layers() -> None:
+    z, x = inputs(3, SMALL.latent)
+    moved = z.detach().clone()
+    moved[:, 0] += 1
+    for cross in (True, False):
+        decoder = filled(Decoder(3, replace(SMALL, cross_part=cross)).double())
+        change = (decoder(moved, x) - decoder(z, x)).detach().abs().amax(dim=(0, 2))
+        assert change[0] > 1e-3
+        assert bool((change[1:] > 1e-6).all()) is cross
+        if not cross:
+            assert float(change[1:].detach().max()) == 0.0
+
+
+def test_without_modulation_the_latent_enters_once() -> None:
+    decoder = Decoder(2, replace(SMALL, modulation=False))
+    assert [layer.modulation is not None for layer in decoder.single] == [True, False, False, False, False]
+
+
+def test_transformer_is_a_decoder_of_the_same_form() -> None:
+    settings = replace(SMALL, architecture="transformer", heads=2)
+    decoder = filled(TransformerDecoder(3, settings).double())
+    z, x = inputs(3, SMALL.latent)
+    assert decoder(z, x).shape == (3, 3, 7)
+    assert torch.autograd.gradcheck(decoder, (z[:1, :, :], x[:1, :, :2]), atol=1e-4)
+    swapped = decoder(z, torch.flip(x, (2,)))
+    torch.testing.assert_close(swapped, torch.flip(decoder(z, x), (2,)))  # points are independent
+
+
+def test_half_precision_rounds_no_coordinates() -> None:
+    decoder = Decoder(2, replace(SMALL, width=64)).float()
+    z, x = inputs(2, SMALL.latent, torch.float32)
+    with torch.autocast("cpu", torch.bfloat16):
+        half = decoder(z, x)
+    assert half.dtype == torch.float32
+    torch.testing.assert_close(half, decoder(z, x), atol=0.02, rtol=0.05)

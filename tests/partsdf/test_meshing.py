@@ -1,0 +1,71 @@
+"""The sparse lattice against the dense grid, on fields whose surfaces are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from partwright.meshing.cells import cell_polygons
+from partwright.meshing.tables import CORNERS
+from partwright.partsdf.meshing import SparseLattice
+
+
+def two_balls(points: np.ndarray) -> np.ndarray:
+    """A union and its parts: (3, N)."""
+    a = np.linalg.norm(points - [0.3, 0.1, 0.0], axis=1) - 0.5
+    b = np.linalg.norm(points - [-0.4, 0.0, -0.1], axis=1) - 0.35
+    return np.stack([np.minimum(a, b), a, b]).astype(np.float32)
+
+
+def dense(resolution: int) -> list[np.ndarray]:
+    """Vertices of the same fields on the full grid."""
+    axis = np.arange(resolution + 1) * 2 / resolution - 1
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    values = two_balls(grid).reshape(3, *[resolution + 1] * 3)
+    cells = np.argwhere(np.ones([resolution] * 3, dtype=bool))
+    corner = tuple(np.moveaxis(cells[:, None] + CORNERS, 2, 0))
+    return [cell_polygons(cells, v[corner]).vertices * 2 / resolution - 1 for v in values]
+
+
+def test_the_sparse_surface_is_the_dense_one() -> None:
+    lattice = SparseLattice(two_balls, 1.0, 32, slope=1.0)
+    for mesh, expected in zip(lattice.meshes(), dense(32), strict=True):
+        assert mesh is not None
+        assert mesh.is_watertight
+        assert mesh.volume > 0
+        # The same vertices, to the last digits, whatever their order.
+        mine = {tuple(v) for v in np.round(mesh.vertices, 4)}
+        theirs = {tuple(v) for v in np.round(expected, 4)}
+        assert len(mine ^ theirs) <= 0.001 * len(theirs)
+
+
+def test_a_fine_lattice_is_asked_at_few_points() -> None:
+    lattice = SparseLattice(lambda p: two_balls(p)[:1], 1.0, 256, slope=1.0)
+    assert lattice.dense == 257**3
+    assert lattice.evaluations * 20 < lattice.dense
+    (mesh,) = lattice.meshes()
+    assert mesh is not None
+    assert mesh.is_watertight
+    assert np.abs(two_balls(mesh.vertices)[0]).max() < lattice.cell / 2
+
+
+@pytest.mark.parametrize("slope", [0.2, 0.5])
+def test_too_low_a_slope_leaves_no_hole(slope: float) -> None:
+    """Cubes are left out too early, and the surface grows back from those that are met."""
+    steep = SparseLattice(lambda p: 3 * two_balls(p), 1.0, 64, slope=slope)
+    expected = dense(64)
+    for mesh, vertices in zip(steep.meshes(), expected, strict=True):
+        assert mesh is not None
+        assert mesh.is_watertight
+        assert len(mesh.vertices) == pytest.approx(len(vertices), rel=0.001)
+
+
+def test_what_reaches_the_box_ends_there_and_what_is_nowhere_is_none() -> None:
+    def fields(points: np.ndarray) -> np.ndarray:
+        return np.stack([np.linalg.norm(points, axis=1) - 1.2, np.ones(len(points))]).astype(np.float32)
+
+    cut, nothing = SparseLattice(fields, 1.0, 32, slope=1.0).meshes()
+    assert nothing is None
+    assert cut is not None
+    assert cut.is_watertight
+    assert np.abs(cut.vertices).max() <= 1.0
