@@ -43,12 +43,15 @@ class Change:
         return own | ({"note": self.note} if self.note else {})
 
 
-def of_part(part: Part, near: Approximation, blend: float) -> Change | None:
-    """The change that a solid in a part's stead is, without its blend; None where it is none."""
+def of_part(part: Part, near: Approximation, blend: float, length: float = 1.0) -> Change | None:
+    """The change that a solid in a part's stead is, without its blend; None where it is none.
+
+    length: of the parts' unit of length in the unit that changes are to be told in, as `blend` is.
+    """
     if near.exact and blend == 0.0:
         return None
     kind = near.solid.kind
-    return Change((part.name,), kind, near.volume_error_ratio, near.max_deviation, blend)
+    return Change((part.name,), kind, near.volume_error_ratio, near.max_deviation * length, blend)
 
 
 def report_path(path: str | Path) -> Path:

@@ -1,24 +1,42 @@
 """Exact B-rep solids by OpenCASCADE, of the `cad` extra: analytic faces, no facets.
 
-Two families cover every canonical solid and more: straight parts of round cross-section are their profile,
-offset by the dilation, turned about the axis; prisms are their rounded rectangle, offset likewise.
+Three constructions cover the SuperFrustum: round ones are their profile turned about the axis, other straight
+ones their profile swept around the rounded rectangle, bent ones that along the arc. What was built is checked
+against the field: where OpenCASCADE lost something, the part does not count as built.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import math
+from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.rows import as_superfrustum
 from partwright.errors import MissingDependencyError, NoSurfaceError
-from partwright.export.brep_solids import prism, revolved
+from partwright.export.brep_bent import bent_solid
+from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
+from partwright.export.brep_solids import revolved
+from partwright.export.brep_swept import Sweep
+from partwright.export.nearest import Approximation
 from partwright.export.recognise import SAME
 from partwright.fields import Field, Solid, SuperFrustum
+from partwright.meshing import mesh_part
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-_SHORTEST_SIDE = 1e-3  # of the longest
+_LOST = 1e-4  # of the larger volume: what an operation may lose by rounding
+_FUZZY = (0.0, 1e-5, 1e-3)  # tolerances of operations, of the cube root of the volume
+_SHORTEST = 1e-5  # of the longest side: shorter edges are left out
+_STRAIGHT = 1e-4  # radians: an arc of this half angle is none
+# What is built may be off by this share of volume and longest side; the mesh that it is held against lacks a
+# few percent of thin walls, and where OpenCASCADE fails it loses a whole wall, hole or end.
+_SAME_VOLUME, _SAME_PLACE = 0.05, 2e-3
 
 
 def require_cad() -> None:
@@ -31,53 +49,206 @@ def require_cad() -> None:
         ) from error
 
 
-def is_exact(field: Field) -> bool:
-    """Whether `solid_of` builds the field's very surface."""
+def built(part: Part) -> Approximation | None:
+    """The part as `solid_of` builds it, or unbent where its bend cannot be built and hardly shows; None where
+    neither is the part's surface. `max_deviation` is 0 where all faces are the very surface."""
+    field = part.field
     if not isinstance(field, SuperFrustum | Solid):
-        return False
+        return None
     f = field.superfrustum()
-    if f.bulge > SAME:
-        return False
-    return _turns(f) or _extrudes(f)
+    if f.thinnest < SAME * max(*f.size, f.dilation):
+        return None
+    for candidate in dict.fromkeys((f, dataclasses.replace(f, bulge=0.0))):
+        off = _off(candidate, f)
+        if off is not None:
+            kept = part if candidate is f else dataclasses.replace(part, field=candidate)
+            return Approximation(kept.field, kept, *off)
+    return None
 
 
+@lru_cache(maxsize=256)
 def solid_of(field: Field) -> TopoDS_Shape:
-    """The field of `is_exact` as a solid in its own frame."""
-    f = as_superfrustum(field)
-    return revolved(f) if _turns(f) else prism(f)
-
-
-def combined(node: Node) -> TopoDS_Shape:
-    """The node's solids, of `is_exact` fields, joined by the boolean operations of its tree.
+    """The field as a solid in its own frame.
 
     Raises:
-        NoSurfaceError: the operations leave nothing.
+        NoSurfaceError: OpenCASCADE cannot build it.
     """
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
+    from OCP.Standard import Standard_Failure
+
+    f = as_superfrustum(field)
+    longest = max(*f.size, f.dilation)
+    if f.bulge * math.pi / 2 < _STRAIGHT and _turns(f):
+        return revolved(f)
+    corner = f.roundness * min(f.size[:2]) / 2
+    d = f.dilation if f.dilation > _SHORTEST * longest else 0.0
+    half_x, half_y = (_not_tiny(side / 2 - corner, longest) for side in f.size[:2])
+    sweep = Sweep(half_x, half_y, _SHORTEST * longest)
+    body = _body(f, sweep)
+    try:
+        outer = clipped(outer_outline(f, corner, d), -math.inf, sweep.shortest)
+        result = body(outer[0])
+        if f.hollow:
+            inner = clipped(inner_outline(f, corner, d), -min(half_x, half_y), sweep.shortest)
+            result = _without(result, [body(run) for run in inner])
+    except (Standard_Failure, IndexError) as error:  # OpenCASCADE's own, and an outline of no length
+        raise NoSurfaceError("a part is too thin for a B-rep") from error
+    return result
+
+
+def _not_tiny(half: float, longest: float) -> float:
+    return half if half > 10 * _SHORTEST * longest else 0.0
+
+
+def _body(f: SuperFrustum, sweep: Sweep) -> Callable[[Outline], TopoDS_Shape]:
+    angle = f.bulge * math.pi / 2
+    if angle < _STRAIGHT:
+        return sweep.solid
+    return lambda outline: bent_solid(sweep, outline, f.size[2] / 2, angle)
+
+
+def _without(solid: TopoDS_Shape, holes: list[TopoDS_Shape]) -> TopoDS_Shape:
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+
+    for hole in holes:
+        cut = BRepAlgoAPI_Cut(solid, hole)
+        if not cut.IsDone():
+            raise NoSurfaceError("the hole of a part cannot be cut; it is too thin for a B-rep")
+        solid = cut.Shape()
+    return solid
+
+
+@lru_cache(maxsize=256)
+def _off(built_field: SuperFrustum, field: SuperFrustum) -> tuple[float, float] | None:
+    """How far what is built of one field is off another: share of the volume at most, and length at most."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    longest = max(*field.size, field.dilation)
+    try:
+        shape = solid_of(built_field)
+        volume = float(mesh_part(Part(field), 64).volume)
+    except NoSurfaceError:
+        return None
+    bulk, area = volume_and_area(shape)
+    places = _places(shape, 2e-3 * longest)
+    deviation = float(np.abs(field(places)).max())
+    valid = BRepCheck_Analyzer(shape).IsValid()
+    if not valid or abs(bulk / volume - 1) > _SAME_VOLUME or deviation > _SAME_PLACE * longest:
+        return None
+    exact = built_field == field and _analytic(field)
+    return (0.0, 0.0) if exact else (area * deviation / bulk, deviation)
+
+
+def volume_and_area(shape: TopoDS_Shape) -> tuple[float, float]:
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    volume, area = GProp_GProps(), GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, volume)
+    BRepGProp.SurfaceProperties_s(shape, area)
+    return float(volume.Mass()), float(area.Mass())
+
+
+def _analytic(f: SuperFrustum) -> bool:
+    """Whether all faces are: a bend with taper is a surface through sections."""
+    return f.bulge * math.pi / 2 < _STRAIGHT or abs(f.taper - 1) < SAME
+
+
+def _places(shape: TopoDS_Shape, chord: float) -> np.ndarray:
+    """Places (N, 3) float32 on the shape's surface."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS
+
+    BRepMesh_IncrementalMesh(shape, chord, False, 0.3, False)
+    places = []
+    faces = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    while faces.More():
+        location = TopLoc_Location()
+        triangles = BRep_Tool.Triangulation_s(TopoDS.Face(faces.Current()), location)
+        if triangles is not None:
+            pose = location.Transformation()
+            nodes = (triangles.Node(i + 1).Transformed(pose) for i in range(triangles.NbNodes()))
+            places += [(node.X(), node.Y(), node.Z()) for node in nodes]
+        faces.Next()
+    return np.array(places, np.float32).reshape(-1, 3)
+
+
+def combined(node: Node, apart: list[str]) -> TopoDS_Shape:
+    """The node's solids, of `built` fields, joined by the boolean operations of its tree.
+
+    apart: takes the names of what OpenCASCADE cannot unite with the rest; it stays a solid of its own.
+
+    Raises:
+        NoSurfaceError: the operations leave nothing, or OpenCASCADE cannot do them.
+    """
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
 
     if isinstance(node, Part):
         return placed(node)
-    operation = {
-        "union": BRepAlgoAPI_Fuse,
-        "difference": BRepAlgoAPI_Cut,
-        "intersection": BRepAlgoAPI_Common,
-    }[node.operation]
-    result = combined(node.children[0])
+    result, left = combined(node.children[0], apart), []
     for child in node.children[1:]:
-        joined = operation(result, combined(child))
-        if not joined.IsDone():
-            raise NoSurfaceError(f"the {node.operation} with {_label(child)} failed; move it a little")
-        result = joined.Shape()
+        solid = combined(child, apart)
+        try:
+            result = _operated(node.operation, result, solid, _label(child))
+        except NoSurfaceError:
+            if node.operation != "union":
+                raise
+            left.append(solid)
+            apart.append(child.name or _label(child))
     if len(node.children) > 1:
         unify = ShapeUpgrade_UnifySameDomain(result, True, True, False)
         unify.Build()
-        result = unify.Shape()
+        result = _side_by_side([unify.Shape(), *left])
     if not TopExp_Explorer(result, TopAbs_ShapeEnum.TopAbs_SOLID).More():
         raise NoSurfaceError(f"nothing to export: the {node.operation} of {_label(node)} is empty")
     return result
+
+
+def _side_by_side(solids: list[TopoDS_Shape]) -> TopoDS_Shape:
+    from OCP.BRep import BRep_Builder
+    from OCP.TopoDS import TopoDS_Compound
+
+    if len(solids) == 1:
+        return solids[0]
+    builder, compound = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(compound)
+    for solid in solids:
+        builder.Add(compound, solid)
+    return compound
+
+
+def _operated(operation: str, first: TopoDS_Shape, second: TopoDS_Shape, label: str) -> TopoDS_Shape:
+    """The boolean operation, ever more tolerant until its volume is one that it can have.
+
+    Where surfaces nearly touch, OpenCASCADE may lose a whole solid and say nothing.
+    """
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
+    from OCP.collections import List_TopoDS_Shape as Shapes
+
+    a, b = volume_and_area(first)[0], volume_and_area(second)[0]
+    low, high = {"union": (max(a, b), a + b), "difference": (a - b, a), "intersection": (0.0, min(a, b))}[
+        operation
+    ]
+    slack = _LOST * max(a, b)
+    for tolerance in _FUZZY:
+        work = {"union": BRepAlgoAPI_Fuse, "difference": BRepAlgoAPI_Cut, "intersection": BRepAlgoAPI_Common}[
+            operation
+        ]()
+        arguments, tools = Shapes(), Shapes()
+        arguments.Append(first)
+        tools.Append(second)
+        work.SetArguments(arguments)
+        work.SetTools(tools)
+        work.SetFuzzyValue(tolerance * max(a, b) ** (1 / 3))
+        work.Build()
+        if work.IsDone() and low - slack <= volume_and_area(work.Shape())[0] <= high + slack:
+            return work.Shape()
+    raise NoSurfaceError(f"OpenCASCADE fails at the {operation} with {label}; move it a little")
 
 
 def placed(part: Part) -> TopoDS_Shape:
@@ -105,11 +276,3 @@ def _turns(f: SuperFrustum) -> bool:
     open_throughout = min(1.0, f.taper) * middle * f.onion > f.dilation + SAME * width
     solid = f.dilation > 0 or (min(width, f.size[2]) > 0 and f.onion < 1)
     return is_round and upright and solid and (closed or open_throughout)
-
-
-def _extrudes(f: SuperFrustum) -> bool:
-    """A prism whose flat sides, where it has any, are long enough to be rounded one by one."""
-    middle = min(f.size[:2]) / 2
-    flat = (1 - f.roundness) * middle
-    sides = flat <= SAME * middle or flat > _SHORTEST_SIDE * max(f.size)
-    return abs(f.taper - 1) <= SAME and not f.hollow and sides and min(f.size) > _SHORTEST_SIDE * max(f.size)

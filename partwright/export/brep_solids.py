@@ -1,4 +1,4 @@
-"""One exact solid: a rounded profile turned about the axis, or a rounded rectangle extruded along it."""
+"""A round solid: its rounded profile turned about the axis."""
 
 from __future__ import annotations
 
@@ -26,28 +26,10 @@ def revolved(f: SuperFrustum) -> TopoDS_Shape:
     if f.hollow:
         corners += [(m * f.taper * f.onion, h), (m * f.onion, -h)]
     longest = 2 * max(m, m * f.taper, h) + 2 * f.dilation
-    outline = _Outline(upright=True, shortest=SAME * longest)
+    outline = _Outline(SAME * longest)
     d = f.dilation if f.dilation > outline.shortest else 0.0
     _profile(outline, corners, d, f.hollow)
     return BRepPrimAPI_MakeRevol(outline.face(), gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))).Shape()
-
-
-def prism(f: SuperFrustum) -> TopoDS_Shape:
-    """The solid of a straight SuperFrustum of one cross-section, all edges rounded by the dilation."""
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakePrism
-    from OCP.gp import gp_Pnt, gp_Vec
-
-    d = f.dilation if f.dilation > SAME * max(f.size) else 0.0
-    x, y, z = (side / 2 + d for side in f.size)
-    radius = f.roundness * min(f.size[:2]) / 2
-    if radius <= SAME * max(f.size):
-        box = BRepPrimAPI_MakeBox(gp_Pnt(-x, -y, -z), gp_Pnt(x, y, z)).Shape()
-        return _rounded(box, d, all_edges=True)
-    outline = _Outline(upright=False, shortest=SAME * max(x, y, z), height=-z)
-    inset_x, inset_y = x - radius - d, y - radius - d
-    for i, (sx, sy) in enumerate(((1, -1), (1, 1), (-1, 1), (-1, -1))):
-        outline.arc((sx * inset_x, sy * inset_y), radius + d, math.pi / 2 * (i - 1), math.pi / 2 * i)
-    return _rounded(BRepPrimAPI_MakePrism(outline.face(), gp_Vec(0, 0, 2 * z)).Shape(), d, all_edges=False)
 
 
 def _profile(outline: _Outline, corners: list[Point], d: float, hollow: bool) -> None:
@@ -75,12 +57,12 @@ def _normal(a: Point, b: Point, inner: bool = False) -> float:
 
 
 class _Outline:
-    """A closed line of segments and arcs in the xz-plane, or in the xy-plane at a height."""
+    """A closed line of segments and arcs in the xz-plane."""
 
-    def __init__(self, upright: bool, shortest: float, height: float = 0.0) -> None:
+    def __init__(self, shortest: float) -> None:
         from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeWire
 
-        self.upright, self.shortest, self.height = upright, shortest, height
+        self.shortest = shortest
         self._wire = BRepBuilderAPI_MakeWire()
         self._first: Point | None = None
         self._last: Point = (0.0, 0.0)
@@ -128,31 +110,4 @@ class _Outline:
     def _at(self, point: Point):  # type: ignore[no-untyped-def]  # a gp_Pnt
         from OCP.gp import gp_Pnt
 
-        return gp_Pnt(point[0], 0, point[1]) if self.upright else gp_Pnt(*point, self.height)
-
-
-def _rounded(solid: TopoDS_Shape, radius: float, all_edges: bool) -> TopoDS_Shape:
-    """All edges, or those of the two ends, rounded by the radius; 0 leaves them."""
-    from OCP.BRepAdaptor import BRepAdaptor_Curve
-    from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
-
-    if radius == 0:
-        return solid
-    fillet = BRepFilletAPI_MakeFillet(solid)
-    edges = TopExp_Explorer(solid, TopAbs_ShapeEnum.TopAbs_EDGE)
-    while edges.More():
-        edge = TopoDS.Edge(edges.Current())
-        curve = BRepAdaptor_Curve(edge)
-        ends = [curve.Value(t).Z() for t in (curve.FirstParameter(), curve.LastParameter())]
-        if all_edges or math.isclose(*ends, abs_tol=radius * 1e-6):
-            fillet.Add(radius, edge)
-        edges.Next()
-    fillet.Build()
-    if not fillet.IsDone():
-        raise NoSurfaceError(
-            f"the edges of a part cannot be rounded by {radius:g}; it is too thin for a B-rep"
-        )
-    return fillet.Shape()
+        return gp_Pnt(point[0], 0, point[1])

@@ -12,39 +12,42 @@ from collections.abc import Callable
 from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError
 from partwright.export.approximation import Change, of_part
-from partwright.export.nearest import nearest_solid
+from partwright.export.nearest import Approximation, nearest_solid
 from partwright.fields import Cone, Cylinder, Field, Frustum
 
-Keep = Callable[[Field], bool]
+Keep = Callable[[Part], Approximation | None]
 
 
-def _keep_none(_: Field) -> bool:
-    return False
+def _keep_none(_: Part) -> None:
+    return None
 
 
-def solid_tree(assembly: Assembly, keep: Keep = _keep_none) -> tuple[Assembly, list[Change]]:
+def solid_tree(
+    assembly: Assembly, keep: Keep = _keep_none, length: float = 1.0
+) -> tuple[Assembly, list[Change]]:
     """The assembly of exact solids alone, with no blend, and what was changed for it.
 
-    keep: whether the format holds a field as it is, though it is none of the named solids.
+    keep: the part as the format holds it though it is none of the named solids, if it does.
+    length: of the assembly's unit of length in the unit that changes are to be told in.
 
     Raises:
         NoSurfaceError: no part has a volume, so nothing would be left.
         ParameterError: a part's field has no solid near it.
     """
     changes: list[Change] = []
-    tree = _solid(assembly.expanded(), True, keep, changes)
+    tree = _solid(assembly.expanded(), True, keep, length, changes)
     if tree is None:
         raise NoSurfaceError("nothing to export: no part of the assembly has a volume")
     return tree, changes  # type: ignore[return-value]  # an assembly stays one
 
 
-def _solid(node: Node, first: bool, keep: Keep, changes: list[Change]) -> Node | None:
-    blend = 0.0 if first else node.blend
+def _solid(node: Node, first: bool, keep: Keep, length: float, changes: list[Change]) -> Node | None:
+    blend = 0.0 if first else node.blend * length
     if isinstance(node, Part):
-        return _leaf(node, blend, keep, changes)
+        return _leaf(node, blend, keep, length, changes)
     if blend:
         changes.append(Change(tuple(p.name for p in node.parts), "sharp edges", blend_dropped=blend))
-    solids = [_solid(child, i == 0, keep, changes) for i, child in enumerate(node.children)]
+    solids = [_solid(child, i == 0, keep, length, changes) for i, child in enumerate(node.children)]
     if solids[0] is None and node.operation == "difference":
         return None
     if None in solids and node.operation == "intersection":
@@ -53,17 +56,13 @@ def _solid(node: Node, first: bool, keep: Keep, changes: list[Change]) -> Node |
     return dataclasses.replace(node, children=children, blend=0.0) if children else None
 
 
-def _leaf(part: Part, blend: float, keep: Keep, changes: list[Change]) -> Part | None:
-    if keep(part.field):
-        if blend:
-            changes.append(Change((part.name,), part.field.kind, blend_dropped=blend))
-        return dataclasses.replace(part, blend=0.0)
+def _leaf(part: Part, blend: float, keep: Keep, length: float, changes: list[Change]) -> Part | None:
     try:
-        near = nearest_solid(part)
+        near = keep(part) or nearest_solid(part)
     except NoSurfaceError:
         changes.append(Change((part.name,), "nothing", note="it has no volume"))
         return None
-    changes += filter(None, [of_part(part, near, blend)])
+    changes += filter(None, [of_part(part, near, blend, length)])
     return dataclasses.replace(near.part_with_solid, field=_plain(near.solid), blend=0.0)
 
 

@@ -1,7 +1,8 @@
 """STEP (AP214): exact B-rep solids with analytic faces, one named product in the assembly's own unit.
 
-Straight parts that are round, or prisms, are exact, whatever their taper, hole, rounding and dilation; others
-become the nearest solid. Blends become sharp edges. FILE.report.json lists both.
+Straight parts are exact, whatever their taper, hole, rounding and dilation, and so are bent ones without
+taper. Bent ones with taper are surfaces through sections; what cannot be built becomes the nearest solid.
+Blends become sharp edges. FILE.report.json lists all but the exact.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from typing import TYPE_CHECKING
 from partwright import __version__
 from partwright.assembly import Assembly
 from partwright.errors import OutputError
-from partwright.export.approximation import write_report
-from partwright.export.brep import combined, is_exact, require_cad
+from partwright.export.approximation import Change, write_report
+from partwright.export.brep import built, combined, require_cad
 from partwright.export.solid_tree import solid_tree
 from partwright.shapes import METRES, canonical_unit
 from partwright.writing import replacing
@@ -38,16 +39,23 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     """
     require_cad()
     unit = canonical_unit(assembly.unit) if assembly.unit else None
-    tree, changes = solid_tree(assembly, keep=is_exact)
-    scaled = tree.scaled(METRES[unit] / _WORKING) if unit else tree
+    scale = METRES[unit] / _WORKING if unit else 1.0
+    scaled, changes = solid_tree(assembly.scaled(scale), built, 1 / scale)
     children = scaled.children if separate and scaled.operation == "union" else (scaled,)
     names = [child.name or f"assembly_{i:02d}" for i, child in enumerate(children, 1)]
     if children == (scaled,):
         names = [assembly.name or Path(path).stem]
-    document = _document([(name, combined(child)) for name, child in zip(names, children, strict=True)])
+    apart: list[str] = []
+    document = _document(
+        [(name, combined(child, apart)) for name, child in zip(names, children, strict=True)]
+    )
     with replacing(path) as temporary:
         _write(document, temporary, unit or "mm", Path(path))
     notes = [] if unit else ["the length unit is unknown: the file says millimetres"]
+    if apart:
+        changes.append(
+            Change(tuple(apart), "a solid of its own", note="it overlaps the rest: the union failed")
+        )
     write_report(assembly, path, changes, notes)
 
 
