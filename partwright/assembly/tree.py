@@ -78,6 +78,12 @@ class _Common(ABC):
         frame = unit_similarity(self)  # type: ignore[arg-type]
         return frame, self.transformed(frame)
 
+    def describe(self, digits: int = 4) -> str:
+        """The tree in words and numbers, a line a node."""
+        from partwright.assembly.description import describe
+
+        return describe(self, digits)  # type: ignore[arg-type]
+
     def distance(self, points: Array) -> Array:
         """Signed distance (N,) at points (N, 3), negative inside, in the points' own dtype.
 

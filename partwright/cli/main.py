@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from partwright import __version__
-from partwright.cli import evaluate, export, fit, segment
+from partwright.cli import describe, evaluate, export, fit, segment
 from partwright.errors import PartwrightError
 
-COMMANDS = (fit, evaluate, export, segment)
+COMMANDS = (fit, evaluate, describe, export, segment)
 INTERRUPTED = 130
 
 

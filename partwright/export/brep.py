@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -17,20 +17,24 @@ import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.rows import as_superfrustum
+from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import MissingDependencyError, NoSurfaceError
 from partwright.export.brep_bent import bent_solid
 from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
+from partwright.export.brep_quadrics import quadric_solid
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
+from partwright.export.closed_quadrics import Ball
 from partwright.export.nearest import Approximation
 from partwright.export.recognise import SAME
-from partwright.fields import Field, Solid, SuperFrustum
+from partwright.fields import Field, Quadric, Solid, SuperFrustum
 from partwright.meshing import mesh_part
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
 _LOST = 1e-4  # of the larger volume: what an operation may lose by rounding
+_INTEGRATED = 1e-6  # relative error of volumes; without it B-splines are integrated to 1 %
 _FUZZY = (0.0, 1e-5, 1e-3)  # tolerances of operations, of the cube root of the volume
 _SHORTEST = 1e-5  # of the longest side: shorter edges are left out
 _STRAIGHT = 1e-4  # radians: an arc of this half angle is none
@@ -53,6 +57,8 @@ def built(part: Part) -> Approximation | None:
     """The part as `solid_of` builds it, or unbent where its bend cannot be built and hardly shows; None where
     neither is the part's surface. `max_deviation` is 0 where all faces are the very surface."""
     field = part.field
+    if isinstance(field, Quadric):  # by `quadric_solid`, or not at all
+        return Approximation(field, part, 0.0, 0.0)
     if not isinstance(field, SuperFrustum | Solid):
         return None
     f = field.superfrustum()
@@ -143,7 +149,7 @@ def volume_and_area(shape: TopoDS_Shape) -> tuple[float, float]:
     from OCP.GProp import GProp_GProps
 
     volume, area = GProp_GProps(), GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, volume)
+    BRepGProp.VolumeProperties_s(shape, volume, _INTEGRATED)
     BRepGProp.SurfaceProperties_s(shape, area)
     return float(volume.Mass()), float(area.Mass())
 
@@ -176,9 +182,10 @@ def _places(shape: TopoDS_Shape, chord: float) -> np.ndarray:
     return np.array(places, np.float32).reshape(-1, 3)
 
 
-def combined(node: Node, apart: list[str]) -> TopoDS_Shape:
+def combined(node: Node, ball: Ball, apart: list[str]) -> TopoDS_Shape:
     """The node's solids, of `built` fields, joined by the boolean operations of its tree.
 
+    ball: holds all of the node; quadrics that do not end are closed off outside of it.
     apart: takes the names of what OpenCASCADE cannot unite with the rest; it stays a solid of its own.
 
     Raises:
@@ -189,10 +196,10 @@ def combined(node: Node, apart: list[str]) -> TopoDS_Shape:
     from OCP.TopExp import TopExp_Explorer
 
     if isinstance(node, Part):
-        return placed(node)
-    result, left = combined(node.children[0], apart), []
+        return placed(node, ball)
+    result, left = combined(node.children[0], ball, apart), []
     for child in node.children[1:]:
-        solid = combined(child, apart)
+        solid = combined(child, ball, apart)
         try:
             result = _operated(node.operation, result, solid, _label(child))
         except NoSurfaceError:
@@ -251,16 +258,22 @@ def _operated(operation: str, first: TopoDS_Shape, second: TopoDS_Shape, label: 
     raise NoSurfaceError(f"OpenCASCADE fails at the {operation} with {label}; move it a little")
 
 
-def placed(part: Part) -> TopoDS_Shape:
+def placed(part: Part, ball: Ball) -> TopoDS_Shape:
     """The part's solid in the part's place."""
+    if isinstance(part.field, Quadric):
+        return _moved(quadric_solid(ball.form(part), ball.radius), NO_ROTATION, ball.centre.tolist())
+    return _moved(solid_of(part.field), part.rotation, part.translation)
+
+
+def _moved(shape: TopoDS_Shape, rotation: Sequence[float], place: Sequence[float]) -> TopoDS_Shape:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
     from OCP.gp import gp_Quaternion, gp_Trsf, gp_Vec
 
-    w, x, y, z = part.rotation
+    w, x, y, z = rotation
     pose = gp_Trsf()
     pose.SetRotation(gp_Quaternion(x, y, z, w))
-    pose.SetTranslationPart(gp_Vec(*part.translation))
-    return BRepBuilderAPI_Transform(solid_of(part.field), pose, True).Shape()
+    pose.SetTranslationPart(gp_Vec(*place))
+    return BRepBuilderAPI_Transform(shape, pose, True).Shape()
 
 
 def _label(node: Node) -> str:

@@ -3,7 +3,8 @@
 glTF is in metres with Y up, so the root of the scene converts; where the assembly knows no unit or up axis
 its numbers stay as they are, and `asset.extras` says so. Each part is meshed in its own frame and placed by
 its node, so that a far place costs no digits and a node turns about the part's own origin. The copies of a
-repeated part are nodes below the part's own, named leg/2, leg/3 ..., and share its mesh.
+repeated part are nodes below the part's own, named leg/2, leg/3 ..., and share its mesh. An intersection of
+quadrics (a convex of CAPRI-Net's) is one node, since its leaves alone have no end; its `extras` list them.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from partwright.assembly.files import instance_dict
 from partwright.assembly.palette import palette
 from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import NoSurfaceError
-from partwright.meshing import mesh_part
+from partwright.fields import Box, Quadric
+from partwright.meshing import has_exact_mesh, mesh_csg, mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
 from partwright.writing import write_bytes
 
@@ -93,8 +95,23 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
                 frame_to=copy, frame_from=part.name, matrix=within, geometry=part.name, metadata=extras
             )
 
+    def add_whole(node: Node, parent: str, pose: np.ndarray, about: dict[str, Any]) -> None:
+        """A leaf or an intersection, its mesh in the assembly's own frame."""
+        parts = (node,) if isinstance(node, Part) else node.parts
+        name = _free_name(node.name or "convex", taken) if isinstance(node, Assembly) else node.name
+        about = about | {"operation": "intersection", "parts": [{"name": p.name} | _extras(p) for p in parts]}
+        try:
+            mesh = coloured(mesh_csg(_within(node, assembly)), colours[parts[0].name])
+        except NoSurfaceError:
+            scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=about)
+        else:
+            scene.add_geometry(mesh, name, name, parent, pose, metadata=about)
+
     def add(node: Node, parent: str, pose: np.ndarray, role: str) -> None:
         extras: dict[str, Any] = {"role": role} if role else {}
+        if _is_whole(node):
+            add_whole(node, parent, pose, extras)
+            return
         if isinstance(node, Part):
             placed = pose @ Similarity(1.0, node.rotation, node.translation).matrix()
             mesh = _local_mesh(node, resolution)
@@ -115,6 +132,23 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
 
     add(assembly, "world", to_gltf(assembly).matrix(), "")
     return scene
+
+
+def _is_whole(node: Node) -> bool:
+    """A quadric, or an intersection of leaves with quadrics among them that has an exact mesh."""
+    if isinstance(node, Part):
+        return isinstance(node.field, Quadric)
+    quadrics = any(isinstance(part.field, Quadric) for part in node.parts)
+    return quadrics and node.operation == "intersection" and has_exact_mesh(node)
+
+
+def _within(node: Node, assembly: Assembly) -> Node:
+    """The node where it does not end cut off at the assembly's bounds, so far as these end."""
+    lower, upper = assembly.bounds()
+    if np.isfinite(node.bounds()).all() or not np.isfinite([lower, upper]).all():
+        return node
+    x, y, z = ((lower + upper) / 2).tolist()
+    return Assembly((Part(Box(tuple((upper - lower).tolist())), (x, y, z)), node), "intersection")
 
 
 def _local_mesh(part: Part, resolution: int) -> trimesh.Trimesh | None:

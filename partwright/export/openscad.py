@@ -1,17 +1,23 @@
 """OpenSCAD source to go on with by hand: parameters on top, one module a part, the tree at the end.
 
-Named solids are exact, to the facets of `$fn`; other parts become the nearest solid, and blends sharp edges:
-FILE.report.json lists them.
+Named solids are exact, to the facets of `$fn`, and so are planes, cylinders, cones and spheres given as
+quadrics. Other quadrics are written as polyhedra, other parts become the nearest solid, and blends sharp
+edges: FILE.report.json lists them.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from partwright.assembly import Assembly, Node, Part
-from partwright.export.approximation import write_report
+import numpy as np
+
+from partwright.assembly import Assembly, Node, Part, Similarity
+from partwright.export.approximation import Change, write_report
+from partwright.export.closed_quadrics import Ball
 from partwright.export.identifiers import comment
+from partwright.export.nearest import Approximation
 from partwright.export.solid_source import (
     MEANING,
     SourcePart,
@@ -21,6 +27,8 @@ from partwright.export.solid_source import (
     source_parts,
 )
 from partwright.export.solid_tree import solid_tree
+from partwright.fields import Quadric
+from partwright.meshing.quadric_solids import quadric_solid
 from partwright.shapes import canonical_unit
 from partwright.writing import write_bytes
 
@@ -56,7 +64,9 @@ def write(assembly: Assembly, path: str | Path, facets: int = 128) -> None:
         SettingError: the assembly's unit is unknown.
         OutputError: the file cannot be written.
     """
-    tree, changes = solid_tree(assembly)
+    tree, changes = solid_tree(assembly, keep=_quadric)
+    ball = Ball.around(tree)
+    changes += [Change((part.name,), "mesh", note=f"{facets} facets to a full turn") for part in _kept(tree)]
     parts = source_parts(tree.parts, fixed_axes_angles, _RESERVED.split())
     unit = canonical_unit(assembly.unit) if assembly.unit else "unknown unit"
     lines = [
@@ -68,7 +78,7 @@ def write(assembly: Assembly, path: str | Path, facets: int = 128) -> None:
         *(line for part in parts for line in _table(part, unit)),
         *_tree(plain_unions(tree), {p.part.name: p.function for p in parts}, ""),
         "",
-        *(line for part in parts for line in _module(part)),
+        *(line for part in parts for line in _module(part, ball, facets)),
     ]
     write_bytes(path, ("\n".join(lines).rstrip() + "\n").encode())
     write_report(assembly, path, changes)
@@ -84,13 +94,38 @@ def _table(part: SourcePart, unit: str) -> Iterator[str]:
     yield ""
 
 
-def _module(part: SourcePart) -> Iterator[str]:
-    names = part.variables()
+def _quadric(part: Part) -> Approximation | None:
+    return Approximation(part.field, part, 0.0, 0.0) if isinstance(part.field, Quadric) else None
+
+
+def _kept(tree: Assembly) -> list[Part]:
+    return [part for part in tree.parts if isinstance(part.field, Quadric)]
+
+
+def _module(part: SourcePart, ball: Ball, facets: int) -> Iterator[str]:
+    names, field = part.variables(), part.part.field
+    solid = (
+        _polyhedron(part.part, ball, facets)
+        if isinstance(field, Quadric)
+        else _SOLIDS[field.kind].format(**names)
+    )
     yield f"module {part.function}() {{  // {comment(part.part.name)}"
     yield f"    translate({names['place']}) rotate({names['turn']})"
-    yield f"        {_SOLIDS[part.part.field.kind].format(**names)}"
+    yield f"        {solid}"
     yield "}"
     yield ""
+
+
+def _polyhedron(part: Part, ball: Ball, facets: int) -> str:
+    """The quadric in its own frame, closed off outside the ball."""
+    assert isinstance(part.field, Quadric)
+    centre = Similarity(1.0, part.rotation, part.translation).inverse()(ball.centre)
+    chord = ball.radius * (1 - math.cos(math.pi / facets))
+    box = centre + ball.radius * np.array([[-1.0], [1.0]])
+    mesh = quadric_solid(part.field, box, chord).to_mesh64()
+    points = ", ".join(f"[{', '.join(map(number, p))}]" for p in np.asarray(mesh.vert_properties).tolist())
+    faces = np.asarray(mesh.tri_verts)[:, ::-1].tolist()  # OpenSCAD's run clockwise
+    return f"polyhedron(points = [{points}], faces = {faces});"
 
 
 def _tree(node: Node, modules: dict[str, str], indent: str) -> Iterator[str]:

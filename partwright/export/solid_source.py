@@ -6,11 +6,13 @@ import dataclasses
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
 from partwright.export.identifiers import identifiers
+from partwright.fields import Field, Quadric
 
 MEANING = {
     "size": "full extents x, y, z",
@@ -56,7 +58,7 @@ def source_parts(
 
     values = []
     for part in parts:
-        own = {f.name: getattr(part.field, f.name) for f in dataclasses.fields(part.field)}  # type: ignore[arg-type]
+        own = _parameters(part.field)
         values.append(own | {"place": part.translation, "turn": turn(rotation_matrix(part.rotation))})
     functions = identifiers([part.name for part in parts], reserved)
     wanted = [f"{f}_{name}" for f, own in zip(functions, values, strict=True) for name in own]
@@ -65,6 +67,13 @@ def source_parts(
         SourcePart(f, part, tuple(Parameter(next(variables), name, value) for name, value in own.items()))
         for f, part, own in zip(functions, parts, values, strict=True)
     ]
+
+
+def _parameters(field: Field) -> dict[str, Any]:
+    """By name; a quadric's coefficients mean nothing to a reader."""
+    if isinstance(field, Quadric):
+        return {}
+    return {entry.name: getattr(field, entry.name) for entry in dataclasses.fields(field)}  # type: ignore[arg-type]
 
 
 def number(value: float) -> str:

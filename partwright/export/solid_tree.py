@@ -9,9 +9,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
+import numpy as np
+
 from partwright.assembly import Assembly, Node, Part
-from partwright.errors import NoSurfaceError
+from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export.approximation import Change, of_part
+from partwright.export.closed_quadrics import with_closed_quadrics
 from partwright.export.nearest import Approximation, nearest_solid
 from partwright.fields import Cone, Cylinder, Field, Frustum
 
@@ -35,7 +38,7 @@ def solid_tree(
         ParameterError: a part's field has no solid near it.
     """
     changes: list[Change] = []
-    tree = _solid(assembly.expanded(), True, keep, length, changes)
+    tree = _solid(with_closed_quadrics(assembly.expanded()), True, keep, length, changes)
     if tree is None:
         raise NoSurfaceError("nothing to export: no part of the assembly has a volume")
     return tree, changes  # type: ignore[return-value]  # an assembly stays one
@@ -58,12 +61,21 @@ def _solid(node: Node, first: bool, keep: Keep, length: float, changes: list[Cha
 
 def _leaf(part: Part, blend: float, keep: Keep, length: float, changes: list[Change]) -> Part | None:
     try:
-        near = keep(part) or nearest_solid(part)
+        near = keep(part) or _nearest(part)
     except NoSurfaceError:
         changes.append(Change((part.name,), "nothing", note="it has no volume"))
         return None
     changes += filter(None, [of_part(part, near, blend, length)])
     return dataclasses.replace(near.part_with_solid, field=_plain(near.solid), blend=0.0)
+
+
+def _nearest(part: Part) -> Approximation:
+    if not np.isfinite(part.field.bounds()).all():
+        raise ParameterError(
+            f"part {part.name!r} is a quadric without end that no solid of this format is like; "
+            "export STEP, OpenSCAD or a mesh instead"
+        )
+    return nearest_solid(part)
 
 
 def _plain(solid: Field) -> Field:

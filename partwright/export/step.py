@@ -1,8 +1,9 @@
 """STEP (AP214): exact B-rep solids with analytic faces, one named product in the assembly's own unit.
 
 Straight parts are exact, whatever their taper, hole, rounding and dilation, and so are bent ones without
-taper. Bent ones with taper are surfaces through sections; what cannot be built becomes the nearest solid.
-Blends become sharp edges. FILE.report.json lists all but the exact.
+taper, and quadrics (saddles and their like are refused). Bent ones with taper are surfaces through sections;
+what cannot be built becomes the nearest solid. Blends become sharp edges. FILE.report.json lists all but
+the exact.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from partwright.assembly import Assembly
 from partwright.errors import OutputError
 from partwright.export.approximation import Change, write_report
 from partwright.export.brep import built, combined, require_cad
+from partwright.export.closed_quadrics import Ball
 from partwright.export.solid_tree import solid_tree
 from partwright.shapes import METRES, canonical_unit
 from partwright.writing import replacing
@@ -45,10 +47,9 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     names = [child.name or f"assembly_{i:02d}" for i, child in enumerate(children, 1)]
     if children == (scaled,):
         names = [assembly.name or Path(path).stem]
-    apart: list[str] = []
-    document = _document(
-        [(name, combined(child, apart)) for name, child in zip(names, children, strict=True)]
-    )
+    ball, apart = Ball.around(scaled), list[str]()
+    solids = [combined(child, ball, apart) for child in children]
+    document = _document(list(zip(names, solids, strict=True)))
     with replacing(path) as temporary:
         _write(document, temporary, unit or "mm", Path(path))
     notes = [] if unit else ["the length unit is unknown: the file says millimetres"]

@@ -47,7 +47,7 @@ def read_back(path: Path) -> tuple[float, Counter[str]]:
     shape = reader.OneShape()
     assert BRepCheck_Analyzer(shape).IsValid()
     properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, properties)
+    BRepGProp.VolumeProperties_s(shape, properties, 1e-6)  # B-splines need it
     kinds: Counter[str] = Counter()
     faces = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
     while faces.More():

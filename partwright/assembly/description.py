@@ -1,0 +1,70 @@
+"""An assembly as a text to read: the tree of operations, and each leaf in words and numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+
+from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.tree import Node, Part
+from partwright.fields import NormalForm, Quadric, normal_form
+
+
+def describe(node: Node, digits: int = 4) -> str:
+    """The tree, a line a node; numbers have this many digits."""
+    return "\n".join(_lines(node, digits, "", ""))
+
+
+def _lines(node: Node, digits: int, first: str, rest: str) -> Iterator[str]:
+    if isinstance(node, Part):
+        yield first + _leaf(node, digits)
+        return
+    blend = f", blend {_number(node.blend, digits)}" if node.blend else ""
+    yield f"{first}{node.operation}{' ' + node.name if node.name else ''}{blend}"
+    for i, child in enumerate(node.children):
+        last = i == len(node.children) - 1
+        sign = "- " if node.operation == "difference" and i else ""
+        yield from _lines(
+            child, digits, rest + ("└─ " if last else "├─ ") + sign, rest + ("   " if last else "│  ")
+        )
+
+
+def _leaf(part: Part, digits: int) -> str:
+    if isinstance(part.field, Quadric):
+        moved = part.field.moved(rotation_matrix(part.rotation), np.array(part.translation))
+        own = _quadric(normal_form(moved), digits)
+    else:
+        values = ((f.name, getattr(part.field, f.name)) for f in dataclasses.fields(part.field))  # type: ignore[arg-type]
+        numbers = [f"{name} {_numbers(value, digits)}" for name, value in values]
+        own = " ".join([part.field.kind, ", ".join(numbers), f"at {_numbers(part.translation, digits)}"])
+    copies = f", {len(part.copies)} copies" if part.instances else ""
+    blend = f", blend {_number(part.blend, digits)}" if part.blend else ""
+    return f"{part.name + ': ' if part.name else ''}{own}{copies}{blend}"
+
+
+def _quadric(form: NormalForm, digits: int) -> str:
+    """Of a plane its normal and offset; of the others the radii that they have, the centre and the axis."""
+    w = form.axes[:, 2]
+    if form.name == "plane":
+        normal = -w if form.complement else w
+        return f"plane {_numbers(normal, digits)} . p <= {_number(float(normal @ form.centre), digits)}"
+    outside = "outside of " if form.complement else ""
+    radii = form.radii[:1] if form.round and form.level else form.radii
+    radii = radii[np.isfinite(radii) & (radii > 0)]
+    size = f" radius {_numbers(radii, digits)}," if len(radii) and form.level else ""
+    if form.name == "cone":
+        size = f" slope {_number(float(np.sqrt(-form.curvature[2] / form.curvature[0])), digits)},"
+    axis = "" if form.name == "sphere" else f", axis {_numbers(w, digits)}"
+    return f"{outside}{form.name}{size} centre {_numbers(form.centre, digits)}{axis}"
+
+
+def _numbers(values: object, digits: int) -> str:
+    given = np.atleast_1d(np.asarray(values, dtype=np.float64)).tolist()
+    text = [_number(value, digits) for value in given]
+    return text[0] if len(text) == 1 else f"({', '.join(text)})"
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{0.0 if abs(value) < 1e-12 else value:.{digits}g}"

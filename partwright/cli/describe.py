@@ -1,0 +1,24 @@
+"""`partwright describe`: an assembly's tree in words and numbers."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "describe",
+        help="print an assembly's tree",
+        description="Prints the tree of an assembly, a line a part: its kind, its numbers and its place.",
+    )
+    command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    command.add_argument("--digits", metavar="N", type=int, default=4, help="of each number (default: 4)")
+    command.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from partwright.assembly import load_assembly
+
+    print(load_assembly(arguments.assembly).describe(max(1, min(arguments.digits, 17))))
+    return 0

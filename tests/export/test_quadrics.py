@@ -1,0 +1,135 @@
+"""Assemblies of quadrics in other formats: read back, they have the volume of the exact mesh."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.errors import NoSurfaceError, ParameterError
+from partwright.export import export
+from partwright.export.closed_quadrics import with_closed_quadrics
+from partwright.fields import Box, Cone, Cylinder, Quadric, Sphere
+from partwright.meshing import mesh_csg
+from tests.export.test_step import read_back
+
+TURN = Similarity(1.0, (0.9, 0.1, -0.3, 0.2), (4.0, -1.0, 2.0))
+# name -> the quadric and the face that STEP gives it
+CURVED = {
+    "sphere": (Quadric.sphere(0.6, (0.3, 0.2, 0.1)), "Sphere"),
+    "cylinder": (Quadric.cylinder(0.5), "Cylinder"),
+    "cone": (Quadric.cone(0.4, (0, 0, 1), (0.1, 0, 0.3)), "Cone"),
+    "ellipsoid": (Quadric.ellipsoid((0.4, 0.7, 1.3)), "BSplineSurface"),
+    "elliptic cylinder": (Quadric.ellipsoid((0.3, 0.6, np.inf)), "BSplineSurface"),
+    "elliptic cone": (Quadric((1, 3, -0.5, 0, 0, 0, 0)), "BSplineSurface"),
+    "paraboloid": (Quadric((2, 2, 0, 0, 0, -1, 0.1)), "BSplineSurface"),
+    "hyperboloid of one sheet": (Quadric((1, 1, -1, 0, 0, 0, -0.1)), "SurfaceOfRevolution"),
+    "hyperboloid of two sheets": (Quadric((1, 1, -1, 0, 0, 0, 0.05)), "SurfaceOfRevolution"),
+    "parabolic cylinder": (Quadric((1, 0, 0, 0, 0, 1, -0.2)), "SurfaceOfExtrusion"),
+}
+
+
+def planes(half: float = 1.0) -> tuple[Part, ...]:
+    return tuple(Part(Quadric.plane(n, half)) for n in np.vstack([np.eye(3), -np.eye(3)]))
+
+
+def placed(solid: Assembly) -> Assembly:
+    return dataclasses.replace(solid.transformed(TURN), unit="mm")
+
+
+@pytest.mark.parametrize("hole", [False, True])
+@pytest.mark.parametrize("name", CURVED)
+def test_step_has_exact_faces(tmp_path: Path, name: str, hole: bool) -> None:
+    pytest.importorskip("OCP.STEPCAFControl", reason="OpenCASCADE is missing: pip install 'partwright[cad]'")
+    quadric, face = CURVED[name]
+    solid = placed(
+        Assembly((*planes(), Part(quadric.complement() if hole else quadric)), operation="intersection")
+    )
+    export(solid, tmp_path / "a.step")
+    volume, kinds = read_back(tmp_path / "a.step")
+    assert volume == pytest.approx(mesh_csg(solid, 2e-4).volume, rel=2e-3)
+    assert kinds[face] >= 1
+    assert set(kinds) == {face, "Plane"} - ({"Plane"} if name == "sphere" and not hole else set())
+    assert not (tmp_path / "a.step.report.json").exists()
+
+
+def test_closed_quadrics_are_the_same_solid_of_named_ones() -> None:
+    cone, ball = Part(Quadric.cone(0.4), (0, 0, -0.2)), Part(Quadric.sphere(0.5, (1, 0, 0)))
+    drill = Part(Quadric.cylinder(0.3, (0, 1, 0)).complement())
+    solid = placed(Assembly((Assembly((*planes(), drill), "intersection"), cone, ball), "difference"))
+    closed = with_closed_quadrics(solid)
+    assert {type(part.field) for part in closed.parts} == {Box, Cylinder, Cone, Sphere}
+    points = TURN(np.random.default_rng(0).uniform(-1.2, 1.2, (20_000, 3)))
+    there, here = solid.distance(points), closed.distance(points)
+    clear = np.abs(there) > 1e-5
+    assert (np.sign(there) == np.sign(here))[clear].all()
+
+
+def test_what_step_cannot_hold_and_what_does_not_end_is_said(tmp_path: Path) -> None:
+    pytest.importorskip("OCP.STEPCAFControl", reason="OpenCASCADE is missing: pip install 'partwright[cad]'")
+    saddle = Assembly((*planes(), Part(Quadric((1, -1, 0, 0, 0, 1, 0)))), "intersection")
+    with pytest.raises(ParameterError, match="hyperbolic paraboloid"):
+        export(saddle, tmp_path / "a.step")
+    with pytest.raises(NoSurfaceError, match="does not end"):
+        export(Assembly((Part(Quadric.cylinder(1.0)),)), tmp_path / "a.step")
+    with pytest.raises(ParameterError, match="without end"):
+        export(
+            Assembly((*planes(), Part(CURVED["paraboloid"][0])), "intersection"), tmp_path / "a.build123d.py"
+        )
+    assert not list(tmp_path.iterdir())
+
+
+def test_openscad_has_named_solids_and_polyhedra(tmp_path: Path) -> None:
+    body = Assembly((*planes(), Part(Quadric.cylinder(0.9), name="round")), "intersection")
+    solid = body - Part(Quadric.ellipsoid((0.3, 0.5, np.inf)), name="slot")
+    export(solid, tmp_path / "a.scad", facets=24)
+    text = (tmp_path / "a.scad").read_text()
+    assert "cylinder(r = round_radius" in text
+    (entry,) = json.loads((tmp_path / "a.scad.report.json").read_text())["approximated"]
+    assert (entry["parts"], entry["to"]) == (["slot"], "mesh")
+    program = shutil.which("openscad")
+    if program is None:
+        pytest.skip("openscad is missing (Debian: openscad)")
+    subprocess.run([program, "-o", tmp_path / "a.stl", tmp_path / "a.scad"], check=True, capture_output=True)
+    mesh = trimesh.load_mesh(tmp_path / "a.stl")
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(mesh_csg(solid).volume, rel=0.02)
+
+
+def test_glb_has_a_node_a_convex(tmp_path: Path) -> None:
+    convexes = [
+        Assembly((*planes(), Part(CURVED["cylinder"][0])), "intersection", name=f"convex_{i}").translated(
+            (3.0 * i, 0, 0)
+        )
+        for i in range(2)
+    ]
+    solid = Assembly(tuple(convexes)) - Part(Quadric.cylinder(0.1), name="bore")
+    export(solid, tmp_path / "a.glb")
+    scene = trimesh.load_scene(tmp_path / "a.glb")
+    assert set(scene.geometry) == {"convex_0", "convex_1", "bore"}
+    for name in ("convex_0", "convex_1"):
+        mesh = scene.geometry[name]
+        assert mesh.is_watertight
+        assert mesh.volume == pytest.approx(np.pi / 2, rel=2e-3)
+    data = (tmp_path / "a.glb").read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    extras = {node["name"]: node.get("extras", {}) for node in json.loads(data[20 : 20 + length])["nodes"]}
+    assert len(extras["convex_0"]["parts"]) == 7
+    assert extras["bore"]["role"] == "subtracted"
+
+
+@pytest.mark.parametrize("suffix", ["obj", "stl", "ply", "3mf"])
+def test_mesh_formats_write_the_exact_mesh(tmp_path: Path, suffix: str) -> None:
+    solid = Assembly(planes(), "intersection")
+    path = tmp_path / f"a.{suffix}"
+    export(solid, path)
+    mesh = trimesh.load(path, force="mesh")
+    assert len(mesh.faces) == 12
+    assert mesh.volume == pytest.approx(8)
