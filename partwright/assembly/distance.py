@@ -18,9 +18,11 @@ from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.assembly.tree import Assembly, Node, Operation, Part, operands
 from partwright.errors import ParameterError
 from partwright.fields import kernel, smooth_difference, smooth_intersection, smooth_union
+from partwright.fields.joint import JointField
 from partwright.fields.operations import is_tensor
 
 _UNIT_SIDE = 1.8
+_KERNEL = "kernel"
 _ROUNDING = 1e-14  # of the place: what is smaller has no size
 _FOLD = {"union": smooth_union, "intersection": smooth_intersection, "difference": smooth_difference}
 
@@ -136,13 +138,36 @@ def _in_one_row(node: Node) -> bool:
     return isinstance(node, Part) and is_superfrustum(node.field) and not node.instances
 
 
+def _batch(node: Node) -> object:
+    """What neighbouring nodes have in common that are evaluated by one call; None for one by itself."""
+    if _in_one_row(node):
+        return _KERNEL
+    if isinstance(node, Part) and isinstance(node.field, JointField) and not node.instances:
+        return node.field.shape_key
+    return None
+
+
+def _joint(parts: list[Part], points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
+    """Parts of one learned shape in one pass; the next shape begins with the first that is none of them."""
+    fields = [cast(JointField, part.field) for part in parts]
+    known = [member.field for member in fields[0].members]
+    last = next((i for i, field in enumerate(fields) if i and field not in known), len(parts))
+    local = (points - np.array(parts[0].translation, np.float32)) @ rotation_matrix(parts[0].rotation)
+    values = fields[0].together(local.astype(np.float32), fields[:last])
+    yield from zip(values, (part.blend for part in parts[:last]), strict=True)
+    if last < len(parts):
+        yield from _joint(parts[last:], points)
+
+
 def _children(children: tuple[Node, ...], points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
-    """Each child's distance alone and its blend; neighbouring leaves share a kernel call."""
-    for batched, group in groupby(children, _in_one_row):
-        if batched:
+    """Each child's distance alone and its blend; neighbouring leaves share a call."""
+    for batched, group in groupby(children, _batch):
+        if batched == _KERNEL:
             leaves = cast(list[Part], list(group))
             values = kernel.evaluate_parts(rows(leaves), points)
             yield from zip(values, (leaf.blend for leaf in leaves), strict=True)
+        elif batched is not None:
+            yield from _joint(cast(list[Part], list(group)), points)
         else:
             for node in group:
                 if isinstance(node, Part) and not node.instances:

@@ -20,6 +20,7 @@ from partwright.assembly.checks import (
     unit_quaternion,
     vector,
 )
+from partwright.assembly.joint import joined
 from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import (
     NO_ROTATION,
@@ -193,7 +194,7 @@ class Assembly(_Common):
             if not isinstance(getattr(self, label), str | None):
                 raise ParameterError(f"{label}: expected a string or None, got {getattr(self, label)!r}")
         _check_common(self)
-        object.__setattr__(self, "children", _with_unique_names(children))
+        object.__setattr__(self, "children", joined(_with_unique_names(children)))
         if self.depth > MAX_DEPTH:
             raise ParameterError(f"assemblies nest at most {MAX_DEPTH} deep, got {self.depth}")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,15 +11,15 @@ import numpy as np
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.rows import as_superfrustum, is_superfrustum
 from partwright.errors import NoSurfaceError
-from partwright.fields import Quadric
+from partwright.fields import Field, Quadric, SuperFrustum
+from partwright.fields.joint import JointField
+from partwright.meshing.blocks import LIPSCHITZ
 from partwright.meshing.csg import has_exact_mesh, mesh_csg
 from partwright.meshing.dust import without_dust
 from partwright.meshing.marching import mesh_field
 
 if TYPE_CHECKING:
     import trimesh
-
-    from partwright.fields import SuperFrustum
 
 # Cells across the thinnest wall. Under sqrt(3) a slanted wall would show holes; 3 also keep a thin rod round.
 _ACROSS, _ACROSS_PART = 2.0, 3.0
@@ -58,7 +59,7 @@ def mesh_assembly(
     counts = int(np.ceil(wanted[wanted <= _FINEST * resolution].max(initial=resolution)))
     local = assembly.transformed(frame)
     room = _ROOM + (upper - lower) * frame.scale / 2
-    mesh = mesh_field(local.distance, -room, room, counts, sharp=sharp)
+    mesh = mesh_field(local.distance, -room, room, counts, lipschitz=_slope(parts), sharp=sharp)
     vertices, faces = without_dust(mesh.vertices, mesh.faces, np.full(3, 2 * room.max() / counts))
     return trimesh.Trimesh(frame.inverse()(vertices), faces, process=False)
 
@@ -74,13 +75,14 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     """
     if isinstance(part.field, Quadric):
         return _repeated(_exact(replace(part, instances=()), resolution), part.instances)
-    field = as_superfrustum(part.field)
+    learned = isinstance(part.field, JointField)
+    field: Field = part.field if learned else as_superfrustum(part.field)
     lower, upper = field.bounds()
     frame = _frame(lower, upper)
     local = field.scaled(frame.scale)
     centre = np.asarray(frame.translation)
     extent = (upper - lower) * frame.scale + 2 * _ROOM
-    thin = np.maximum(walls(local), 1e-9)
+    thin = extent if not isinstance(local, SuperFrustum) else np.maximum(walls(local), 1e-9)
     counts = np.maximum(resolution * extent / extent.max(), _ACROSS_PART * extent / thin)
     surface = 4 * (counts * np.roll(counts, 1)).sum()
     counts = np.clip(counts * min(1.0, float(np.sqrt(_PART_CELLS / surface))), 4.0, _MOST)
@@ -88,10 +90,17 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     def distance(points: np.ndarray) -> np.ndarray:
         return local(points - centre.astype(np.float32))
 
-    mesh = mesh_field(distance, -extent / 2, extent / 2, counts, sharp=sharp)
+    mesh = mesh_field(
+        distance, -extent / 2, extent / 2, counts, lipschitz=_slope([part]), sharp=sharp and not learned
+    )
     pose = Similarity(1.0, part.rotation, part.translation) @ frame.inverse()
     mesh.vertices = pose(mesh.vertices)
     return _repeated(mesh, part.instances)
+
+
+def _slope(parts: Sequence[Part]) -> float:
+    """How fast the distance may change: learned parts know how steep they are."""
+    return max([LIPSCHITZ, *(part.field.slope for part in parts if isinstance(part.field, JointField))])
 
 
 def _exact(node: Assembly | Part, resolution: int) -> trimesh.Trimesh:

@@ -14,6 +14,7 @@ from partwright.assembly import Assembly, Part, load_assembly
 from partwright.assembly.files import MAX_BYTES, from_text, to_text
 from partwright.errors import AssemblyFileError, NewerVersionError, OutputError, UnreadableFileError
 from partwright.fields import KINDS, Sphere
+from partwright.fields.registry import LEARNED
 from tests.assembly.strategies import ASSEMBLIES
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "assembly.schema.json").read_text())
@@ -35,7 +36,7 @@ def test_schema_names_every_kind() -> None:
     for choice in SCHEMA["$defs"]["field"]["oneOf"]:
         kind = choice["properties"]["kind"]
         named |= set(kind.get("enum", [kind.get("const")]))
-    assert named == set(KINDS)
+    assert named == {*KINDS, *LEARNED}
 
 
 def test_saving_leaves_nothing_else_behind(tmp_path: Path, mug: Assembly) -> None:

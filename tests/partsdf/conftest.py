@@ -20,5 +20,5 @@ def lamps(tmp_path_factory: pytest.TempPathFactory) -> PreparedFamily:
 def model(lamps: PreparedFamily, tmp_path_factory: pytest.TempPathFactory) -> Model:
     """Trained for a few seconds: good enough to be meshed, edited and reconstructed with."""
     torch.set_num_threads(1)
-    config = small_config(lamps, epochs=300, points=512, rate=5e-3, latent_rate=5e-3)
+    config = small_config(lamps, epochs=100, batch=8, points=512, rate=5e-3, latent_rate=5e-3)
     return train(config, tmp_path_factory.mktemp("trained")).model

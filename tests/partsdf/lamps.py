@@ -64,7 +64,7 @@ def distances(points: np.ndarray, centres: np.ndarray, half: np.ndarray, *radii:
     return np.stack([plate, *balls], axis=1)
 
 
-def write_lamps(folder: Path, count: int = 10, samples: int = 4000) -> PreparedFamily:
+def write_lamps(folder: Path, count: int = 26, samples: int = 4000) -> PreparedFamily:
     """Every third has no knob; the last two are for validation and test."""
     shapes = [lamp(f"lamp{i}", i, knob=i % 3 != 2, count=samples) for i in range(count)]
     present = np.array([s.present.astype(bool) for s in shapes])

@@ -1,0 +1,55 @@
+"""Leaves that depend on one another are told of one another whenever an assembly is made."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, TypeGuard
+
+from partwright.assembly.similarity import Similarity
+from partwright.fields.joint import JointField, Member
+
+if TYPE_CHECKING:
+    from partwright.assembly.tree import Node, Part
+
+
+def joined(children: tuple[Node, ...]) -> tuple[Node, ...]:
+    """The children, each joint field among the others of its shape.
+
+    A second field of the same role begins another shape, to which those after it belong.
+    """
+    latest: dict[object, dict[str, int]] = {}  # the last shape of each key: its roles, and whose they are
+    shapes: list[dict[str, int]] = []
+    for i, child in enumerate(children):
+        if _is_joint(child):
+            shape = latest.get(child.field.shape_key)
+            if shape is None or child.field.role in shape:
+                shape = latest[child.field.shape_key] = {}
+                shapes.append(shape)
+            shape[child.field.role] = i
+    result = list(children)
+    for shape in shapes:
+        parts = [part for i in shape.values() if _is_joint(part := children[i])]
+        for i, part in zip(shape.values(), parts, strict=True):
+            result[i] = _among(part, parts)
+    return tuple(result)
+
+
+def _is_joint(node: Node) -> TypeGuard[_JointPart]:
+    return isinstance(getattr(node, "field", None), JointField)
+
+
+def _among(part: _JointPart, parts: list[_JointPart]) -> Part:
+    back = _pose(part).inverse()
+    seen = [(other.field, back @ _pose(other)) for other in parts]
+    members = [Member(field, pose.translation, pose.rotation) for field, pose in seen]
+    return dataclasses.replace(part, field=part.field.among(members))
+
+
+def _pose(part: Part) -> Similarity:
+    return Similarity(1.0, part.rotation, part.translation)
+
+
+if TYPE_CHECKING:
+
+    class _JointPart(Part):
+        field: JointField

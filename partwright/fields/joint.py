@@ -1,0 +1,52 @@
+"""Fields that depend on those beside them: learned parts, which adapt to one another."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from partwright.fields.base import Field
+
+
+class Member(NamedTuple):
+    """A field of the same shape and its pose, as seen from the field that is told of it: translation (3,),
+    rotation a unit quaternion (w, x, y, z)."""
+
+    field: JointField
+    translation: tuple[float, float, float]
+    rotation: tuple[float, float, float, float]
+
+
+class JointField(Field):
+    """One of several fields that are decoded together. An assembly tells its leaves of one another.
+
+    members: those of its shape, in the order of the assembly, itself among them; empty for a field alone.
+    """
+
+    members: tuple[Member, ...]
+
+    @property
+    @abstractmethod
+    def shape_key(self) -> object:
+        """What fields share that can stand in one shape."""
+
+    @property
+    @abstractmethod
+    def role(self) -> str:
+        """Which part it is; a shape has each role at most once."""
+
+    @property
+    @abstractmethod
+    def slope(self) -> float:
+        """About how much the distance changes per length at most."""
+
+    @abstractmethod
+    def among(self, members: Sequence[Member]) -> Self:
+        """This field as it is beside others (in the order of the assembly, itself among them)."""
+
+    @abstractmethod
+    def together(self, points: np.ndarray, fields: Sequence[JointField]) -> list[np.ndarray]:
+        """Distances (N,) of several members of the same shape at points (N, 3) of this field's own frame."""

@@ -1,0 +1,195 @@
+"""A learned part as a field of an assembly (kind "neural")."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import torch
+
+from partwright.assembly.similarity import Similarity
+from partwright.errors import ParameterError, SettingError
+from partwright.fields.base import LARGEST, number, scale_lengths, vector
+from partwright.fields.joint import JointField, Member
+from partwright.fields.operations import is_tensor
+from partwright.partsdf.model import Model, find_model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.poses import PoseTensors
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+# The box around a part is looked for in so many cells an axis, twice, within its cuboid times _REACH.
+_CELLS, _REACH = 12, 1.5
+
+
+@dataclass(frozen=True)
+class NeuralField(JointField):
+    """A part of a model: what an assembly file holds, all lengths in own units.
+
+    model, hash: which; opening a field raises ModelError where it is not found. part: its name there. latent:
+    Z numbers. half_lengths: of the pose, along the part's own axes (eq. 1's s). unit: the length of 1 in the
+    unit frame. frame_translation, frame_rotation: where the unit frame lies, seen from the part; the average
+    pose of parts that the shape has not is taken there. members: the other parts, set by the assembly.
+
+    Raises ParameterError where a number cannot be used.
+    """
+
+    kind: ClassVar[str] = "neural"
+    model: str
+    hash: str
+    part: str
+    latent: tuple[float, ...]
+    half_lengths: Vector
+    unit: float
+    frame_translation: Vector = (0.0, 0.0, 0.0)
+    frame_rotation: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    members: tuple[Member, ...] = dataclasses.field(default=(), compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("model", "hash", "part"):
+            if not isinstance(getattr(self, name), str):
+                raise ParameterError(f"neural: {name} is {getattr(self, name)!r:.80}; expected a string")
+        try:
+            self.network.index(self.part)
+        except SettingError as error:
+            raise ParameterError(f"neural: {error}") from error
+        latent = _finite(self.latent, self.network.latents.shape[2], "latent")
+        rotation = Similarity(1.0, _finite(self.frame_rotation, 4, "frame_rotation")).rotation  # type: ignore[arg-type]
+        values = {
+            "latent": latent,
+            "half_lengths": vector(self, "half_lengths", LARGEST**-1, LARGEST),
+            "unit": number(self, "unit", 0.0, LARGEST, above=True),
+            "frame_translation": vector(self, "frame_translation", -LARGEST, LARGEST),
+            "frame_rotation": rotation,
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def network(self) -> Model:
+        return find_model(self.model, self.hash)
+
+    @property
+    def shape_key(self) -> object:
+        return self.hash
+
+    @property
+    def role(self) -> str:
+        return self.part
+
+    @property
+    def slope(self) -> float:
+        return self.network.slope
+
+    def among(self, members: Sequence[Member]) -> Self:
+        return dataclasses.replace(self, members=tuple(members))
+
+    @cached_property
+    def shape(self) -> NeuralShape:
+        """The whole shape in this part's frame, lengths in those of the unit frame."""
+        model = self.network
+        members = self.members or (Member(self, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),)
+        fields = [m.field for m in members]
+        assert all(isinstance(field, NeuralField) for field in fields)
+        present = torch.zeros(len(model.parts), dtype=torch.bool)
+        latents, poses = model.absent_latent.clone(), self._absent_poses(members[0])
+        for member in members:
+            field = member.field
+            assert isinstance(field, NeuralField)
+            index = model.index(field.part)
+            present[index] = True
+            latents[index] = torch.tensor(field.latent)
+            poses.translation[index] = torch.tensor(member.translation) / self.unit
+            poses.rotation[index] = torch.tensor(member.rotation)
+            poses.scale[index] = torch.tensor(field.half_lengths) / self.unit
+        return NeuralShape(model, latents, poses, present)
+
+    def _absent_poses(self, first: Member) -> PoseTensors:
+        """Average poses of all parts, in the unit frame as the shape's first part sees it."""
+        field = first.field
+        assert isinstance(field, NeuralField)
+        seen = Similarity(1.0, first.rotation, first.translation)
+        frame = seen @ Similarity(1.0, field.frame_rotation, field.frame_translation)
+        average = self.network.average_pose.numpy()
+        poses = [
+            frame @ Similarity(1.0, tuple(q), tuple(self.unit * t))
+            for t, q in zip(average.translation.tolist(), average.rotation.tolist(), strict=True)
+            for t in [np.array(t)]
+        ]
+        translation = torch.tensor([p.translation for p in poses], dtype=torch.float32) / self.unit
+        rotation = torch.tensor([p.rotation for p in poses], dtype=torch.float32)
+        return PoseTensors(translation, rotation, torch.from_numpy(average.scale.copy()))
+
+    def together(self, points: np.ndarray, fields: Sequence[JointField]) -> list[np.ndarray]:
+        values = self.shape.part_distances(np.asarray(points, np.float32) / np.float32(self.unit))
+        row = {name: i for i, name in enumerate(self.shape.names())}
+        return [values[row[field.role]] * np.float32(self.unit) for field in fields]
+
+    def __call__(self, points: Any) -> Any:
+        if not is_tensor(points):
+            return self.together(np.asarray(points), [self])[0]
+        shape = self.shape
+        each = shape.model.part_distances(shape.latents, shape.poses, points.float() / self.unit)
+        return (self.unit * each[self.network.index(self.part)]).to(points.dtype)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._box[0].copy(), self._box[1].copy()
+
+    @cached_property
+    def _box(self) -> np.ndarray:
+        """(2, 3) found by the cells that the surface can enter; a point where the part is nowhere."""
+        upper = _REACH * np.array(self.half_lengths)
+        box = np.array([-upper, upper])
+        for _ in range(2):
+            cell = (box[1] - box[0]) / _CELLS
+            steps = np.stack(np.meshgrid(*[np.arange(_CELLS) + 0.5] * 3, indexing="ij"), axis=-1).reshape(
+                -1, 3
+            )
+            centres = box[0] + steps * cell
+            near = self(centres.astype(np.float32)) <= self.slope * np.linalg.norm(cell) / 2
+            if not near.any():
+                return np.zeros((2, 3))
+            box = np.array([centres[near].min(axis=0) - cell / 2, centres[near].max(axis=0) + cell / 2])
+        return box
+
+    def scaled(self, factor: float) -> Self:
+        lengths = ("half_lengths", "unit", "frame_translation")
+        alone: Self = scale_lengths(dataclasses.replace(self, members=()), factor, lengths)
+        members = [
+            Member(
+                alone if m.field is self else scale_lengths(_alone(m.field), factor, lengths),
+                tuple(factor * v for v in m.translation),  # type: ignore[arg-type]
+                m.rotation,
+            )
+            for m in self.members
+        ]
+        return alone.among(members)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        if "members" in data:
+            raise ParameterError("neural: unknown parameters ['members']; the assembly itself says which")
+        return super().from_dict(data)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {name: value for name, value in super().to_dict().items() if name != "members"}
+
+
+def _alone(field: JointField) -> JointField:
+    return dataclasses.replace(field, members=())  # type: ignore[type-var]
+
+
+def _finite(values: Any, count: int, name: str) -> tuple[float, ...]:
+    if not isinstance(values, list | tuple) or len(values) != count:
+        given = len(values) if isinstance(values, list | tuple) else repr(values)[:40]
+        raise ParameterError(f"neural: {name}: expected {count} numbers, got {given}")
+    for value in values:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise ParameterError(f"neural: {name} holds {value!r:.40}; expected finite numbers")
+    return tuple(float(value) for value in values)

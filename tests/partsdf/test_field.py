@@ -1,0 +1,182 @@
+"""Neural parts in an assembly: one pass, the same file back, edits that the other parts hear of, exports."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+import partwright as pw
+from partwright.assembly import Similarity
+from partwright.errors import AssemblyFileError, ModelError
+from partwright.meshing import mesh_assembly, mesh_part
+from partwright.partsdf import model as models
+from partwright.partsdf.assemblies import from_assembly, to_assembly
+from partwright.partsdf.field import NeuralField
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.shapes import UnitFrame
+
+FRAME = UnitFrame((10.0, 20.0, 30.0), 0.5)
+POINTS = np.random.default_rng(1).uniform(-0.9, 0.9, (300, 3)).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def lamp(model: Model) -> NeuralShape:
+    return NeuralShape.trained(model, "lamp1")
+
+
+@pytest.fixture(scope="module")
+def assembly(lamp: NeuralShape) -> pw.Assembly:
+    return to_assembly(lamp, FRAME, unit="mm", source="lamp1")
+
+
+def test_distances_are_the_shapes_in_own_units(lamp: NeuralShape, assembly: pw.Assembly) -> None:
+    own = FRAME.from_unit(POINTS)
+    expected = 2.0 * lamp.part_distances(POINTS)
+    np.testing.assert_allclose(assembly.part_distances(own), expected, atol=2e-5)
+    np.testing.assert_allclose(assembly.distance(own), expected.min(axis=0), atol=2e-5)
+    tensor = torch.tensor(own, requires_grad=True)
+    np.testing.assert_allclose(assembly.distance(tensor).detach(), expected.min(axis=0), atol=2e-5)
+
+
+def test_all_parts_are_decoded_in_one_pass(assembly: pw.Assembly, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    decode = NeuralShape.part_distances
+    assembly.distance(np.zeros((1, 3)))  # its bounds are known then
+
+    def counted(shape: NeuralShape, points: np.ndarray) -> np.ndarray:
+        asked.append(len(points))
+        return decode(shape, points)
+
+    monkeypatch.setattr(NeuralShape, "part_distances", counted)
+    assembly.distance(FRAME.from_unit(POINTS))
+    assert asked == [len(POINTS)]
+
+
+def test_turning_scaling_and_moving_moves_the_surface_along(assembly: pw.Assembly) -> None:
+    turn = Similarity(3.0, (math.cos(0.4), 0.0, math.sin(0.4), 0.0), (1.0, -2.0, 5.0))
+    own = FRAME.from_unit(POINTS)
+    np.testing.assert_allclose(
+        assembly.transformed(turn).distance(turn(own)), 3 * assembly.distance(own), atol=2e-4
+    )
+
+
+def test_a_file_comes_back_to_the_byte(assembly: pw.Assembly, tmp_path: Path) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    assembly.save(tmp_path / "a.json")
+    again = pw.load_assembly(tmp_path / "a.json")
+    assert again == assembly
+    again.save(tmp_path / "b.json")
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    own = FRAME.from_unit(POINTS)
+    np.testing.assert_array_equal(again.distance(own), assembly.distance(own))
+    schema = json.loads((Path(__file__).parents[2] / "docs" / "assembly.schema.json").read_text())
+    jsonschema.validate(json.loads((tmp_path / "a.json").read_text()), schema)
+
+
+def test_opening_needs_the_model(
+    assembly: pw.Assembly, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assembly.save(tmp_path / "a.json")
+    monkeypatch.setattr(models, "_loaded", {})
+    with pytest.raises(ModelError, match=r"need the model 'lamps' with hash [0-9a-f]{12}, which is not here"):
+        pw.load_assembly(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("part", "handle", "lamps has no part 'handle'"),
+        ("latent", [0.0], "latent: expected 8 numbers, got 1"),
+        ("latent", [0.0] * 7 + ["x"], "latent holds 'x'"),
+        ("half_lengths", [1, 1, 0], "half_lengths"),
+        ("unit", -1, "unit is -1"),
+        ("members", [], "unknown parameters"),
+    ],
+)
+def test_broken_files_are_refused_by_place(
+    assembly: pw.Assembly, tmp_path: Path, key: str, value: object, message: str
+) -> None:
+    assembly.save(tmp_path / "a.json")
+    data = json.loads((tmp_path / "a.json").read_text())
+    data["children"][1]["field"][key] = value
+    (tmp_path / "a.json").write_text(json.dumps(data))
+    with pytest.raises(AssemblyFileError, match=message):
+        pw.load_assembly(tmp_path / "a.json")
+
+
+def test_the_others_hear_of_an_edit_of_the_assembly(lamp: NeuralShape, assembly: pw.Assembly) -> None:
+    from partwright.partsdf.editing import moved
+
+    ball = assembly["ball"]
+    shifted = assembly.replace_part("ball", ball.translated((0.4, 0.0, 0.0)))
+    expected = 2.0 * moved(lamp, "ball", (0.2, 0, 0)).part_distances(POINTS)
+    own = FRAME.from_unit(POINTS)
+    np.testing.assert_allclose(shifted.part_distances(own), expected, atol=2e-5)
+    plate = assembly.part_distances(own)[0]
+    assert np.abs(shifted.part_distances(own)[0] - plate).max() > 1e-3
+
+
+def test_dropping_a_part_is_as_if_it_were_absent(lamp: NeuralShape, assembly: pw.Assembly) -> None:
+    from partwright.partsdf.editing import without
+
+    own = FRAME.from_unit(POINTS)
+    expected = 2.0 * without(lamp, "knob").part_distances(POINTS)
+    np.testing.assert_allclose(assembly.without("knob").part_distances(own), expected, atol=2e-5)
+
+
+def test_two_shapes_in_one_assembly_stay_apart(model: Model, assembly: pw.Assembly) -> None:
+    other = to_assembly(NeuralShape.trained(model, "lamp2"), FRAME).translated((4.0, 0.0, 0.0))
+    both = pw.Assembly((*assembly.children, *other.children))
+    assert len(both) == 5
+    own = FRAME.from_unit(POINTS)
+    expected = np.concatenate([assembly.part_distances(own), other.part_distances(own)])
+    np.testing.assert_allclose(both.part_distances(own), expected, atol=1e-4)
+
+
+def test_there_and_back_again(lamp: NeuralShape, assembly: pw.Assembly) -> None:
+    again, frame = from_assembly(assembly)
+    np.testing.assert_allclose(frame.centre, FRAME.centre, atol=1e-9)
+    assert frame.scale == pytest.approx(FRAME.scale)
+    np.testing.assert_allclose(again.part_distances(POINTS), lamp.part_distances(POINTS), atol=1e-5)
+    dropped, frame = from_assembly(assembly.without("plate"))
+    assert dropped.names() == ["ball", "knob"]
+    np.testing.assert_allclose(frame.centre, FRAME.centre, atol=1e-9)
+
+
+def test_meshes_are_closed_and_lie_where_the_parts_are(assembly: pw.Assembly) -> None:
+    whole = mesh_assembly(assembly, 48)
+    assert whole.is_watertight
+    assert np.abs(assembly.distance(whole.vertices)).max() < 0.05
+    ball = mesh_part(assembly["ball"], 24)
+    assert ball.is_watertight
+    # All of the ball is in the bounds, and those are not far from it.
+    lower, upper = assembly["ball"].bounds()
+    assert (ball.vertices.min(axis=0) > lower).all()
+    assert (ball.vertices.max(axis=0) < upper).all()
+    assert (upper - lower).max() < 1.6 * np.ptp(ball.vertices, axis=0).max()
+
+
+def test_exports(assembly: pw.Assembly, tmp_path: Path) -> None:
+    pw.export(assembly, tmp_path / "lamp.glb")
+    scene = trimesh.load(tmp_path / "lamp.glb")
+    assert {"plate", "ball", "knob"} <= set(scene.geometry)
+    pw.export(assembly, tmp_path / "lamp.stl", resolution=32)
+    assert trimesh.load(tmp_path / "lamp.stl").is_volume
+
+
+def test_a_field_alone_is_as_its_model_knows_it(model: Model, assembly: pw.Assembly) -> None:
+    field = assembly["ball"].field
+    assert isinstance(field, NeuralField)
+    alone = dataclasses.replace(field, members=())
+    assert alone.shape.names() == ["ball"]
+    twice = alone.scaled(2.0)
+    local = np.random.default_rng(0).uniform(-1, 1, (50, 3)).astype(np.float32)
+    np.testing.assert_allclose(twice(2 * local), 2 * alone(local), atol=1e-5)

@@ -1,0 +1,131 @@
+"""Unseen shapes: with known parts and without, rotations that really turn, and broken input."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+import partwright as pw
+from partwright.datasets.poses import Poses
+from partwright.datasets.prepared import PreparedFamily
+from partwright.errors import ModelError, SettingError
+from partwright.partsdf.meshing import mesh_shape
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.poses import rotation_matrices
+from partwright.partsdf.reconstruction import (
+    ReconstructionSettings,
+    Target,
+    reconstruct,
+    reconstruct_unknown,
+)
+
+QUICK = ReconstructionSettings(iterations=150, points=512)
+
+
+def iou(found: NeuralShape, points: np.ndarray, sdf: np.ndarray) -> float:
+    inside = found.distances(points) < 0
+    return np.count_nonzero(inside & (sdf < 0)) / np.count_nonzero(inside | (sdf < 0))
+
+
+def test_known_parts(model: Model, lamps: PreparedFamily) -> None:
+    """A shape that was held out, with the poses it was prepared with."""
+    (index,) = lamps.split("test")
+    shape = lamps.load(index)
+    found = reconstruct(model, shape, QUICK)
+    mean = NeuralShape.mean(model, torch.from_numpy(shape.present.astype(bool)))
+    # Three in four samples lie within a few cells of the surface, where a small network is unsure.
+    assert iou(found, shape.points, shape.sdf) > max(0.7, iou(mean, shape.points, shape.sdf) + 0.05)
+    np.testing.assert_array_equal(found.poses.translation, shape.translation)
+    numbers = np.flatnonzero(shape.present)
+    owner = numbers[found.part_distances(shape.points).argmin(axis=0)]
+    assert (owner == shape.part)[shape.sdf < -0.03].mean() > 0.9
+
+
+def test_a_plain_mesh_gets_its_parts(model: Model, lamps: PreparedFamily) -> None:
+    (index,) = lamps.split("test")
+    known = lamps.load(index)
+    mesh = trimesh.Trimesh(known.frame.from_unit(known.vertices), known.faces, process=False)
+    shape = pw.load_shape(mesh)
+    found = reconstruct(model, shape, QUICK)
+    # The input's unit frame is its own: compare in its own units.
+    own = known.frame.from_unit(known.points)
+    assert iou(found, shape.frame.to_unit(own).astype(np.float32), known.sdf) > 0.65
+
+
+def test_latents_places_sizes_and_rotations_all_move(model: Model, lamps: PreparedFamily) -> None:
+    """The samples are turned by 15 degrees: only rotations can follow, and they do."""
+    known = lamps.load(0)
+    angle = math.radians(15)
+    turn = np.array(
+        [[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]], np.float32
+    )
+    points = torch.tensor(known.points @ turn.T)
+    target = Target(points, torch.tensor(known.sdf))
+    settings = ReconstructionSettings(iterations=200, points=512, pose_rate=1e-2)
+    found = reconstruct_unknown(model, target, settings)
+    start = NeuralShape.trained(model, "lamp0")
+    for before, after in ((start.latents, found.latents), *zip(start.poses, found.poses, strict=True)):
+        assert float((after - before).abs().max()) > 1e-3
+    plate = rotation_matrices(found.poses.rotation)[0]
+    turned = math.degrees(math.atan2(float(plate[1, 0]), float(plate[0, 0])))
+    assert turned == pytest.approx(15, abs=4)
+    before_iou = iou(start, points.numpy(), known.sdf)
+    assert iou(found, points.numpy(), known.sdf) > before_iou + 0.05
+
+
+def test_parts_that_are_not_there_are_dropped(model: Model, lamps: PreparedFamily) -> None:
+    known = lamps.load(2)
+    assert not known.present[2]
+    found = reconstruct_unknown(model, Target(torch.tensor(known.points), torch.tensor(known.sdf)), QUICK)
+    assert found.names() == ["plate", "ball"]
+
+
+def test_repeats_by_seed(model: Model, lamps: PreparedFamily) -> None:
+    settings = ReconstructionSettings(iterations=5, points=100)
+    first, again = (reconstruct(model, lamps.load(1), settings).latents for _ in range(2))
+    assert first.equal(again)
+
+
+def test_ctrl_c_keeps_what_was_found(model: Model, lamps: PreparedFamily) -> None:
+    def stop(done: int, of: int, loss: float) -> None:
+        if done == 20:
+            raise KeyboardInterrupt
+
+    stopped = reconstruct(model, lamps.load(1), QUICK, stop)
+    whole = reconstruct(model, lamps.load(1), replace(QUICK, iterations=40))
+    assert stopped.latents.shape == whole.latents.shape
+    assert float(stopped.latents.abs().max()) > 0.03  # not where it started, which was 0.01 wide
+
+
+def test_a_shape_of_another_family_is_refused(model: Model, lamps: PreparedFamily) -> None:
+    shape = lamps.load(0)
+    poses = Poses(*(a[:2] for a in (shape.translation, shape.rotation, shape.scale)))
+    with pytest.raises(ModelError, match=r"lamp0 has 2 parts, but lamps knows 3: plate, ball, knob"):
+        reconstruct(model, replace(shape, poses=poses, present=shape.present[:2]), QUICK)
+    with pytest.raises(SettingError, match="iterations is 0"):
+        ReconstructionSettings(iterations=0)
+    with pytest.raises(SettingError, match="start is 'best'"):
+        ReconstructionSettings(start="best")
+
+
+def test_sparse_meshes_are_the_dense_ones(model: Model) -> None:
+    """On a trained decoder: the same surface as the full grid's, far fewer evaluations, all parts closed."""
+    shape = NeuralShape.trained(model, "lamp0")
+    sparse = mesh_shape(shape, 64)
+    assert sparse.whole.is_watertight
+    assert set(sparse.parts) == {"plate", "ball", "knob"}
+    assert all(part.is_watertight for part in sparse.parts.values())
+    side = round(sparse.dense ** (1 / 3))
+    axis = (np.arange(side) - side // 2) / np.float32(32)
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    inside = (shape.distances(grid) < 0).reshape(side, side, side)
+    crossings = sum(np.count_nonzero(np.diff(inside, axis=a)) for a in range(3))
+    # Marching cubes has a vertex on every lattice edge whose ends differ.
+    assert len(sparse.whole.vertices) == crossings
+    assert sparse.evaluations < 0.35 * sparse.dense
