@@ -1,4 +1,4 @@
-"""Face labels in and out: label files as they come, and a segmented mesh with its labels beside it."""
+"""Face labels out: a segmented mesh with its labels beside it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly.palette import palette
-from partwright.errors import UnreadableFileError, UnsupportedFormatError
+from partwright.errors import UnsupportedFormatError
 from partwright.export.glb import coloured, to_gltf
+from partwright.shapes.labels import labels_path
 from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -21,36 +22,6 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".ply", ".glb")
 _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3), ("colour", "u1", 3), ("label", "<i4")])
-
-
-def read_labels(path: str | Path) -> NDArray[Any]:
-    """Labels (F,), integers or strings, of a .json, .npy or text file.
-
-    JSON is an array, or an object with `labels` and perhaps `names` as `write_segments` writes it; text has a
-    label a line.
-
-    Raises:
-        UnreadableFileError: the file is missing, or holds no labels.
-    """
-    path = Path(path)
-    try:
-        labels = _read(path)
-    except (OSError, ValueError, IndexError, KeyError, TypeError, EOFError, RecursionError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise UnreadableFileError(
-            f"{path}: cannot be read as face labels ({reason}); expected a JSON array, an NPY array, or text "
-            "with one label a line"
-        ) from error
-    if labels.ndim != 1 or labels.dtype.kind not in "iuU":
-        raise UnreadableFileError(
-            f"{path}: holds {labels.dtype} of shape {labels.shape}; expected one integer or string a face"
-        )
-    return labels
-
-
-def labels_path(path: str | Path) -> Path:
-    """FILE.labels.json beside FILE."""
-    return Path(path).with_name(Path(path).name + ".labels.json")
 
 
 def check_suffix(path: str | Path) -> None:
@@ -78,23 +49,6 @@ def write_segments(
     write_bytes(path, _ply(shape, labels, names) if is_ply else _glb(shape, labels, names, assembly))
     about = {"faces": len(labels), "names": list(names), "labels": labels.tolist()}
     write_bytes(labels_path(path), (json.dumps(about) + "\n").encode())
-
-
-def _read(path: Path) -> NDArray[Any]:
-    suffix = path.suffix.lower()
-    if suffix == ".npy":
-        return np.load(path, allow_pickle=False)
-    if suffix != ".json":
-        return np.array(path.read_text("utf-8").splitlines())
-    data = json.loads(path.read_text("utf-8"))
-    if not isinstance(data, dict):
-        return np.array(data)
-    labels = np.array(data["labels"])
-    if "names" not in data:
-        return labels
-    if labels.size and labels.min() < 0:
-        raise ValueError("negative labels have no name")
-    return np.array(data["names"], dtype=str)[labels]
 
 
 def _ply(shape: Shape, labels: NDArray[Any], names: Sequence[str]) -> bytes:

@@ -65,3 +65,44 @@ class Display:
     @staticmethod
     def _line(text: str) -> None:
         print(f"partwright: {text}", file=sys.stderr, flush=True)
+
+
+class Count:
+    """A context in which `show` counts things that get done one by one."""
+
+    def __init__(self, name: str) -> None:
+        console = Console(file=sys.stderr)
+        self._name = name
+        self._bar = (
+            Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                TextColumn("{task.completed:.0f}/{task.total:.0f}  {task.fields[detail]}"),
+                TimeRemainingColumn(compact=True),
+                console=console,
+                transient=True,
+            )
+            if console.is_terminal
+            else None
+        )
+        self._last_time = 0.0
+
+    def __enter__(self) -> Self:
+        if self._bar:
+            self._bar.start()
+            self._task = self._bar.add_task(self._name, total=None, detail="")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar:
+            self._bar.stop()
+
+    def show(self, done: int, total: int, what: str) -> None:
+        """`what` was just done, the `done`th of `total`."""
+        if self._bar:
+            self._bar.update(self._task, completed=done, total=total, detail=what)
+        elif done == total or time.monotonic() - self._last_time > _QUIET:
+            print(f"partwright: {self._name}: {done}/{total}  {what}", file=sys.stderr, flush=True)
+            self._last_time = time.monotonic()

@@ -31,9 +31,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
     from partwright.cleaning import segment
-    from partwright.cleaning.label_files import check_suffix, read_labels, write_segments
+    from partwright.cleaning.label_files import check_suffix, write_segments
     from partwright.cleaning.segmentation import node_labels
     from partwright.shapes import load_shape
+    from partwright.shapes.labels import read_labels
 
     check_suffix(arguments.output)
     assembly = load_assembly(arguments.assembly)

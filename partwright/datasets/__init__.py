@@ -3,5 +3,7 @@
 from __future__ import annotations
 
 from partwright.datasets.families import FAMILIES, FamilyShape, family
+from partwright.datasets.prepared import PreparedFamily
+from partwright.datasets.preparing import Preparation, prepare
 
-__all__ = ["FAMILIES", "FamilyShape", "family"]
+__all__ = ["FAMILIES", "FamilyShape", "Preparation", "PreparedFamily", "family", "prepare"]

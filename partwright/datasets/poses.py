@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,21 @@ class Poses:
 
     def __len__(self) -> int:
         return len(self.translation)
+
+    @classmethod
+    def identity(cls, count: int) -> Poses:
+        """`count` poses that change nothing."""
+        zero, one = np.zeros((count, 3), np.float32), np.ones((count, 3), np.float32)
+        return cls(zero, np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1)), one)
+
+    @classmethod
+    def joined(cls, poses: Sequence[Poses]) -> Poses:
+        """All rows, one after another."""
+        return cls(
+            np.concatenate([p.translation for p in poses]),
+            np.concatenate([p.rotation for p in poses]),
+            np.concatenate([p.scale for p in poses]),
+        )
 
 
 def mean_rotation(quaternions: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -53,8 +69,4 @@ def average_poses(present: NDArray[np.bool_], poses: list[Poses]) -> Poses:
         mean_pose(Poses(*(values[present[:, part], part] for values in stacked)))
         for part in range(present.shape[1])
     ]
-    return Poses(
-        np.concatenate([m.translation for m in means]),
-        np.concatenate([m.rotation for m in means]),
-        np.concatenate([m.scale for m in means]),
-    )
+    return Poses.joined(means)

@@ -141,8 +141,8 @@ class PreparedFamily:
         return shape
 
 
-def write_shape(path: str | Path, shape: PreparedShape, about: dict[str, str] | None = None) -> str:
-    """Write a shape's file and return its SHA-256. about: further lines of the file's metadata.
+def write_shape(path: str | Path, shape: PreparedShape, about: dict[str, Any] | None = None) -> str:
+    """Write a shape's file and return its SHA-256. about: what else the file shall say, for `read_about`.
 
     Raises FamilyError where the arrays do not fit together, OutputError where it cannot be written.
     """
@@ -179,6 +179,16 @@ def read_shape(path: str | Path, name: str, data: bytes | None = None) -> Prepar
     poses = Poses(tensors["translation"], tensors["rotation"], tensors["scale"])
     rest = {key: tensors[key] for key in _TENSORS if key not in ("translation", "rotation", "scale")}
     return PreparedShape(name=name, poses=poses, frame=frame, **rest)
+
+
+def read_about(path: str | Path) -> dict[str, Any]:
+    """What a shape's file says beside its tensors, which are not read. Raises UnreadableFileError."""
+    try:
+        with Path(path).open("rb") as file:
+            head = file.read(8)
+            return _metadata(head + file.read(int.from_bytes(head, "little")))
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+        raise UnreadableFileError(f"{path}: cannot be read as a prepared shape ({error})") from error
 
 
 def write_manifest(

@@ -35,6 +35,9 @@ class DistanceSource(Protocol):
     def signed(self, points: NDArray[Any]) -> NDArray[np.float32]:
         """Distance to the surface at points (N, 3), negative inside."""
 
+    def signed_nearest(self, points: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """As `signed`, and the triangle (N,) that is nearest."""
+
     def inside_grid(
         self, origin: ArrayLike, spacing: float, shape: tuple[int, int, int]
     ) -> NDArray[np.bool_]:
@@ -95,15 +98,26 @@ class MeshDistance:
         triangle = np.concatenate([_triangles(found) for found in self._find(points)])
         return closest_on_triangles(self._vertices[self._faces[triangle]], points).astype(np.float32)
 
+    def nearest(self, points: NDArray[Any]) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Nearest triangle (N,) of each of the points (N, 3), and the distance (N,) to it."""
+        found = list(self._find(points))
+        return (
+            np.concatenate([_triangles(f) for f in found]),
+            np.concatenate([_distances(f) for f in found]),
+        )
+
     def signed(self, points: NDArray[Any]) -> NDArray[np.float32]:
         """Distance to the nearest triangle at points (N, 3), negative inside."""
-        found = list(self._find(points))
-        distance = np.concatenate([_distances(f) for f in found])
+        return self.signed_nearest(points)[0]
+
+    def signed_nearest(self, points: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Distance (N,) to the nearest triangle at points (N, 3), negative inside; and that triangle (N,)."""
+        triangle, distance = self.nearest(points)
         if len(points) >= _MANY:
-            inside = self._inside_by_lattice(points, distance, np.concatenate([_triangles(f) for f in found]))
+            inside = self._inside_by_lattice(points, distance, triangle)
         else:
             inside = self.inside(points)
-        return np.where(inside, -distance, distance)
+        return np.where(inside, -distance, distance), triangle
 
     def _find(self, points: NDArray[Any], within: float = np.inf) -> Iterator[Any]:
         """Records of the nearest triangles, chunk by chunk."""

@@ -135,12 +135,19 @@ class Shape:
 
         Raises NotFiniteError for NaN or infinite points.
         """
+        return self.unit_nearest(points)[0]
+
+    def unit_nearest(self, points: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Signed distance (N,) at points (N, 3), unit frame, and the row (N,) of `faces` that is nearest.
+
+        Raises as `unit_distance` does.
+        """
         array = np.asarray(points)
         if array.ndim != 2 or array.shape[1] != 3:
             raise SettingError(f"points of shape {array.shape} were given; expected (N, 3)")
         if not np.isfinite(array).all():
             raise NotFiniteError("points hold NaN or infinite coordinates; all must be finite")
-        return self._source.signed(array)
+        return self._source.signed_nearest(array)
 
     def unit_surface(self, count: int, seed: int = 0) -> SurfaceSamples:
         """`count` area-weighted points of the surface with normals and curvature, unit frame."""

@@ -11,12 +11,12 @@ import trimesh
 
 from partwright.assembly import Assembly, Part
 from partwright.cleaning import segment
-from partwright.cleaning.label_files import labels_path, read_labels
 from partwright.cleaning.segmentation import node_labels
 from partwright.cli.main import main
 from partwright.errors import SettingError, UnreadableFileError
 from partwright.fields import Box, Cylinder, Sphere
 from partwright.shapes import Shape, load_shape
+from partwright.shapes.labels import labels_path, read_labels
 
 
 def dumbbell() -> tuple[Shape, Assembly, np.ndarray]:

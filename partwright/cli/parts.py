@@ -1,0 +1,20 @@
+"""`partwright parts`: learned families of parts, one file a subcommand."""
+
+from __future__ import annotations
+
+import argparse
+
+from partwright.cli import parts_prepare
+
+COMMANDS = (parts_prepare,)
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "parts",
+        help="learn a family of shapes made of the same parts",
+        description="Shapes of one family, made of the same named parts.",
+    )
+    subcommands = command.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for subcommand in COMMANDS:
+        subcommand.add(subcommands)

@@ -1,0 +1,85 @@
+"""`partwright parts prepare`: shapes made of named parts become what PartSDF trains on."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from partwright.datasets import Preparation
+
+_EPILOG = """\
+FOLDER holds one shape an entry: a scene whose named nodes are its parts, a folder with a mesh a part (and
+perhaps the whole as _whole), or a mesh with FILE.labels.json beside it, as `partwright segment` writes them.
+Ctrl-C keeps what is done; the same command goes on from there.
+"""
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "prepare",
+        help="prepare a family of shapes for training",
+        description="Fits a pose to every part and samples signed distance and nearest part around every "
+        "shape. Says which shapes it leaves out, and why.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    command.add_argument(
+        "source", metavar="FOLDER_OR_FAMILY", help="a folder of shapes, or mixers, chairs or cars"
+    )
+    command.add_argument("-o", "--output", metavar="FOLDER", type=Path, required=True, help="where to write")
+    option = command.add_argument
+    option("--count", metavar="N", type=int, default=300, help="shapes of a made family (default: 300)")
+    option("--samples", metavar="N", type=int, default=100_000, help="points a shape (default: 100000)")
+    option(
+        "--parts", metavar="A,B", type=_names, default=(), help="the family's parts, in order (default: all)"
+    )
+    option(
+        "--test", metavar="A,B", type=_names, default=(), help="shapes to test on (default: a fifth of them)"
+    )
+    option("--workers", metavar="N", type=int, help="processes (default: one a processor)")
+    option("--seed", metavar="S", type=int, default=0, help="of shapes, samples and the split (default: 0)")
+    command.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from partwright.cli.progress import Count
+    from partwright.datasets import prepare
+
+    with Count("preparing") as count:
+        try:
+            made = prepare(
+                arguments.source,
+                arguments.output,
+                count=arguments.count,
+                samples=arguments.samples,
+                parts=arguments.parts,
+                held_out=arguments.test,
+                seed=arguments.seed,
+                workers=arguments.workers,
+                progress=lambda step: count.show(step.done, step.total, step.shape),
+            )
+        except KeyboardInterrupt:
+            print(
+                f"partwright: interrupted; shapes that are done are kept in {arguments.output}, and the same "
+                "command goes on from there",
+                file=sys.stderr,
+            )
+            return 130
+    _report(made, arguments.output)
+    return 0
+
+
+def _report(made: Preparation, folder: Path) -> None:
+    from partwright.cli.tables import warn
+
+    warn(f"{shape.name} is left out: {shape.reason}" for shape in made.refused)
+    family = made.family
+    counts = ", ".join(f"{len(family.split(name))} {name}" for name in ("train", "validation", "test"))
+    print(f"{len(family)} shapes of {len(family.parts)} parts ({counts}): {folder}")
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())

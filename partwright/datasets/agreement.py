@@ -1,0 +1,124 @@
+"""One orientation for a part across its family.
+
+A cuboid's axes can be named in 24 ways and a cylinder may be turned about its axis without any change of its
+fit. Of all that fit as well, the naming is chosen that agrees best with the family's average: least sum of
+squared angle and squared difference of the half-lengths' logarithms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.datasets.poses import mean_rotation
+from partwright.datasets.primitives import CUBOID, CYLINDER, PrimitiveFit
+
+_AS_GOOD, _SLACK = 1.25, 1e-6  # what a fit's Chamfer distance may exceed the best one's by to count as good
+_WORTH = 0.8  # a cylinder is taken where its mean Chamfer distance is less than this share of the cuboid's
+_REFERENCES, _ROUNDS = 24, 10
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Reference:
+    """What the namings are compared with."""
+
+    rotation: Array
+    log_scale: Array
+
+
+def _axis_namings() -> Array:
+    """The 24 rotations (24, 3, 3) that map the axes onto axes."""
+    matrices = [
+        np.eye(3)[list(order)] * np.array(signs)
+        for order in permutations(range(3))
+        for signs in product((1.0, -1.0), repeat=3)
+    ]
+    return np.stack([m for m in matrices if np.linalg.det(m) > 0])
+
+
+_NAMINGS = _axis_namings()
+
+
+def agreed(shapes: Sequence[Sequence[PrimitiveFit]]) -> list[PrimitiveFit]:
+    """One fit for each shape, from all fits of one part in the shapes that have it.
+
+    All are of one kind: the cylinder where it fits clearly better on average.
+    """
+    kind = _kind_of(shapes)
+    good = [_as_good(fits, kind) for fits in shapes]
+    world = _Reference(np.eye(3), np.zeros(3))
+    every = max(len(good) // _REFERENCES, 1)
+    starts = [_best(fits, world, turn_only=True) for fits in good[::every]]
+    reference = min((_reference([fit]) for fit in starts), key=lambda r: _total(good, r))
+    chosen = [_best(fits, reference) for fits in good]
+    for _ in range(_ROUNDS):
+        again = [_best(fits, _reference(chosen)) for fits in good]
+        if all(np.array_equal(a.rotation, b.rotation) for a, b in zip(chosen, again, strict=True)):
+            break
+        chosen = again
+    return chosen
+
+
+def _kind_of(shapes: Sequence[Sequence[PrimitiveFit]]) -> str:
+    mean = {
+        kind: np.mean([min(fit.chamfer for fit in fits if fit.kind == kind) for fits in shapes])
+        for kind in (CUBOID, CYLINDER)
+    }
+    return CYLINDER if mean[CYLINDER] < _WORTH * mean[CUBOID] else CUBOID
+
+
+def _as_good(fits: Sequence[PrimitiveFit], kind: str) -> list[PrimitiveFit]:
+    own = [fit for fit in fits if fit.kind == kind]
+    limit = _AS_GOOD * min(fit.chamfer for fit in own) + _SLACK
+    return [fit for fit in own if fit.chamfer <= limit]
+
+
+def _reference(fits: Sequence[PrimitiveFit]) -> _Reference:
+    from scipy.spatial.transform import Rotation
+
+    quaternions = np.stack([Rotation.from_matrix(fit.rotation).as_quat() for fit in fits])
+    x, y, z, w = mean_rotation(quaternions)
+    log_scale = np.mean([np.log(fit.scale) for fit in fits], axis=0)
+    return _Reference(Rotation.from_quat([x, y, z, w]).as_matrix(), log_scale)
+
+
+def _total(good: Sequence[Sequence[PrimitiveFit]], reference: _Reference) -> float:
+    return sum(_cost(_best(fits, reference), reference) for fits in good)
+
+
+def _cost(fit: PrimitiveFit, reference: _Reference, turn_only: bool = False) -> float:
+    cosine = (np.sum(fit.rotation * reference.rotation) - 1) / 2
+    angle = np.arccos(np.clip(cosine, -1, 1))
+    return float(angle**2 + (0 if turn_only else np.sum((np.log(fit.scale) - reference.log_scale) ** 2)))
+
+
+def _best(fits: Sequence[PrimitiveFit], reference: _Reference, turn_only: bool = False) -> PrimitiveFit:
+    """The fit and naming nearest to the reference, or to its rotation alone."""
+    named = [other for fit in fits for other in _renamed(fit, reference)]
+    return min(named, key=lambda fit: _cost(fit, reference, turn_only))
+
+
+def _renamed(fit: PrimitiveFit, reference: _Reference) -> list[PrimitiveFit]:
+    """The same solid, its axes named in every way; a cylinder turned as near to the reference as may be."""
+    if fit.kind == CUBOID:
+        return [replace(fit, rotation=fit.rotation @ m, scale=np.abs(m.T) @ fit.scale) for m in _NAMINGS]
+    ends = (fit.rotation[:, 2], -fit.rotation[:, 2])
+    return [replace(fit, rotation=_swung(reference.rotation, axis)) for axis in ends]
+
+
+def _swung(rotation: Array, axis: Array) -> Array:
+    """`rotation`, turned the shortest way so that its z becomes `axis`."""
+    from scipy.spatial.transform import Rotation
+
+    across = np.cross(rotation[:, 2], axis)
+    length = np.linalg.norm(across)
+    if length < 1e-12:  # as it is, or head over heels about x
+        return rotation if rotation[:, 2] @ axis > 0 else rotation * np.array([1, -1, -1])
+    angle = np.arctan2(length, rotation[:, 2] @ axis)
+    return Rotation.from_rotvec(across / length * angle).as_matrix() @ rotation

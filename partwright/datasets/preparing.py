@@ -1,0 +1,306 @@
+"""From shapes made of named parts to a prepared family: poses that agree, and samples, on disk.
+
+Each shape is a file of its own, kept as soon as it is done, so that a run that was stopped goes on where it
+was. Poses are agreed on when all shapes are there; the manifest is written last.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.datasets.agreement import agreed
+from partwright.datasets.families.recipes import FAMILIES
+from partwright.datasets.inputs import MadeShape, PartedSource, find_shapes
+from partwright.datasets.labelling import label_surface, sample
+from partwright.datasets.poses import Poses, average_poses
+from partwright.datasets.prepared import (
+    MANIFEST,
+    MOST_PARTS,
+    SHAPES,
+    SPLITS,
+    Entry,
+    PreparedFamily,
+    PreparedShape,
+    read_about,
+    read_shape,
+    write_manifest,
+    write_shape,
+)
+from partwright.datasets.primitives import PrimitiveFit, fit_primitives
+from partwright.errors import FamilyError, OutputError, PartwrightError, SettingError
+from partwright.writing import check_folder
+
+VALIDATION, TEST = 0.2, 0.2  # shares of the shapes; the rest trains (PartSDF, B.4)
+FEWEST_SAMPLES = 1000
+_REVISION = 1  # of what a shape's file holds: another number prepares it again
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A shape that was left out, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Progress:
+    """shape: what has just been done, or refused; done of total."""
+
+    shape: str
+    done: int
+    total: int
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """A prepared family, and the shapes that it was prepared without."""
+
+    family: PreparedFamily
+    refused: tuple[Refused, ...]
+
+
+@dataclass(frozen=True)
+class _Job:
+    """All that a process needs to prepare one shape."""
+
+    source: PartedSource
+    parts: tuple[str, ...]
+    samples: int
+    seed: int
+    path: Path
+
+
+def prepare(
+    source: str | Path,
+    output: str | Path,
+    *,
+    count: int = 300,
+    samples: int = 100_000,
+    parts: Sequence[str] = (),
+    held_out: Sequence[str] = (),
+    seed: int = 0,
+    workers: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Preparation:
+    """Prepare a folder of shapes, or `count` shapes of one of FAMILIES, for PartSDF.
+
+    samples: points a shape (the paper's program has 525,000). parts: the family's parts in order; all that
+    the shapes have if empty. held_out: the shapes to test on; if empty, 60 % train, 20 % validate and 20 %
+    test, drawn by seed. workers: processes; one a processor if None. Shapes that cannot be used are left out
+    and said why. Ctrl-C loses only the shapes that are being worked on: the same call goes on from there.
+
+    Raises SettingError, OutputError, and FamilyError where fewer than two shapes can be used, a part of
+    `parts` is missing everywhere, or a held-out shape is not there.
+    """
+    if samples < FEWEST_SAMPLES:
+        raise SettingError(f"{samples} samples a shape were asked for; expected {FEWEST_SAMPLES} or more")
+    output = Path(output)
+    name, sources = _sources(source, count, seed)
+    refused: list[Refused] = []
+    sources, names = _with_parts(sources, tuple(parts), refused)
+    _check_enough(name, sources, refused)
+    unknown = sorted(set(held_out) - {s.name for s in sources})
+    if unknown:
+        raise FamilyError(f"{name}: no usable shape is called {', '.join(unknown)}; hold out others")
+    _start(output)
+    jobs = [_Job(s, names, samples, seed, output / SHAPES / f"{s.name}.safetensors") for s in sources]
+    for number, (job, reason) in enumerate(_run(jobs, workers or os.cpu_count() or 1), 1):
+        if reason:
+            refused.append(Refused(job.source.name, reason))
+        if progress is not None:
+            progress(Progress(job.source.name, number, len(jobs)))
+    left_out = {shape.name for shape in refused}
+    jobs = [job for job in jobs if job.source.name not in left_out]
+    _check_enough(name, [job.source for job in jobs], refused)
+    family = _finish(output, name, jobs, splits([job.source.name for job in jobs], held_out, seed))
+    return Preparation(family, tuple(sorted(refused, key=lambda r: r.name)))
+
+
+def splits(names: Sequence[str], held_out: Sequence[str], seed: int) -> dict[str, str]:
+    """The split of each name; without `held_out` by the order of their hashes, however they come."""
+    if held_out:
+        return {name: "test" if name in held_out else "train" for name in names}
+    ranked = sorted(names, key=lambda name: hashlib.sha256(f"{seed}:{name}".encode()).digest())
+    validation, test = round(VALIDATION * len(names)), max(round(TEST * len(names)), 1)
+    numbers = np.repeat(np.arange(3), [len(names) - validation - test, validation, test])
+    return {name: SPLITS[number] for name, number in zip(ranked, numbers, strict=True)}
+
+
+def _sources(source: str | Path, count: int, seed: int) -> tuple[str, list[PartedSource]]:
+    """A family's name and shapes."""
+    if str(source) in FAMILIES:
+        if count < 1:
+            raise SettingError(f"{count} shapes of {source} were asked for; expected 2 or more")
+        return str(source), [MadeShape(str(source), seed, number) for number in range(count)]
+    folder = Path(source)
+    if not folder.is_dir():
+        raise FamilyError(
+            f"{source}: neither a folder nor one of {', '.join(FAMILIES)}; give a folder of shapes, or a name"
+        )
+    return folder.absolute().name, find_shapes(folder)
+
+
+def _with_parts(
+    sources: Sequence[PartedSource], parts: tuple[str, ...], refused: list[Refused]
+) -> tuple[list[PartedSource], tuple[str, ...]]:
+    """The shapes whose parts can be named, and the family's parts: those given, or all in order of coming."""
+    kept, seen = [], dict[str, None]()
+    for source in sources:
+        try:
+            seen |= dict.fromkeys(source.part_names())
+            kept.append(source)
+        except PartwrightError as error:
+            refused.append(Refused(source.name, str(error)))
+    missing = [part for part in parts if part not in seen]
+    if missing:
+        raise FamilyError(
+            f"no shape has {', '.join(missing)}; the shapes' parts are {', '.join(seen) or 'unknown'}. "
+            "Name the parts as the shapes do"
+        )
+    names = parts or tuple(seen)
+    if len(names) > MOST_PARTS:
+        raise FamilyError(f"{len(names)} different part names; at most {MOST_PARTS} can be told apart")
+    return kept, names
+
+
+def _check_enough(name: str, sources: Sequence[PartedSource], refused: Sequence[Refused]) -> None:
+    if len(sources) < 2:
+        why = "".join(f"; {shape.name} was refused: {shape.reason}" for shape in refused)
+        raise FamilyError(f"{name}: {len(sources)} usable shapes; a family needs at least two{why}")
+
+
+def _start(output: Path) -> None:
+    """Make the folders. A manifest that is there says that the folder is complete, which it no longer is."""
+    check_folder(output)
+    try:
+        (output / SHAPES).mkdir(parents=True, exist_ok=True)
+        (output / MANIFEST).unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot write into {output}: {error.strerror}; choose another place") from error
+
+
+def _run(jobs: Sequence[_Job], workers: int) -> Iterator[tuple[_Job, str]]:
+    """Each job as it is done, with the reason why its shape was refused, or ""."""
+    if min(workers, len(jobs)) == 1:
+        yield from ((job, _prepare_shape(job)) for job in jobs)
+        return
+    with ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn")) as pool:
+        waiting = {pool.submit(_prepare_shape, job): job for job in jobs}
+        try:
+            for done in as_completed(waiting):
+                yield waiting[done], done.result()
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def _prepare_shape(job: _Job) -> str:
+    """Write the shape's file unless it is there already; returns why that cannot be, or ""."""
+    try:
+        key = _key(job)
+        if _is_done(job.path, key):
+            return ""
+        shape, fits = _sampled(job)
+        write_shape(job.path, shape, {"key": key, "fits": fits})
+    except OutputError:
+        raise
+    except PartwrightError as error:
+        return str(error)
+    return ""
+
+
+def _key(job: _Job) -> str:
+    """Of all that the file depends on."""
+    about = (_REVISION, job.source.fingerprint(), job.parts, job.samples, job.seed)
+    return hashlib.sha256(repr(about).encode()).hexdigest()
+
+
+def _is_done(path: Path, key: str) -> bool:
+    if not path.exists():
+        return False
+    try:
+        return read_about(path).get("key") == key
+    except PartwrightError:  # cut short or of another program: it is written anew
+        return False
+
+
+def _sampled(job: _Job) -> tuple[PreparedShape, dict[str, list[Any]]]:
+    """The shape with poses that are still to be agreed on, and all fits of each part."""
+    labelled = label_surface(job.source.read(), job.parts)
+    points, sdf, part = sample(labelled, job.samples, _seed_of(job))
+    fits = {number: fit_primitives(v, job.seed) for number, v in labelled.vertices.items()}
+    present = np.array([number in fits for number in range(len(job.parts))], dtype=np.uint8)
+    shape = labelled.shape
+    prepared = PreparedShape(
+        job.source.name,
+        points,
+        sdf,
+        part,
+        Poses.identity(len(job.parts)),
+        present,
+        shape.frame.to_unit(shape.vertices).astype(np.float32),
+        shape.faces.astype(np.int32),
+        labelled.label,
+        shape.frame,
+    )
+    return prepared, {job.parts[number]: [fit.to_row() for fit in found] for number, found in fits.items()}
+
+
+def _seed_of(job: _Job) -> int:
+    """Another stream for each shape, whatever the others are."""
+    return int.from_bytes(hashlib.sha256(f"{job.seed}:{job.source.name}".encode()).digest()[:4], "big")
+
+
+def _finish(output: Path, name: str, jobs: Sequence[_Job], split: dict[str, str]) -> PreparedFamily:
+    """Agree on poses, write them into the shapes' files, and write the manifest."""
+    parts = jobs[0].parts
+    about = [read_about(job.path) for job in jobs]
+    present = np.array([[part in a["fits"] for part in parts] for a in about])
+    absent = [part for number, part in enumerate(parts) if not present[:, number].any()]
+    if absent:
+        raise FamilyError(f"{name}: no usable shape has {', '.join(absent)}; leave the name out of the parts")
+    poses = _agreed_poses(parts, about, present)
+    average = average_poses(present, poses)
+    entries = []
+    for job, has, own, said in zip(jobs, present, poses, about, strict=True):
+        shape = read_shape(job.path, job.source.name)
+        shape = replace(shape, poses=_filled(own, average, has))
+        extra = {key: said[key] for key in ("key", "fits")}
+        digest = write_shape(job.path, shape, extra)
+        entries.append(Entry(shape.name, f"{SHAPES}/{job.path.name}", split[shape.name], digest))
+    write_manifest(output, name, parts, entries, jobs[0].samples, average, jobs[0].seed)
+    return PreparedFamily(output)
+
+
+def _agreed_poses(
+    parts: Sequence[str], about: Sequence[dict[str, Any]], present: NDArray[np.bool_]
+) -> list[Poses]:
+    """Poses of P rows for each shape; those of missing parts are still the identity."""
+    rows = [[Poses.identity(1)] * len(parts) for _ in about]
+    for number, part in enumerate(parts):
+        having = np.flatnonzero(present[:, number]).tolist()
+        fits = [[PrimitiveFit.from_row(row) for row in about[i]["fits"][part]] for i in having]
+        for i, fit in zip(having, agreed(fits), strict=True):
+            rows[i][number] = fit.pose()
+    return [Poses.joined(row) for row in rows]
+
+
+def _filled(poses: Poses, average: Poses, present: NDArray[np.bool_]) -> Poses:
+    """A missing part has the average pose (PartSDF, section 3.3)."""
+    has = present[:, None]
+    return Poses(
+        np.where(has, poses.translation, average.translation),
+        np.where(has, poses.rotation, average.rotation),
+        np.where(has, poses.scale, average.scale),
+    )
