@@ -53,6 +53,10 @@ class SettingError(PartwrightError):
     """An option has a value that cannot be used, or two options contradict each other."""
 
 
+class BoundsError(SettingError):
+    """Bounds on an assembly contradict each other, or are finer than can be told."""
+
+
 class MissingDependencyError(PartwrightError):
     """An optional package is needed; the message carries the install line."""
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from partwright import __version__
 from partwright.assembly import Assembly, Similarity
 from partwright.assembly.checks import MAX_NAME
+from partwright.bounding import Bounds, bounds_report, bounds_warnings, check_alone, promise
 from partwright.errors import SettingError
 from partwright.shapes import METRES, Shape
 from partwright.writing import finishing, replacing_files, write_bytes
@@ -113,6 +114,9 @@ def fit(
     progress: Callable[[Any], None] | None = None,
     source: str | None = None,
     density: float | None = None,
+    tolerance: float | str | None = None,
+    contain: float | str | bool | None = None,
+    inside: float | str | bool | None = None,
 ) -> Result:
     """Fit an assembly to a shape.
 
@@ -130,8 +134,13 @@ def fit(
         progress: called with the method's progress: .stage .round .rounds .parts .iou .fraction.
         source: the file's name, for the report.
         density: in kg/m3; the report then has the mass and its inertia, too.
+        tolerance: the largest distance between the surfaces, both ways, kept with the fewest parts that do:
+            in the shape's units, or text as "0.5mm" or "1%" of the longest side.
+        contain: the shape nowhere sticks out of the assembly by more than this; True is 0.
+        inside: the assembly nowhere sticks out of the shape by more than this; True is 0.
 
     Raises:
+        BoundsError: tolerance, contain or inside contradict each other, or are finer than can be told.
         SettingError: an option has a value that cannot be used.
     """
     _check_density(density, shape.unit)
@@ -142,6 +151,10 @@ def fit(
         raise SettingError(
             f"device {device!r} is not available for {method}; use one of {', '.join(DEVICES)}"
         )
+    bounds = None
+    if any(asked not in (None, False) for asked in (tolerance, contain, inside)):
+        check_alone(tolerance, min_iou=min_iou, curve=curve, per_node=per_node)
+        bounds = Bounds.of(shape, tolerance, contain, inside)
     module = import_module(METHODS[method])
     settings = module.Settings.for_quality(
         quality,
@@ -159,10 +172,23 @@ def fit(
     fitted = _fit_pieces(module, pieces, settings, progress, start, locked)
     assembly = _assembled(shape, pieces, fitted, per_node, source)
     seconds = _seconds(fitted)
+    outcome = next(o for o in OUTCOMES if any(one.outcome == o for one in fitted))
+    bounded = None
+    if bounds is not None:
+
+        def refit(share: float) -> Assembly | None:
+            if max_parts is not None and len(assembly) >= max_parts:
+                return None
+            cheaper = dataclasses.replace(settings, alpha=settings.alpha * share)
+            again = _fit_pieces(module, pieces, cheaper, progress, start, locked)
+            return _assembled(shape, pieces, again, per_node, source)
+
+        fitted_at = time.perf_counter()
+        bounded, outcome = promise(assembly, shape, bounds, outcome, refit, locked, seed)
+        assembly, seconds["bounds"] = bounded.assembly, time.perf_counter() - fitted_at
     with finishing():
         scores, surface = _scored(shape, assembly, seed, seconds)
     seconds["all"] = time.perf_counter() - started
-    outcome = next(o for o in OUTCOMES if any(one.outcome == o for one in fitted))
     report = {
         "outcome": outcome,
         "version": __version__,
@@ -175,8 +201,10 @@ def fit(
         "instances": sum(len(part.copies) for part in assembly.parts),
         "scores": scores.to_dict(),
         "mass_properties": _mass(surface, shape, density),
-        "warnings": _warnings(shape, scores),
+        "warnings": _warnings(shape, scores) + (bounds_warnings(bounded, shape) if bounded else []),
     }
+    if bounded is not None:
+        report["bounds"] = bounds_report(bounded, shape, float(surface.volume))
     points = tuple(fitted[0].curve)
     if points:
         report["curve"] = [{"parts": p.parts, "score": p.score, "iou": p.iou} for p in points]

@@ -34,6 +34,25 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option("--max-parts", metavar="N", type=int, help="at most N parts")
     option("--min-iou", metavar="X", type=float, help="stop at the fewest parts that reach IoU X")
+    option(
+        "--tolerance",
+        metavar="T",
+        help="the fewest parts whose surface is nowhere further than T from the shape's: 0.5mm, 1%%",
+    )
+    option(
+        "--contain",
+        metavar="SLACK",
+        nargs="?",
+        const="0",
+        help="the parts contain the shape, but for SLACK (0)",
+    )
+    option(
+        "--inside",
+        metavar="SLACK",
+        nargs="?",
+        const="0",
+        help="the parts stay inside the shape, but for SLACK",
+    )
     option("--curve", action="store_true", help="also write smaller and smaller assemblies, and a picture")
     option("--start", metavar="ASSEMBLY", type=Path, help="refine and continue this assembly")
     option("--lock", metavar="NAMES", help="parts of the start that stay as they are, separated by commas")
@@ -93,6 +112,9 @@ def run(arguments: argparse.Namespace) -> int:
             progress=display.show,
             source=arguments.shape.name,
             density=arguments.density,
+            tolerance=arguments.tolerance,
+            contain=arguments.contain,
+            inside=arguments.inside,
         )
         display.stage("writing")
         result.save(folder)

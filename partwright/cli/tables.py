@@ -20,6 +20,13 @@ if TYPE_CHECKING:
 def print_result(result: Result, folder: Path) -> None:
     """The outcome of a fit: scores, time, and where the files are."""
     table = _scores_table(result.shape.name, result.scores, result.shape.unit)
+    length = f" {result.shape.unit}" if result.shape.unit else ""
+    for name, bound in result.report.get("bounds", {}).items():
+        if isinstance(bound, dict):
+            kept = "kept" if bound["kept"] else "missed"
+            table.add_row(f"{name} {bound['asked']:.3g}{length}", f"{kept}: {bound['reached']:.3g}{length}")
+        else:
+            table.add_row("volume, of the shape's", f"{bound:.3f}")
     table.add_row("outcome", result.outcome.replace("_", " "))
     table.add_row("seconds", f"{result.report['seconds']['all']:.1f}")
     _print(table)

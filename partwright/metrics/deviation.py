@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 COUNT = 30_000
+_STEP = 5e-4  # unit lengths: half of what a field's slope is measured over
+_STEPS = 3
+_ON = 1e-4  # a point whose distance is less lies on the surface
 _MIDDLE = 1 / 3  # of a half extent: nearer to the middle than this a direction is not named
 
 
@@ -33,6 +37,25 @@ def deviation(
     worst = int(distances.argmax())
     quantile = max(float(np.quantile(there, 0.95)), float(np.quantile(back, 0.95)))
     return Deviation(float(distances[worst]), quantile, np.asarray(points[worst], dtype=np.float64))
+
+
+def projected(
+    distance: Callable[[np.ndarray], np.ndarray], points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points (N, 3) moved onto a field's surface by Newton steps along its slope, and which (N,) got there.
+
+    Those that did not (the field has a crease in between) stay where they were.
+    """
+    moved = np.asarray(points, dtype=np.float64)
+    axes = _STEP * np.eye(3)
+    for _ in range(_STEPS):
+        sides = np.concatenate([moved[None] + axes[:, None], moved[None] - axes[:, None]]).reshape(-1, 3)
+        high, low = np.asarray(distance(sides), dtype=np.float64).reshape(2, 3, -1)
+        slope = (high - low).T / (2 * _STEP)
+        square = np.maximum((slope * slope).sum(axis=1), 0.1)
+        moved = moved - (np.asarray(distance(moved)) / square)[:, None] * slope
+    arrived = np.abs(distance(moved)) < _ON
+    return np.where(arrived[:, None], moved, points), arrived
 
 
 def place_name(unit_point: np.ndarray, unit_size: np.ndarray, up: str | None = None) -> str:

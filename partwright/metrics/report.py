@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
     from partwright.assembly import Assembly
     from partwright.shapes import Shape
+
+_NEARLY_ALL = 0.98
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ def evaluate(
 
     target, again = of_shape(chamfer.COUNT, seeds[0]), of_shape(chamfer.COUNT, seeds[1])
     result = of_result(chamfer.COUNT, seeds[2])
-    apart = _deviation(shape, surface, vertices, result, target)
+    apart = surface_deviation(shape, local.distance, vertices, surface.faces, result, target)
     return Scores(
         iou=iou(local.distance, shape.unit_occupancy(RESOLUTION)),
         bi_surface_iou=bi_surface.bi_surface_iou(
@@ -100,14 +103,30 @@ def _emd(of_result: Any, of_shape: Any, seeds: list[int]) -> float:
     return emd.emd(of_result(emd.COUNT, seeds[3]), of_shape(emd.COUNT, seeds[4]))
 
 
-def _deviation(
-    shape: Shape, surface: trimesh.Trimesh, vertices: np.ndarray, result: np.ndarray, target: np.ndarray
+def surface_deviation(
+    shape: Shape,
+    distance: Callable[[np.ndarray], np.ndarray],
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    result: np.ndarray,
+    target: np.ndarray,
 ) -> deviations.Deviation:
-    """Between the input's surface and the assembly's mesh, unit frame; the input's corners count too."""
+    """Between a shape's surface and that of a field `distance` with this mesh, all in the unit frame.
+
+    result: (N, 3) points of the mesh; target: (M, 3) points of the shape's surface. The input's corners count
+    too. Where the surfaces are furthest apart the field has the word: its mesh cuts corners off.
+    """
     corners = shape.frame.to_unit(shape.vertices)
     if len(corners) > deviations.COUNT:
         corners = corners[:: -(-len(corners) // deviations.COUNT)]
     on_shape = np.concatenate([target, corners])
-    faces = np.asarray(surface.faces)
-    to_result = MeshDistance(vertices, faces, faces, True).unsigned(on_shape)
-    return deviations.deviation(result, shape.unit_distance(result), on_shape, to_result)
+    to_result = MeshDistance(vertices, np.asarray(faces), np.asarray(faces), True).unsigned(on_shape)
+    far = to_result >= np.quantile(to_result, _NEARLY_ALL)
+    feet, on_it = deviations.projected(distance, on_shape[far])
+    there = np.linalg.norm(feet - on_shape[far], axis=1)
+    to_result[far] = np.where(on_it, np.minimum(there, to_result[far]), to_result[far])
+    to_shape = shape.unit_distance(result)
+    result, far = result.copy(), np.abs(to_shape) >= np.quantile(np.abs(to_shape), _NEARLY_ALL)
+    result[far], _ = deviations.projected(distance, result[far])
+    to_shape[far] = shape.unit_distance(result[far])
+    return deviations.deviation(result, to_shape, on_shape, to_result)

@@ -1,0 +1,128 @@
+"""What pressing leaves over is removed exactly: parts grow or shrink by just as much as is missing.
+
+Every fold of a tree passes a shift on: where all leaves grow by e (those that are subtracted shrink), F falls
+by e. So growing the leaf that decides F at a point lowers F there, and no other point rises.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.rows import as_superfrustum
+from partwright.bounding.leaves import tightest, weigh
+from partwright.bounding.pressing import Constraints
+from partwright.errors import ParameterError
+from partwright.fields import Field, SuperFrustum
+from partwright.fields.solids import Box, Capsule, Cone, Cylinder, Frustum, Sphere, Torus, Tube
+
+_PASSES = 20
+_LEAST_WEIGHT = 0.25
+_THINNEST = 1e-3  # unit lengths: a thinner part is as good as none
+_ROOM = 2e-6  # unit lengths, for rounding to float32
+
+
+def close(assembly: Assembly, wanted: Constraints, held: frozenset[str] = frozenset()) -> Assembly:
+    """The assembly with the constraints met by changes of size, as far as that goes; leaves in `held` stay,
+    and those that would shrink to nothing go.
+
+    Points that ask for more come first; where some ask a leaf to grow and others to shrink it stays between.
+    """
+    for _ in range(_PASSES):
+        value, weights = weigh(assembly, wanted.points)
+        violation = wanted.violation(value)
+        broken = np.flatnonzero(np.abs(violation) > 0)
+        if len(broken) == 0:
+            break
+        leaf = np.abs(weights[:, broken]).argmax(axis=0)
+        weight = weights[leaf, broken]
+        growth = violation[broken] / np.sign(weight) / np.maximum(np.abs(weight), _LEAST_WEIGHT)
+        new = assembly
+        for i, part in enumerate(assembly.parts):
+            mine = growth[leaf == i]
+            if part.name in held or len(mine) == 0:
+                continue
+            most, least = max(mine.max(), 0.0), min(mine.min(), 0.0)
+            step = most + least + math.copysign(_ROOM, most + least)
+            new = _resized(new, part, step)
+        if new is assembly:
+            break
+        assembly = new
+    return assembly
+
+
+def _resized(assembly: Assembly, part: Part, by: float) -> Assembly:
+    """The assembly with one part grown; without it where nothing of it would be left."""
+    try:
+        new = grown(part, by)
+    except ParameterError:
+        new = None
+    if new is not None and as_superfrustum(new.field).thinnest > _THINNEST:
+        return assembly.replace_part(part.name, new)
+    try:
+        return assembly.without(part.name)
+    except ParameterError:  # it is all there is
+        return assembly
+
+
+def grown(part: Part, by: float) -> Part:
+    """A part whose surface lies `by` further out everywhere (further in where negative), or a little more
+    where its kind cannot do so exactly: a box stays a box, so its corners move further.
+
+    Raises:
+        ParameterError: nothing of the part would be left.
+    """
+    field, along = _grown(part.field, by)
+    shift = Similarity(1.0, part.rotation)(np.array([[0.0, 0.0, along]]))[0]
+    return replace(part, field=field, translation=tuple((np.array(part.translation) + shift).tolist()))
+
+
+def _dilated(field: SuperFrustum, by: float) -> SuperFrustum:
+    """Its dilation takes all; where none is left the sides give way, and a hole gets wider."""
+    dilation = field.dilation + by
+    if dilation >= 0:
+        return replace(field, dilation=dilation)
+    x, y, z = (v + 2 * dilation for v in field.size)
+    hole = min(field.size[:2]) / 2 * field.onion - dilation if field.onion > 0 else 0.0
+    onion = hole / max(min(x, y) / 2, 1e-12) if hole else 0.0
+    return replace(field, dilation=0.0, size=(x, y, z), bulge=min(field.bulge, tightest(x, z)), onion=onion)
+
+
+def _grown(field: Field, by: float) -> tuple[Field, float]:
+    """The field, and how far its centre moves along its axis."""
+    match field:
+        case SuperFrustum():
+            return _dilated(field, by), 0.0
+        case Box():
+            x, y, z = field.size
+            return Box((x + 2 * by, y + 2 * by, z + 2 * by)), 0.0
+        case Cylinder():
+            return Cylinder(field.radius + by, field.height + 2 * by), 0.0
+        case Sphere():
+            return Sphere(field.radius + by), 0.0
+        case Capsule():
+            return Capsule(field.radius + by, field.height), 0.0
+        case Tube():
+            return Tube(field.radius + by, field.thickness + 2 * by, field.height + 2 * by), 0.0
+        case Torus():
+            return Torus(field.major_radius, field.minor_radius + by), 0.0
+        case Cone():
+            slant = math.hypot(field.radius, field.height)
+            # the offset cone has the same angle; its tip moves by slant / radius, its base by one
+            height = field.height + by * (1 + slant / field.radius)
+            return Cone(field.radius / field.height * height, height), (height - field.height) / 2 - by
+        case Frustum():
+            lean = (field.bottom_radius - field.top_radius) / field.height
+            out, along = by * math.hypot(1.0, lean), by * lean
+            return (
+                Frustum(
+                    field.bottom_radius + out + along,
+                    max(field.top_radius + out - along, 0.0),
+                    field.height + 2 * by,
+                ),
+                0.0,
+            )
+    raise ParameterError(f"a field of kind {field.kind!r} has no offset of its own kind")

@@ -1,0 +1,204 @@
+"""An assembly's numbers as a vector, and how its distances move with them.
+
+The chain rule in two halves: how the tree's fold weighs each copy of each leaf at a point, in closed form,
+and how a copy's own distance moves with its leaf's numbers, by central differences in the kernel. So any tree
+of SuperFrusta and named solids will do: blends, differences, and repeats whose copies move as one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.rows import rows
+from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.tree import Node, operands
+from partwright.errors import ParameterError
+from partwright.fields import Field, SuperFrustum, kernel
+from partwright.fields.operations import SHARP
+
+_POSE = 6
+_STEP = 2e-3
+# A SuperFrustum's roundness (or 1), dilation, taper, bulge and onion that are these stay: a box stays a box.
+_PLAIN = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
+_LONGEST_STEP = 0.05
+_ALONG = 1e-9
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Slope:
+    """F (N,) at the points, and its derivatives (N, P) by the free numbers of all leaves, leaf by leaf."""
+
+    value: Floats
+    by_number: Floats
+
+
+def free_numbers(part: Part) -> NDArray[np.bool_]:
+    """Which of a leaf's numbers may move: its place, its turn unless it stands along the axes, its lengths,
+    of a SuperFrustum's other numbers those that are not plain, and last its blend unless that is 0."""
+    free = np.ones(_POSE + len(numbers(part.field)) + 1, bool)
+    turn = rotation_matrix(part.rotation)
+    free[3:6] = (np.abs(turn - np.rint(turn)) > _ALONG).any()
+    free[-1] = part.blend > SHARP
+    if isinstance(part.field, SuperFrustum):
+        free[_POSE + 3 : -1] = numbers(part.field)[3:] != _PLAIN
+        free[_POSE + 3] &= part.field.roundness != 1
+    return free
+
+
+def numbers(field: Field) -> Floats:
+    """The field's numbers in the order of its declaration, triples flattened."""
+    return np.concatenate([np.atleast_1d(getattr(field, f.name)) for f in fields(field)])  # type: ignore[arg-type]
+
+
+def with_numbers(field: Field, values: Floats) -> Field:
+    """The field with other numbers.
+
+    Raises:
+        ParameterError: they are out of its range.
+    """
+    new, at = {}, 0
+    for entry in fields(field):  # type: ignore[arg-type]
+        old = getattr(field, entry.name)
+        width = len(old) if isinstance(old, tuple) else 1
+        taken = tuple(values[at : at + width].tolist())
+        new[entry.name], at = taken if isinstance(old, tuple) else taken[0], at + width
+    return replace(field, **new)  # type: ignore[type-var]
+
+
+def moved(part: Part, step: Floats) -> Part:
+    """The leaf after a step of all its numbers: place, turn about the local axes, field, blend.
+
+    A step that would leave the field's range is halved, three times at most; then the leaf stays.
+    """
+    step = np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
+    for _ in range(4):
+        try:
+            return _moved(part, step)
+        except ParameterError:
+            step = step / 2
+    return part
+
+
+def tightest(width: float, length: float) -> float:
+    """The largest bulge of a SuperFrustum: a tighter arc folds through its own centre."""
+    return math.asin(min(1.0, length / max(width, 1e-6))) / (math.pi / 2)
+
+
+def _moved(part: Part, step: Floats) -> Part:
+    values = numbers(part.field) + step[_POSE:-1]
+    if isinstance(part.field, SuperFrustum):
+        values = np.clip(values, 0.0, [math.inf] * 3 + [1.0, math.inf, 2.0, 1.0, 1.0])
+        values[6] = min(values[6], tightest(values[0], values[2]))
+    angle = float(np.linalg.norm(step[3:6]))
+    half = np.sinc(angle / (2 * math.pi)) / 2
+    turn = Similarity(1.0, (math.cos(angle / 2), *(half * step[3:6]).tolist()))
+    pose = Similarity(1.0, part.rotation, part.translation) @ turn
+    place = np.array(part.translation) + step[:3]
+    return replace(
+        part,
+        field=with_numbers(part.field, values),
+        translation=tuple(place.tolist()),
+        rotation=pose.rotation if angle > 0 else part.rotation,
+        blend=max(0.0, part.blend + float(step[-1])),
+    )
+
+
+@dataclass(frozen=True)
+class Share:
+    """Derivatives (N,) of a node's distance by a copy's own distance, and by its blend."""
+
+    by_value: Floats
+    by_blend: Floats
+
+    def __mul__(self, factor: Floats) -> Share:
+        return Share(self.by_value * factor, self.by_blend * factor)
+
+
+def fold(node: Node, values: Iterator[Floats]) -> tuple[Floats, list[Share]]:
+    """Distance (N,) of a node by those of its leaves' copies, depth first, and each copy's share in it."""
+    if isinstance(node, Part) and not node.instances:
+        value = next(values)
+        return value, [Share(np.ones_like(value), np.zeros_like(value))]
+    operation = "union" if isinstance(node, Part) else node.operation
+    result, shares = np.empty(0), []
+    for i, child in enumerate(operands(node)):
+        value, inner = fold(child, values)
+        if i == 0:
+            result, shares = value, inner
+            continue
+        # all three are a smooth minimum of plus or minus their arguments
+        a, b = (1.0, 1.0) if operation == "union" else (-1.0, -1.0 if operation == "intersection" else 1.0)
+        result, share, fillet = _smooth_minimum(a * result, b * value, child.blend)
+        result = a * result
+        shares = [one * share for one in shares] + [one * (a * b * (1 - share)) for one in inner]
+        if isinstance(child, Part):
+            shares[-1] = Share(shares[-1].by_value, a * fillet)
+    return result, shares
+
+
+def _smooth_minimum(a: Floats, b: Floats, k: float) -> tuple[Floats, Floats, Floats]:
+    """min(a, b) - max(k - |a - b|, 0)^2 / 4k, its derivative by a (that by b is 1 less it), and by k."""
+    if k <= SHARP:
+        return np.minimum(a, b), (a <= b).astype(np.float64), np.zeros_like(a)
+    share = np.clip(0.5 + (b - a) / (2 * k), 0.0, 1.0)
+    mixed = share * (1 - share)
+    return share * a + (1 - share) * b - k * mixed, share, -mixed
+
+
+def weigh(assembly: Assembly, points: NDArray[np.float32]) -> tuple[Floats, Floats]:
+    """F (N,) at points (N, 3), and its derivative (L, N) by each leaf's distance, all copies added."""
+    copies = kernel.evaluate_parts(rows(assembly.parts), points).astype(np.float64)
+    value, shares = fold(assembly, iter(copies))
+    firsts = np.cumsum([0, *(len(part.copies) for part in assembly.parts[:-1])])
+    return value, np.add.reduceat(np.stack([share.by_value for share in shares]), firsts, axis=0)
+
+
+def slope(assembly: Assembly, points: NDArray[np.float32], free: list[NDArray[np.bool_]]) -> Slope:
+    """F and its derivatives at points (N, 3); `free` marks each leaf's numbers that may move."""
+    copies = kernel.evaluate_parts(rows(assembly.parts), points).astype(np.float64)
+    value, shares = fold(assembly, iter(copies))
+    columns, at = [np.empty((len(points), 0))], 0
+    for part, may in zip(assembly.parts, free, strict=True):
+        mine = shares[at : at + len(part.copies)]
+        at += len(mine)
+        if may[:-1].any():
+            weight = np.stack([share.by_value for share in mine])
+            columns.append(np.einsum("cn,pcn->np", weight, _leaf_slope(part, points, may, len(mine))))
+        if may[-1]:
+            columns.append(np.sum([share.by_blend for share in mine], axis=0)[:, None])
+    return Slope(value, np.concatenate(columns, axis=1))
+
+
+def _leaf_slope(part: Part, points: NDArray[np.float32], may: NDArray[np.bool_], count: int) -> Floats:
+    """(P, copies, N) derivatives of a leaf's copies by its free numbers but the blend.
+
+    One-sided at the end of a range."""
+    ends, width = [], []
+    for number in np.flatnonzero(may[:-1]):
+        step = np.zeros(len(may))
+        step[number] = _STEP
+        pair = [_moved_or_same(part, step), _moved_or_same(part, -step)]
+        ends += pair
+        width.append(2 * _STEP if number < _POSE else _apart(pair[0], pair[1], int(number) - _POSE))
+    values = kernel.evaluate_parts(rows(ends), points).astype(np.float64)
+    high, low = np.moveaxis(values.reshape(len(width), 2, count, -1), 1, 0)
+    return np.asarray((high - low) / np.maximum(width, _STEP / 10)[:, None, None])
+
+
+def _apart(high: Part, low: Part, number: int) -> float:
+    return float(numbers(high.field)[number] - numbers(low.field)[number])
+
+
+def _moved_or_same(part: Part, step: Floats) -> Part:
+    try:
+        return _moved(part, step)
+    except ParameterError:
+        return part

@@ -1,0 +1,143 @@
+"""What may be asked of an assembly: lengths with units, and which of them contradict each other."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from partwright.bounding.noise import roughness
+from partwright.errors import BoundsError, SettingError
+from partwright.shapes import LONGEST_SIDE, METRES, Shape, canonical_unit
+
+# Of the longest side. Samples 0.7 % apart on each surface tell no finer difference reliably.
+RESOLUTION = 1e-3
+_NOISE = 3.0  # deviations of the noise that a tolerance has to leave room for
+
+Length = float | str
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What is promised, in unit lengths; None where nothing is.
+
+    tolerance: the surfaces are nowhere further apart, both ways. contain: the shape nowhere sticks out of the
+    assembly by more. inside: the assembly nowhere sticks out of the shape by more.
+    """
+
+    tolerance: float | None = None
+    contain: float | None = None
+    inside: float | None = None
+
+    @classmethod
+    def of(
+        cls,
+        shape: Shape,
+        tolerance: Length | None = None,
+        contain: Length | bool | None = None,
+        inside: Length | bool | None = None,
+    ) -> Bounds:
+        """Bounds from lengths in the shape's own units, or text: "0.5", "0.5mm", "1%" of the longest side.
+
+        `contain` and `inside` may be True: no slack at all.
+
+        Raises:
+            BoundsError: a length that is none, bounds that no assembly can keep, or a tolerance finer than
+                the shape's own noise or than samples can tell.
+        """
+        bounds = cls(
+            _length("tolerance", tolerance, shape),
+            _slack("contain", contain, shape),
+            _slack("inside", inside, shape),
+        )
+        bounds._check(shape)
+        return bounds
+
+    @property
+    def out(self) -> float:
+        """How far the shape may stick out of the assembly; infinite where that is not bounded."""
+        return min((b for b in (self.contain, self.tolerance) if b is not None), default=math.inf)
+
+    @property
+    def beyond(self) -> float:
+        """How far the assembly may stick out of the shape; infinite where that is not bounded."""
+        return min((b for b in (self.inside, self.tolerance) if b is not None), default=math.inf)
+
+    @property
+    def within(self) -> float:
+        return math.inf if self.tolerance is None else self.tolerance
+
+    def narrowed(self, margin: float, share: float = 1.0) -> Bounds:
+        """Bounds that ask for `margin` (unit lengths) more, of a tolerance for this share."""
+        return Bounds(
+            None if self.tolerance is None else max(share * self.tolerance - margin, self.tolerance / 2),
+            None if self.contain is None else self.contain - margin,
+            None if self.inside is None else self.inside - margin,
+        )
+
+    def _check(self, shape: Shape) -> None:
+        least = RESOLUTION * LONGEST_SIDE
+        if self.tolerance is not None:
+            noise = _NOISE * roughness(shape)
+            if self.tolerance < least:
+                raise BoundsError(
+                    f"tolerance {said(self.tolerance, shape)} is finer than a surface's samples can tell; "
+                    f"the least for this shape is {said(least, shape)}"
+                )
+            if self.tolerance < noise:
+                raise BoundsError(
+                    f"tolerance {said(self.tolerance, shape)} is less than the noise of the shape's own "
+                    f"surface; give at least {said(noise, shape)}, or smooth the shape"
+                )
+        if self.contain is not None and self.inside is not None and self.contain + self.inside < least:
+            raise BoundsError(
+                f"contain {said(self.contain, shape)} and inside {said(self.inside, shape)} leave no room "
+                f"between the two surfaces; give one of them at least {said(least, shape)}"
+            )
+
+
+def said(length: float, shape: Shape) -> str:
+    """A unit length in the shape's own units, for people; never rounded down to less than it is."""
+    own = float(shape.frame.length_from_unit(length))
+    if own > 0:
+        digit = 10.0 ** (math.floor(math.log10(own)) - 2)
+        own = math.ceil(own / digit - 1e-6) * digit
+    return f"{own:.3g}{' ' + shape.unit if shape.unit else ''}"
+
+
+def _slack(name: str, given: Length | bool | None, shape: Shape) -> float | None:
+    if isinstance(given, bool):
+        return 0.0 if given else None
+    return _length(name, given, shape)
+
+
+def _length(name: str, given: Length | None, shape: Shape) -> float | None:
+    """A length in the unit frame."""
+    if given is None:
+        return None
+    text = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([A-Za-z]*|%)\s*", given) if isinstance(given, str) else None
+    try:
+        number = float(text[1] if text else given)
+    except (TypeError, ValueError):
+        number = math.nan
+    if isinstance(given, bool) or not math.isfinite(number) or number < 0:
+        raise BoundsError(f'{name}: expected a length such as 0.5, "0.5mm" or "1%", got {given!r}')
+    suffix = text[2] if text else ""
+    if suffix == "%":
+        return number / 100 * LONGEST_SIDE
+    factor = _factor(name, suffix, given, shape) if suffix else 1.0
+    return float(shape.frame.length_to_unit(number * factor))
+
+
+def _factor(name: str, suffix: str, given: Length, shape: Shape) -> float:
+    """What one of the suffix's unit is in the shape's."""
+    try:
+        unit = canonical_unit(suffix)
+    except SettingError as error:
+        raise BoundsError(f"{name}: {error}") from error
+    if shape.unit is None:
+        raise BoundsError(
+            f"{name}: {given!r} has a unit but {shape.name} has none; "
+            "state it (--unit), or give a plain number"
+        )
+    return METRES[unit] / METRES[shape.unit]

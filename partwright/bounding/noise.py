@@ -1,0 +1,32 @@
+"""How rough a shape's own surface is: what no smooth part can follow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from partwright.shapes import Shape
+
+_POINTS = 30_000
+_PATCHES = 1_000
+_AROUND = 32  # samples of a patch: about 0.04 unit lengths wide
+
+
+def roughness(shape: Shape) -> float:
+    """Standard deviation of the surface off a quadric through its neighbourhood, in unit lengths.
+
+    The median over patches all over the surface: edges and corners, which are few, do not count as noise.
+    """
+    from scipy.spatial import cKDTree
+
+    points = shape.unit_surface(_POINTS, seed=17).points.astype(np.float64)
+    centres = points[:: max(1, len(points) // _PATCHES)]
+    near = points[cKDTree(points).query(centres, _AROUND)[1]]
+    local = near - near.mean(axis=1, keepdims=True)
+    axes = np.linalg.svd(local, full_matrices=False)[2]
+    u, v, height = np.moveaxis(local @ axes.transpose(0, 2, 1), -1, 0)
+    basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
+    scale = np.maximum(np.abs(basis).max(axis=1, keepdims=True), 1e-12)
+    coefficients = np.linalg.pinv(basis / scale) @ height[..., None]
+    left = height - ((basis / scale) @ coefficients)[..., 0]
+    free = _AROUND - basis.shape[-1]
+    return float(np.median(np.sqrt((left * left).sum(axis=1) / free)))

@@ -1,0 +1,119 @@
+"""From a fit to an assembly that keeps its bounds: more parts where they are needed, fewer where not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from partwright.assembly import Assembly
+from partwright.bounding.check import check, place_of
+from partwright.bounding.keeping import Bounded, bound
+from partwright.bounding.limits import Bounds, Length, said
+from partwright.bounding.thinning import fewest
+from partwright.errors import BoundsError
+from partwright.metrics.frames import in_unit_frame
+from partwright.shapes import Shape
+from partwright.writing import finishing
+
+# A tolerance that the fit does not reach is tried again with parts that cost this share of their price.
+CHEAPER = (1 / 3, 1 / 10)
+
+
+def check_alone(tolerance: Length | None, *, min_iou: float | None, curve: bool, per_node: bool) -> None:
+    """Bounds are one assembly's, and a tolerance alone decides how many parts it has.
+
+    Raises:
+        BoundsError: something else is asked for that contradicts that.
+    """
+    if curve:
+        raise BoundsError("bounds are kept by one assembly, and a curve has many: ask for one of the two")
+    if tolerance is not None and (min_iou is not None or per_node):
+        other = "min_iou" if min_iou is not None else "per_node"
+        raise BoundsError(f"tolerance and {other} both decide how many parts there are: give one of the two")
+
+
+def promise(
+    assembly: Assembly,
+    shape: Shape,
+    bounds: Bounds,
+    outcome: str,
+    refit: Callable[[float], Assembly | None],
+    held: Sequence[str] = (),
+    seed: int = 0,
+) -> tuple[Bounded, str]:
+    """An assembly that keeps the bounds, or comes nearest to it, and how the fit ended with that in mind.
+
+    outcome: of the fit; one that was interrupted is measured only. refit: makes an assembly of more parts, at
+    a share of their price (None where there may be no more). Parts in `held` stay.
+    """
+    if outcome == "interrupted":
+        with finishing():
+            local = in_unit_frame(assembly, shape.frame)
+            return Bounded(assembly, check(local, shape, bounds, seed), complete=False), outcome
+    bounded = bound(assembly, shape, bounds, held, seed)
+    if bounds.tolerance is not None:
+        bounded = _by_parts(bounded, shape, bounds, refit, held, seed)
+    if not bounded.complete:
+        return bounded, "interrupted"
+    if not bounded.kept:
+        return bounded, "budget_reached"
+    return bounded, "target_reached" if bounds.tolerance is not None else outcome
+
+
+def _by_parts(
+    best: Bounded,
+    shape: Shape,
+    bounds: Bounds,
+    refit: Callable[[float], Assembly | None],
+    held: Sequence[str],
+    seed: int,
+) -> Bounded:
+    """More parts until a tolerance is kept, and then the fewest that keep it."""
+    for share in CHEAPER:
+        if best.kept or not best.complete:
+            break
+        more = refit(share)
+        if more is None:
+            break
+        tried = bound(more, shape, bounds, held, seed)
+        if sum(tried.checked.excess.values()) < sum(best.checked.excess.values()):
+            best = tried
+    return fewest(best, shape, bounds, held, seed) if best.kept and best.complete else best
+
+
+def bounds_report(bounded: Bounded, shape: Shape, volume: float) -> dict[str, Any]:
+    """For report.json: each bound with what was asked and reached, in the shape's own units; volume: of the
+    assembly's surface."""
+    checked = bounded.checked
+    entries: dict[str, Any] = {}
+    for name, side in checked.found.items():
+        entries[name] = {
+            "asked": float(shape.frame.length_from_unit(getattr(checked.bounds, name))),
+            "reached": max(0.0, float(shape.frame.length_from_unit(side.worst))),
+            "kept": name not in checked.excess,
+            "place": place_of(side.point, shape),
+        }
+    return {**entries, "volume_ratio": volume / shape.volume}
+
+
+_MISSED = {
+    "tolerance": "the surfaces are up to {reached} apart",
+    "contain": "the shape sticks out of the parts by up to {reached}",
+    "inside": "the parts stick out of the shape by up to {reached}",
+}
+
+
+def bounds_warnings(bounded: Bounded, shape: Shape) -> list[str]:
+    """A sentence for each bound that is missed."""
+    checked = bounded.checked
+    result = []
+    for name in checked.excess:
+        side = checked.found[name]
+        missed = _MISSED[name].format(reached=said(side.worst, shape))
+        asked = said(getattr(checked.bounds, name), shape)
+        place = place_of(side.point, shape)
+        parts = len(bounded.assembly)
+        result.append(
+            f"{name} {asked} is not kept: {missed}, at the {place}, with {parts} part{'s' * (parts > 1)}"
+        )
+    return result
