@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from partwright.superfrusta import CurvePoint
 
 # method -> the module whose `fit(shape, settings, progress=...)` and `Settings` do it
-METHODS = {"superfrusta": "partwright.superfrusta"}
+METHODS = {"superfrusta": "partwright.superfrusta", "solids": "partwright.superfrusta.solids"}
 QUALITIES = ("draft", "normal", "high")
 DEVICES = ("auto", "cpu", "cuda")
 # A result stands for the worst of its pieces, in this order.
@@ -108,6 +108,7 @@ def fit(
     locked: Sequence[str] = (),
     per_node: bool = False,
     symmetry: bool = True,
+    subtract: bool | None = None,
     seed: int = 0,
     device: str = "auto",
     threads: int = 0,
@@ -128,6 +129,7 @@ def fit(
         start: an assembly to refine and continue. locked: names of its parts that stay as they are.
         per_node: fit each node of a scene by itself; the assembly's children are named after the nodes.
         symmetry: where the shape has a mirror plane or a rotation, parts come as repeats (`Part.instances`).
+        subtract: parts may also be taken away from others (holes); None: for solids yes, for superfrusta no.
         seed: the same seed gives the same assembly, at any number of threads.
         device: "cpu", "cuda", or "auto": the compiled kernel on the CPU, which needs no other package.
         threads: 0 means one per core.
@@ -165,6 +167,7 @@ def fit(
         seed=seed,
         threads=threads,
         device=device,
+        **({} if subtract is None else {"subtract": subtract}),
     )
     if per_node and (curve or start is not None):
         raise SettingError("per_node fits every node anew; it goes with neither a curve nor a start")

@@ -24,7 +24,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="where to write; SHAPE-parts if not given",
     )
     option(
-        "--method", choices=("superfrusta",), default="superfrusta", help="how to fit (default: %(default)s)"
+        "--method",
+        choices=("superfrusta", "solids"),
+        default="superfrusta",
+        help="kind of parts: SuperFrusta, or boxes, cylinders and other named solids (default: %(default)s)",
     )
     option(
         "--quality",
@@ -62,6 +65,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         action=argparse.BooleanOptionalAction,
         default=True,
         help="where the shape is symmetric, parts come as repeats (default: on)",
+    )
+    option(
+        "--subtract",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="parts may also be subtracted: holes, slots, pockets (default: on for solids, off for superfrusta)",
     )
     option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
     option("--density", metavar="D", type=float, help="in kg/m3: the report then has mass and inertia")
@@ -106,6 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
             locked=[name for name in (arguments.lock or "").split(",") if name],
             per_node=arguments.per_node,
             symmetry=arguments.symmetry,
+            subtract=arguments.subtract,
             seed=arguments.seed,
             device=arguments.device,
             threads=arguments.threads,

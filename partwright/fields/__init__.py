@@ -14,7 +14,19 @@ from partwright.fields.operations import (
 from partwright.fields.quadric import Quadric
 from partwright.fields.quadric_forms import NormalForm, normal_form
 from partwright.fields.registry import KINDS, from_dict
-from partwright.fields.solids import Box, Capsule, Cone, Cylinder, Frustum, Solid, Sphere, Torus, Tube
+from partwright.fields.solids import (
+    Box,
+    Capsule,
+    Cone,
+    Cylinder,
+    Frustum,
+    HollowBox,
+    HollowFrustum,
+    Solid,
+    Sphere,
+    Torus,
+    Tube,
+)
 from partwright.fields.superfrustum import SuperFrustum
 
 __all__ = [
@@ -25,6 +37,8 @@ __all__ = [
     "Cylinder",
     "Field",
     "Frustum",
+    "HollowBox",
+    "HollowFrustum",
     "NormalForm",
     "Quadric",
     "Solid",

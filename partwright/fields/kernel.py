@@ -27,6 +27,9 @@ DERIVATIVES = ("tx", "ty", "tz", "wx", "wy", "wz", "sx", "sy", "sz",
 
 UNSIGNED = len(COLUMNS) - 1
 
+if _kernel.COLUMNS != len(COLUMNS):
+    raise ImportError("the compiled kernel is older or newer than the Python beside it: install partwright again")
+
 Rows = NDArray[np.float32]
 Floats = NDArray[np.float32]
 

@@ -10,12 +10,26 @@ from typing import Any
 from partwright.errors import MissingDependencyError, ParameterError
 from partwright.fields.base import Field
 from partwright.fields.quadric import Quadric
-from partwright.fields.solids import Box, Capsule, Cone, Cylinder, Frustum, Sphere, Torus, Tube
+from partwright.fields.solids import (
+    Box,
+    Capsule,
+    Cone,
+    Cylinder,
+    Frustum,
+    HollowBox,
+    HollowFrustum,
+    Sphere,
+    Torus,
+    Tube,
+)
 from partwright.fields.superfrustum import SuperFrustum
 
 KINDS: dict[str, type[Field]] = {
     field.kind: field
-    for field in (SuperFrustum, Box, Cylinder, Cone, Frustum, Sphere, Capsule, Tube, Torus, Quadric)
+    for field in (
+        SuperFrustum, Box, Cylinder, Cone, Frustum, Sphere, Capsule, Tube, Torus, HollowBox, HollowFrustum,
+        Quadric,
+    )  # fmt: skip
 }
 
 # Kinds whose fields need more than this room: module and class, imported when a file names one.

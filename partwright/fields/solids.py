@@ -16,6 +16,9 @@ from partwright.fields.base import LARGEST, Array, Field, normalise, number, sca
 from partwright.fields.superfrustum import SuperFrustum
 
 
+_BEYOND = 0.1  # share of its length by which a hole goes beyond the solid, so that no faces coincide
+
+
 class Solid(Field):
     """A field that is a SuperFrustum under its usual name."""
 
@@ -170,6 +173,72 @@ class Torus(Solid):
     def superfrustum(self) -> SuperFrustum:
         size = _round(self.major_radius, 0.0)
         return SuperFrustum(size, roundness=1.0, dilation=self.minor_radius, onion=1.0)
+
+
+@dataclass(frozen=True)
+class HollowBox(Solid):
+    """A cuboid of full extents x, y, z with a rectangular hole along z that leaves walls of this thickness."""
+
+    kind: ClassVar[str] = "hollow_box"
+    size: tuple[float, float, float]
+    thickness: float
+
+    def __post_init__(self) -> None:
+        normalise(self, size=vector(self, "size", 0.0, LARGEST))
+        self._check_positive("thickness")
+        if 2 * self.thickness >= min(self.size[:2]):
+            raise ParameterError(
+                f"hollow_box: thickness is {self.thickness:g}; expected less than half of the sides "
+                f"{self.size[0]:g} and {self.size[1]:g}; a hollow box without a hole is a box"
+            )
+
+    def superfrustum(self) -> SuperFrustum:
+        return SuperFrustum(self.size, onion=1 - 2 * self.thickness / min(self.size[:2]))
+
+    def pieces(self) -> tuple[Solid, Solid]:
+        """The box, and the box through it that is its hole."""
+        x, y, z = self.size
+        wall = 2 * self.thickness
+        return Box(self.size), Box((x - wall, y - wall, (1 + _BEYOND) * z))
+
+
+@dataclass(frozen=True)
+class HollowFrustum(Solid):
+    """A frustum with a coaxial round hole whose radius is the same share of the outer one at both ends.
+
+    thickness: of the wall at the bottom; at the top it is in proportion. A top_radius of 0 is a hollow cone.
+    """
+
+    kind: ClassVar[str] = "hollow_frustum"
+    bottom_radius: float
+    top_radius: float
+    thickness: float
+    height: float
+
+    def __post_init__(self) -> None:
+        outer = Frustum(self.bottom_radius, self.top_radius, self.height)
+        normalise(self, bottom_radius=outer.bottom_radius, top_radius=outer.top_radius, height=outer.height)
+        self._check_positive("thickness")
+        if self.thickness >= self.bottom_radius:
+            raise ParameterError(
+                f"hollow_frustum: thickness is {self.thickness:g}; expected less than the bottom_radius "
+                f"{self.bottom_radius:g}; a hollow frustum without a hole is a frustum"
+            )
+
+    def superfrustum(self) -> SuperFrustum:
+        taper = min(2.0, self.top_radius / self.bottom_radius)
+        onion = 1 - self.thickness / self.bottom_radius
+        return SuperFrustum(_round(self.bottom_radius, self.height), roundness=1.0, taper=taper, onion=onion)
+
+    def pieces(self) -> tuple[Solid, Solid]:
+        """The frustum, and the frustum through it that is its hole; a hollow cone's hole ends at the tip."""
+        outer = Frustum(self.bottom_radius, self.top_radius, self.height)
+        share = 1 - self.thickness / self.bottom_radius
+        bottom, top = share * self.bottom_radius, share * self.top_radius
+        lean = bottom - top
+        more = _BEYOND if lean == 0 else min(_BEYOND, 2 * min(bottom, top) / abs(lean))
+        bottom, top = bottom + lean * more / 2, max(top - lean * more / 2, 0.0)
+        return outer, Frustum(bottom, top, (1 + more) * self.height)
 
 
 def _round(radius: float, height: float) -> tuple[float, float, float]:

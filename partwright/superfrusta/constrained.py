@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from partwright.assembly import Similarity
 from partwright.fields import kernel
 from partwright.superfrusta.evidence import Evidence, Rows
-from partwright.superfrusta.refining import LIMITS, Stages, freedom, penalties, sharpened
+from partwright.superfrusta.refining import LIMITS, Stages, freedom, penalties, sharpened, ties
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetry import Isometry
 
 Floats = NDArray[np.float64]
 
 _WIDTH = len(kernel.DERIVATIVES)
-_SX, _SZ, _BULGE = (kernel.COLUMNS.index(name) for name in ("sx", "sz", "bulge"))
+_SX, _SZ, _BULGE, _SIGN = (kernel.COLUMNS.index(name) for name in ("sx", "sz", "bulge", "sign"))
+_D_SX, _D_SY, _D_BULGE = (kernel.DERIVATIVES.index(name) for name in ("sx", "sy", "bulge"))
 # A SuperFrustum is symmetric in its local y: a mirrored one is the same field in another rigid pose.
 _FLIP = np.diag([1.0, -1.0, 1.0])
 _SETTLED = 3e-4  # relative fall of the loss that ends a stage
@@ -28,14 +29,14 @@ _DAMPING, _CALM, _HARSH = 1e-2, 0.3, 5.0
 
 @dataclass(frozen=True)
 class Leaf:
-    """A parameter row (16,) and the isometries that make its further copies."""
+    """A parameter row (17,) and the isometries that make its further copies."""
 
     row: NDArray[np.float32]
     isometries: tuple[Isometry, ...] = ()
 
     @property
     def rows(self) -> Rows:
-        """(1 + copies, 16), the leaf itself first."""
+        """(1 + copies, 17), the leaf itself first."""
         return np.stack([self.row, *(image(self.row, isometry) for isometry in self.isometries)])
 
     @property
@@ -59,7 +60,7 @@ def rigid(row: NDArray[np.float32], isometry: Isometry) -> Similarity:
 
 
 def image(row: NDArray[np.float32], isometry: Isometry) -> NDArray[np.float32]:
-    """The row (16,) of a part's image."""
+    """The row (17,) of a part's image."""
     placed = rigid(row, isometry) @ _pose(row)
     return np.array([*placed.translation, *placed.rotation, *row[7:]], dtype=np.float32)
 
@@ -80,17 +81,20 @@ def refit(
     leaves = list(leaves)
     target = evidence.target(evidence.training)
     moving = np.arange(len(leaves)) >= locked
-    free = freedom(moving, settings).ravel()
+    firsts = np.stack([leaf.row for leaf in leaves])
+    tied = ties(firsts, settings)
+    free = freedom(firsts, moving, settings)
+    free[tied, _D_SY] = False
     damping, quality, threads = _DAMPING, penalties(settings), settings.threads
     for beta, iterations in sharpened(stages, evidence.thickness):
         for _ in range(int(iterations)):
             rows = expanded(leaves)
             loss, gradient, matrix = kernel.normal_equations(rows, target, float(beta), quality, threads)
-            gradient, matrix = _projected(leaves, gradient, matrix)
-            step = _damped(gradient, matrix, free, damping)
+            gradient, matrix = _projected(leaves, tied, gradient, matrix)
+            step = _damped(gradient, matrix, free.ravel(), damping)
             moved = [
-                _moved(leaf, s) if moves else leaf
-                for leaf, s, moves in zip(leaves, step, moving, strict=True)
+                _moved(leaf, s, f, t) if moves else leaf
+                for leaf, s, f, t, moves in zip(leaves, step, free, tied, moving, strict=True)
             ]
             fallen = loss - kernel.loss(expanded(moved), target, float(beta), quality, threads)
             if fallen <= 0:
@@ -102,13 +106,17 @@ def refit(
     return leaves
 
 
-def _projected(leaves: Sequence[Leaf], gradient: Floats, matrix: Floats) -> tuple[Floats, Floats]:
+def _projected(
+    leaves: Sequence[Leaf], tied: NDArray[np.bool_], gradient: Floats, matrix: Floats
+) -> tuple[Floats, Floats]:
     """P^T g and P^T H P, where P takes steps of the leaves to steps of their copies."""
     count = sum(1 + len(leaf.isometries) for leaf in leaves)
     lift = np.zeros((count, _WIDTH, len(leaves), _WIDTH))
     at = 0
     for i, leaf in enumerate(leaves):
         for block in [np.eye(_WIDTH), *(_lifted(isometry) for isometry in leaf.isometries)]:
+            if tied[i]:
+                block[_D_SY] = block[_D_SX]
             lift[at, :, i] = block
             at += 1
     flat = lift.reshape(count * _WIDTH, -1)
@@ -134,8 +142,8 @@ def _damped(gradient: Floats, matrix: Floats, free: NDArray[np.bool_], damping: 
     return step.reshape(-1, _WIDTH)
 
 
-def _moved(leaf: Leaf, step: Floats) -> Leaf:
-    """The leaf after a step (15,), clipped, within bounds."""
+def _moved(leaf: Leaf, step: Floats, free: NDArray[np.bool_], tied: bool) -> Leaf:
+    """The leaf after a step (15,), clipped, within bounds; what is not `free` (15,) keeps its bits."""
     lower, upper, longest = LIMITS.array().astype(np.float64)
     step = np.clip(step, -longest, longest)
     row = leaf.row.astype(np.float64)
@@ -144,10 +152,15 @@ def _moved(leaf: Leaf, step: Floats) -> Leaf:
     half = np.sinc(angle / (2 * math.pi)) / 2
     turn = Similarity(1.0, (math.cos(angle / 2), *(half * step[3:6]).tolist()))
     row[3:7] = (_pose(leaf.row) @ turn).rotation
-    row[7:] = np.clip(row[7:] + step[6:], lower[6:], upper[6:])
+    shape = row[_SX:_SIGN]
+    moved = np.clip(shape + step[_D_SX:], lower[_D_SX:], upper[_D_SX:])
+    row[_SX:_SIGN] = np.where(free[_D_SX:], moved, shape)
+    if tied and free[_D_SX]:
+        row[_SX + 1] = row[_SX]
     # An arc tighter than half the section's width folds through its own centre.
-    tightest = math.asin(min(1.0, row[_SZ] / max(row[_SX], 1e-6))) / (math.pi / 2)
-    row[_BULGE] = min(row[_BULGE], tightest)
+    if free[_D_BULGE]:
+        tightest = math.asin(min(1.0, row[_SZ] / max(row[_SX], 1e-6))) / (math.pi / 2)
+        row[_BULGE] = min(row[_BULGE], tightest)
     return Leaf(row.astype(np.float32), leaf.isometries)
 
 

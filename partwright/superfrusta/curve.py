@@ -17,12 +17,12 @@ def with_parents(larger: Assembly, smaller: Assembly) -> Assembly:
     A point belongs to the part that it lies deepest in, or nearest to.
     """
     names = [part.name for part in smaller.parts]
-    children = []
     for part in larger.parts:
         owners = smaller.nearest_parts(_points_in(part))
         parent = names[int(np.bincount(owners, minlength=len(names)).argmax())]
-        children.append(dataclasses.replace(part, metadata={**part.metadata, "parent": parent}))
-    return dataclasses.replace(larger, children=tuple(children))
+        known = dataclasses.replace(part, metadata={**part.metadata, "parent": parent})
+        larger = larger.replace_part(part.name, known)
+    return larger
 
 
 def _points_in(part: Part) -> np.ndarray:

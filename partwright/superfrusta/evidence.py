@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.fields.kernel import Target
+from partwright.fields.kernel import COLUMNS, Target
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid
 from partwright.shapes.sampling import morton_order
@@ -17,6 +17,7 @@ from partwright.superfrusta.backend import Kernel, backend
 from partwright.superfrusta.settings import Settings
 
 Rows = NDArray[np.float32]
+NOTHING: Rows = np.empty((0, len(COLUMNS)), np.float32)
 
 _REACH = 1.2  # half the side of the cube that guards and probes fill
 _LOUDEST = 3.0

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from partwright.fields import kernel
 
-Family = Literal["superfrustum", "superprimitive", "cuboid"]
+Family = Literal["superfrustum", "superprimitive", "cuboid", "solid"]
 
 # family -> the parameters that its parts do not have, and the values that switch them off
 FAMILIES: dict[Family, dict[str, float]] = {
     "superfrustum": {},
     "superprimitive": {"taper": 1.0, "bulge": 0.0},
     "cuboid": {"roundness": 0.0, "dilation": 0.0, "taper": 1.0, "bulge": 0.0, "onion": 0.0},
+    "solid": {"bulge": 0.0},  # what else each part holds is its kind's: see kinds.py
 }
 
 

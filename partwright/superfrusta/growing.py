@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from partwright.fields import kernel
-from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta import solid_starts
+from partwright.superfrusta.evidence import NOTHING, Evidence, Rows
 from partwright.superfrusta.families import held, held_down
+from partwright.superfrusta.kinds import SIGN, plainness
 from partwright.superfrusta.objective import occupancy_score
-from partwright.superfrusta.refining import LIMITS, freedom, sharpened
+from partwright.superfrusta.refining import LIMITS, freedom, sharpened, ties
 from partwright.superfrusta.seeding import starts
 from partwright.superfrusta.settings import Settings
 
@@ -31,8 +33,10 @@ class Region:
     """Voxels (X * Y * Z,) to explain with one part, beside parts `others` that stay.
 
     depth: of the erosion. margin: how far around the region samples count, as a share of its longest side.
-    elsewhere: weight of inside samples outside the region that no part explains yet. frames: rotations (w, x,
-    y, z) to start from beside the principal axes.
+    elsewhere: weight of samples outside the region that the others do not explain either. frames: rotations
+    (w, x, y, z) to start from beside the principal axes. sign: +1 for a part to add where the shape is missed,
+    -1 for one to subtract where too much is covered. under: the part goes before those that are subtracted,
+    so that it may run through them.
     """
 
     voxels: NDArray[np.bool_]
@@ -41,6 +45,22 @@ class Region:
     margin: float
     elsewhere: float
     frames: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 4), np.float32))
+    sign: float = 1.0
+    under: bool = False
+
+
+@dataclass(frozen=True)
+class Grown:
+    """New rows: `first` go before all that move, so that what is subtracted cuts them too, `last` to the end."""
+
+    first: Rows
+    last: Rows
+
+    def __len__(self) -> int:
+        return len(self.first) + len(self.last)
+
+    def joined(self, rows: Rows, locked: int) -> Rows:
+        return np.concatenate([rows[:locked], self.first, rows[locked:], self.last])
 
 
 @dataclass(frozen=True)
@@ -53,9 +73,20 @@ class View:
 
 
 def regions(evidence: Evidence, rows: Rows, settings: Settings) -> list[Region]:
-    """Morphological decomposition of the residual max(S, -F), and its largest connected pieces whole."""
+    """Pieces of the residual max(S, -F), to add to, and of max(F, -S), to subtract from where that is allowed."""
+    values, field = evidence.grid.values, evidence.grid_field(rows)
+    found = _pieces(evidence, np.maximum(values, -field), rows, settings, 1.0)
+    if settings.subtract and len(rows):
+        found += _pieces(evidence, np.maximum(field, -values), rows, settings, -1.0)
+    return found
+
+
+def _pieces(
+    evidence: Evidence, residual: NDArray[np.float32], rows: Rows, settings: Settings, sign: float
+) -> list[Region]:
+    """Morphological decomposition of the residual, and its largest connected pieces whole."""
     grid = evidence.grid
-    residual = np.maximum(grid.values, -evidence.grid_field(rows))
+    carved = sign > 0 and bool((rows[:, SIGN] < 0).any())
     least_depth, least = _LEAST_DEPTH * grid.spacing, _LEAST_VOLUME * evidence.inside_voxels
     labels, depths = kernel.decompose(
         residual, grid.spacing, settings.regions, settings.kappa, least_depth, least
@@ -63,24 +94,26 @@ def regions(evidence: Evidence, rows: Rows, settings: Settings) -> list[Region]:
     found = []
     for label, depth in enumerate(depths):
         voxels = (labels == label).ravel()
-        found += [Region(voxels, rows, depth, 0.2, 0.15), Region(voxels, rows, depth, 0.5, 1.0)]
+        found.append(Region(voxels, rows, depth, 0.2, 0.15, sign=sign))
+        found.append(Region(voxels, rows, depth, 0.5, 1.0, sign=sign, under=carved))
     if len(depths) > 1:
         pieces, _ = ndimage.label(residual < -least_depth)
         sizes = np.bincount(pieces.ravel())
         sizes[0] = 0
         for piece in np.argsort(-sizes, kind="stable")[:_LARGEST]:
             if sizes[piece] > least:
-                found.append(Region((pieces == piece).ravel(), rows, float(np.median(depths)), 0.1, 0.3))
+                voxels, depth = (pieces == piece).ravel(), float(np.median(depths))
+                found.append(Region(voxels, rows, depth, 0.1, 0.3, sign=sign))
     return found
 
 
-def grow(evidence: Evidence, rows: Rows, settings: Settings, most: int) -> Rows:
+def grow(evidence: Evidence, rows: Rows, settings: Settings, most: int) -> Grown:
     """New rows, at most `most`, that raise the objective by more than their price; none when nothing does."""
     wanted = regions(evidence, rows, settings)
     if not wanted or most <= 0:
-        return np.empty((0, 16), np.float32)
+        return Grown(NOTHING, NOTHING)
     candidates = fit_regions(evidence, wanted, settings)
-    return _select(evidence, candidates, evidence.field(rows) < 0, settings.price / 2, most)
+    return _select(evidence, candidates, rows, settings.price / 2, most)
 
 
 def _view(evidence: Evidence, region: Region) -> View:
@@ -93,24 +126,33 @@ def _view(evidence: Evidence, region: Region) -> View:
     index = np.concatenate([index, evidence.outskirts])
     background = evidence.distance_of(region.others, evidence.points[index])
     weight = evidence.weight[index].copy()
-    unexplained = evidence.inside[index] & ~region.voxels[evidence.voxel[index]] & (background > 0)
-    weight[unexplained] *= region.elsewhere
+    wrong = (background < 0) != evidence.inside[index]
+    missed = evidence.inside[index] if region.sign > 0 else ~evidence.inside[index]
+    weight[wrong & missed & ~region.voxels[evidence.voxel[index]]] *= region.elsewhere
+    if region.under:
+        cuts = region.others[region.others[:, SIGN] < 0]
+        weight[(evidence.parts_of(cuts, evidence.points[index]) < 0).any(axis=0)] = 0
     return View(index, weight / max(float(weight.sum()), 1e-9), background)
 
 
 def fit_regions(evidence: Evidence, wanted: list[Region], settings: Settings, overlap: float = 0.0) -> Rows:
-    """The best part for each region: all starts are screened briefly on few samples, the best go on.
+    """The best part for each region."""
+    fitted, owner, losses = finalists(evidence, wanted, settings, overlap)
+    if settings.family == "solid":
+        losses = losses * plainness(fitted)
+    return fitted[np.concatenate([_best(losses, owner, i, 1) for i in range(len(wanted))])]
 
-    `overlap` is the price of running into the other parts. Growth asks none: a new part that may not cross
+
+def finalists(
+    evidence: Evidence, wanted: list[Region], settings: Settings, overlap: float = 0.0
+) -> tuple[Rows, NDArray[np.int64], NDArray[np.float64]]:
+    """Some parts fitted to each region, the regions that they are for, and their losses.
+
+    All starts are screened briefly on few samples, and the best go on. `overlap` is the price of running into the other parts. Growth asks none: a new part that may not cross
     what is there gets stuck in its region.
     """
     views = [_view(evidence, region) for region in wanted]
-    spacing = evidence.grid.spacing
-    values = held(settings.family, settings.smooth)
-    guesses = [
-        held_down(starts(evidence.grid_points[region.voxels], spacing, region.frames), values)
-        for region in wanted
-    ]
+    guesses = [_guesses(evidence, region, settings) for region in wanted]
     owner = np.repeat(np.arange(len(wanted)), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))
     screened, losses = _run(
@@ -128,8 +170,18 @@ def fit_regions(evidence: Evidence, wanted: list[Region], settings: Settings, ov
         evidence, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings
     )
     # A thin part that shoots out of the shape passes between the few samples out there.
-    losses += evidence.astray(fitted) / np.array([len(view.index) for view in views])[owner[kept]]
-    return fitted[np.concatenate([_best(losses, owner[kept], i, 1) for i in range(len(wanted))])]
+    astray = evidence.astray(fitted) * (fitted[:, SIGN] > 0)
+    losses += astray / np.array([len(view.index) for view in views])[owner[kept]]
+    return fitted, owner[kept], losses
+
+
+def _guesses(evidence: Evidence, region: Region, settings: Settings) -> Rows:
+    points, spacing = evidence.grid_points[region.voxels], evidence.grid.spacing
+    if settings.family == "solid":
+        return solid_starts.starts(points, spacing, region.sign, region.frames)
+    rows = held_down(starts(points, spacing, region.frames), held(settings.family, settings.smooth))
+    rows[:, SIGN] = region.sign
+    return rows
 
 
 def _best(
@@ -165,24 +217,36 @@ def _run(
         target,
         stages,
         LIMITS,
-        free=freedom(np.ones(len(rows), bool), settings),
+        free=freedom(rows, np.ones(len(rows), bool), settings),
+        tied=ties(rows, settings),
         penalties=kernel.Penalties(overlap=overlap),
         threads=settings.threads,
     )
 
 
-def _select(
-    evidence: Evidence, candidates: Rows, covered: NDArray[np.bool_], price: float, most: int
-) -> Rows:
-    """Greedy choice: whichever candidate raises R most joins, until none pays its price."""
+def _select(evidence: Evidence, candidates: Rows, rows: Rows, price: float, most: int) -> Grown:
+    """Greedy choice: whichever candidate raises R most joins, until none pays its price.
+
+    What is added may join before the parts that are subtracted, or after them.
+    """
     occupied = evidence.parts_of(candidates, evidence.points) < 0
-    chosen: list[int] = []
+    added, cuts = candidates[:, SIGN] > 0, rows[rows[:, SIGN] < 0]
+    carved = (evidence.parts_of(cuts, evidence.points) < 0).any(axis=0) if len(cuts) else None
+    covered = evidence.field(rows) < 0
+    chosen: list[tuple[bool, int]] = []
     current = float(occupancy_score(evidence, covered))
     while len(chosen) < most:
-        scores = occupancy_score(evidence, covered | occupied)
-        best = int(scores.argmax())
-        if scores[best] < current + price:
+        ways = {False: np.where(added[:, None], covered | occupied, covered & ~occupied)}
+        if carved is not None:
+            ways[True] = np.where(added[:, None], covered | (occupied & ~carved), covered)
+        scores = {under: occupancy_score(evidence, way) for under, way in ways.items()}
+        under = max(scores, key=lambda u: (float(scores[u].max()), u))
+        best = int(scores[under].argmax())
+        if scores[under][best] < current + price:
             break
-        chosen.append(best)
-        covered, current = covered | occupied[best], float(scores[best])
-    return candidates[chosen]
+        chosen.append((under, best))
+        covered, current = ways[under][best], float(scores[under][best])
+        if carved is not None and not added[best]:
+            carved = carved | occupied[best]
+    first, last = ([i for u, i in chosen if u is under] for under in (True, False))
+    return Grown(candidates[first], candidates[last])

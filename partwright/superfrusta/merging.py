@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.growing import Region, fit_regions
+from partwright.superfrusta.kinds import SIGN
 from partwright.superfrusta.objective import coverage, occupancy_score, removal_scores, score
 from partwright.superfrusta.pruning import neighbours
 from partwright.superfrusta.refining import TOUCH_UP, refine
@@ -74,8 +76,9 @@ def mergers(
     member are fitted, in one batch."""
     without, _ = removal_scores(evidence, rows)
     found = list(combinations(range(len(rows)), 2)) if apart else _touching_pairs(evidence, rows)
+    found = [(i, j) for i, j in found if rows[i, SIGN] == rows[j, SIGN]]
     value = {pair: float(-max(without[list(pair)])) for pair in found if pair[0] >= locked}
-    owner = _owners(evidence, rows)
+    owner = owners(evidence, rows)
     pairs = [p for p in sorted(value, key=lambda p: (value[p], p)) if np.isin(owner, p).any()][:_FITTED]
     if not pairs:
         return []
@@ -87,43 +90,72 @@ def mergers(
             margin=0.2,
             elsewhere=0.15,
             frames=rows[list(pair), 3:7],
+            sign=float(rows[pair[0], SIGN]),
+            under=bool((rows[np.delete(np.arange(len(rows)), pair), SIGN] < 0).any()),
         )
         for pair in pairs
     ]
     merged = fit_regions(evidence, regions, settings, settings.overlap)
     occupied = evidence.parts_of(rows, evidence.points) < 0
     single = evidence.parts_of(merged, evidence.points) < 0
-    kept = np.array([_without(occupied, pair) for pair in pairs])
-    together: NDArray[np.bool_] = np.asarray(occupied.any(axis=0))
-    gains = np.subtract(occupancy_score(evidence, kept | single), occupancy_score(evidence, together))
+    added = rows[:, SIGN] > 0
+    trials = [
+        _folded(_replaced(occupied, *pair, one), np.delete(added, pair[1]))
+        for pair, one in zip(pairs, single, strict=True)
+    ]
+    together = _folded(occupied, added)
+    gains = np.subtract(occupancy_score(evidence, np.array(trials)), occupancy_score(evidence, together))
     return [Merger(pairs[i], merged[i], float(gains[i])) for i in np.argsort(-gains, kind="stable")]
 
 
 def _touching_pairs(evidence: Evidence, rows: Rows) -> list[tuple[int, int]]:
     near = evidence.parts_of(rows, evidence.points[::4]) < _TOUCHING
-    inside = near[:, evidence.inside[::4]].astype(np.float32)
-    shared = inside @ inside.T > 2
+    inside = evidence.inside[::4]
+    near &= np.where(rows[:, SIGN, None] > 0, inside, ~inside)
+    shared = near.astype(np.float32) @ near.T.astype(np.float32) > 2
     return [(int(i), int(j)) for i, j in zip(*np.nonzero(np.triu(shared, 1)), strict=True)]
 
 
-def _owners(evidence: Evidence, rows: Rows) -> NDArray[np.int64]:
-    """The part (X * Y * Z,) that each voxel inside lies deepest in or nearest to; -1 outside the shape."""
-    inside = np.flatnonzero(evidence.grid.values.ravel() < 0)
-    owner = np.full(evidence.grid.values.size, -1, dtype=np.int64)
-    distance = evidence.parts_of(rows, evidence.grid_points[inside])
-    owner[inside] = distance.argmin(axis=0)
+def owners(evidence: Evidence, rows: Rows) -> NDArray[np.int64]:
+    """The part (X * Y * Z,) that each voxel inside the shape lies deepest in or nearest to; -1 outside.
+
+    Voxels outside that parts would cover belong to those that are subtracted there.
+    """
+    inside = evidence.grid.values.ravel() < 0
+    owner = np.full(len(inside), -1, dtype=np.int64)
+    added = rows[:, SIGN] > 0
+    voxels = np.flatnonzero(inside)
+    distance = evidence.parts_of(rows, evidence.grid_points[voxels])
+    owner[voxels] = np.where(added[:, None], distance, np.inf).argmin(axis=0)
+    if not added.all():
+        voxels = np.flatnonzero(~inside)
+        distance = evidence.parts_of(rows, evidence.grid_points[voxels])
+        covered = (distance[added] < 0).any(axis=0)
+        cut = np.where(added[:, None], np.inf, distance)
+        owner[voxels[covered]] = cut.argmin(axis=0)[covered]
     return owner
 
 
 def _depth(evidence: Evidence, owner: NDArray[np.int64], pair: tuple[int, int]) -> float:
-    depths = evidence.grid.values.ravel()[np.isin(owner, pair)]
-    return float(-depths.min()) if len(depths) else evidence.grid.spacing
+    depths = np.abs(evidence.grid.values.ravel()[np.isin(owner, pair)])
+    return float(depths.max()) if len(depths) else evidence.grid.spacing
 
 
-def _without(occupied: NDArray[np.bool_], pair: tuple[int, int]) -> NDArray[np.bool_]:
-    others = np.ones(len(occupied), bool)
-    others[list(pair)] = False
-    return np.asarray(occupied[others].any(axis=0))
+def _replaced(rows: Any, first: int, second: int, part: Any) -> Any:
+    """The rows (M, ...) with `part` (...) in place of both."""
+    merged = rows.copy()
+    merged[first] = part
+    return np.delete(merged, second, axis=0)
+
+
+def _folded(occupied: NDArray[np.bool_], added: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Occupancy (N,) of parts (M, N) joined from first to last without blends."""
+    if added.all():
+        return np.asarray(occupied.any(axis=0))
+    result = np.zeros(occupied.shape[1], bool)
+    for one, plus in zip(occupied, added, strict=True):
+        result = result | one if plus else result & ~one
+    return result
 
 
 def _carried_out(
@@ -139,6 +171,5 @@ def _carried_out(
     moving = neighbours(evidence, rows, first) | neighbours(evidence, rows, second)
     moving[first] = True
     moving[:locked] = False
-    merged = rows.copy()
-    merged[first] = part
-    return refine(evidence, np.delete(merged, second, axis=0), TOUCH_UP, settings, np.delete(moving, second))
+    merged = _replaced(rows, first, second, part)
+    return refine(evidence, merged, TOUCH_UP, settings, np.delete(moving, second))

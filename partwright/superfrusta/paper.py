@@ -130,7 +130,7 @@ def optimise(
     locked: int = 0,
     device: str | torch.device = "cpu",
 ) -> Optimised:
-    """Minimises eq. 8 from rows (M, 17), all added, against distances (N,) with weights (N,) at points (N, 3).
+    """Minimises eq. 8 from rows (M, 17) of added parts by distances (N,) with weights (N,) at points (N, 3).
 
     The first `locked` rows stay bit for bit and always exist. Parts whose existence probability ends below
     0.5 are dropped; if that were all, the likeliest stays.

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from partwright.fields import kernel
 from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.families import held
+from partwright.superfrusta.kinds import kind_freedom, round_parts
 from partwright.superfrusta.settings import Settings
 
 # A side shorter than this is thinner than any wall that the samples can see.
@@ -38,11 +39,19 @@ def penalties(settings: Settings) -> kernel.Penalties:
     return kernel.Penalties(settings.overlap, settings.blending)
 
 
-def freedom(parts: NDArray[np.bool_], settings: Settings) -> NDArray[np.bool_]:
-    """Which parameters (M, 15) may move: all of the marked parts, less those held by the family."""
-    free = np.repeat(parts[:, None], len(kernel.DERIVATIVES), axis=1)
+def freedom(rows: Rows, moving: NDArray[np.bool_], settings: Settings) -> NDArray[np.bool_]:
+    """Which parameters (M, 15) may move: all of the parts marked in `moving` (M,), less those held by the
+    family or, among solids, by the part's kind."""
+    free = np.repeat(moving[:, None], len(kernel.DERIVATIVES), axis=1)
+    if settings.family == "solid":
+        return free & kind_freedom(rows)
     free[:, [kernel.DERIVATIVES.index(name) for name in held(settings.family, settings.smooth)]] = False
     return free
+
+
+def ties(rows: Rows, settings: Settings) -> NDArray[np.bool_]:
+    """Parts (M,) that stay round: sx and sy move as one."""
+    return round_parts(rows) if settings.family == "solid" else np.zeros(len(rows), bool)
 
 
 def optimise(evidence: Evidence, rows: Rows, stages: Stages, settings: Settings, locked: int = 0) -> Rows:
@@ -83,7 +92,8 @@ def refine(
         evidence.target(evidence.training),
         sharpened(stages, evidence.thickness),
         LIMITS,
-        free=freedom(moving, settings),
+        free=freedom(rows, moving, settings),
+        tied=ties(rows, settings),
         penalties=penalties(settings),
         threads=settings.threads,
     )

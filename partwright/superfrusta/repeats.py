@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from partwright.superfrusta.constrained import Leaf, expanded, image, refit
 from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta.kinds import SIGN
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetry import Isometry, Symmetry, groups
@@ -89,6 +90,7 @@ def candidates(
             covered = images[distinct].any(axis=0) if distinct else np.zeros(len(points), bool)
             share = (parts & covered).sum(axis=1) / sizes
             share[:locked] = share[base] = 0
+            share[rows[:, SIGN] != rows[base, SIGN]] = 0
             replaced = frozenset(np.flatnonzero(share > _COVERED).tolist())
             if replaced:
                 result.append(Repeat(base, tuple(group[i] for i in distinct), replaced))

@@ -14,15 +14,17 @@ from typing import Literal
 
 import numpy as np
 
-from partwright.assembly import Assembly, Similarity
+from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.rows import parts_from_rows
 from partwright.assembly.rows import rows as rows_of
 from partwright.errors import EmptyShapeError, SettingError
+from partwright.fields import kernel
 from partwright.shapes import Shape
 from partwright.superfrusta.constrained import Leaf, expanded
 from partwright.superfrusta.curve import with_parents
-from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta.evidence import NOTHING, Evidence, Rows
 from partwright.superfrusta.growing import grow
+from partwright.superfrusta.kinds import SIGN, is_solid, solid
 from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
 from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
@@ -30,14 +32,15 @@ from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimi
 from partwright.superfrusta.repeats import repeat
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetry import symmetries
+from partwright.superfrusta.tree import flattened, nested
 
 Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"]
 
 # In growth, parts need only pay this; the settings' alpha decides when the assembly is thinned out.
 GROWTH_ALPHA = 1e-3
 PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
+_STEM = {True: "part", False: "cut"}  # of the names of parts that are added, and subtracted
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
-NOTHING: Rows = np.empty((0, 16), np.float32)
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,7 @@ def fit(
         SettingError: `start` is no union of SuperFrusta, or a locked name is none of its parts.
     """
     settings = settings or Settings()
-    rows, fixed = starting_rows(shape, start, locked)
+    rows, fixed = starting_rows(shape, start, locked, settings)
     run = Run(settings, progress, len(fixed))
     try:
         with run.timed("prepare"):
@@ -113,15 +116,13 @@ def fit(
             "can see. Check its thickness, or use --quality high"
         )
     leaves = run.leaves or [Leaf(row) for row in run.best]
-    assembly = _assembly(
-        shape, np.stack([leaf.row for leaf in leaves]), fixed, moves=[leaf.moves for leaf in leaves]
-    )
+    moves = [leaf.moves for leaf in leaves]
+    assembly = _assembly(shape, np.stack([leaf.row for leaf in leaves]), settings, fixed, moves=moves)
     curve: list[CurvePoint] = []
     for step in run.curve:
         smaller = curve[-1].assembly if curve else None
-        curve.append(
-            CurvePoint(len(step.rows), step.score, step.iou, _assembly(shape, step.rows, fixed, smaller))
-        )
+        one = _assembly(shape, step.rows, settings, fixed, smaller)
+        curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
     return Fitted(assembly, outcome, run.seconds, run.history, tuple(reversed(curve)))
 
 
@@ -212,7 +213,7 @@ class Run:
                 return rows, True
             with self.timed("optimise"):
                 stages = FINE if len(rows) else COARSE_TO_FINE
-                rows = optimise(evidence, np.concatenate([rows, new]), stages, settings, self.locked)
+                rows = optimise(evidence, new.joined(rows, self.locked), stages, settings, self.locked)
             with self.timed("prune"):
                 rows = prune(evidence, rows, min(GROWTH_ALPHA, settings.price), self.locked)
             stale = 0 if self.keep(evidence, rows, "grow", round_ + 1) else stale + 1
@@ -261,7 +262,7 @@ class Run:
         if len(new) == 0:
             return rows
         with self.timed("optimise"):
-            return optimise(evidence, np.concatenate([rows, new]), FINE, self.settings, self.locked)
+            return optimise(evidence, new.joined(rows, self.locked), FINE, self.settings, self.locked)
 
     def one_less(self, evidence: Evidence, rows: Rows) -> Rows:
         """The cheapest way to do with one part less: a removal or a merger."""
@@ -342,28 +343,46 @@ class Run:
 
 
 def starting_rows(
-    shape: Shape, start: Assembly | None, locked: Sequence[str]
+    shape: Shape, start: Assembly | None, locked: Sequence[str], settings: Settings
 ) -> tuple[Rows, tuple[str, ...]]:
-    """Rows of an assembly in the shape's unit frame, locked parts first, and their names in that order."""
+    """Rows of an assembly in the shape's unit frame, locked parts first, and their names in that order.
+
+    For a fit of solids, parts that are none become the nearest one.
+    """
     if start is None:
         if locked:
             raise SettingError("locked parts need an assembly to start from")
         return NOTHING, ()
-    if start.operation != "union" or start.depth > 1 + len(start.parts):
-        raise SettingError("the start must be a union of parts")
-    parts = start.translated([-c for c in shape.frame.centre]).scaled(shape.frame.scale).parts
-    unknown = set(locked) - {part.name for part in parts}
+    unit = start.translated([-c for c in shape.frame.centre]).scaled(shape.frame.scale)
+    unknown = set(locked) - {part.name for part in unit.parts}
     if unknown:
-        names = ", ".join(part.name for part in parts)
+        names = ", ".join(part.name for part in unit.parts)
         raise SettingError(f"no part is named {', '.join(sorted(unknown))}; the start has {names}")
-    fixed = [copy for part in parts if part.name in locked for copy in part.copies]
-    moving = [part for part in parts if part.name not in locked]
-    return rows_of(fixed + moving).astype(np.float32), tuple(part.name for part in fixed)
+    leaves = [(copy, plus) for part, plus in flattened(unit) for copy in part.copies]
+    if not settings.subtract and not all(plus for _, plus in leaves):
+        raise SettingError("the start subtracts parts; allow it to the fit with --subtract")
+    leaves.sort(key=lambda leaf: leaf[0].name not in locked)
+    fixed = tuple(part.name for part, _ in leaves if part.name in locked)
+    if settings.family == "solid":
+        leaves = [(part if part.name in locked else nearest_part(part), plus) for part, plus in leaves]
+    signs = np.array([[1.0 if plus else -1.0] for _, plus in leaves])
+    rows = np.hstack([rows_of([part for part, _ in leaves]), signs]).astype(np.float32)
+    if not settings.smooth:
+        rows[len(fixed) :, kernel.COLUMNS.index("blend")] = 0
+    return rows, fixed
+
+
+def nearest_part(part: Part) -> Part:
+    """The part as the nearest named solid."""
+    from partwright.export.nearest import nearest_solid
+
+    return nearest_solid(part).part_with_solid
 
 
 def _assembly(
     shape: Shape,
     rows: Rows,
+    settings: Settings,
     fixed: Sequence[str] = (),
     smaller: Assembly | None = None,
     moves: Sequence[tuple[Similarity, ...]] = (),
@@ -372,10 +391,16 @@ def _assembly(
 
     moves: those of each part's further copies, if any.
     """
-    names = [*fixed, *(f"part_{i + 1:02d}" for i in range(len(fixed), len(rows)))]
-    parts = parts_from_rows(rows, names)
+    added = rows[:, SIGN] > 0
+    names = [*fixed, *(f"{_STEM[bool(added[i])]}_{i + 1:02d}" for i in range(len(fixed), len(rows)))]
+    parts = parts_from_rows(rows[:, :SIGN], names)
+    if settings.family == "solid":
+        parts = tuple(
+            replace(part, field=solid(row)) if is_solid(row) else part
+            for part, row in zip(parts, rows, strict=True)
+        )
     if moves:
         parts = tuple(replace(part, instances=m) for part, m in zip(parts, moves, strict=True))
-    whole = Assembly(parts, unit=shape.unit)
+    whole = replace(nested(parts, added.tolist(), plain=not settings.smooth), unit=shape.unit)
     whole = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
     return whole if smaller is None else with_parents(whole, smaller)

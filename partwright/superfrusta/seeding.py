@@ -11,14 +11,14 @@ from partwright.superfrusta.refining import START_BLEND
 
 _ENOUGH = 600  # points that describe a region well enough for its extents
 _NONE = np.empty((0, 4), np.float32)
-_TRIM = 3.0  # percent at either end of an extent that do not count
+TRIM = 3.0  # percent at either end of an extent that do not count
 _DILATION = 0.005
 _BOXY, _ROUND = 0.2, 0.9
 _BENT = [(turn, bulge) for turn in range(4) for bulge in (0.4, 0.9)]  # quarter turns about the axis, bulge
 
 
 def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float32] = _NONE) -> Rows:
-    """Starting rows (K, 16) for a region given by its voxel centres (n, 3).
+    """Starting rows (K, 17) for a region given by its voxel centres (n, 3).
 
     Straight ones along each principal and each frame axis, boxy and round; hollow ones along each principal
     axis; bent ones along the longest, bulging to four sides. Optimisation from all of them decides, where the
@@ -29,9 +29,9 @@ def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float
     centre = points.mean(axis=0)
     local = points - centre
     _, axes = np.linalg.eigh(local.T @ local / len(local) + 1e-8 * np.eye(3))
-    principal = [_along(axes, axis) for axis in range(3)]
+    principal = [along(axes, axis) for axis in range(3)]
     given = Rotation.from_quat(frames, scalar_first=True).as_matrix() if len(frames) else []
-    straight = [*principal, *(_along(np.eye(3), axis) for axis in range(3)), *given]
+    straight = [*principal, *(along(np.eye(3), axis) for axis in range(3)), *given]
     quarters = Rotation.from_euler("z", 90 * np.arange(4)[:, None], degrees=True).as_matrix()
 
     # frame, roundness, bulge, onion of each start
@@ -40,29 +40,29 @@ def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float
     guesses += [(principal[2] @ quarters[turn], 0.8, bulge, 0.0) for turn, bulge in _BENT]
 
     turned = np.stack([frame for frame, *_ in guesses])
-    low, high = _extents(local, turned)
-    size = np.maximum((high - low) / (1 - 0.02 * _TRIM) + 0.5 * spacing, 0.8 * spacing)
-    rows = np.empty((len(guesses), 16), np.float32)
+    low, high = extents(local, turned)
+    size = np.maximum((high - low) / (1 - 0.02 * TRIM) + 0.5 * spacing, 0.8 * spacing)
+    rows = np.empty((len(guesses), 17), np.float32)
     rows[:, :3] = centre + np.einsum("kij,kj->ki", turned, (low + high) / 2)
     rows[:, 3:7] = Rotation.from_matrix(turned).as_quat(scalar_first=True)
     rows[:, 7:10] = size
     rows[:, 10:] = [
-        (roundness, _DILATION, 1.0, bulge, onion, START_BLEND) for _, roundness, bulge, onion in guesses
+        (roundness, _DILATION, 1.0, bulge, onion, START_BLEND, 1.0) for _, roundness, bulge, onion in guesses
     ]
     return rows
 
 
-def _extents(
+def extents(
     local: NDArray[np.float64], frames: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Ends (K, 3) of the points along the columns of the frames (K, 3, 3), outliers trimmed."""
     last = len(local) - 1
-    below = int(last * _TRIM / 100)
-    along = np.partition(frames.transpose(0, 2, 1) @ local.T, (below, last - below), axis=-1)
-    return along[..., below], along[..., last - below]
+    below = int(last * TRIM / 100)
+    sorted_ = np.partition(frames.transpose(0, 2, 1) @ local.T, (below, last - below), axis=-1)
+    return sorted_[..., below], sorted_[..., last - below]
 
 
-def _along(basis: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+def along(basis: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
     """A right-handed frame whose z is the given column of the basis."""
     x, z = basis[:, (axis + 1) % 3], basis[:, axis]
     return np.stack([x, np.cross(z, x), z], axis=1)

@@ -29,9 +29,11 @@ class Settings:
             "adam", the paper's three losses by gradient descent.
         overlap, blending: weights of the quality terms of eq. 8 beside the reconstruction (paper: 1e-2 in a
             mean that is not squared). More of them costs parts and surface rather than buying less overlap.
+        subtract: parts may also be taken away from what came before them, where too much is covered.
         smooth: parts blend into each other (eq. 4); otherwise unions are plain.
-        family: "superfrustum", or less of it: "superprimitive" (no taper, no bulge) or "cuboid" (Table 2).
-            Parts of an assembly to start from keep what they have of the rest.
+        family: "superfrustum", or less of it: "superprimitive" (no taper, no bulge), "cuboid" (Table 2), or
+            "solid": each part one of the named kinds (kinds.py). Parts of an assembly to start from keep what
+            they have of the rest.
 
     Ours:
         merging: replace touching pairs of parts by one where it explains as much.
@@ -53,6 +55,7 @@ class Settings:
     optimiser: Optimiser = "newton"
     overlap: float = 0.02
     blending: float = 0.02
+    subtract: bool = False
     smooth: bool = True
     family: Family = "superfrustum"
     merging: bool = True
@@ -89,10 +92,11 @@ class Settings:
             raise SettingError(f'optimiser: expected "newton" or "adam", got {self.optimiser!r}')
         if self.family not in FAMILIES:
             raise SettingError(f"family: expected one of {', '.join(FAMILIES)}, got {self.family!r}")
-        if self.optimiser == "adam" and held(self.family, self.smooth):
+        if self.optimiser == "adam" and (held(self.family, self.smooth) or self.subtract):
             raise SettingError(
-                'optimiser "adam" moves every parameter: it needs family "superfrustum" and smooth unions, '
-                f"got {self.family!r} and smooth={self.smooth}"
+                'optimiser "adam" moves every parameter of parts that are added: it needs family "superfrustum", '
+                f"smooth unions and no subtraction, got {self.family!r}, smooth={self.smooth} and "
+                f"subtract={self.subtract}"
             )
 
     @classmethod

@@ -1,0 +1,67 @@
+"""Method "solids": assemblies of boxes, cylinders and other named solids, added and subtracted.
+
+SuperFrusta, section 5, infers programs of canonical solids by the same residual fit. Here unions are plain, each
+part is of one kind (`kinds`), and parts may also be subtracted, which the paper leaves to hollow primitives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from partwright.assembly import Assembly
+from partwright.errors import SettingError
+from partwright.shapes import Shape
+from partwright.superfrusta import resfit, settings
+from partwright.superfrusta.families import Family
+from partwright.superfrusta.resfit import Fitted, Progress
+
+
+@dataclass(frozen=True)
+class Settings(settings.Settings):
+    """The settings of a SuperFrusta fit with other defaults.
+
+    family, smooth: named solids that do not blend. subtract: on. alpha: a hole is a part and moves R by less
+    than a part of the body does.
+    """
+
+    family: Family = "solid"
+    smooth: bool = False
+    subtract: bool = True
+    alpha: float = 2e-3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.family != "solid" or self.smooth:
+            raise SettingError(
+                f'solids are of family "solid" and do not blend, got {self.family!r} and smooth={self.smooth}'
+            )
+
+    @classmethod
+    def for_quality(cls, quality: settings.Quality = "normal", **changes: Any) -> Settings:
+        """The preset `draft`, `normal` or `high`, with `changes` on top.
+
+        Raises:
+            SettingError: the preset or a change is unknown or out of range.
+        """
+        preset = asdict(settings.Settings.for_quality(quality))
+        unknown = set(changes) - set(preset)
+        if unknown:
+            raise SettingError(f"unknown settings: {', '.join(sorted(unknown))}")
+        own = ("family", "smooth", "subtract", "alpha")
+        return cls(**{name: value for name, value in preset.items() if name not in own} | changes)
+
+
+def fit(
+    shape: Shape,
+    settings: Settings | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    start: Assembly | None = None,
+    locked: Sequence[str] = (),
+) -> Fitted:
+    """Fits an assembly of named solids to a shape; as `partwright.superfrusta.fit`.
+
+    Parts of `start` that are no named solid become the nearest one, unless they are locked.
+    """
+    return resfit.fit(shape, settings or Settings(), progress, start, locked)

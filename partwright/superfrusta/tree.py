@@ -1,0 +1,129 @@
+"""Rows with signs as a tree that reads well, and such a tree as rows again.
+
+The fold of the rows is one long chain: ((a + b - c) + d) - e. Where unions are plain, a part that is subtracted
+belongs to those alone that it touches, so the chain falls apart into a union of small differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.assembly import Assembly, Part
+from partwright.assembly.rows import rows as rows_of
+from partwright.assembly.tree import Node
+from partwright.errors import SettingError
+from partwright.fields import kernel
+
+_PER_SIDE = 20  # lattice points along each side of a box in which two parts may meet
+_MEETS = -1e-4  # unit lengths: shallower than this, two parts only touch
+
+
+@dataclass
+class _Stage:
+    """Indices of parts that are added, then of those that are subtracted from all so far."""
+
+    added: list[int] = field(default_factory=list)
+    cuts: list[int] = field(default_factory=list)
+
+
+def nested(parts: Sequence[Part], added: Sequence[bool], plain: bool) -> Assembly:
+    """The fold of the parts as a tree of unions and differences.
+
+    plain: no part blends, so that each subtracted part may go to those that it cuts; one that cuts nothing is
+    left out. Otherwise the tree is the chain itself. Parts are in the unit frame.
+    """
+    if all(added):
+        return Assembly(tuple(parts))
+    meets = _meetings(parts, added) if plain else np.ones((len(parts), len(parts)), bool)
+    groups = _groups(added, meets)
+    nodes = [_node(parts, _stages(group, added, meets)) for group in groups]
+    if len(nodes) == 1 and isinstance(nodes[0], Assembly):
+        return nodes[0]
+    return Assembly(tuple(nodes))
+
+
+def flattened(node: Node) -> list[tuple[Part, bool]]:
+    """The leaves in the order of the fold, and whether each is added.
+
+    Exact for trees of `nested`; in others, a part is also taken from what another branch brought before it.
+
+    Raises:
+        SettingError: the tree has an intersection, or a difference of what is itself a difference.
+    """
+    if isinstance(node, Part):
+        return [(node, True)]
+    if node.operation == "intersection":
+        raise SettingError("the start must be made of unions and differences; it has an intersection")
+    leaves = [flattened(child) for child in node.children]
+    if node.operation == "union":
+        # Branches with differences first: what they subtract is not meant for the others.
+        leaves.sort(key=lambda branch: all(plus for _, plus in branch))
+        return [leaf for branch in leaves for leaf in branch]
+    if not all(plus for branch in leaves[1:] for _, plus in branch):
+        raise SettingError("the start subtracts a difference; only unions of parts can be subtracted")
+    return leaves[0] + [(part, False) for branch in leaves[1:] for part, _ in branch]
+
+
+def _meetings(parts: Sequence[Part], added: Sequence[bool]) -> NDArray[np.bool_]:
+    """(M, M): whether the interiors of a subtracted part and an added one meet."""
+    meets = np.zeros((len(parts), len(parts)), bool)
+    boxes = [part.bounds() for part in parts]
+    for i in np.flatnonzero(~np.array(added)):
+        for j in np.flatnonzero(added):
+            low = np.maximum(boxes[i][0], boxes[j][0])
+            high = np.minimum(boxes[i][1], boxes[j][1])
+            if (low < high).all():
+                meets[i, j] = meets[j, i] = _meet(parts[i], parts[j], low, high)
+    return meets
+
+
+def _meet(a: Part, b: Part, low: NDArray[np.float64], high: NDArray[np.float64]) -> bool:
+    steps = (np.arange(_PER_SIDE) + 0.5) / _PER_SIDE
+    lattice = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = (low + lattice * (high - low)).astype(np.float32)
+    return bool((np.maximum(*(kernel.evaluate(rows_of([part]), points) for part in (a, b))) < _MEETS).any())
+
+
+def _groups(added: Sequence[bool], meets: NDArray[np.bool_]) -> list[list[int]]:
+    """Parts that belong to one another because something is subtracted from both, in order."""
+    group = list(range(len(added)))
+    for cut in np.flatnonzero(~np.array(added)):
+        for part in range(cut):
+            if added[part] and meets[cut, part]:
+                old, new = group[part], group[cut]
+                group = [new if g == old else g for g in group]
+    members = [[i for i, g in enumerate(group) if g == label] for label in dict.fromkeys(group)]
+    members = [m for m in members if any(added[i] for i in m)]
+    return sorted(members, key=lambda m: next(i for i in m if added[i]))
+
+
+def _stages(group: list[int], added: Sequence[bool], meets: NDArray[np.bool_]) -> list[_Stage]:
+    """The group's fold in as few stages as it takes: each part goes as far to the front as it may."""
+    stages = [_Stage()]
+    for index in group:
+        if added[index]:
+            # Not before a stage whose cuts came earlier and would cut it.
+            blocked = [s for s, stage in enumerate(stages) if any(meets[c, index] for c in stage.cuts)]
+            place = blocked[-1] + 1 if blocked else 0
+            if place == len(stages):
+                stages.append(_Stage())
+            stages[place].added.append(index)
+        else:
+            cut = [s for s, stage in enumerate(stages) if any(meets[index, a] for a in stage.added)]
+            stages[cut[-1] if cut else -1].cuts.append(index)
+    return stages
+
+
+def _node(parts: Sequence[Part], stages: list[_Stage]) -> Node:
+    node: Node | None = None
+    for stage in stages:
+        children: list[Node] = ([node] if node is not None else []) + [parts[i] for i in stage.added]
+        node = children[0] if len(children) == 1 else Assembly(tuple(children))
+        if stage.cuts:
+            node = Assembly((node, *(parts[i] for i in stage.cuts)), operation="difference")
+    assert node is not None
+    return node
