@@ -70,7 +70,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--subtract",
         action=argparse.BooleanOptionalAction,
         default=None,
-        help="parts may also be subtracted: holes, slots, pockets (default: on for solids, off for superfrusta)",
+        help="parts may also be subtracted: holes, slots, pockets (default: on for solids only)",
     )
     option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
     option("--density", metavar="D", type=float, help="in kg/m3: the report then has mass and inertia")

@@ -16,7 +16,7 @@ from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export.approximation import Change, of_part
 from partwright.export.closed_quadrics import with_closed_quadrics
 from partwright.export.nearest import Approximation, nearest_solid
-from partwright.fields import Cone, Cylinder, Field, Frustum
+from partwright.fields import Cone, Cylinder, Field, Frustum, HollowBox, HollowFrustum
 
 Keep = Callable[[Part], Approximation | None]
 
@@ -38,7 +38,7 @@ def solid_tree(
         ParameterError: a part's field has no solid near it.
     """
     changes: list[Change] = []
-    tree = _solid(with_closed_quadrics(assembly.expanded()), True, keep, length, changes)
+    tree = _solid(_with_holes(with_closed_quadrics(assembly.expanded())), True, keep, length, changes)
     if tree is None:
         raise NoSurfaceError("nothing to export: no part of the assembly has a volume")
     return tree, changes  # type: ignore[return-value]  # an assembly stays one
@@ -76,6 +76,18 @@ def _nearest(part: Part) -> Approximation:
             "export STEP, OpenSCAD or a mesh instead"
         )
     return nearest_solid(part)
+
+
+def _with_holes(node: Node) -> Node:
+    """Hollow boxes and frusta as what they are outside, minus their hole."""
+    if isinstance(node, Assembly):
+        return dataclasses.replace(node, children=tuple(_with_holes(child) for child in node.children))
+    if not isinstance(node.field, HollowBox | HollowFrustum):
+        return node
+    outer, hole = node.field.pieces()
+    whole = dataclasses.replace(node, field=outer, blend=0.0)
+    cut = dataclasses.replace(node, field=hole, blend=0.0, name=f"{node.name}_hole")
+    return Assembly((whole, cut), operation="difference", blend=node.blend)
 
 
 def _plain(solid: Field) -> Field:

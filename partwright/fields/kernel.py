@@ -27,8 +27,10 @@ DERIVATIVES = ("tx", "ty", "tz", "wx", "wy", "wz", "sx", "sy", "sz",
 
 UNSIGNED = len(COLUMNS) - 1
 
-if _kernel.COLUMNS != len(COLUMNS):
-    raise ImportError("the compiled kernel is older or newer than the Python beside it: install partwright again")
+if len(COLUMNS) != _kernel.COLUMNS:
+    raise ImportError(
+        "the compiled kernel is of another version than the Python beside it: install partwright again"
+    )
 
 Rows = NDArray[np.float32]
 Floats = NDArray[np.float32]

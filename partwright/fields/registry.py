@@ -27,9 +27,19 @@ from partwright.fields.superfrustum import SuperFrustum
 KINDS: dict[str, type[Field]] = {
     field.kind: field
     for field in (
-        SuperFrustum, Box, Cylinder, Cone, Frustum, Sphere, Capsule, Tube, Torus, HollowBox, HollowFrustum,
+        SuperFrustum,
+        Box,
+        Cylinder,
+        Cone,
+        Frustum,
+        Sphere,
+        Capsule,
+        Tube,
+        Torus,
+        HollowBox,
+        HollowFrustum,
         Quadric,
-    )  # fmt: skip
+    )
 }
 
 # Kinds whose fields need more than this room: module and class, imported when a file names one.

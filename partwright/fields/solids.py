@@ -15,7 +15,6 @@ from partwright.errors import ParameterError
 from partwright.fields.base import LARGEST, Array, Field, normalise, number, scale_lengths, vector
 from partwright.fields.superfrustum import SuperFrustum
 
-
 _BEYOND = 0.1  # share of its length by which a hole goes beyond the solid, so that no faces coincide
 
 
@@ -177,7 +176,7 @@ class Torus(Solid):
 
 @dataclass(frozen=True)
 class HollowBox(Solid):
-    """A cuboid of full extents x, y, z with a rectangular hole along z that leaves walls of this thickness."""
+    """A cuboid of full extents x, y, z with a rectangular hole along z inside walls of this thickness."""
 
     kind: ClassVar[str] = "hollow_box"
     size: tuple[float, float, float]

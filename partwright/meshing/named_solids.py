@@ -8,7 +8,19 @@ from typing import Any
 import numpy as np
 from manifold3d import Manifold
 
-from partwright.fields import Box, Capsule, Cone, Cylinder, Frustum, Solid, Sphere, Torus, Tube
+from partwright.fields import (
+    Box,
+    Capsule,
+    Cone,
+    Cylinder,
+    Frustum,
+    HollowBox,
+    HollowFrustum,
+    Solid,
+    Sphere,
+    Torus,
+    Tube,
+)
 from partwright.meshing.turned import corners_of_circle, turned
 
 
@@ -16,6 +28,9 @@ def named_solid(solid: Solid, tolerance: float) -> Manifold:
     """The solid in its own frame."""
     if isinstance(solid, Box):
         return Manifold.cube(solid.size, True)
+    if isinstance(solid, HollowBox):
+        outer, hole = solid.pieces()
+        return named_solid(outer, tolerance) - named_solid(hole, tolerance)
     profile = _PROFILES[type(solid)](solid, tolerance)
     return turned(profile, corners_of_circle(float(profile[:, 0].max()), tolerance))
 
@@ -47,6 +62,13 @@ def _tube(solid: Tube, _: float) -> np.ndarray:
     return np.array([(outer, -half), (outer, half), (inner, half), (inner, -half)])
 
 
+def _hollow_frustum(solid: HollowFrustum, _: float) -> np.ndarray:
+    share, half = 1 - solid.thickness / solid.bottom_radius, solid.height / 2
+    outer = [(solid.bottom_radius, -half), (solid.top_radius, half)]
+    inner = [(share * radius, z) for radius, z in reversed(outer)]
+    return np.array([*outer, *(inner if solid.top_radius > 0 else inner[1:])])
+
+
 _PROFILES: dict[type[Solid], Callable[[Any, float], np.ndarray]] = {
     Cylinder: lambda s, _: _frustum(s.radius, s.radius, s.height),
     Cone: lambda s, _: _frustum(s.radius, 0.0, s.height),
@@ -57,4 +79,5 @@ _PROFILES: dict[type[Solid], Callable[[Any, float], np.ndarray]] = {
         _arc(s.minor_radius, 0.0, 4.0, tolerance)[:-1] + np.array([s.major_radius, 0.0])
     ),
     Tube: _tube,
+    HollowFrustum: _hollow_frustum,
 }

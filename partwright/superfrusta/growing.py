@@ -34,9 +34,9 @@ class Region:
 
     depth: of the erosion. margin: how far around the region samples count, as a share of its longest side.
     elsewhere: weight of samples outside the region that the others do not explain either. frames: rotations
-    (w, x, y, z) to start from beside the principal axes. sign: +1 for a part to add where the shape is missed,
-    -1 for one to subtract where too much is covered. under: the part goes before those that are subtracted,
-    so that it may run through them.
+    (w, x, y, z) to start from beside the principal axes. sign: +1 for a part to add where the shape is
+    missed, -1 for one to subtract where too much is covered. under: the part goes before those that are
+    subtracted, so that it may run through them.
     """
 
     voxels: NDArray[np.bool_]
@@ -51,7 +51,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Grown:
-    """New rows: `first` go before all that move, so that what is subtracted cuts them too, `last` to the end."""
+    """New rows: `first` go before all that move, so that cuts reach them too, `last` to the end."""
 
     first: Rows
     last: Rows
@@ -73,7 +73,7 @@ class View:
 
 
 def regions(evidence: Evidence, rows: Rows, settings: Settings) -> list[Region]:
-    """Pieces of the residual max(S, -F), to add to, and of max(F, -S), to subtract from where that is allowed."""
+    """Pieces of the residual max(S, -F), to add, and, where settings allow, of max(F, -S), to subtract."""
     values, field = evidence.grid.values, evidence.grid_field(rows)
     found = _pieces(evidence, np.maximum(values, -field), rows, settings, 1.0)
     if settings.subtract and len(rows):
@@ -148,8 +148,8 @@ def finalists(
 ) -> tuple[Rows, NDArray[np.int64], NDArray[np.float64]]:
     """Some parts fitted to each region, the regions that they are for, and their losses.
 
-    All starts are screened briefly on few samples, and the best go on. `overlap` is the price of running into the other parts. Growth asks none: a new part that may not cross
-    what is there gets stuck in its region.
+    All starts are screened briefly on few samples, and the best go on. `overlap` is the price of running into
+    the other parts. Growth asks none: a new part that may not cross what is there gets stuck in its region.
     """
     views = [_view(evidence, region) for region in wanted]
     guesses = [_guesses(evidence, region, settings) for region in wanted]

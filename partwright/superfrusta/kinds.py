@@ -3,8 +3,8 @@
 A row says itself what kind it is: a parameter at its plain value (a roundness, a taper of 1, a size of 0) is
 held there, and so no fit changes a part's kind. The paper (section 5) mixes the parameters of all kinds with
 barycentric weights and sharpens the mix to one of them; a mix of a box and a sphere is neither, and which of
-them it leans to is settled by the first steps. Here every kind starts on its own for every region, is fitted by
-its own few parameters, and the best one wins; other kinds are tried again once all parts are there.
+them it leans to is settled by the first steps. Here every kind starts on its own for every region, is fitted
+by its own few parameters, and the best one wins; plainer kinds are tried again once all parts are there.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def round_parts(rows: Rows) -> NDArray[np.bool_]:
 
 
 def solid(row: Rows) -> Field:
-    """The named field of a row (17,). float32 values keep their shortest decimal form: 0.1, not 0.100000001."""
+    """The named field of a row (17,); float32 values keep their shortest decimal form."""
     sx, sy, sz, roundness, dilation, taper, _, onion = (float(str(v)) for v in row[7:15])
     if sx == sy == 0:
         return Capsule(dilation, sz) if sz > 0 else Sphere(dilation)

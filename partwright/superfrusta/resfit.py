@@ -31,6 +31,7 @@ from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
 from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimise
 from partwright.superfrusta.repeats import repeat
 from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.settling import cut_through, plainer_kinds
 from partwright.superfrusta.symmetry import symmetries
 from partwright.superfrusta.tree import flattened, nested
 
@@ -167,6 +168,10 @@ class Run:
             self.choose(evidence)
         if self.best is None:
             return "converged"
+        if settings.family == "solid":
+            with self.timed("settle"):
+                plain = plainer_kinds(evidence, self.best, settings, self.locked)
+                self.best = cut_through(evidence, plain, self.locked)
         if settings.curve:
             self.descend(evidence, self.best)
         if settings.min_iou is not None and volume_iou(evidence, self.best) >= settings.min_iou:
@@ -208,7 +213,8 @@ class Run:
         stale = 0
         for round_ in range(settings.rounds):
             with self.timed("grow"):
-                new = grow(evidence, rows, replace(settings, regions=self.regions), self.regions)
+                most = settings.at_once(round_, self.regions)
+                new = grow(evidence, rows, replace(settings, regions=self.regions), most)
             if len(new) == 0:
                 return rows, True
             with self.timed("optimise"):
@@ -243,6 +249,8 @@ class Run:
             rows = optimise(evidence, rows, POLISH, settings, self.locked)
             if evidence.learn(rows):
                 rows = optimise(evidence, rows, POLISH, settings, self.locked)
+            if settings.family == "solid":
+                rows = plainer_kinds(evidence, rows, settings, self.locked)
         return rows
 
     def worthwhile(self, evidence: Evidence, thinned: Rows, kept: float, whole: float) -> bool:

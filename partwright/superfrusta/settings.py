@@ -94,9 +94,9 @@ class Settings:
             raise SettingError(f"family: expected one of {', '.join(FAMILIES)}, got {self.family!r}")
         if self.optimiser == "adam" and (held(self.family, self.smooth) or self.subtract):
             raise SettingError(
-                'optimiser "adam" moves every parameter of parts that are added: it needs family "superfrustum", '
-                f"smooth unions and no subtraction, got {self.family!r}, smooth={self.smooth} and "
-                f"subtract={self.subtract}"
+                'optimiser "adam" moves all parameters of parts that are added: it needs family '
+                f'"superfrustum", smooth unions and no subtraction, got {self.family!r}, '
+                f"smooth={self.smooth} and subtract={self.subtract}"
             )
 
     @classmethod
@@ -112,6 +112,11 @@ class Settings:
         if unknown:
             raise SettingError(f"unknown settings: {', '.join(sorted(unknown))}")
         return replace(PRESETS[quality], **changes)
+
+    def at_once(self, round_: int, most: int) -> int:
+        """Parts that one round may add: few at first where some are subtracted, for each changes what is left
+        to explain."""
+        return min(most, 1 + round_ // 2) if self.subtract else most
 
     @property
     def price(self) -> float:

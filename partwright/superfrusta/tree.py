@@ -1,7 +1,7 @@
 """Rows with signs as a tree that reads well, and such a tree as rows again.
 
-The fold of the rows is one long chain: ((a + b - c) + d) - e. Where unions are plain, a part that is subtracted
-belongs to those alone that it touches, so the chain falls apart into a union of small differences.
+The fold of the rows is one long chain: ((a + b - c) + d) - e. Where unions are plain, a part that is
+subtracted belongs to those alone that it meets, so the chain falls apart into a union of small differences.
 """
 
 from __future__ import annotations
@@ -72,8 +72,9 @@ def _meetings(parts: Sequence[Part], added: Sequence[bool]) -> NDArray[np.bool_]
     """(M, M): whether the interiors of a subtracted part and an added one meet."""
     meets = np.zeros((len(parts), len(parts)), bool)
     boxes = [part.bounds() for part in parts]
-    for i in np.flatnonzero(~np.array(added)):
-        for j in np.flatnonzero(added):
+    cuts = [i for i, plus in enumerate(added) if not plus]
+    for i in cuts:
+        for j in set(range(len(parts))) - set(cuts):
             low = np.maximum(boxes[i][0], boxes[j][0])
             high = np.minimum(boxes[i][1], boxes[j][1])
             if (low < high).all():

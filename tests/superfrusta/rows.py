@@ -21,15 +21,15 @@ def row(
     onion=0.0,
     blend=0.02,
 ) -> np.ndarray:
-    """One row (16,) with a unit quaternion."""
+    """One row (17,) with a unit quaternion, added."""
     unit = np.array(rotation) / np.linalg.norm(rotation)
-    return np.array([*centre, *unit, *size, roundness, dilation, taper, bulge, onion, blend], np.float32)
+    return np.array([*centre, *unit, *size, roundness, dilation, taper, bulge, onion, blend, 1.0], np.float32)
 
 
 def subtracting(rows: np.ndarray, *which: int) -> np.ndarray:
     """The rows with their signs (M, 17), those of these indices subtracted."""
     signs = np.where(np.isin(np.arange(len(rows)), which), -1.0, 1.0)
-    return np.hstack([rows, signs[:, None]]).astype(np.float32)
+    return np.hstack([rows[:, :16], signs[:, None]]).astype(np.float32)
 
 
 def ball(radius: float, centre=(0.0, 0.0, 0.0)) -> np.ndarray:
@@ -65,7 +65,7 @@ def disturbed(one: np.ndarray) -> np.ndarray:
 
 
 def random_rows(parts: int, seed: int) -> np.ndarray:
-    """Rows (M, 16) well inside the ranges, so that everything has a derivative."""
+    """Rows (M, 17) well inside the ranges, so that everything has a derivative."""
     generator = np.random.default_rng(seed)
     made = []
     for _ in range(parts):

@@ -62,8 +62,8 @@ def test_held_values_replace_others_and_make_starts_equal() -> None:
     ("changes", "message"),
     [
         ({"family": "sphere"}, "superfrustum, superprimitive, cuboid"),
-        ({"family": "cuboid", "optimiser": "adam"}, "moves every parameter"),
-        ({"smooth": False, "optimiser": "adam"}, "moves every parameter"),
+        ({"family": "cuboid", "optimiser": "adam"}, "moves all parameters"),
+        ({"smooth": False, "optimiser": "adam"}, "moves all parameters"),
     ],
 )
 def test_settings_name_what_cannot_be(changes, message: str) -> None:

@@ -19,7 +19,7 @@ from tests.superfrusta.meshes import box, union
 from tests.superfrusta.rows import box as box_row
 
 SETTINGS = Settings.for_quality("draft", threads=1)
-NONE = np.empty((0, 16), np.float32)
+NONE = np.empty((0, 17), np.float32)
 
 # Two blocks apart along x, in the unit frame already: 1.8 long.
 LEFT = ((0.6, 0.8, 0.5), (-0.6, 0.0, 0.0))
@@ -37,7 +37,7 @@ def exact() -> np.ndarray:
 
 
 def test_two_blocks_grow_two_parts(pair: Evidence, exact: np.ndarray) -> None:
-    grown = grow(pair, NONE, SETTINGS, most=5)
+    grown = grow(pair, NONE, SETTINGS, most=5).last
     assert len(grown) == 2
     assert score(pair, grown) > 0.95
     assert np.sort(grown[:, 0]) == pytest.approx([-0.6, 0.6], abs=0.02)
@@ -45,12 +45,12 @@ def test_two_blocks_grow_two_parts(pair: Evidence, exact: np.ndarray) -> None:
 
 def test_what_is_explained_already_grows_nothing(pair: Evidence, exact: np.ndarray) -> None:
     assert score(pair, exact) > 0.998
-    assert grow(pair, exact, SETTINGS, most=5).shape == (0, 16)
+    assert len(grow(pair, exact, SETTINGS, most=5)) == 0
 
 
 def test_the_other_block_grows_where_one_is_missing(pair: Evidence, exact: np.ndarray) -> None:
     for there, missing in ((0, 1), (1, 0)):
-        grown = grow(pair, exact[[there]], SETTINGS, most=5)
+        grown = grow(pair, exact[[there]], SETTINGS, most=5).last
         assert len(grown) == 1
         points = pair.points[pair.near :]
         occupied, wanted = (kernel.evaluate(r, points) < 0 for r in (grown, exact[[missing]]))
@@ -58,18 +58,18 @@ def test_the_other_block_grows_where_one_is_missing(pair: Evidence, exact: np.nd
 
 
 def test_no_more_than_wanted_grow_and_the_best_comes_first(pair: Evidence) -> None:
-    assert grow(pair, NONE, SETTINGS, most=0).shape == (0, 16)
-    one = grow(pair, NONE, SETTINGS, most=1)
+    assert len(grow(pair, NONE, SETTINGS, most=0)) == 0
+    one = grow(pair, NONE, SETTINGS, most=1).last
     assert len(one) == 1
     assert one[0, 0] < 0  # the larger block
 
 
 def test_growing_repeats_at_any_number_of_threads(pair: Evidence) -> None:
-    first = grow(pair, NONE, SETTINGS, most=5)
+    first = grow(pair, NONE, SETTINGS, most=5).last
     for threads in (1, 2):
         again = dataclasses.replace(pair, threads=threads)
         changed = Settings.for_quality("draft", threads=threads)
-        np.testing.assert_array_equal(grow(again, NONE, changed, most=5), first)
+        np.testing.assert_array_equal(grow(again, NONE, changed, most=5).last, first)
 
 
 def test_pruning_drops_copies_crumbs_and_strays_only(pair: Evidence, exact: np.ndarray) -> None:

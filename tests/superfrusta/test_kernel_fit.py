@@ -24,7 +24,7 @@ STAGES = ((15.0, 20), (40.0, 20), (100.0, 30))
 BOTH = kernel.Penalties(overlap=0.3, blending=0.2)
 BLEND = kernel.DERIVATIVES.index("blend")
 SX, SZ, BULGE = (kernel.DERIVATIVES.index(name) for name in ("sx", "sz", "bulge"))
-SIZES = slice(kernel.COLUMNS.index("sx"), None)
+SIZES = slice(kernel.COLUMNS.index("sx"), kernel.COLUMNS.index("sign"))
 # A quaternion's entries move with the local rotation; every other derivative has a column of its own.
 COLUMN_OF = {d: kernel.COLUMNS.index(name) for d, name in enumerate(kernel.DERIVATIVES) if name[0] != "w"}
 

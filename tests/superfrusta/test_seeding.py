@@ -32,7 +32,7 @@ def local(rows: np.ndarray, points: np.ndarray) -> np.ndarray:
 def check(rows: np.ndarray) -> None:
     """What every start must be, whatever the region: finite, in range, with a proper rotation."""
     assert rows.dtype == np.float32
-    assert rows.shape[1] == 16
+    assert rows.shape[1] == 17
     assert len(rows) > 0
     assert np.isfinite(rows).all()
     np.testing.assert_allclose(np.linalg.norm(rows[:, 3:7], axis=1), 1, atol=1e-5)

@@ -23,6 +23,7 @@ from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetry import Isometry, Symmetry, groups, mirror, rotation, symmetries
 from tests.assembly.strategies import ROTATION, SUPERFRUSTA, VECTOR
 from tests.superfrusta.meshes import box, table, union
+from tests.superfrusta.rows import subtracting
 
 DRAFT = replace(Settings.for_quality("draft"), near=6000, uniform=6000, resolution=48)
 POINTS = np.random.default_rng(0).uniform(-2, 2, (300, 3)).astype(np.float32)
@@ -106,7 +107,7 @@ def known_table() -> tuple[Evidence, np.ndarray, tuple[Symmetry, ...]]:
     boxes += [((0.15, 0.15, 1.05), (x, y, 0.5)) for x in (-0.85, 0.85) for y in (-0.5, 0.5)]
     parts = Assembly(tuple(Part(SuperFrustum(size), place, blend=0.001) for size, place in boxes))
     unit = parts.translated([-c for c in shape.frame.centre]).scaled(shape.frame.scale)
-    return Evidence.of(shape, DRAFT), rows(unit.parts).astype(np.float32), symmetries(shape, DRAFT)
+    return Evidence.of(shape, DRAFT), subtracting(rows(unit.parts)), symmetries(shape, DRAFT)
 
 
 def test_legs_of_a_table_become_one_leaf() -> None:

@@ -1,0 +1,119 @@
+"""What is decided once all solids are there: plainer kinds, and cuts that go all the way through."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.assembly.similarity import rotation_matrix
+from partwright.fields import kernel
+from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta.kinds import SIGN, SX, SY, SZ
+from partwright.superfrusta.objective import score
+from partwright.superfrusta.pruning import neighbours
+from partwright.superfrusta.refining import TOUCH_UP, refine
+from partwright.superfrusta.settings import Settings
+
+Row = NDArray[np.float32]
+
+_ROUNDNESS, _DILATION, _TAPER, _ONION = (
+    kernel.COLUMNS.index(name) for name in ("roundness", "dilation", "taper", "onion")
+)
+_LOSS = 5e-4  # of R: a plainer kind may cost so much
+_PROMISING = 0.01  # of R: a kind that costs more before its refit is not tried
+_BEYOND = 0.06  # unit lengths by which a cut goes beyond the solid
+_HARMLESS = 2e-5  # of R
+
+
+def plainer_kinds(evidence: Evidence, rows: Rows, settings: Settings, locked: int = 0) -> Rows:
+    """Each part as the plainest kind that explains as much.
+
+    A frustum that hardly tapers becomes a cylinder, and so does a tube with hardly a hole, or a capsule whose
+    ends are flat. The part and its neighbours are refitted before the two are compared.
+    """
+    whole = score(evidence, rows)
+    for index in range(locked, len(rows)):
+        for plainer in _plainer(rows[index]):
+            trial = rows.copy()
+            trial[index] = plainer
+            if score(evidence, trial) < whole - _PROMISING:
+                continue
+            moving = neighbours(evidence, rows, index)
+            moving[index], moving[:locked] = True, False
+            trial = refine(evidence, trial, TOUCH_UP, settings, moving)
+            reached = score(evidence, trial)
+            if reached >= whole - _LOSS:
+                rows, whole = trial, reached
+                break
+    return rows
+
+
+def _plainer(row: Row) -> list[Row]:
+    """The row (17,) as kinds of fewer parameters, the plainest first."""
+    if row[_DILATION] > 0:
+        return _of_dilated(row)
+    hollow = row[_ONION] > 0
+    if row[_ROUNDNESS] == 0:
+        return [_changed(row, onion=0.0)] if hollow else []
+    if row[_TAPER] in (0, 1):
+        return [_changed(row, onion=0.0)] if hollow else []
+    width = float(row[SX]) * (1 + float(row[_TAPER])) / 2
+    straight = _changed(row, sx=width, sy=width, taper=1.0)
+    trials = [_changed(straight, onion=0.0)] if hollow else []
+    trials += [straight]
+    trials += [_changed(row, onion=0.0)] if hollow else []
+    trials += [_changed(row, taper=0.0)] if row[_TAPER] < 0.3 else []
+    return trials
+
+
+def _of_dilated(row: Row) -> list[Row]:
+    """Capsules as spheres, cylinders and boxes; rings as tubes."""
+    radius, length = float(row[_DILATION]), float(row[SZ])
+    if length > 0:
+        whole = {"sx": 2 * radius, "sy": 2 * radius, "sz": length + 2 * radius, "dilation": 0.0}
+        short = _changed(row, sz=0.0, dilation=radius + length / 4)
+        return [short, _changed(row, roundness=1.0, **whole), _changed(row, roundness=0.0, **whole)]
+    if row[SX] > 0:
+        outer = float(row[SX]) + 2 * radius
+        return [_changed(row, sx=outer, sy=outer, sz=2 * radius, dilation=0.0, onion=1 - 4 * radius / outer)]
+    return []
+
+
+def _changed(row: Row, **values: float) -> Row:
+    result = row.copy()
+    for name, value in values.items():
+        result[kernel.COLUMNS.index(name)] = value
+    return result
+
+
+def cut_through(evidence: Evidence, rows: Rows, locked: int = 0) -> Rows:
+    """Subtracted parts made longer where they end in the open, so that no skin is left over a hole.
+
+    A fit does not care how far a cut goes where nothing is; a CAD program does when two faces coincide.
+    """
+    least = score(evidence, rows) - _HARMLESS
+    for index in range(locked, len(rows)):
+        if rows[index, SIGN] > 0:
+            continue
+        for axis, side in _ends(rows[index]):
+            trial = rows.copy()
+            trial[index] = _extended(rows[index], axis, side)
+            if score(evidence, trial) >= least:
+                rows = trial
+    return rows
+
+
+def _ends(row: Row) -> list[tuple[int, float]]:
+    """The faces that may move on their own: all six of a box, both ends of a straight round part."""
+    if row[_DILATION] > 0 or row[_TAPER] != 1:
+        return []
+    axes = (0, 1, 2) if row[_ROUNDNESS] == 0 and row[_ONION] == 0 else (2,)
+    return [(axis, side) for axis in axes for side in (-1.0, 1.0)]
+
+
+def _extended(row: Row, axis: int, side: float) -> Row:
+    result = row.copy()
+    w, x, y, z = (float(v) for v in row[3:7])
+    result[:3] += side * _BEYOND / 2 * rotation_matrix((w, x, y, z))[:, axis]
+    result[(SX, SY, SZ)[axis]] += _BEYOND
+    return result
