@@ -3,7 +3,19 @@
 from __future__ import annotations
 
 from partwright.metrics.purity import Purity, owners, purity
+from partwright.metrics.reconstruction import ReconstructionScores, mean_scores, reconstruction_scores
 from partwright.metrics.report import Scores, evaluate
 from partwright.metrics.stability import Stability, stability
 
-__all__ = ["Purity", "Scores", "Stability", "evaluate", "owners", "purity", "stability"]
+__all__ = [
+    "Purity",
+    "ReconstructionScores",
+    "Scores",
+    "Stability",
+    "evaluate",
+    "mean_scores",
+    "owners",
+    "purity",
+    "reconstruction_scores",
+    "stability",
+]
