@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from partwright.cli import parts_prepare
+from partwright.cli import parts_edit, parts_interpolate, parts_prepare, parts_reconstruct, parts_train
 
-COMMANDS = (parts_prepare,)
+COMMANDS = (parts_prepare, parts_train, parts_reconstruct, parts_edit, parts_interpolate)
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

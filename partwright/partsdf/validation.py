@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 import torch
 
 from partwright.assembly.palette import palette
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
-from partwright.errors import NoSurfaceError
 from partwright.partsdf.config import Config
 from partwright.partsdf.losses import clamped_error
-from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.pictures import blank, picture
 from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct
 from partwright.render import render_mesh, sheet, write_png
 
@@ -43,10 +41,10 @@ class Validation:
             held = np.arange(len(shape.sdf)) % HELD_OUT == 0
             found = reconstruct(model, _rows(shape, ~held), settings)
             scores.append(_scores(found, _rows(shape, held)))
-            panels += [_target_picture(shape), _picture(found)]
-        picture = sheet(panels, columns=2)
-        write_png(self._folder / f"validation_{epoch:05d}.png", picture)
-        return {name: float(np.mean([s[name] for s in scores])) for name in scores[0]}, picture
+            panels += [_target_picture(shape), picture(found, RESOLUTION, PANEL)]
+        page = sheet(panels, columns=2)
+        write_png(self._folder / f"validation_{epoch:05d}.png", page)
+        return {name: float(np.mean([s[name] for s in scores])) for name in scores[0]}, page
 
 
 def _rows(shape: PreparedShape, rows: np.ndarray) -> PreparedShape:
@@ -75,29 +73,11 @@ def _iou(a: np.ndarray, b: np.ndarray) -> float:
     return np.count_nonzero(a & b) / union if union else 1.0
 
 
-def _picture(found: NeuralShape) -> np.ndarray:
-    """The reconstruction, coloured by part; blank where nothing came out."""
-    import trimesh
-
-    try:
-        parts = mesh_shape(found, RESOLUTION).parts
-    except NoSurfaceError:
-        return _blank()
-    colours = palette(len(found.model.parts))
-    faces = [np.tile(colours[found.model.index(n)], (len(m.faces), 1)) for n, m in parts.items()]
-    mesh = cast(trimesh.Trimesh, trimesh.util.concatenate(list(parts.values())))
-    return render_mesh(mesh, size=(PANEL, PANEL), colours=np.concatenate(faces))
-
-
 def _target_picture(shape: PreparedShape) -> np.ndarray:
     """The shape itself, blank where the family was prepared without its surface."""
     import trimesh
 
     if not len(shape.faces):
-        return _blank()
+        return blank(PANEL)
     mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
     return render_mesh(mesh, size=(PANEL, PANEL), colours=palette(len(shape.present))[shape.label])
-
-
-def _blank() -> np.ndarray:
-    return np.full((PANEL, PANEL, 3), 255, dtype=np.uint8)

@@ -1,0 +1,57 @@
+"""`partwright parts interpolate`: a film from one learned shape to another."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "interpolate",
+        help="draw the way from one learned shape to another",
+        description="Draws the shapes between two shapes of one model: a GIF, and a contact sheet beside it "
+        "(.png). A and B are assemblies of neural parts (.json), or MODEL:NAME as for `parts edit`.",
+    )
+    command.add_argument("first", metavar="A", help="an assembly (.json) or MODEL:NAME")
+    command.add_argument("second", metavar="B", help="another of the same model")
+    command.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="film (.gif)")
+    option = command.add_argument
+    option("--model", metavar="FILE", help="the model of A and B, if it does not ship")
+    option("--steps", metavar="N", type=int, default=24, help="pictures one way (default: %(default)s)")
+    option("--size", metavar="N", type=int, default=320, help="pixels a side (default: %(default)s)")
+    option(
+        "--resolution",
+        metavar="N",
+        type=int,
+        default=96,
+        help="cells along the unit frame, a multiple of 8 (default: %(default)s)",
+    )
+    command.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from partwright.partsdf.pictures import film
+    from partwright.partsdf.sources import open_source
+    from partwright.render import Camera
+
+    first = open_source(arguments.first, arguments.model)
+    second = open_source(arguments.second)
+    still = film(
+        first.shape,
+        second.shape,
+        arguments.output,
+        arguments.steps,
+        arguments.resolution,
+        arguments.size,
+        Camera(up=first.up or "z"),
+        _show,
+    )
+    print(f"written to {arguments.output}, sheet in {still}")
+    return 0
+
+
+def _show(done: int, of: int) -> None:
+    import sys
+
+    print(f"partwright: picture {done}/{of}", file=sys.stderr, flush=True)

@@ -1,0 +1,70 @@
+"""`partwright parts reconstruct`: a shape as parts of a trained model."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "reconstruct",
+        help="find the parts of a shape with a trained model",
+        description="Finds latents and poses of a model's parts that make up a plain shape, without labels. "
+        "Writes assembly.json, parts.glb, surface.ply, report.json and preview.png. The shape has to stand "
+        "as those that the model was trained on.",
+    )
+    command.add_argument("model", metavar="MODEL", help="a model that ships, or a file (.safetensors)")
+    command.add_argument("shape", metavar="SHAPE", type=Path, help="mesh, points, grid or STEP file")
+    option = command.add_argument
+    option("-o", "--output", metavar="DIR", type=Path, help="where to write; SHAPE-parts if not given")
+    option("--iterations", metavar="N", type=int, default=400, help="steps (default: %(default)s)")
+    option("--points", metavar="N", type=int, default=2048, help="samples a step (default: %(default)s)")
+    option(
+        "--start",
+        choices=("nearest", "mean"),
+        default="nearest",
+        help="from which training shape: the one that fits best, or their mean (default: %(default)s)",
+    )
+    option(
+        "--resolution",
+        metavar="N",
+        type=int,
+        default=128,
+        help="cells along the unit frame, a multiple of 8 (default: %(default)s)",
+    )
+    option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
+    option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
+    option("--seed", metavar="S", type=int, default=0, help="of the samples (default: %(default)s)")
+    command.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from partwright.partsdf.model import load_model
+    from partwright.partsdf.reconstruction import ReconstructionSettings
+    from partwright.partsdf.results import reconstruct_shape
+    from partwright.shapes import load_shape
+    from partwright.writing import check_folder
+
+    folder: Path = arguments.output or Path(f"{arguments.shape.stem}-parts")
+    check_folder(folder)
+    settings = ReconstructionSettings(
+        arguments.iterations, arguments.points, start=arguments.start, seed=arguments.seed
+    )
+    model = load_model(arguments.model)
+    shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
+    result = reconstruct_shape(model, shape, settings, arguments.resolution, _show)
+    result.save(folder)
+    scores = result.report["scores"]
+    absent = result.report["absent"]
+    print(f"parts: {', '.join(result.neural.names())}" + (f"; absent: {', '.join(absent)}" if absent else ""))
+    print(f"IoU {scores['iou']:.4f}, Chamfer x 10,000 {1e4 * scores['chamfer']:.2f}")
+    print(f"written to {folder}")
+    return 0
+
+
+def _show(done: int, of: int, loss: float) -> None:
+    import sys
+
+    if done == 1 or done % 50 == 0 or done == of:
+        print(f"partwright: step {done}/{of}  loss {loss:.5f}", file=sys.stderr, flush=True)

@@ -1,0 +1,97 @@
+"""Neural shapes as pictures: stills coloured by part, and films from one shape to another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from partwright.assembly.palette import palette
+from partwright.errors import NoSurfaceError, SettingError, UnsupportedFormatError
+from partwright.partsdf.editing import interpolated
+from partwright.partsdf.meshing import mesh_shape
+from partwright.partsdf.neural import NeuralShape
+from partwright.render import Camera, render_mesh, sheet, write_png
+from partwright.render.output import write
+
+if TYPE_CHECKING:
+    import trimesh
+
+_SHOWN = 8  # pictures of a contact sheet
+_FRAME = 60  # milliseconds
+_PAUSE = 8  # frames' time at either end
+
+
+def coloured_parts(shape: NeuralShape, resolution: int) -> tuple[trimesh.Trimesh, np.ndarray]:
+    """All parts as one mesh, unit frame, and a colour (F, 3) a face; raises NoSurfaceError."""
+    import trimesh
+
+    parts = mesh_shape(shape, resolution).parts
+    colours = palette(len(shape.model.parts))
+    faces = [np.tile(colours[shape.model.index(n)], (len(m.faces), 1)) for n, m in parts.items()]
+    mesh = cast("trimesh.Trimesh", trimesh.util.concatenate(list(parts.values())))
+    return mesh, np.concatenate(faces)
+
+
+def picture(
+    shape: NeuralShape, resolution: int = 96, size: int = 320, camera: Camera | None = None
+) -> np.ndarray:
+    """(size, size, 3) uint8, each part in its colour; blank where the shape has no surface."""
+    try:
+        mesh, colours = coloured_parts(shape, resolution)
+    except NoSurfaceError:
+        return blank(size)
+    return render_mesh(mesh, camera, (size, size), colours)
+
+
+def blank(size: int) -> np.ndarray:
+    return np.full((size, size, 3), 255, dtype=np.uint8)
+
+
+def film(
+    a: NeuralShape,
+    b: NeuralShape,
+    path: str | Path,
+    steps: int = 24,
+    resolution: int = 96,
+    size: int = 320,
+    camera: Camera | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Write a GIF from a to b and back, and a contact sheet beside it (same name, .png); returns the sheet.
+
+    Raises:
+        UnsupportedFormatError: the suffix is not .gif.
+        SettingError: fewer than two steps.
+    """
+    from PIL import Image
+
+    path = Path(path)
+    if path.suffix.lower() != ".gif":
+        raise UnsupportedFormatError(f"{path}: films are written as .gif")
+    if steps < 2:
+        raise SettingError(f"steps is {steps}; expected 2 or more")
+    frames = []
+    for i in range(steps):
+        t = i / (steps - 1)
+        frames.append(picture(interpolated(a, b, t), resolution, size, _fixed(camera)))
+        if progress:
+            progress(i + 1, steps)
+    first, *rest = [
+        Image.fromarray(f).quantize(128, dither=Image.Dither.NONE) for f in [*frames, *frames[-2:0:-1]]
+    ]
+    times = [_FRAME * (_PAUSE if i in (0, steps - 1) else 1) for i in range(len(rest) + 1)]
+    options = {"save_all": True, "append_images": rest, "duration": times, "loop": 0}
+    write(path, lambda name: first.save(name, format="GIF", **options))
+    chosen = np.unique(np.linspace(0, steps - 1, min(_SHOWN, steps)).round().astype(int))
+    captions = [f"{i / (steps - 1):.2f}" for i in chosen]
+    still = path.with_suffix(".png")
+    write_png(still, sheet([frames[i] for i in chosen], captions, columns=min(4, len(chosen))))
+    return still
+
+
+def _fixed(camera: Camera | None) -> Camera:
+    return replace(camera or Camera(), margin=0.12)

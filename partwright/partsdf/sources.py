@@ -1,0 +1,52 @@
+"""What the commands take as a neural shape: an assembly file, or MODEL:SHAPE for a training shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from partwright.assembly import Assembly, load_assembly
+from partwright.errors import SettingError
+from partwright.partsdf.assemblies import UNIT_FRAME, from_assembly, to_assembly
+from partwright.partsdf.model import load_model
+from partwright.partsdf.neural import NeuralShape
+from partwright.shapes import UnitFrame
+
+
+@dataclass(frozen=True)
+class Source:
+    """A neural shape and what its assembly says besides: frame, unit, up axis and name."""
+
+    shape: NeuralShape
+    frame: UnitFrame = UNIT_FRAME
+    unit: str | None = None
+    up: str | None = None
+    name: str = ""
+
+    def assembly(self, shape: NeuralShape) -> Assembly:
+        """An edited shape as an assembly in the same units and place."""
+        return to_assembly(shape, self.frame, self.unit, self.up, self.name)
+
+
+def open_source(text: str, model: str | None = None) -> Source:
+    """A neural shape by an assembly's file, or by MODEL:SHAPE, where SHAPE is a name or number.
+
+    model: a model's file, for assemblies whose model does not ship.
+
+    Raises:
+        SettingError: it is neither, or the model was not trained on the shape.
+        ModelError, UnreadableFileError, AssemblyFileError: as the model and the assembly.
+    """
+    if model is not None:
+        load_model(model)
+    if Path(text).suffix == ".json":
+        assembly = load_assembly(text)
+        shape, frame = from_assembly(assembly)
+        name = str(assembly.metadata.get("source", Path(text).stem))
+        return Source(shape, frame, assembly.unit, assembly.up, name)
+    source, colon, shape_name = text.rpartition(":")
+    if not colon:
+        raise SettingError(
+            f"{text!r} is no assembly file (.json) and no MODEL:SHAPE, such as mixers:0; give one of these"
+        )
+    return Source(NeuralShape.trained(load_model(source), shape_name), name=shape_name)

@@ -1,0 +1,153 @@
+"""The commands, from a configuration to edited shapes and films, on a tiny family."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+import partwright as pw
+from partwright.cli.main import main
+from partwright.datasets.prepared import PreparedFamily
+from partwright.errors import SettingError, UnreadableFileError
+from partwright.partsdf.config import read_config
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from tests.partsdf.lamps import small_config
+
+
+@pytest.fixture
+def file(model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The model as a file, in an empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "lamps.safetensors"
+    path.write_bytes(model.to_bytes())
+    return path
+
+
+def toml(family: PreparedFamily, **training: object) -> str:
+    """A configuration file of the small settings."""
+    data = asdict(small_config(family, epochs=1, **training))
+    lines = [f"{k} = {json.dumps(v)}" for k, v in data.items() if not isinstance(v, dict)]
+    for section, values in data.items():
+        if isinstance(values, dict):
+            lines += [f"[{section}]", *(f"{k} = {json.dumps(v)}" for k, v in values.items())]
+    return "\n".join(lines)
+
+
+def test_train(lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "lamps.toml").write_text(toml(lamps))
+    arguments = ["parts", "train", str(tmp_path / "lamps.toml"), "-o", str(tmp_path / "out"), "--half"]
+    assert main(arguments) == 0
+    assert "lamps: 24 shapes" in capsys.readouterr().out
+    sizes = [(tmp_path / "out" / f).stat().st_size for f in ("model.safetensors", "model-half.safetensors")]
+    assert sizes[1] < sizes[0]
+    assert main(arguments) == 0  # all epochs are done: the same model again
+    assert [(tmp_path / "out" / "model.safetensors").stat().st_size] == sizes[:1]
+
+
+def test_reconstruct(
+    file: Path, lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = lamps.load(lamps.split("test")[0])
+    mesh = trimesh.Trimesh(known.frame.from_unit(known.vertices), known.faces, process=False)
+    mesh.export(tmp_path / "lamp.ply")
+    quick = ["--iterations", "60", "--points", "400", "--resolution", "48"]
+    assert main(["parts", "reconstruct", str(file), "lamp.ply", "-o", "out", *quick]) == 0
+    assert "parts: plate, ball" in capsys.readouterr().out
+    report = json.loads(Path("out/report.json").read_text())
+    assert report["scores"]["iou"] > 0.75
+    assert report["evaluations"]["meshing"] < report["evaluations"]["dense grid"]
+    surface = trimesh.load("out/surface.ply")
+    assert surface.is_watertight
+    np.testing.assert_allclose(surface.center_mass, mesh.center_mass, atol=0.15)  # of a size of 3.6
+    assembly = pw.load_assembly("out/assembly.json")
+    assert np.abs(assembly.distance(surface.vertices[::50])).max() < 0.1
+    assert {p.name for p in Path("out").iterdir()} == {
+        "assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png",
+    }  # fmt: skip
+
+
+def test_edit(file: Path, model: Model, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["parts", "edit", f"{file}:lamp1", "-o", "a.json"]
+    edits = ["--move", "ball=0.1,0,0", "--swap", f"plate={file}:lamp3", "--turn", "plate=0,0,1,30"]
+    assert main([*arguments, *edits, "--drop", "knob"]) == 0
+    assert "plate, ball: written to a.json" in capsys.readouterr().out
+    assembly = pw.load_assembly("a.json")
+    start = NeuralShape.trained(model, "lamp1")
+    moved = assembly["ball"].translation[0] - float(start.poses.translation[1, 0])
+    assert moved == pytest.approx(0.1, abs=1e-6)
+    assert assembly["plate"].rotation[3] == pytest.approx(np.sin(np.radians(15)), abs=1e-6)
+    assert Image.open("a.png").size == (480, 480)
+    assert main(["parts", "edit", "a.json", "-o", "b.json", "--scale", "ball=1,1,0.5"]) == 0
+    before, after = (pw.load_assembly(f)["ball"].field.half_lengths for f in ("a.json", "b.json"))
+    assert after == pytest.approx((before[0], before[1], before[2] / 2))
+
+
+def test_interpolate(file: Path) -> None:
+    arguments = ["parts", "interpolate", f"{file}:lamp1", f"{file}:2", "-o", "film.gif"]
+    assert main([*arguments, "--steps", "3", "--size", "64", "--resolution", "32"]) == 0
+    film = Image.open("film.gif")
+    assert film.n_frames == 4  # there, and back
+    assert film.size == (64, 64)
+    assert Image.open("film.png").size[0] == 3 * 64
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["edit", "lamp.obj", "-o", "a.json"], "no assembly file"),
+        (["edit", "{}:lamp1", "-o", "a.glb"], "written as .json"),
+        (["edit", "{}:lamp1", "-o", "a.json", "--move", "ball=1,2"], "3 numbers"),
+        (["edit", "{}:lamp1", "-o", "a.json", "--drop", "arm"], "no part 'arm'"),
+        (["edit", "{}:lamp99", "-o", "a.json"], "was not trained on 'lamp99'"),
+        (["edit", "sofas:1", "-o", "a.json"], "no model is named 'sofas'"),
+        (["interpolate", "{}:1", "{}:2", "-o", "a.avi"], "written as .gif"),
+        (["reconstruct", "{}", "none.ply"], "none.ply"),
+        (["reconstruct", "{}", "none.ply", "--iterations", "0"], "iterations is 0"),
+        (["train", "none.toml", "-o", "out"], "cannot read none.toml"),
+    ],
+)
+def test_what_goes_wrong_is_one_line(
+    file: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    before = set(Path().iterdir())
+    assert main(["parts", *(a.format(file) for a in arguments)]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert set(Path().iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "message"),
+    [
+        ("family = ", UnreadableFileError, "is no TOML file"),
+        ('family = "a"', SettingError, "name is missing"),
+        ('family = "a"\nname = "b"\nsize = 3', SettingError, "unknown key size"),
+        ('family = "a"\nname = "b"\n[decoder]\nwidht = 3', SettingError, "unknown key decoder.widht"),
+        ('family = "a"\nname = "b"\n[decoder]\nwidth = 0', SettingError, "decoder.width is 0"),
+        ('family = "a"\nname = "b"\n[decoder]\nwidth = "big"', SettingError, "decoder.width is 'big'"),
+        ('family = "a"\nname = "b"\ndecoder = 3', SettingError, "decoder is 3; expected a table"),
+        ('family = "a"\nname = "b/c"', SettingError, "name is 'b/c'"),
+        ('family = "a"\nname = "b"\n[training]\nprecision = "8"', SettingError, "training.precision is '8'"),
+        ('family = "a"\nname = "b"\n[training]\nbatch = 3\ndevices = 2', SettingError, "cannot share"),
+        ('family = "a"\nname = "b"\n[losses]\nhard = 1.5', SettingError, "losses.hard is 1.5"),
+    ],
+)
+def test_configurations_check_themselves(
+    tmp_path: Path, text: str, error: type[Exception], message: str
+) -> None:
+    (tmp_path / "c.toml").write_text(text)
+    with pytest.raises(error, match=message):
+        read_config(tmp_path / "c.toml")
+
+
+@pytest.mark.parametrize("path", sorted((Path(__file__).parents[2] / "configs").glob("*.toml")))
+def test_committed_configurations_are_valid(path: Path) -> None:
+    assert read_config(path).name
