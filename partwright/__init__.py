@@ -15,6 +15,7 @@ _PUBLIC = {
     "load_shape": "partwright.shapes",
     "Shape": "partwright.shapes",
     "fit": "partwright.fitting",
+    "fit_many": "partwright.batch",
     "Part": "partwright.assembly",
     "Assembly": "partwright.assembly",
     "load_assembly": "partwright.assembly",

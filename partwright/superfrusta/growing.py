@@ -21,6 +21,7 @@ from partwright.superfrusta.settings import Settings
 _LEAST_DEPTH = 0.15  # voxels: thinner regions are noise (half a voxel would lose thin walls)
 _LEAST_VOLUME = 2e-4  # of the shape
 _LARGEST = 2  # connected pieces of the residual that are also seeded whole
+_EAGER = 3  # growth asks this part of a part's price: the thinning finds what is worth the whole
 _PLENTY = 3000  # samples that one part is fitted to
 _SCREEN_EVERY = 3  # screening uses every third of them
 _KEPT = 4  # starts that survive screening
@@ -113,7 +114,7 @@ def grow(evidence: Evidence, rows: Rows, settings: Settings, most: int) -> Grown
     if not wanted or most <= 0:
         return Grown(NOTHING, NOTHING)
     candidates = fit_regions(evidence, wanted, settings)
-    return _select(evidence, candidates, rows, settings.price / 2, most)
+    return _select(evidence, candidates, rows, settings.price / _EAGER, most)
 
 
 def _view(evidence: Evidence, region: Region) -> View:

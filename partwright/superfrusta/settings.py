@@ -51,7 +51,7 @@ class Settings:
     rounds: int = 10
     regions: int = 7
     kappa: float = 0.02
-    alpha: float = 3e-3
+    alpha: float = 3.4e-3
     optimiser: Optimiser = "newton"
     overlap: float = 0.02
     blending: float = 0.02
@@ -132,7 +132,7 @@ def _check(name: str, value: float, low: float, high: float = math.inf) -> None:
 
 
 PRESETS: dict[str, Settings] = {
-    "draft": Settings(rounds=2, cycles=1, trials=1, near=12_000, uniform=12_000, resolution=72),
+    "draft": Settings(rounds=2, regions=14, cycles=1, trials=1, near=10_000, uniform=10_000, resolution=64),
     "normal": Settings(),
     "high": Settings(attempts=3, cycles=3, alpha=2e-3, near=45_000, uniform=45_000),
 }
