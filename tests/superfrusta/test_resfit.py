@@ -176,7 +176,7 @@ def test_of_several_attempts_the_best_is_kept(table_shape: Shape) -> None:
     assert several.best_objective == several.objective(evidence, several.best)
     assert seen == sorted(seen)
     assert len([entry for entry in several.history if entry["stage"] == "thin"]) == 3
-    assert [Run(settings, attempt=i).regions for i in range(5)] == [7, 5, 9, 3, 11]
+    assert [Run(Settings(), attempt=i).regions for i in range(5)] == [7, 5, 9, 3, 11]
 
 
 def test_an_interruption_in_a_later_attempt_keeps_the_earlier_ones_result(table_shape: Shape) -> None:
