@@ -15,6 +15,15 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     command.add_argument("shape", metavar="SHAPE", type=Path, help="the mesh or scene it was made from")
     command.add_argument("--json", action="store_true", help="print the scores as JSON")
+    command.add_argument(
+        "--cad",
+        metavar="POINTS",
+        nargs="?",
+        type=int,
+        const=30_000,
+        help="also normal consistency, edge Chamfer, light field distance, primitives and convexes, "
+        "from this many points (default: 30000; CAPRI-Net's tables have 8000)",
+    )
     command.set_defaults(run=run)
 
 
@@ -23,12 +32,15 @@ def run(arguments: argparse.Namespace) -> int:
 
     from partwright.assembly import load_assembly
     from partwright.cli.tables import print_scores
+    from partwright.errors import SettingError
     from partwright.metrics import evaluate
     from partwright.shapes import load_shape
 
+    if arguments.cad is not None and not 100 <= arguments.cad <= 1_000_000:
+        raise SettingError(f"--cad {arguments.cad}: expected 100 to 1000000 points")
     assembly = load_assembly(arguments.assembly)
     shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
-    scores = evaluate(assembly, shape)
+    scores = evaluate(assembly, shape, cad_points=arguments.cad)
     if arguments.json:
         print(json.dumps(scores.to_dict(), indent=2))
     else:

@@ -14,7 +14,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from partwright.fitting import Result
-    from partwright.metrics import Scores
+    from partwright.metrics import CadScores, Scores
 
 
 def print_result(result: Result, folder: Path) -> None:
@@ -56,7 +56,23 @@ def _scores_table(name: str, scores: Scores, unit: str | None) -> Table:
     table.add_row("overlap", f"{scores.overlap:.3f}")
     table.add_row("95 % deviation", f"{scores.deviation_95:.3g}{length}")
     table.add_row("largest deviation", f"{scores.max_deviation:.3g}{length}, {scores.worst_place}")
+    if scores.cad is not None:
+        _add_cad_rows(table, scores.cad)
     return table
+
+
+def _add_cad_rows(table: Table, scores: CadScores) -> None:
+    """The measures of CAPRI-Net's tables, each beside its floor."""
+    table.add_row("points of these", f"{scores.points:,}")
+    for name, label, scale in (
+        ("chamfer", "Chamfer x 1000", 1e3),
+        ("normal_consistency", "normal consistency", 1.0),
+        ("edge_chamfer", "edge Chamfer x 1000", 1e3),
+    ):
+        value, floor = getattr(scores, name), getattr(scores, f"{name}_floor")
+        table.add_row(label, f"{scale * value:.3f} (floor {scale * floor:.3f})")
+    table.add_row("light field distance", f"{scores.light_field_distance:.0f}")
+    table.add_row("primitives, convexes", f"{scores.primitives}, {scores.convexes}")
 
 
 def _print(table: Table) -> None:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from partwright.metrics.cad import CadScores, cad_scores
 from partwright.metrics.purity import Purity, owners, purity
 from partwright.metrics.reconstruction import ReconstructionScores, mean_scores, reconstruction_scores
 from partwright.metrics.report import Scores, evaluate
 from partwright.metrics.stability import Stability, stability
 
 __all__ = [
+    "CadScores",
     "Purity",
     "ReconstructionScores",
     "Scores",
     "Stability",
+    "cad_scores",
     "evaluate",
     "mean_scores",
     "owners",

@@ -11,6 +11,7 @@ import numpy as np
 from partwright.meshing import mesh_assembly
 from partwright.metrics import bi_surface, chamfer, emd
 from partwright.metrics import deviation as deviations
+from partwright.metrics.cad import CadScores, cad_scores
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import RESOLUTION, iou
 from partwright.metrics.overlap import overlap
@@ -42,10 +43,13 @@ class Scores:
     deviation_95: float
     worst_place: str
     worst_point: tuple[float, float, float]
+    cad: CadScores | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """For report.json."""
-        return asdict(self) | {"worst_point": list(self.worst_point)}
+        own = asdict(self) | {"worst_point": list(self.worst_point)}
+        del own["cad"]
+        return own | ({"cad": self.cad.to_dict()} if self.cad else {})
 
 
 def evaluate(
@@ -54,11 +58,13 @@ def evaluate(
     seed: int = 0,
     emd: bool = True,
     surface: trimesh.Trimesh | None = None,
+    cad_points: int | None = None,
 ) -> Scores:
     """Measure an assembly against the shape it stands for. docs/metrics.md defines each score.
 
     seed: of the sampled points. emd: also match points, which may take a second (None where left out).
     surface: `mesh_assembly(assembly)` in the input's units, if it is known already.
+    cad_points: also take the measures of CAPRI-Net's tables (`cad_scores`), from this many points.
 
     Raises NoSurfaceError where nothing is left of the assembly.
     """
@@ -96,6 +102,7 @@ def evaluate(
             apart.worst_point, shape.frame.length_to_unit(np.ptp(shape.vertices, axis=0)), shape.up
         ),
         worst_point=tuple(shape.frame.from_unit(apart.worst_point).tolist()),
+        cad=cad_scores(assembly, shape, cad_points, seed, surface) if cad_points else None,
     )
 
 
