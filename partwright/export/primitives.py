@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -11,14 +12,19 @@ import numpy as np
 from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export.approximation import Change
+from partwright.export.convex import segments, wedges
 from partwright.export.nearest import Approximation, nearest_solid
 from partwright.export.pieces import Piece, piece_mesh, pieces, require_some
-from partwright.fields import Field
+from partwright.fields import Field, Solid
+from partwright.meshing import mesh_part
+from partwright.shapes import MeshDistance
 
 if TYPE_CHECKING:
     import trimesh
 
 TOLERANCE = 0.05  # of the longest side: how far a solid's surface may lie from its part's
+_MOST_ERROR = 0.3  # of its volume: thin parts are within any tolerance of much
+_COMPARED = 32  # cells along what is compared
 
 
 @dataclass(frozen=True)
@@ -56,30 +62,102 @@ def geometries(
         raise ParameterError(f"tolerance: expected a share of the longest side, 0.05 say, got {tolerance!r}")
     lower, upper = assembly.bounds()
     allowed = tolerance * float((upper - lower).max())
-    result, changes = [], []
+    result: list[Geometry] = []
+    changes: list[Change] = []
     for piece in pieces(assembly):
-        blend = piece.blend * length
         try:
-            near = nearest_solid(piece.node, kinds) if isinstance(piece.node, Part) else None
-            if near is None or near.max_deviation > allowed:
-                mesh, error, deviation = _mesh(piece, resolution, convex)
-                to = "convex mesh" if convex else "mesh"
-                changes.append(Change(piece.part_names, to, error, deviation * length, blend))
-                result.append(Geometry(piece.name, piece.colour, None, mesh))
-                continue
+            found, change = _stand_ins(piece, kinds, allowed, resolution, convex)
         except NoSurfaceError as nothing:
             changes.append(Change(piece.part_names, "nothing", note=str(nothing)))
             continue
-        result.append(Geometry(piece.name, piece.colour, near.part_with_solid, None))
-        changes += _change(piece, near, blend, length)
+        result += found
+        if change is not None or piece.blend:
+            kind = found[0].part.field.kind if found[0].part else ""
+            told = change or Change(piece.part_names, kind, 0.0, 0.0)
+            deviation = (told.max_deviation or 0.0) * length
+            changes.append(
+                dataclasses.replace(told, max_deviation=deviation, blend_dropped=piece.blend * length)
+            )
     return require_some(assembly, result), changes
 
 
-def _change(piece: Piece, near: Approximation, blend: float, length: float) -> list[Change]:
-    if near.exact and not blend:
-        return []
-    error, deviation = near.volume_error_ratio, near.max_deviation * length
-    return [Change(piece.part_names, near.solid.kind, error, deviation, blend)]
+def _stand_ins(
+    piece: Piece, kinds: Sequence[type[Field]], allowed: float, resolution: int, convex: bool
+) -> tuple[list[Geometry], Change | None]:
+    """What stands for a piece, and the change that this is: the first of these that is near enough.
+
+    A solid; its hull, where only hulls collide; solids along the arc of a bent part; the hulls of the pieces
+    of a bent or hollow part; its mesh.
+    """
+    names = piece.part_names
+    part = piece.node if isinstance(piece.node, Part) else None
+    if part is not None:
+        near = nearest_solid(part, kinds)
+        if _alike(near, allowed):
+            change = Change(names, near.solid.kind, near.volume_error_ratio, near.max_deviation)
+            return [Geometry(piece.name, piece.colour, near.part_with_solid, None)], (
+                None if near.exact else change
+            )
+    mesh, error, deviation = _mesh(piece, resolution, convex)
+    whole = [Geometry(piece.name, piece.colour, None, mesh)]
+    if part is None or (convex and deviation <= allowed and error <= _MOST_ERROR):
+        return whole, Change(names, "convex mesh" if convex else "mesh", error, deviation)
+    chain = _chain(piece, part, kinds, allowed, resolution)
+    if all(geometry.part for geometry in chain):
+        return chain, _compared(piece, chain, f"chain of {len(chain)} solids")
+    if not convex or len(chain) == 1:
+        return whole, Change(names, "convex mesh" if convex else "mesh", error, deviation)
+    return chain, _compared(piece, chain, f"{len(chain)} convex pieces")
+
+
+def _chain(
+    piece: Piece, part: Part, kinds: Sequence[type[Field]], allowed: float, resolution: int
+) -> list[Geometry]:
+    """The straight segments of a part as solids, or the hulls of their wedges."""
+    forms: list[Part | trimesh.Trimesh] = []
+    named = [kind for kind in kinds if issubclass(kind, Solid)]
+    for segment in segments(part, allowed):
+        try:
+            near = nearest_solid(segment, named)
+        except NoSurfaceError:
+            continue  # a segment beyond a tip
+        if _alike(near, allowed):
+            forms.append(near.part_with_solid)
+        else:
+            forms += wedges(segment, allowed, resolution)
+    return [
+        Geometry(
+            f"{piece.name}/{i}", piece.colour, *((form, None) if isinstance(form, Part) else (None, form))
+        )
+        for i, form in enumerate(forms, 1)
+    ]
+
+
+def _alike(near: Approximation, allowed: float) -> bool:
+    return near.max_deviation <= allowed and near.volume_error_ratio <= _MOST_ERROR
+
+
+def _compared(piece: Piece, chain: list[Geometry], to: str) -> Change:
+    """Volume and distance between the piece and the union of what stands for it."""
+    from manifold3d import Manifold, Mesh, OpType
+
+    lower, upper = piece.node.bounds()
+    middle, side = (lower + upper) / 2, float((upper - lower).max())
+
+    def solid(mesh: trimesh.Trimesh) -> Manifold:
+        vertices = (mesh.vertices - middle) / side
+        return Manifold(Mesh(vertices.astype(np.float32), mesh.faces.astype(np.uint32)))
+
+    own = solid(piece_mesh(piece, _COMPARED))
+    meshes = (g.mesh if g.part is None else mesh_part(g.part, _COMPARED) for g in chain)
+    union = Manifold.batch_boolean([solid(mesh) for mesh in meshes if mesh is not None], OpType.Add)
+    apart = (own - union).volume() + (union - own).volume()
+    surface = union.refine_to_length(0.05).to_mesh()
+    places, faces = surface.vert_properties[:, :3].astype(np.float64), surface.tri_verts.astype(np.int64)
+    there = np.abs(piece.node.distance(places * side + middle)).max()
+    back = MeshDistance(places, faces, faces, True).unsigned(own.to_mesh().vert_properties[:, :3]).max()
+    deviation = max(float(there), float(back) * side)
+    return Change(piece.part_names, to, apart / own.volume(), deviation)
 
 
 def _mesh(piece: Piece, resolution: int, convex: bool) -> tuple[trimesh.Trimesh, float, float]:

@@ -65,17 +65,16 @@ def test_meshes_lie_beside_it_where_no_solid_fits(tmp_path: Path) -> None:
         "a.urdf.report.json",
         "a_block.stl",
         "a_cup.stl",
-        "a_hook.stl",
         "a_spike.stl",
     ]
     robot = yourdfpy.URDF.load(str(path), build_collision_scene_graph=True, load_collision_meshes=True)
     assert np.allclose(robot.collision_scene.bounds, awkward().bounds(), atol=0.02)
     meshes = list(robot.collision_scene.geometry.values())
     assert all(mesh.is_watertight for mesh in meshes)
-    assert sum(mesh.volume for mesh in meshes) == pytest.approx(mass_properties(awkward()).volume, rel=0.03)
+    assert sum(mesh.volume for mesh in meshes) == pytest.approx(mass_properties(awkward()).volume, rel=0.05)
     changes = json.loads(report_path(path).read_text())["approximated"]
     assert {tuple(change["parts"]): change["to"] for change in changes} == {
-        ("hook",): "mesh",
+        ("hook",): "chain of 3 solids",
         ("spike",): "mesh",
         ("cup",): "mesh",
         ("block", "hole"): "mesh",
