@@ -20,6 +20,7 @@ _PUBLIC = {
     "Assembly": "partwright.assembly",
     "load_assembly": "partwright.assembly",
     "evaluate": "partwright.metrics",
+    "clean": "partwright.cleaning",
 }
 _MODULES = ("fields", "shapes", "assembly", "meshing", "render", "metrics", "errors", "datasets")
 

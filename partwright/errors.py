@@ -95,3 +95,11 @@ class LabelError(PartwrightError):
 
 class ModelError(PartwrightError):
     """A trained model is needed and not here, is damaged, or belongs to another family."""
+
+
+class UncleanableError(PartwrightError):
+    """An assembly has parts whose numbers no relation can bind."""
+
+
+class NothingToCleanError(PartwrightError):
+    """Every number of an assembly is plain already, and every relation between them holds."""

@@ -23,6 +23,7 @@ from partwright.writing import finishing, replacing_files, write_bytes
 if TYPE_CHECKING:
     import trimesh
 
+    from partwright.cleaning import Cleaned
     from partwright.metrics import Scores
     from partwright.superfrusta import CurvePoint
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 METHODS = {"superfrusta": "partwright.superfrusta", "solids": "partwright.superfrusta.solids"}
 QUALITIES = ("draft", "normal", "high")
 DEVICES = ("auto", "cpu", "cuda")
+CLEANABLE = ("superfrusta", "solids")  # methods whose parts have numbers that relations can bind
 # A result stands for the worst of its pieces, in this order.
 OUTCOMES = ("interrupted", "budget_reached", "converged", "target_reached")
 FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
@@ -49,7 +51,7 @@ class Result:
     assembly: in the shape's own units and place. outcome: "converged", "budget_reached", "target_reached" or
     "interrupted". report: what report.json holds. surface: the blended surface's mesh, in the shape's units.
     curve: assemblies of falling size, whose parts name their parent in the next smaller one by
-    `metadata["parent"]`.
+    `metadata["parent"]`. clean: what `clean=True` found, with `.relations`.
     """
 
     shape: Shape
@@ -59,6 +61,7 @@ class Result:
     surface: trimesh.Trimesh
     report: dict[str, Any]
     curve: tuple[CurvePoint, ...] = ()
+    clean: Cleaned | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -118,6 +121,8 @@ def fit(
     tolerance: float | str | None = None,
     contain: float | str | bool | None = None,
     inside: float | str | bool | None = None,
+    clean: bool = False,
+    clean_tolerance: float | None = None,
 ) -> Result:
     """Fit an assembly to a shape.
 
@@ -140,6 +145,8 @@ def fit(
             in the shape's units, or text as "0.5mm" or "1%" of the longest side.
         contain: the shape nowhere sticks out of the assembly by more than this; True is 0.
         inside: the assembly nowhere sticks out of the shape by more than this; True is 0.
+        clean: make numbers plain and relations exact after the fit (`partwright.clean`). clean_tolerance: how
+            much further from the shape any part may come to lie by that, on average, in the shape's units.
 
     Raises:
         BoundsError: tolerance, contain or inside contradict each other, or are finer than can be told.
@@ -157,6 +164,7 @@ def fit(
     if any(asked not in (None, False) for asked in (tolerance, contain, inside)):
         check_alone(tolerance, min_iou=min_iou, curve=curve, per_node=per_node)
         bounds = Bounds.of(shape, tolerance, contain, inside)
+    _check_cleaning(method, clean, clean_tolerance, locked, bounds is not None)
     module = import_module(METHODS[method])
     settings = module.Settings.for_quality(
         quality,
@@ -189,6 +197,13 @@ def fit(
         fitted_at = time.perf_counter()
         bounded, outcome = promise(assembly, shape, bounds, outcome, refit, locked, seed)
         assembly, seconds["bounds"] = bounded.assembly, time.perf_counter() - fitted_at
+    cleaned = None
+    if clean and outcome != "interrupted":
+        cleaned, seconds["clean"] = _cleaned(assembly, shape, clean_tolerance)
+        if cleaned is None:
+            outcome = "interrupted"
+        else:
+            assembly = cleaned.assembly
     with finishing():
         scores, surface = _scored(shape, assembly, seed, seconds)
     seconds["all"] = time.perf_counter() - started
@@ -211,7 +226,35 @@ def fit(
     points = tuple(fitted[0].curve)
     if points:
         report["curve"] = [{"parts": p.parts, "score": p.score, "iou": p.iou} for p in points]
-    return Result(shape, assembly, outcome, scores, surface, report, points)
+    if cleaned is not None:
+        report["clean"] = cleaned.to_dict()
+    return Result(shape, assembly, outcome, scores, surface, report, points, cleaned)
+
+
+def _check_cleaning(
+    method: str, clean: bool, tolerance: float | None, locked: Sequence[str], bounded: bool
+) -> None:
+    if not clean:
+        if tolerance is not None:
+            raise SettingError("a clean tolerance was given, but nothing is to be cleaned; add --clean")
+        return
+    if method not in CLEANABLE:
+        raise SettingError(f"what {method} makes cannot be cleaned; {', '.join(CLEANABLE)} can")
+    if locked:
+        raise SettingError("cleaning may change every part, so no part can be locked; clean or lock")
+    if bounded:
+        raise SettingError("cleaning moves surfaces, which bounds do not allow; clean, or bound the fit")
+
+
+def _cleaned(assembly: Assembly, shape: Shape, tolerance: float | None) -> tuple[Cleaned | None, float]:
+    """None after Ctrl-C: the fit is then kept as it was. And the seconds it took."""
+    from partwright.cleaning import clean
+
+    start = time.perf_counter()
+    try:
+        return clean(assembly, shape, tolerance), time.perf_counter() - start
+    except KeyboardInterrupt:
+        return None, time.perf_counter() - start
 
 
 def _fit_pieces(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from partwright.cleaning.relations import Relation
 from partwright.cleaning.segmentation import segment
+from partwright.cleaning.tidying import Cleaned, clean
 
-__all__ = ["segment"]
+__all__ = ["Cleaned", "Relation", "clean", "segment"]

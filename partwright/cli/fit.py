@@ -72,6 +72,14 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         default=None,
         help="parts may also be subtracted: holes, slots, pockets (default: on for solids only)",
     )
+    option("--clean", action="store_true", help="make numbers plain and relations exact after the fit")
+    option(
+        "--clean-tolerance",
+        metavar="X",
+        type=float,
+        help="how much further from the shape cleaning may move any part, on average, in the shape's units "
+        "(default: half a thousandth of the longest side)",
+    )
     option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
     option("--density", metavar="D", type=float, help="in kg/m3: the report then has mass and inertia")
     option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
@@ -95,7 +103,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
     from partwright.cli.progress import Display
-    from partwright.cli.tables import print_result, warn
+    from partwright.cli.tables import print_relations, print_result, warn
     from partwright.fitting import fit
     from partwright.shapes import load_shape
     from partwright.writing import check_folder
@@ -125,10 +133,14 @@ def run(arguments: argparse.Namespace) -> int:
             tolerance=arguments.tolerance,
             contain=arguments.contain,
             inside=arguments.inside,
+            clean=arguments.clean,
+            clean_tolerance=arguments.clean_tolerance,
         )
         display.stage("writing")
         result.save(folder)
     print_result(result, folder)
+    if result.clean:
+        print_relations(result.clean)
     warn(result.warnings)
     if result.outcome == "interrupted":
         warn([f"interrupted: {folder} holds the best assembly so far"])

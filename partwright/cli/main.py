@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from partwright import __version__
-from partwright.cli import describe, evaluate, export, fit, parts, segment
+from partwright.cli import clean, describe, evaluate, export, fit, parts, segment
 from partwright.errors import PartwrightError
 
-COMMANDS = (fit, evaluate, describe, export, segment, parts)
+COMMANDS = (fit, clean, evaluate, describe, export, segment, parts)
 INTERRUPTED = 130
 
 

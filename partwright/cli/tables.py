@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 if TYPE_CHECKING:
+    from partwright.cleaning import Cleaned
     from partwright.fitting import Result
     from partwright.metrics import CadScores, Scores
 
@@ -35,6 +36,23 @@ def print_result(result: Result, folder: Path) -> None:
 
 def print_scores(name: str, scores: Scores, unit: str | None) -> None:
     _print(_scores_table(name, scores, unit))
+
+
+def print_relations(cleaned: Cleaned) -> None:
+    """What cleaning found, a line each."""
+    for relation in cleaned.relations:
+        print(relation)
+
+
+def print_cleaned(cleaned: Cleaned, path: Path) -> None:
+    """The relations, and how much was lost."""
+    print_relations(cleaned)
+    before, after, unit = cleaned.before, cleaned.after, cleaned.assembly.unit
+    length = f" {unit}" if unit else ""
+    print(
+        f"{before.parts} parts -> {after.parts}, IoU {before.iou:.4f} -> {after.iou:.4f}, "
+        f"mean deviation {before.mean_deviation:.3g} -> {after.mean_deviation:.3g}{length}: {path}"
+    )
 
 
 def warn(messages: Iterable[str]) -> None:

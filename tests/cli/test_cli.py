@@ -16,6 +16,7 @@ import partwright
 from partwright.assembly import load_assembly
 from partwright.cli.main import main
 from partwright.errors import PartwrightError
+from partwright.fields import Box
 from partwright.fitting import FILES, fit
 from partwright.shapes import load_shape
 from tests.cli.conftest import BoxMethod
@@ -215,3 +216,35 @@ def test_unknown_methods_and_devices(block: Path) -> None:
     for options in ({"method": "magic"}, {"device": "abacus"}):
         with pytest.raises(PartwrightError, match=r"expected one of|use one of"):
             fit(shape, **options)
+
+
+def test_clean_after_a_fit(
+    block: Path, method: BoxMethod, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    method.shrink = 0.998765
+    assert main(["fit", str(block), "-o", str(tmp_path / "out"), "--clean", "--clean-tolerance", "0.02"]) == 0
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report["clean"]["tolerance"] == 0.02
+    assert report["seconds"]["clean"] > 0
+    part = load_assembly(tmp_path / "out" / "assembly.json").parts[0]
+    assert part.field == Box((4, 2, 1))
+    assert part.translation == (10, 20, 30)
+    assert "aligned" in {relation["kind"] for relation in report["clean"]["relations"]}
+    assert "along the input's axes" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [(["--clean-tolerance", "0.1"], "add --clean"), (["--clean", "--lock", "a"], "clean or lock")],
+)
+def test_options_that_do_not_go_with_cleaning(
+    options: list[str],
+    says: str,
+    block: Path,
+    method: BoxMethod,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["fit", str(block), "-o", str(tmp_path / "out"), *options]) == 2
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

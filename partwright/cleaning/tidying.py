@@ -1,0 +1,145 @@
+"""`clean`: a fitted assembly with the numbers that a person would type.
+
+Six steps, each change taken only if it costs little: parts become named solids; they turn along the input's
+axes and one another; relations between their numbers become equations; the numbers that are left free are
+fitted once more; all go to a grid; parts that repeat become one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from partwright.bounding.noise import roughness
+from partwright.cleaning.evidence import Evidence, State
+from partwright.cleaning.grid import Grid
+from partwright.cleaning.judging import Judge
+from partwright.cleaning.kinds import plainer
+from partwright.cleaning.model import Model
+from partwright.cleaning.orientations import turned
+from partwright.cleaning.relations import Relation, relations
+from partwright.cleaning.repeats import collapsed, tidy, unchanged
+from partwright.cleaning.snapping import snapped
+from partwright.errors import SettingError
+from partwright.metrics.iou import RESOLUTION, iou
+
+if TYPE_CHECKING:
+    from partwright.assembly import Assembly
+    from partwright.shapes import Shape
+
+TOLERANCE = 5e-4  # of the longest side
+_COARSEST = 0.05  # of the longest side
+_FINEST = 1e-5
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """iou: with the shape, or with the given assembly where there is no shape. mean_deviation: over points of
+    both surfaces, own units. parts: leaves."""
+
+    iou: float
+    mean_deviation: float
+    parts: int
+
+    def to_dict(self) -> dict[str, float]:
+        return {"iou": self.iou, "mean_deviation": self.mean_deviation, "parts": self.parts}
+
+
+@dataclass(frozen=True)
+class Cleaned:
+    """assembly: the very one that was given where nothing was to be done. relations: all that hold in it.
+    tolerance: own units."""
+
+    assembly: Assembly
+    relations: tuple[Relation, ...]
+    tolerance: float
+    before: Agreement
+    after: Agreement
+    changed: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """For report.json."""
+        return {
+            "tolerance": self.tolerance,
+            "changed": self.changed,
+            "before": self.before.to_dict(),
+            "after": self.after.to_dict(),
+            "relations": [relation.to_dict() for relation in self.relations],
+        }
+
+
+def clean(assembly: Assembly, shape: Shape | None = None, tolerance: float | None = None) -> Cleaned:
+    """The assembly with plain numbers: relations between parts made exact, lengths on a grid.
+
+    What a person may have typed already stays, so that a second time changes nothing.
+
+    Args:
+        shape: what the assembly stands for, in the same units; the assembly's own surface if not given.
+        tolerance: how much further from the shape the surface of any part may come to lie, on average, in
+            own units; half a thousandth of the longest side if not given.
+
+    Raises:
+        UncleanableError: a part is neither a SuperFrustum nor a named solid.
+        SettingError: the tolerance is no positive length, too large, or below the mesh's own noise.
+        NoSurfaceError: nothing is left of the assembly.
+    """
+    model = Model.of(assembly)
+    longest = _longest(assembly, shape)
+    tolerance = _checked(tolerance, longest, shape, assembly.unit)
+    grid = Grid.of(longest)
+    evidence = Evidence.of(model, shape)
+    given = State.of(evidence, model)
+    judge = Judge.of(given, tolerance * evidence.scale)
+    state, frames = turned(plainer(given, judge, grid), judge)
+    state = snapped(state, judge, frames, grid)
+    tidied = np.array([tidy(value, grid) for value in state.vector.tolist()])
+    made = collapsed(state.model.moved(tidied), frames, grid)
+    changed = not unchanged(model, made, grid)
+    result = made if changed else assembly
+    before = _agreement(assembly, assembly, given, shape)
+    after = _agreement(result, assembly, state, shape) if changed else before
+    return Cleaned(result, relations(result, frames, grid), tolerance, before, after, changed)
+
+
+def _longest(assembly: Assembly, shape: Shape | None) -> float:
+    lower, upper = (shape.vertices.min(axis=0), shape.vertices.max(axis=0)) if shape else assembly.bounds()
+    return float((upper - lower).max())
+
+
+def _checked(tolerance: float | None, longest: float, shape: Shape | None, unit: str | None) -> float:
+    length = f" {unit}" if unit else ""
+    if tolerance is None:
+        return TOLERANCE * longest
+    if not (math.isfinite(tolerance) and 0 < tolerance <= _COARSEST * longest):
+        raise SettingError(
+            f"clean tolerance {tolerance:g}: expected a length above 0 and at most "
+            f"{_COARSEST * longest:.3g}{length}, a twentieth of the longest side"
+        )
+    noise = _FINEST * longest
+    if shape is not None:
+        noise = max(noise, roughness(shape) / shape.frame.scale)
+    if tolerance < noise:
+        what = "the mesh's own noise" if shape is not None else "what distances are computed to"
+        raise SettingError(
+            f"clean tolerance {tolerance:g}{length} is below {what}, {noise:.3g}{length}; "
+            "allow more than that"
+        )
+    return tolerance
+
+
+def _agreement(assembly: Assembly, given: Assembly, state: State, shape: Shape | None) -> Agreement:
+    from partwright.assembly import Similarity
+    from partwright.meshing import occupancy_grid
+
+    centre, scale = state.evidence.centre, state.evidence.scale
+    x, y, z = (-scale * centre).tolist()
+    frame = Similarity(scale, translation=(x, y, z))
+    if shape is not None:
+        target = shape.unit_occupancy(RESOLUTION)
+    else:
+        target = occupancy_grid(given.transformed(frame).distance, RESOLUTION)
+    mean = float(np.abs(state.field - state.evidence.target).mean()) / scale
+    return Agreement(iou(assembly.transformed(frame).distance, target), mean, len(assembly))

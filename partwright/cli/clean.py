@@ -1,0 +1,46 @@
+"""`partwright clean`: an assembly with plain numbers and exact relations."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "clean",
+        help="make an assembly's numbers plain and the relations of its parts exact",
+        description="Makes what is nearly so exact: parts along the input's axes, coaxial, flush, equal, "
+        "mirrored or repeated, named solids, lengths on a grid. Writes the assembly to FILE (.json), and "
+        "the relations to FILE.report.json.",
+    )
+    option = command.add_argument
+    option("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    option("-o", "--output", metavar="FILE", type=Path, required=True, help="where to write")
+    option("--shape", metavar="SHAPE", type=Path, help="what it stands for (default: its own surface)")
+    option(
+        "--clean-tolerance",
+        metavar="X",
+        type=float,
+        help="how much further from the shape any part may come to lie, on average, in the assembly's units "
+        "(default: half a thousandth of the longest side)",
+    )
+    command.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from partwright.assembly import load_assembly
+    from partwright.cleaning import clean
+    from partwright.cleaning.report import check_suffix, write_cleaned
+    from partwright.cli.tables import print_cleaned
+    from partwright.shapes import load_shape
+
+    check_suffix(arguments.output)
+    assembly = load_assembly(arguments.assembly)
+    shape = None
+    if arguments.shape is not None:
+        shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
+    cleaned = clean(assembly, shape, arguments.clean_tolerance)
+    write_cleaned(cleaned, arguments.output)
+    print_cleaned(cleaned, arguments.output)
+    return 0
