@@ -22,7 +22,7 @@ _PUBLIC = {
     "evaluate": "partwright.metrics",
     "clean": "partwright.cleaning",
 }
-_MODULES = ("fields", "shapes", "assembly", "meshing", "render", "metrics", "errors", "datasets")
+_MODULES = ("fields", "shapes", "assembly", "meshing", "render", "metrics", "errors", "datasets", "capri")
 
 __all__ = ["__version__", "export", *_PUBLIC, *_MODULES]
 

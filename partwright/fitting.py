@@ -28,7 +28,11 @@ if TYPE_CHECKING:
     from partwright.superfrusta import CurvePoint
 
 # method -> the module whose `fit(shape, settings, progress=...)` and `Settings` do it
-METHODS = {"superfrusta": "partwright.superfrusta", "solids": "partwright.superfrusta.solids"}
+METHODS = {
+    "superfrusta": "partwright.superfrusta",
+    "solids": "partwright.superfrusta.solids",
+    "capri": "partwright.capri",
+}
 QUALITIES = ("draft", "normal", "high")
 DEVICES = ("auto", "cpu", "cuda")
 CLEANABLE = ("superfrusta", "solids")  # methods whose parts have numbers that relations can bind
@@ -134,7 +138,7 @@ def fit(
         start: an assembly to refine and continue. locked: names of its parts that stay as they are.
         per_node: fit each node of a scene by itself; the assembly's children are named after the nodes.
         symmetry: where the shape has a mirror plane or a rotation, parts come as repeats (`Part.instances`).
-        subtract: parts may also be taken away from others (holes); None: for solids yes, for superfrusta no.
+        subtract: parts may also be taken away from others (holes); None: for superfrusta no, for the others yes.
         seed: the same seed gives the same assembly, at any number of threads.
         device: "cpu", "cuda", or "auto": the compiled kernel on the CPU, which needs no other package.
         threads: 0 means one per core.
@@ -163,6 +167,8 @@ def fit(
     bounds = None
     if any(asked not in (None, False) for asked in (tolerance, contain, inside)):
         check_alone(tolerance, min_iou=min_iou, curve=curve, per_node=per_node)
+        if method == "capri":
+            raise SettingError("capri keeps no tolerance and no bound; use method superfrusta or solids")
         bounds = Bounds.of(shape, tolerance, contain, inside)
     _check_cleaning(method, clean, clean_tolerance, locked, bounds is not None)
     module = import_module(METHODS[method])
@@ -223,6 +229,8 @@ def fit(
     }
     if bounded is not None:
         report["bounds"] = bounds_report(bounded, shape, float(surface.volume))
+    if method == "capri":
+        report["tree"] = [one.details for one in fitted]
     points = tuple(fitted[0].curve)
     if points:
         report["curve"] = [{"parts": p.parts, "score": p.score, "iou": p.iou} for p in points]

@@ -25,9 +25,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option(
         "--method",
-        choices=("superfrusta", "solids"),
+        choices=("superfrusta", "solids", "capri"),
         default="superfrusta",
-        help="kind of parts: SuperFrusta, or boxes, cylinders and other named solids (default: %(default)s)",
+        help="kind of parts: SuperFrusta; boxes, cylinders and other named solids; or capri, a CSG tree of "
+        "quadrics (default: %(default)s)",
     )
     option(
         "--quality",

@@ -1,0 +1,75 @@
+"""The quadrics among which a tree is chosen: detected surfaces, planes that part them, the box around all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.capri import rows
+from partwright.capri.detection import Surfel
+from partwright.capri.rows import Row
+from partwright.capri.surface import Surface
+
+_SAME = 4e-3  # rows whose numbers differ by less are one
+_TANGENT = 0.03  # unit lengths and sine: how nearly a plane touches a cylinder
+_CUTS = 60  # at most so many planes that part
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Rows (K, 10); complement (K,) marks the outside of a curved quadric, which is not convex."""
+
+    rows: NDArray[np.float64]
+    complement: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, given: list[Row], *, nested: bool, oriented: bool) -> Pool:
+        """Each quadric once, planes with both of their sides; with `nested` the outside of the others, too.
+
+        oriented: keep cross terms; otherwise only rows without (the paper's seven coefficients).
+        """
+        kept: list[Row] = []
+        for row in given:
+            if not oriented and np.abs(row[7:]).max() > 0.02 * np.abs(row[:7]).max():
+                continue
+            row = row if oriented else np.r_[row[:7], np.zeros(3)]
+            if not any(min(np.abs(row - k).max(), np.abs(row + k).max()) < _SAME for k in kept):
+                kept.append(row)
+        table = np.stack(kept)
+        flat = rows.is_plane(table)
+        second = table if nested else table[flat]
+        outside = np.zeros(len(table) + len(second), dtype=bool)
+        outside[len(table) :] = ~rows.is_plane(second)
+        return cls(np.concatenate([table, -second]), outside)
+
+
+def candidates(found: list[Surfel], surface: Surface) -> list[Row]:
+    """Rows of the detected surfaces, of planes that part them, and of the bounding box's sides."""
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    box = [rows.plane(axis, float((surface.points @ axis).max())) for axis in axes]
+    return [one.row for one in found] + box + parting_planes(found)
+
+
+def parting_planes(found: list[Surfel]) -> list[Row]:
+    """Planes through the axis of a cylinder where it runs smoothly into a plane, square to that plane.
+
+    A rounded end or edge ends there without a surface of its own; a union of convexes needs it as a face.
+    """
+    planes = np.array([one.row for one in found if one.kind == "plane"]).reshape(-1, 10)
+    made: list[Row] = []
+    for one in found:
+        if one.kind != "cylinder" or len(planes) == 0:
+            continue
+        form, slope, _ = rows.split(one.row)
+        bent, vectors = np.linalg.eigh(form)
+        axis, radius = vectors[:, 0], 1 / (2 * bent[-1])
+        centre = -np.linalg.pinv(2 * form, rcond=1e-6) @ slope
+        normal, offset = planes[:, 3:6], planes[:, 6]
+        reach = np.abs(normal @ centre + offset)
+        for n in normal[(np.abs(normal @ axis) < _TANGENT) & (np.abs(reach - radius) < _TANGENT)]:
+            across = np.cross(n, axis)
+            across /= np.linalg.norm(across)
+            made.append(rows.plane(across, float(across @ centre)))
+    return made[:_CUTS]

@@ -1,0 +1,157 @@
+"""Surfaces of a shape as quadrics: efficient RANSAC (Schnabel, Wahl & Klein 2007) on oriented points.
+
+Planes come from one point and its normal, spheres and cylinders from two, cones from three close points. The
+hypothesis that most points bear out, by distance and by normal, is refitted to them and taken out; again and
+again, until what is left bears out nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from partwright.capri import rows
+from partwright.capri.kinds import FITTERS, MAKERS, Draw
+from partwright.capri.rows import Row
+from partwright.capri.surface import Surface
+
+_SEEDS = 48  # hypotheses of each kind in one draw
+_PROBE = 1500  # points that sift hypotheses
+_FINALISTS = 6
+_TOLERANCE = 0.006  # unit frame: how far from its quadric a point may lie
+_AGREE = np.cos(np.radians(18.0))  # and by how much its normal may differ
+_NEAR, _FAR = 6, 60  # neighbours among which partners are drawn
+_SIMPLER = {
+    "plane": 1.0,
+    "cylinder": 0.95,
+    "sphere": 0.92,
+    "cone": 0.9,
+    "quadric": 0.75,
+}  # rather the simpler
+_PATCH = 40  # points of a patch that a general quadric is fitted to
+_REFITS = 3
+_STALE = 6  # draws without a find that end the search
+_MOST = 250
+_FEWEST = 8  # points of a fit
+
+
+@dataclass(frozen=True)
+class Surfel:
+    """A quadric found on a surface: its row (10,), kind, and the points (K,) (indices) that bear it out.
+
+    outward: whether the points' normals point out of f <= 0, as on a boss; on a hole's wall they do not.
+    """
+
+    row: Row
+    kind: str
+    members: NDArray[np.int64]
+    outward: bool
+
+
+def detect(
+    surface: Surface, kinds: tuple[str, ...], least: int, seed: int, tolerance: float = _TOLERANCE
+) -> list[Surfel]:
+    """Quadrics of these kinds (of `KINDS`) that `least` points bear out."""
+    rng = np.random.default_rng(seed)
+    points, normals = surface.points, surface.normals
+    neighbours = cKDTree(points).query(points, min(_FAR + 1, len(points)))[1][:, 1:]
+    left = np.ones(len(points), dtype=bool)
+    found: list[Surfel] = []
+    stale = 0
+    while stale < _STALE and left.sum() >= least and len(found) < _MOST:
+        best = _draw(points, normals, neighbours, left, kinds, rng, tolerance)
+        if best is None or len(best.members) < least:
+            stale += 1
+            continue
+        stale = 0
+        left[best.members] = False
+        found.append(best)
+    return found
+
+
+def _draw(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    neighbours: NDArray[np.int64],
+    left: NDArray[np.bool_],
+    kinds: tuple[str, ...],
+    rng: np.random.Generator,
+    tolerance: float,
+) -> Surfel | None:
+    """The best of one draw of hypotheses, refitted."""
+    free = np.flatnonzero(left)
+    seeds = rng.choice(free, _SEEDS)
+    mates = np.stack([_mate(seeds, neighbours, left, rng) for _ in range(2)])
+    draw = Draw(points, normals, seeds, mates, neighbours[seeds, :_PATCH])
+    probe = rng.choice(free, min(_PROBE, len(free)), replace=False)
+    scored: list[tuple[float, Row, str]] = []
+    for kind in kinds:
+        made = MAKERS[kind](draw)
+        if len(made) == 0:
+            continue
+        agree = _agreeing(made, points[probe], normals[probe], tolerance)
+        counts = _SIMPLER[kind] * agree.sum(axis=1)
+        scored += [(float(count), row, kind) for count, row in zip(counts, made, strict=True)]
+    scored.sort(key=lambda entry: -entry[0])
+    best: Surfel | None = None
+    reached = 0.0
+    for _, row, kind in scored[:_FINALISTS]:
+        one = _refitted(row, kind, points, normals, free, tolerance)
+        if one is not None and len(one.members) * _SIMPLER[kind] > reached:
+            best, reached = one, len(one.members) * _SIMPLER[kind]
+    return best
+
+
+def _mate(
+    seeds: NDArray[np.int64],
+    neighbours: NDArray[np.int64],
+    left: NDArray[np.bool_],
+    rng: np.random.Generator,
+) -> NDArray[np.int64]:
+    """A partner for each seed among its neighbours, which is free itself where one of four tries is."""
+    width = neighbours.shape[1]
+    tries = rng.integers(0, np.where(rng.random(len(seeds)) < 0.4, min(_NEAR, width), width), (4, len(seeds)))
+    chosen = neighbours[seeds[None], tries]
+    first = np.argmax(left[chosen], axis=0)
+    return np.asarray(chosen[first, np.arange(len(seeds))])
+
+
+def _agreeing(
+    made: list[Row], points: NDArray[np.float64], normals: NDArray[np.float64], tolerance: float
+) -> NDArray[np.bool_]:
+    """(M, N) whether points lie on the quadrics and their normals agree up to sign."""
+    table = np.stack(made)
+    value = rows.values(table, points).T
+    slope = np.stack([rows.gradients(row, points) for row in made])
+    length = np.maximum(np.linalg.norm(slope, axis=2), 1e-9)
+    along = np.abs((slope * normals).sum(axis=2))
+    return np.asarray((np.abs(value) < tolerance * length) & (along > _AGREE * length))
+
+
+def _refitted(
+    row: Row,
+    kind: str,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    free: NDArray[np.int64],
+    tolerance: float,
+) -> Surfel | None:
+    """The row fitted to the free points that agree with it, and those again."""
+    members = free[_agreeing([row], points[free], normals[free], tolerance)[0]]
+    for _ in range(_REFITS):
+        if len(members) < _FEWEST:
+            return None
+        better = FITTERS[kind](row, points[members], normals[members])
+        if better is None:
+            break
+        again = free[_agreeing([better], points[free], normals[free], tolerance)[0]]
+        if len(again) < len(members):
+            break
+        row, members = better, again
+    signs = (rows.gradients(row, points[members]) * normals[members]).sum(axis=1)
+    outward = bool(np.sum(np.sign(signs)) >= 0)
+    same = members[(signs > 0) == outward] if kind == "plane" else members
+    return Surfel(row, kind, same, outward)

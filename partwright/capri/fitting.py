@@ -1,0 +1,218 @@
+"""A shape to a CSG tree of quadrics: detect, select, prune (schedule "search"), or the paper's network."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from partwright.assembly import Assembly
+from partwright.capri import rows, selection
+from partwright.capri import samples as sampling
+from partwright.capri import surface as surfaces
+from partwright.capri.candidates import Pool, candidates
+from partwright.capri.detection import detect
+from partwright.capri.samples import Samples
+from partwright.capri.selection import Problem
+from partwright.capri.settings import Settings
+from partwright.capri.tree import Tree
+from partwright.errors import EmptyShapeError, SettingError
+from partwright.shapes import Shape
+
+Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"]
+
+_MOST = 64  # convexes: the paper's c (section 4.1)
+_STEP = 1.5  # factor between the prices that are tried for a budget or a target
+_LADDER = 16
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a fit is: `fraction` of the expected work, and the best tree so far in numbers."""
+
+    stage: str
+    round: int
+    rounds: int
+    parts: int
+    iou: float
+    fraction: float
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fit's result: the assembly in the shape's own units and place, and how it came about.
+
+    details: for the report: which start was best, primitives, convexes, quadrics among which was chosen.
+    """
+
+    assembly: Assembly
+    outcome: Outcome
+    seconds: dict[str, float]
+    history: list[dict[str, float | str]]
+    tree: Tree
+    details: dict[str, Any] = field(default_factory=dict)
+    curve: tuple[Any, ...] = ()
+
+
+def fit(
+    shape: Shape,
+    settings: Settings | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    start: Assembly | None = None,
+    locked: Sequence[str] = (),
+) -> Fitted:
+    """Fits a CSG tree of quadrics to a shape.
+
+    `start`: its quadrics and named solids join the detected surfaces, and its tree competes with the others.
+    Ctrl-C ends the fit with the best tree so far and the outcome "interrupted".
+
+    Raises:
+        EmptyShapeError: no tree explains anything (the shape is thinner than the samples can see).
+        SettingError: parts are locked, or the start's parts are no quadrics or named solids.
+    """
+    settings = settings or Settings()
+    if locked:
+        raise SettingError("capri keeps no part locked; give the start alone, or use method superfrusta")
+    run = Run(settings, progress)
+    outcome: Outcome = "converged"
+    try:
+        run.prepare(shape, start)
+        outcome = run.search()
+    except KeyboardInterrupt:
+        if run.best is None:
+            raise
+        outcome = "interrupted"
+    if run.best is None or not any(run.best):
+        raise EmptyShapeError(
+            f"{shape.name}: no convex could be placed; the shape has no volume that {settings.near} samples "
+            "can see. Check its thickness, or use --quality high"
+        )
+    corners = shape.frame.to_unit(shape.vertices)
+    tree = run.tree().closed(corners.min(axis=0), corners.max(axis=0))
+    whole = replace(tree.assembly(), unit=shape.unit)
+    assembly = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
+    details = {
+        "schedule": settings.schedule,
+        "start": run.start,
+        "candidates": len(run.pool.rows),
+        "primitives": tree.primitives,
+        "convexes": tree.convexes,
+    }
+    return Fitted(assembly, outcome, run.seconds, run.history, tree, details)
+
+
+@dataclass
+class Run:
+    """State of one fit: the samples, the pool, and the cheapest layers so far."""
+
+    settings: Settings
+    report: Callable[[Progress], None] | None = None
+    best: selection.Layers | None = None
+    start: str = ""
+    seconds: dict[str, float] = field(default_factory=dict)
+    history: list[dict[str, float | str]] = field(default_factory=list)
+    pool: Pool = field(init=False)
+    samples: Samples = field(init=False)
+    given: selection.Layers = field(default_factory=list)
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
+
+    def prepare(self, shape: Shape, start: Assembly | None) -> None:
+        """Samples, and the pool of quadrics."""
+        s = self.settings
+        with self.timed("prepare"):
+            self.samples = sampling.sample(shape, s.near, s.uniform, s.seed)
+            surface = surfaces.sample(shape, s.surface, s.seed)
+        with self.timed("detect"):
+            found = detect(surface, s.kinds, s.least, s.seed)
+            self.pool = Pool.of(candidates(found, surface), nested=s.nested, oriented=s.oriented)
+            self.outside = (rows.values(self.pool.rows, self.samples.points) > 0).astype(np.float32)
+
+    def problem(self, dearer: float = 1.0) -> Problem:
+        """The selection at the settings' prices, times a factor."""
+        s, volume = self.settings, self.samples.volume
+        price = np.where(self.pool.complement, s.price + s.convex_price, s.price)
+        return Problem(
+            self.outside,
+            self.samples.inside,
+            self.samples.weight,
+            dearer * volume * price,
+            dearer * volume * s.convex_price,
+            np.random.default_rng((s.seed, 3)),
+        )
+
+    def search(self) -> Outcome:
+        """Starts of several severities, the best of them ruined and recreated; then budget and target."""
+        s = self.settings
+        problem = self.problem()
+        empty: selection.Layers = [[] for _ in range(2 if s.subtract else 1)]
+        with self.timed("select"):
+            for i, strict in enumerate(selection.SEVERITIES):
+                layers = selection.polish(problem, selection.fill(problem, empty, strict, _MOST), _MOST)
+                self.keep(problem, layers, "select", i + 1, len(selection.SEVERITIES), "detected surfaces")
+        assert self.best is not None
+        with self.timed("recreate"):
+            for i in range(s.tries):
+                layers = selection.ruin_and_recreate(problem, self.best, _MOST)
+                self.keep(problem, layers, "recreate", i + 1, s.tries, self.start)
+        return self.meet_demands()
+
+    def meet_demands(self) -> Outcome:
+        """Dearer, until the budget is met; cheaper or dearer, until the target is only just met."""
+        s = self.settings
+        assert self.best is not None
+        with self.timed("demands"):
+            if s.min_iou is not None:
+                return self.meet_target(s.min_iou)
+            if s.max_parts is None or self.tree().primitives <= s.max_parts:
+                return "converged"
+            for i in range(1, _LADDER):
+                self.best = selection.polish(self.problem(_STEP**i), self.best, _MOST)
+                if self.tree().primitives <= s.max_parts:
+                    return "budget_reached"
+            raise SettingError(f"max_parts: no tree of {s.max_parts} primitives encloses anything; give more")
+
+    def meet_target(self, target: float) -> Outcome:
+        """The dearest prices at which the IoU of the samples reaches the target."""
+        best = self.best
+        for i in range(_LADDER // 2, -_LADDER // 2, -1):
+            problem = self.problem(_STEP**i)
+            layers = selection.polish(problem, best or [], _MOST)
+            if self.iou(layers) >= target:
+                self.best = layers
+                return "target_reached"
+        return "converged"
+
+    def keep(
+        self, problem: Problem, layers: selection.Layers, stage: str, round_: int, rounds: int, start: str
+    ) -> None:
+        """Keeps layers that are cheaper than the best so far, and tells."""
+        if any(layers) and (self.best is None or problem.cost(layers) < problem.cost(self.best)):
+            self.best, self.start = layers, start
+        tree = self.tree() if self.best else None
+        parts, iou = (tree.primitives, self.iou(self.best)) if tree and self.best else (0, 0.0)
+        self.history.append({"stage": stage, "round": round_, "parts": parts, "iou": iou})
+        if self.report is not None:
+            done = 0.1 + 0.3 * round_ / rounds if stage == "select" else 0.4 + 0.6 * round_ / rounds
+            self.report(Progress(stage, round_, rounds, parts, iou, done))
+
+    def iou(self, layers: selection.Layers) -> float:
+        """IoU over the uniform samples."""
+        rest = slice(self.samples.near, self.samples.near + self.samples.uniform)
+        occupied, inside = self.problem().occupancy(layers)[rest], self.samples.inside[rest]
+        return float((occupied & inside).sum() / max((occupied | inside).sum(), 1))
+
+    def tree(self) -> Tree:
+        assert self.best is not None
+        layers = tuple(tuple(layer) for layer in self.best)
+        return Tree(self.pool.rows, self.pool.complement, layers)

@@ -1,0 +1,257 @@
+"""Which quadrics, in which convexes, in which layers: the selection matrix T (section 3.2) by search.
+
+The gradient of a relaxed T needs tens of thousands of steps to become binary. With quadrics that lie on the
+surface, T is a problem of logic instead: find few conjunctions of half-spaces ("convexes") whose layers
+(added, subtracted, added ...) give every sample its side. Every move (add, drop or exchange a quadric; add or
+drop a convex) changes the objective by a sum over the samples: one matrix product gives it for all quadrics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+Convex = tuple[int, ...]
+Layers = list[list[Convex]]
+Matrix = NDArray[np.float32]
+Move = tuple[int | None, int | None]  # which of the chosen to drop, which quadric to add
+
+_SEEDS = 24
+_COARSE = 6000  # samples on which seeds compete
+_KEPT = 3
+_CACHED = 1000
+SEVERITIES = (0.3, 1.0, 3.0, 10.0)
+_PROGRESS = 1e-3  # of the cost, below which polishing ends
+_EPSILON = 1e-3  # of a sample's least weight
+
+
+@dataclass(frozen=True)
+class Problem:
+    """outside (N, K) float32: 1 where quadric k leaves sample n out; inside (N,) bool: the shape's own side;
+    weight (N,): what a sample on the wrong side costs; all of the shape's inside costs 1.
+
+    price (K,), convex_price: what each quadric and a convex cost (the description length).
+    """
+
+    outside: NDArray[np.float32]
+    inside: NDArray[np.bool_]
+    weight: NDArray[np.float32]
+    price: NDArray[np.float64]
+    convex_price: float
+    rng: np.random.Generator = field(repr=False)
+    known: dict[Convex, NDArray[np.bool_]] = field(default_factory=dict, repr=False)
+
+    def covered(self, convex: Convex) -> NDArray[np.bool_]:
+        """(N,) samples within a convex."""
+        if convex not in self.known:
+            if len(self.known) >= _CACHED:
+                self.known.clear()
+            self.known[convex] = np.asarray(~self.outside[:, list(convex)].any(axis=1))
+        return self.known[convex]
+
+    def occupancy(self, layers: Layers) -> NDArray[np.bool_]:
+        """(N,) the side that the layers give each sample."""
+        result = np.zeros(len(self.inside), dtype=bool)
+        for k, layer in enumerate(layers):
+            for convex in layer:
+                result[self.covered(convex)] = k % 2 == 0
+        return result
+
+    def error(self, layers: Layers) -> float:
+        """Weight of the samples on the wrong side."""
+        return float(self.weight[self.occupancy(layers) != self.inside].sum())
+
+    def cost(self, layers: Layers) -> float:
+        """The objective: error plus description length."""
+        return self.error(layers) + sum(self.length(convex) for layer in layers for convex in layer)
+
+    def length(self, convex: Convex) -> float:
+        """What a convex costs."""
+        return float(self.price[list(convex)].sum()) + self.convex_price
+
+    def worth(self, layers: Layers, at: int, without: int | None = None, strict: float = 1.0) -> Matrix:
+        """(N,) by how much the error falls where a convex in layer `at` covers a sample.
+
+        without: index in that layer of a convex to leave out. strict: how many times a sample counts that the
+        convex would put on the wrong side.
+        """
+        before = np.zeros(len(self.inside), dtype=bool)
+        for k in range(at + 1):
+            for i, convex in enumerate(layers[k]):
+                if k != at or i != without:
+                    before[self.covered(convex)] = k % 2 == 0
+        free = np.ones(len(self.inside), dtype=bool)
+        for layer in layers[at + 1 :]:
+            for convex in layer:
+                free &= ~self.covered(convex)
+        painted = at % 2 == 0
+        change = free & (before != painted)
+        right = self.inside == painted
+        value = np.where(right, self.weight, -np.rint(strict * self.weight))
+        return np.where(change, value, 0).astype(np.float32)
+
+
+def improve(problem: Problem, outside: Matrix, worth: Matrix, convex: Convex) -> tuple[Convex, float]:
+    """Local search over one convex: adds, drops, exchanges while its value rises; the convex, its value.
+
+    outside (N, K) and worth (N,): the samples at which it matters whether the convex covers them.
+    """
+    chosen = list(convex)
+    count = outside[:, chosen].sum(axis=1)
+    while True:
+        within = count == 0
+        gain = -(worth[within] @ outside[within]) - problem.price
+        gain[chosen] = -np.inf
+        best_add = int(np.argmax(gain))
+        best, move = float(gain[best_add]), cast(Move, (None, best_add))
+        if chosen:
+            single = count == 1
+            back = worth[single] @ outside[single][:, chosen] + problem.price[chosen]
+            if back.max() > best:
+                best, move = float(back.max()), (int(np.argmax(back)), None)
+        if best <= _EPSILON:
+            best, move = _exchange(problem, outside, worth, chosen, count)
+            if best <= _EPSILON:
+                break
+        drop, add = move
+        if drop is not None:
+            count = count - outside[:, chosen.pop(drop)]
+        if add is not None:
+            chosen.append(add)
+            count = count + outside[:, add]
+    convex = tuple(sorted(chosen))
+    return convex, float(worth[count == 0].sum()) - problem.length(convex)
+
+
+def _exchange(
+    problem: Problem, outside: Matrix, worth: Matrix, chosen: list[int], count: Matrix
+) -> tuple[float, Move]:
+    """The best exchange of one quadric for another, and its gain."""
+    best: float = 0.0
+    move: Move = (None, None)
+    for i, k in enumerate(chosen):
+        opened = (count == 1) & (outside[:, k] > 0)
+        within = (count == 0) | opened
+        back = float(worth[opened].sum()) + problem.price[k]
+        gain = back - worth[within] @ outside[within] - problem.price
+        gain[chosen] = -np.inf
+        add = int(np.argmax(gain))
+        if gain[add] > best:
+            best, move = float(gain[add]), (i, add)
+    return best, move
+
+
+def seeded(problem: Problem, outside: Matrix, worth: Matrix, allowed: NDArray[np.bool_]) -> Convex:
+    """A convex grown from all of space: the allowed quadrics (K,) join, best first, while that pays."""
+    chosen: list[int] = []
+    while True:
+        gain = np.where(allowed, -(worth @ outside) - problem.price, -np.inf)
+        if chosen:
+            gain[chosen] = -np.inf
+        add = int(np.argmax(gain))
+        if gain[add] <= _EPSILON:
+            return tuple(chosen)
+        keep = outside[:, add] == 0
+        outside, worth = outside[keep], worth[keep]
+        chosen.append(add)
+
+
+def best_convex(problem: Problem, worth: NDArray[np.float32]) -> tuple[Convex, float]:
+    """The most valuable convex that the search finds for samples of this worth."""
+    rows = np.flatnonzero(worth)
+    wanted = rows[worth[rows] > 0]
+    if len(wanted) == 0:
+        return (), 0.0
+    rng = problem.rng
+    coarse = rows if len(rows) <= _COARSE else rng.choice(rows, _COARSE, replace=False)
+    scale = np.float32(len(rows) / len(coarse))
+    outside, value = problem.outside[coarse], worth[coarse] * scale
+    share = worth[wanted].astype(np.float64)
+    seeds = rng.choice(wanted, min(_SEEDS, len(wanted)), replace=False, p=share / share.sum())
+    tried: dict[Convex, float] = {}
+    for seed in seeds:
+        convex = tuple(sorted(seeded(problem, outside, value, problem.outside[seed] == 0)))
+        if convex not in tried:
+            cover = ~outside[:, list(convex)].any(axis=1)
+            tried[convex] = float(value[cover].sum()) - problem.length(convex)
+    best: tuple[Convex, float] = (), 0.0
+    full, worths = problem.outside[rows], worth[rows]
+    for convex in sorted(tried, key=lambda c: -tried[c])[:_KEPT]:
+        found = improve(problem, full, worths, convex)
+        if found[1] > best[1] and found[0]:
+            best = found
+    return best
+
+
+def fill(problem: Problem, layers: Layers, strict: float, most: int) -> Layers:
+    """Convexes added layer by layer while they pay; all layers but the last judge by `strict`.
+
+    Under 1 it forgives what the next layer may take away again; above, convexes stay within the shape.
+    """
+    filled = [list(layer) for layer in layers]
+    for at in range(len(filled)):
+        severity = strict if at + 1 < len(filled) else 1.0
+        while sum(map(len, filled)) < most:
+            convex, value = best_convex(problem, problem.worth(filled, at, strict=severity))
+            if value <= 0:
+                break
+            filled[at].append(convex)
+    return filled
+
+
+def polish(problem: Problem, layers: Layers, most: int, rounds: int = 6) -> Layers:
+    """Local search over all layers: every convex anew given the others, then new ones, until nothing pays."""
+    layers = [list(layer) for layer in layers]
+    cost = np.inf
+    for _ in range(rounds):
+        for at, layer in enumerate(layers):
+            for i in reversed(range(len(layer))):
+                worth = problem.worth(layers, at, without=i)
+                rows = np.flatnonzero(worth)
+                convex, value = improve(problem, problem.outside[rows], worth[rows], layer[i])
+                if value > 0 and convex:
+                    layer[i] = convex
+                else:
+                    layer.pop(i)
+        while sum(map(len, layers)) < most:
+            options = [(*best_convex(problem, problem.worth(layers, at)), at) for at in range(len(layers))]
+            convex, value, at = max(options, key=lambda option: option[1])
+            if value <= 0:
+                break
+            layers[at].append(convex)
+        now = problem.cost(layers)
+        if now > cost * (1 - _PROGRESS):
+            break
+        cost = now
+    return layers
+
+
+def ruin_and_recreate(problem: Problem, layers: Layers, most: int) -> Layers:
+    """Takes out convexes around a sample on the wrong side and fills the gap anew (Schrimpf et al. 2000).
+
+    Returns what came of it if it is cheaper, else the layers as they were.
+    """
+    wrong = np.flatnonzero(problem.occupancy(layers) != problem.inside)
+    weight = problem.weight[wrong].astype(np.float64)
+    if weight.sum() == 0:
+        return layers
+    sample = int(problem.rng.choice(wrong, p=weight / weight.sum()))
+    strict = float(problem.rng.choice(SEVERITIES))
+    tried = fill(problem, _ruined(problem, layers, sample), strict, most)
+    tried = polish(problem, tried, most, rounds=2)
+    return tried if problem.cost(tried) < problem.cost(layers) else layers
+
+
+def _ruined(problem: Problem, layers: Layers, sample: int) -> Layers:
+    """Without at most three convexes: those that hold the sample, or nearly do."""
+    outside = problem.outside[sample]
+    near = sorted(
+        (float(outside[list(convex)].sum()) + problem.rng.random(), at, i)
+        for at, layer in enumerate(layers)
+        for i, convex in enumerate(layer)
+    )
+    gone = {(at, i) for _, at, i in near[: int(problem.rng.integers(0, 4))]}
+    return [[c for i, c in enumerate(layer) if (at, i) not in gone] for at, layer in enumerate(layers)]

@@ -1,0 +1,116 @@
+"""Settings of a CAPRI fit. Defaults that differ from the paper say so and why."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from partwright.capri.kinds import KINDS
+from partwright.errors import SettingError
+
+Quality = Literal["draft", "normal", "high"]
+Schedule = Literal["search", "paper"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a shape becomes a CSG tree of quadrics. Lengths are in the unit frame (longest side 1.8).
+
+    schedule: "search", ours: quadrics detected on the surface, the tree by discrete search; seconds, not
+        hours. "paper": the network of sections 3.1-3.3, fine-tuned by gradient descent in three stages.
+
+    The tree (section 3.2):
+        kinds: quadrics that are looked for; the paper's abc >= 0 leaves out cones.
+        oriented: quadrics may have cross terms, so that a tilted cylinder is one primitive (ours).
+        subtract: a second union is subtracted (eq. 5).
+        nested: a convex may have convex quadrics subtracted within it, where that shortens the tree; each
+            counts as a convex of its own.
+        price, convex_price: what a primitive and a convex cost, as shares of the shape's volume on the wrong
+            side (the description length; the paper has none).
+        max_parts: at most so many primitives. min_iou: the cheapest tree that reaches it.
+
+    Ours:
+        surface, least: points on which quadrics are detected, and how many of them make one.
+        near, uniform: samples near the surface and in the box (the paper: 32,768 voxel centres in all).
+        tries: convexes are taken out and replaced so many times.
+
+    schedule "paper" (section 4.1 and the supplement; stages and thresholds: `partwright.capri.stages`):
+        iterations: of each of the three stages (paper: 12,000). weights: a pre-trained network's file.
+
+    symmetry and threads are options of all methods that a tree has no use for; curve is refused.
+    """
+
+    schedule: Schedule = "search"
+    kinds: tuple[str, ...] = KINDS
+    oriented: bool = True
+    subtract: bool = True
+    nested: bool = True
+    price: float = 6e-4
+    convex_price: float = 3e-3
+    max_parts: int | None = None
+    min_iou: float | None = None
+    surface: int = 20_000
+    least: int = 25
+    near: int = 30_000
+    uniform: int = 20_000
+    tries: int = 20
+    iterations: int = 12_000
+    weights: str | None = None
+    curve: bool = False
+    symmetry: bool = True
+    seed: int = 0
+    threads: int = 0
+    device: str = "auto"
+
+    def __post_init__(self) -> None:
+        for name in ("surface", "near", "uniform"):
+            _check(name, getattr(self, name), low=1000)
+        for name in ("least", "iterations"):
+            _check(name, getattr(self, name), low=1)
+        for name in ("tries", "seed", "threads"):
+            _check(name, getattr(self, name), low=0)
+        for name in ("price", "convex_price"):
+            _check(name, getattr(self, name), low=1e-6, high=1.0)
+        if self.max_parts is not None:
+            _check("max_parts", self.max_parts, low=1)
+        if self.min_iou is not None:
+            _check("min_iou", self.min_iou, low=0.0, high=1.0)
+        if self.schedule not in ("search", "paper"):
+            raise SettingError(f'schedule: expected "search" or "paper", got {self.schedule!r}')
+        unknown = set(self.kinds) - set(KINDS)
+        if unknown or "plane" not in self.kinds:
+            raise SettingError(f"kinds: expected plane and any of {', '.join(KINDS[1:])}, got {self.kinds}")
+        if self.curve:
+            raise SettingError("curve: a CAPRI tree has no curve of sizes; give max_parts or min_iou")
+        if self.weights is not None and not Path(self.weights).is_file():
+            raise SettingError(f"weights: there is no file {self.weights}")
+
+    @classmethod
+    def for_quality(cls, quality: Quality = "normal", **changes: Any) -> Settings:
+        """The preset `draft`, `normal` or `high`, with `changes` on top.
+
+        Raises:
+            SettingError: the preset or a change is unknown or out of range.
+        """
+        if quality not in PRESETS:
+            raise SettingError(f"quality: expected one of {', '.join(PRESETS)}, got {quality!r}")
+        unknown = set(changes) - set(cls.__dataclass_fields__)
+        if unknown:
+            raise SettingError(f"unknown settings: {', '.join(sorted(unknown))}")
+        return replace(PRESETS[quality], **changes)
+
+
+def _check(name: str, value: float, low: float, high: float = math.inf) -> None:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not number or not low <= value <= high:
+        upper = f" and at most {high:g}" if math.isfinite(high) else ""
+        raise SettingError(f"{name}: expected a number of at least {low:g}{upper}, got {value!r}")
+
+
+PRESETS: dict[str, Settings] = {
+    "draft": Settings(tries=0, near=15_000, uniform=10_000, iterations=1_200),
+    "normal": Settings(),
+    "high": Settings(tries=100, surface=40_000, least=30, near=60_000, uniform=40_000),
+}

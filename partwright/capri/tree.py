@@ -1,0 +1,90 @@
+"""The CSG tree: layers of convexes of quadrics, and the assembly that it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from partwright.assembly import Assembly, Node, Part
+from partwright.capri import rows
+from partwright.fields import Quadric
+
+Convex = tuple[int, ...]
+Layers = tuple[tuple[Convex, ...], ...]
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Unions of intersections, added and subtracted in turn: (L0 - L1) + L2 ... (section 3.2; eq. 5 has two).
+
+    rows (K, 10) in the unit frame; a convex is the indices of the quadrics that it intersects. complement
+    (K,) marks rows that are the outside of a convex quadric: subtracting one in a convex counts as a convex.
+    """
+
+    rows: NDArray[np.float64]
+    complement: NDArray[np.bool_]
+    layers: Layers
+
+    @property
+    def primitives(self) -> int:
+        """#P: quadrics, counted in every convex that uses them."""
+        return sum(len(convex) for layer in self.layers for convex in layer)
+
+    @property
+    def convexes(self) -> int:
+        """#C: convexes, and the convex quadrics subtracted within them."""
+        return sum(1 + int(self.complement[list(c)].sum()) for layer in self.layers for c in layer)
+
+    def occupancy(self, points: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """(N,) whether points (N, 3) of the unit frame lie inside."""
+        inside = rows.values(self.rows, points) <= 0
+        result = np.zeros(len(points), dtype=bool)
+        for k, layer in enumerate(self.layers):
+            for convex in layer:
+                result[inside[:, list(convex)].all(axis=1)] = k % 2 == 0
+        return result
+
+    def closed(self, lower: ArrayLike, upper: ArrayLike) -> Tree:
+        """Added convexes that do not end are cut off at the box (3,), (3,) around the shape."""
+        sides = [rows.plane(-e, float(-c)) for e, c in zip(np.eye(3), np.asarray(lower), strict=True)]
+        sides += [rows.plane(e, float(c)) for e, c in zip(np.eye(3), np.asarray(upper), strict=True)]
+        table = np.concatenate([self.rows, sides])
+        complement = np.r_[self.complement, np.zeros(6, dtype=bool)]
+
+        def ended(convex: Convex) -> Convex:
+            open_ = np.flatnonzero(~np.isfinite(self._node(convex, "").bounds()))
+            return (*convex, *(int(i) + len(self.rows) for i in open_))
+
+        layers = tuple(c if k % 2 else tuple(map(ended, c)) for k, c in enumerate(self.layers))
+        return Tree(table, complement, layers)
+
+    def assembly(self) -> Assembly:
+        """Difference of two unions of intersections (eq. 5), leaves are quadrics; in the unit frame."""
+        whole: Node | None = None
+        count = 0
+        for k, layer in enumerate(self.layers):
+            nodes = []
+            for convex in layer:
+                count += 1
+                nodes.append(self._node(convex, f"convex_{count:02d}"))
+            if not nodes:
+                continue
+            union: Node = Assembly(tuple(nodes), name="subtracted" if k % 2 else "added")
+            whole = union if whole is None else Assembly((whole, union), "difference" if k % 2 else "union")
+        assert isinstance(whole, Assembly)
+        return whole
+
+    def _node(self, convex: Convex, name: str) -> Assembly:
+        """One convex; quadrics whose outside it takes are subtracted from the rest."""
+        taken = [k for k in convex if self.complement[k]]
+        held = [k for k in convex if not self.complement[k]]
+        if not taken or not held:
+            return Assembly(tuple(_leaf(self.rows[k]) for k in convex), "intersection", name)
+        core = Assembly(tuple(_leaf(self.rows[k]) for k in held), "intersection", name)
+        return Assembly((core, *(_leaf(-self.rows[k]) for k in taken)), "difference", f"{name}_cut")
+
+
+def _leaf(row: NDArray[np.float64]) -> Part:
+    return Part(Quadric(tuple(row.tolist())))

@@ -1,0 +1,95 @@
+"""Surfaces found on tessellated solids are the solids' own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from partwright.capri import detection, rows, surface
+from partwright.capri.candidates import Pool, candidates
+from partwright.capri.kinds import KINDS
+from partwright.shapes import load_shape
+from tests.capri.meshes import drilled_plate, tilted_rod
+
+
+def found_on(mesh: trimesh.Trimesh, count: int = 6000) -> tuple[list[detection.Surfel], surface.Surface]:
+    drawn = surface.sample(load_shape(mesh), count, 0)
+    return detection.detect(drawn, KINDS, 20, 0), drawn
+
+
+def kinds(found: list[detection.Surfel]) -> list[str]:
+    return sorted(one.kind for one in found)
+
+
+def test_normals_of_a_tessellated_ball_are_those_of_the_ball() -> None:
+    """Facets are up to 4 degrees off; interpolated normals are not."""
+    drawn = surface.sample(load_shape(trimesh.creation.icosphere(3)), 2000, 0)
+    radial = drawn.points / np.linalg.norm(drawn.points, axis=1, keepdims=True)
+    assert np.degrees(np.arccos((drawn.normals * radial).sum(axis=1))).max() < 0.7
+    assert drawn.area == pytest.approx(4 * np.pi * 0.81, rel=0.01)
+
+
+def test_normals_of_a_box_keep_its_edges() -> None:
+    drawn = surface.sample(load_shape(trimesh.creation.box((2, 1, 0.5))), 500, 0)
+    assert (np.abs(drawn.normals).max(axis=1) > 1 - 1e-9).all()
+
+
+def test_a_box_is_six_planes() -> None:
+    found, _ = found_on(trimesh.creation.box((2, 1, 0.5)))
+    assert kinds(found) == ["plane"] * 6
+    offsets = sorted(round(float(-one.row[6]), 6) for one in found)
+    assert offsets == pytest.approx([0.225, 0.225, 0.45, 0.45, 0.9, 0.9], abs=1e-5)
+
+
+def test_holes_are_cylinders_seen_from_inside() -> None:
+    found, _ = found_on(drilled_plate())
+    assert kinds(found) == ["cylinder"] * 2 + ["plane"] * 6
+    for one in found:
+        assert one.outward == (one.kind == "plane")
+        if one.kind == "cylinder":
+            radius = 1 / (2 * one.row[:3].max())
+            assert radius == pytest.approx(0.9 * 0.2, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "expected"),
+    [
+        pytest.param(trimesh.creation.icosphere(4), ["sphere"], id="ball"),
+        pytest.param(tilted_rod(), ["cylinder", "plane", "plane"], id="rod"),
+        pytest.param(trimesh.creation.cone(0.6, 1.5, sections=96), ["cone", "plane"], id="cone"),
+    ],
+)
+def test_round_solids(mesh: trimesh.Trimesh, expected: list[str]) -> None:
+    found, drawn = found_on(mesh)
+    assert kinds(found) == expected
+    covered = np.concatenate([one.members for one in found])
+    assert len(covered) > 0.98 * len(drawn.points)
+    for one in found:
+        assert np.abs(rows.distances(one.row, drawn.points[one.members])).max() < 0.006
+
+
+def test_an_ellipsoid_is_one_quadric_or_a_few() -> None:
+    mesh = trimesh.creation.icosphere(4)
+    mesh.apply_scale((1.0, 0.7, 0.5))
+    found, drawn = found_on(mesh)
+    assert found[0].kind == "quadric"
+    assert len(found[0].members) > 0.5 * len(drawn.points)
+
+
+def test_the_pool_has_planes_both_ways_and_each_quadric_once() -> None:
+    found, drawn = found_on(drilled_plate())
+    given = candidates(found, drawn)
+    convex = Pool.of([*given, *given], nested=False, oriented=True)
+    nested = Pool.of(given, nested=True, oriented=True)
+    assert not convex.complement.any()
+    assert nested.complement.sum() == 2
+    assert len(nested.rows) == len(convex.rows) + 2
+    flat = convex.rows[rows.is_plane(convex.rows)]
+    assert {tuple(np.round(r, 9)) for r in flat} == {tuple(np.round(-r, 9)) for r in flat}
+
+
+def test_without_cross_terms_a_tilted_rod_has_no_cylinder() -> None:
+    found, drawn = found_on(tilted_rod())
+    pool = Pool.of(candidates(found, drawn), nested=False, oriented=False)
+    assert rows.is_plane(pool.rows).all()

@@ -1,0 +1,191 @@
+"""Whole fits of small parts: exact trees, demands, interruptions, repeatability, units, broken input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from partwright.assembly import Assembly
+from partwright.capri import Progress, Settings, fit
+from partwright.capri.tree import Tree
+from partwright.errors import GridError, NeedsSurfaceError, PartwrightError, SettingError
+from partwright.meshing import mesh_csg
+from partwright.shapes import Shape, load_shape
+from tests.capri.meshes import bracket, drilled_plate, tilted_rod
+
+FAST = {"surface": 6000, "near": 6000, "uniform": 5000, "tries": 2, "least": 20}
+
+
+def quick(shape: Shape, progress=None, **changes):
+    return fit(shape, Settings(**FAST | changes), progress)
+
+
+def solid(assembly: Assembly) -> trimesh.Trimesh:
+    mesh = mesh_csg(assembly)
+    assert mesh.is_watertight
+    return mesh
+
+
+@pytest.mark.parametrize(
+    ("mesh", "primitives", "convexes", "genus"),
+    [
+        pytest.param(trimesh.creation.box((2, 1, 0.6)), 6, 1, 0, id="box"),
+        pytest.param(trimesh.creation.icosphere(4), 1, 1, 0, id="ball"),
+        pytest.param(tilted_rod(), 3, 1, 0, id="tilted rod"),
+        pytest.param(drilled_plate(), 8, 3, 2, id="drilled plate"),
+        pytest.param(bracket(), 13, 3, 1, id="bracket"),
+    ],
+)
+def test_known_parts_get_their_tree(
+    mesh: trimesh.Trimesh, primitives: int, convexes: int, genus: int
+) -> None:
+    fitted = quick(load_shape(mesh))
+    assert fitted.tree.primitives <= primitives
+    assert fitted.tree.convexes <= convexes
+    assert len(fitted.assembly) == fitted.tree.primitives == fitted.details["primitives"]
+    made = solid(fitted.assembly)
+    assert made.volume == pytest.approx(mesh.volume, rel=0.01)
+    assert made.euler_number == 2 - 2 * genus
+    assert fitted.outcome == "converged"
+
+
+@pytest.fixture(scope="module")
+def plate() -> Shape:
+    return load_shape(drilled_plate(), unit="mm")
+
+
+def test_without_difference_and_nesting_there_is_one_layer_of_convexes(plate: Shape) -> None:
+    fitted = quick(plate, subtract=False, nested=False)
+    assert len(fitted.tree.layers) == 1
+    assert fitted.tree.convexes == len(fitted.tree.layers[0])
+    assert not fitted.tree.complement[[k for c in fitted.tree.layers[0] for k in c]].any()
+
+
+def test_the_paper_s_form_is_a_difference_of_unions_of_convexes(plate: Shape) -> None:
+    tree = quick(plate, nested=False).tree
+    assert [len(layer) for layer in tree.layers] == [1, 2]
+    whole = tree.assembly()
+    assert whole.operation == "difference"
+    assert [child.name for child in whole.children] == ["added", "subtracted"]
+    assert all(c.operation == "intersection" for union in whole.children for c in union.children)
+
+
+def test_the_assembly_is_the_tree(plate: Shape) -> None:
+    fitted = quick(plate)
+    points = np.random.default_rng(0).uniform(-1, 1, (5000, 3))
+    distance = fitted.assembly.distance(plate.frame.from_unit(points))
+    sure = np.abs(distance) > 1e-3
+    np.testing.assert_array_equal((distance < 0)[sure], fitted.tree.occupancy(points)[sure])
+    assert fitted.assembly.unit == plate.unit
+
+
+def test_nothing_can_be_removed_for_free(plate: Shape) -> None:
+    """Pruned: without any one primitive the tree is another solid."""
+    tree = quick(plate).tree
+    points = np.random.default_rng(1).uniform(-1, 1, (40_000, 3))
+    whole = tree.occupancy(points)
+    for k, layer in enumerate(tree.layers):
+        for i, convex in enumerate(layer):
+            for one in convex:
+                rest = tuple(c for c in convex if c != one)
+                fewer = [list(x) for x in tree.layers]
+                fewer[k][i : i + 1] = [rest] if rest else []
+                less = Tree(tree.rows, tree.complement, tuple(tuple(x) for x in fewer))
+                assert (less.occupancy(points) != whole).mean() > 1e-3
+
+
+def test_the_same_seed_gives_the_same_bytes(tmp_path) -> None:
+    for name in ("a", "b"):
+        quick(load_shape(bracket()), seed=3).assembly.save(tmp_path / name)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_a_budget_of_primitives(plate: Shape) -> None:
+    fitted = quick(plate, max_parts=7)
+    assert len(fitted.assembly) <= 7
+    assert fitted.outcome == "budget_reached"
+    assert solid(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.15)
+
+
+def test_a_target_takes_the_cheapest_tree_that_reaches_it(plate: Shape) -> None:
+    fitted = quick(plate, min_iou=0.85)
+    assert fitted.outcome == "target_reached"
+    assert len(fitted.assembly) <= 6
+
+
+def test_progress_and_interruption(plate: Shape) -> None:
+    seen: list[Progress] = []
+    quick(plate, seen.append)
+    fractions = [step.fraction for step in seen]
+    assert fractions == sorted(fractions)
+    assert 0 < fractions[0] < fractions[-1] == 1
+    assert seen[-1].iou > 0.98
+
+    def interrupt(_: Progress) -> None:
+        raise KeyboardInterrupt
+
+    fitted = quick(plate, interrupt)
+    assert fitted.outcome == "interrupted"
+    assert solid(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.1)
+
+
+@pytest.mark.parametrize("scale", [1e-5, 1e5])
+def test_units_and_place_do_not_matter(scale: float) -> None:
+    mesh = drilled_plate()
+    mesh.vertices = mesh.vertices * scale + np.array([3.0, -2.0, 5.0]) * scale
+    made = solid(quick(load_shape(mesh)).assembly)
+    assert made.volume == pytest.approx(mesh.volume, rel=0.01)
+
+
+def test_points_and_grids_come_in_as_well() -> None:
+    mesh = drilled_plate()
+    points, face = trimesh.sample.sample_surface(mesh, 20_000, seed=0)
+    cloud = np.concatenate([points, mesh.face_normals[face]], axis=1)
+    for given in (cloud, mesh.voxelized(2 / 64).fill().matrix):
+        shape = load_shape(given)
+        fitted = quick(shape, price=1e-3)
+        made = solid(fitted.assembly)
+        assert made.volume == pytest.approx(shape.volume, rel=0.05)
+        assert len(fitted.assembly) <= 14
+
+
+def test_a_closed_cavity_stays() -> None:
+    """A box around a ball of nothing."""
+    inner = trimesh.creation.icosphere(3, radius=0.4)
+    inner.invert()
+    mesh = trimesh.util.concatenate([trimesh.creation.box((2, 1.4, 1.2)), inner])
+    shape = load_shape(mesh)
+    if shape.volume < 3.3:  # the shape itself kept it
+        assert solid(quick(shape).assembly).volume == pytest.approx(mesh.volume, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("given", "error"),
+    [
+        (np.ones((16, 16, 16), bool), GridError),
+        (np.zeros((16, 16, 16), bool), GridError),
+        (np.random.default_rng(0).uniform(size=(50, 3)), NeedsSurfaceError),
+        ((np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])), PartwrightError),
+    ],
+    ids=["full grid", "empty grid", "few points", "one triangle"],
+)
+def test_broken_input_is_named(given, error: type[PartwrightError]) -> None:
+    with pytest.raises(error):
+        quick(load_shape(given))
+
+
+def test_settings_that_cannot_be_used_are_named(plate: Shape) -> None:
+    for changes, message in [
+        ({"max_parts": 0}, "max_parts"),
+        ({"price": 0.0}, "price"),
+        ({"schedule": "fast"}, 'schedule: expected "search" or "paper"'),
+        ({"kinds": ("sphere",)}, "kinds: expected plane"),
+        ({"curve": True}, "curve"),
+        ({"weights": "/nowhere"}, "weights: there is no file"),
+        ({"colour": 1}, "unknown settings: colour"),
+    ]:
+        with pytest.raises(SettingError, match=message):
+            Settings.for_quality("draft", **changes)
+    with pytest.raises(SettingError, match="locked"):
+        fit(plate, Settings(**FAST), locked=("a",))
