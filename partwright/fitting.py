@@ -138,7 +138,7 @@ def fit(
         start: an assembly to refine and continue. locked: names of its parts that stay as they are.
         per_node: fit each node of a scene by itself; the assembly's children are named after the nodes.
         symmetry: where the shape has a mirror plane or a rotation, parts come as repeats (`Part.instances`).
-        subtract: parts may also be taken away from others (holes); None: for superfrusta no, for the others yes.
+        subtract: parts may be taken away from others (holes); None: for superfrusta no, for the others yes.
         seed: the same seed gives the same assembly, at any number of threads.
         device: "cpu", "cuda", or "auto": the compiled kernel on the CPU, which needs no other package.
         threads: 0 means one per core.
