@@ -25,6 +25,7 @@ _EAGER = 3  # growth asks this part of a part's price: the thinning finds what i
 _PLENTY = 3000  # samples that one part is fitted to
 _SCREEN_EVERY = 3  # screening uses every third of them
 _KEPT = 4  # starts that survive screening
+_GENEROUS = 0.1  # weight of too much where it can be carved away again
 _SCREEN = ((15.0, 5),)
 _FIT = ((15.0, 4), (40.0, 10))
 
@@ -37,7 +38,8 @@ class Region:
     elsewhere: weight of samples outside the region that the others do not explain either. frames: rotations
     (w, x, y, z) to start from beside the principal axes. sign: +1 for a part to add where the shape is
     missed, -1 for one to subtract where too much is covered. under: the part goes before those that are
-    subtracted, so that it may run through them.
+    subtracted, so that it may run through them. hull: planes (K, 4) of a convex hull in which covering too
+    much costs little.
     """
 
     voxels: NDArray[np.bool_]
@@ -48,6 +50,7 @@ class Region:
     frames: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 4), np.float32))
     sign: float = 1.0
     under: bool = False
+    hull: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -133,6 +136,9 @@ def _view(evidence: Evidence, region: Region) -> View:
     if region.under:
         cuts = region.others[region.others[:, SIGN] < 0]
         weight[(evidence.parts_of(cuts, evidence.points[index]) < 0).any(axis=0)] = 0
+    if region.hull is not None:
+        within = (evidence.points[index] @ region.hull[:, :3].T + region.hull[:, 3] < 0).all(axis=1)
+        weight[within & ~evidence.inside[index]] *= _GENEROUS
     return View(index, weight / max(float(weight.sum()), 1e-9), background)
 
 

@@ -20,6 +20,7 @@ from partwright.assembly.rows import rows as rows_of
 from partwright.errors import EmptyShapeError, SettingError
 from partwright.fields import kernel
 from partwright.shapes import Shape
+from partwright.superfrusta.carving import body
 from partwright.superfrusta.constrained import Leaf, expanded
 from partwright.superfrusta.curve import with_parents
 from partwright.superfrusta.evidence import NOTHING, Evidence, Rows
@@ -40,6 +41,7 @@ Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"
 # In growth, parts need only pay this; the settings' alpha decides when the assembly is thinned out.
 GROWTH_ALPHA = 1e-3
 PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
+_OPENING = 4  # rounds
 _STEM = {True: "part", False: "cut"}  # of the names of parts that are added, and subtracted
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
 
@@ -185,6 +187,8 @@ class Run:
         if self.best is not None:
             self.earlier = self.best
             self.best, self.best_objective = None, -np.inf
+        if self.settings.subtract and not len(start):
+            start = self.opening(evidence)
         rows, converged = self.growth(evidence, start)
         for cycle in range(self.settings.cycles if self.best is not None else 0):
             rows = self.thinning(evidence, rows)
@@ -193,6 +197,17 @@ class Run:
             if cycle + 1 < self.settings.cycles:
                 rows = self.regrowth(evidence, rows)
         return converged
+
+    def opening(self, evidence: Evidence) -> Rows:
+        """A few rounds from nothing and from a body to carve from; whichever gets further."""
+        brief = replace(self.settings, rounds=min(_OPENING, self.settings.rounds))
+        tried = []
+        for start in (NOTHING, body(evidence, self.settings)):
+            run = Run(brief, None, self.locked, attempt=self.attempt, seconds=self.seconds)
+            run.growth(evidence, start)
+            if run.best is not None:
+                tried.append((run.best_objective, run.best))
+        return max(tried, key=lambda one: one[0])[1] if tried else NOTHING
 
     def choose(self, evidence: Evidence) -> None:
         """Goes back to the earlier attempts' best where this one's is no better."""
