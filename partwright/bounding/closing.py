@@ -17,7 +17,18 @@ from partwright.bounding.leaves import tightest, weigh
 from partwright.bounding.pressing import Constraints
 from partwright.errors import ParameterError
 from partwright.fields import Field, SuperFrustum
-from partwright.fields.solids import Box, Capsule, Cone, Cylinder, Frustum, Sphere, Torus, Tube
+from partwright.fields.solids import (
+    Box,
+    Capsule,
+    Cone,
+    Cylinder,
+    Frustum,
+    HollowBox,
+    HollowFrustum,
+    Sphere,
+    Torus,
+    Tube,
+)
 
 _PASSES = 20
 _LEAST_WEIGHT = 0.25
@@ -101,6 +112,9 @@ def _grown(field: Field, by: float) -> tuple[Field, float]:
             return Box((x + 2 * by, y + 2 * by, z + 2 * by)), 0.0
         case Cylinder():
             return Cylinder(field.radius + by, field.height + 2 * by), 0.0
+        case HollowBox():
+            x, y, z = field.size
+            return HollowBox((x + 2 * by, y + 2 * by, z + 2 * by), field.thickness + 2 * by), 0.0
         case Sphere():
             return Sphere(field.radius + by), 0.0
         case Capsule():
@@ -114,15 +128,13 @@ def _grown(field: Field, by: float) -> tuple[Field, float]:
             # the offset cone has the same angle; its tip moves by slant / radius, its base by one
             height = field.height + by * (1 + slant / field.radius)
             return Cone(field.radius / field.height * height, height), (height - field.height) / 2 - by
-        case Frustum():
+        case Frustum() | HollowFrustum():
             lean = (field.bottom_radius - field.top_radius) / field.height
             out, along = by * math.hypot(1.0, lean), by * lean
-            return (
-                Frustum(
-                    field.bottom_radius + out + along,
-                    max(field.top_radius + out - along, 0.0),
-                    field.height + 2 * by,
-                ),
-                0.0,
-            )
+            bottom, top = field.bottom_radius + out + along, max(field.top_radius + out - along, 0.0)
+            if isinstance(field, Frustum):
+                return Frustum(bottom, top, field.height + 2 * by), 0.0
+            # the hole narrows where its wall is thinnest in proportion, and a little more elsewhere
+            wall = field.thickness + 2 * out + 2 * abs(along)
+            return HollowFrustum(bottom, top, wall, field.height + 2 * by), 0.0
     raise ParameterError(f"a field of kind {field.kind!r} has no offset of its own kind")

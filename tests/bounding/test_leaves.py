@@ -12,7 +12,18 @@ from hypothesis import strategies as st
 import partwright as pw
 from partwright.bounding.closing import grown
 from partwright.bounding.leaves import free_numbers, moved, numbers, slope, weigh, with_numbers
-from partwright.fields import Box, Capsule, Cone, Cylinder, Frustum, Sphere, SuperFrustum, Torus, Tube
+from partwright.fields import (
+    Box,
+    Capsule,
+    Cone,
+    Cylinder,
+    Frustum,
+    HollowBox,
+    Sphere,
+    SuperFrustum,
+    Torus,
+    Tube,
+)
 from tests.bounding.shapes import ALL
 
 SOLIDS = (
@@ -22,6 +33,7 @@ SOLIDS = (
     Capsule(0.2, 0.5),
     Tube(0.5, 0.2, 0.6),
     Torus(0.5, 0.15),
+    HollowBox((0.8, 0.7, 0.5), 0.15),
     Cone(0.4, 0.8),
     Frustum(0.5, 0.2, 0.6),
     Frustum(0.3, 0.5, 0.6),

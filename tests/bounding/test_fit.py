@@ -1,0 +1,36 @@
+"""Bounds as options of a fit."""
+
+from __future__ import annotations
+
+import pytest
+
+import partwright as pw
+from tests.bounding.shapes import boss
+
+
+@pytest.fixture(scope="module")
+def shape() -> pw.Shape:
+    return pw.load_shape(boss()[0], unit="mm")
+
+
+def test_a_fit_contains_its_shape_with_few_parts(shape: pw.Shape) -> None:
+    result = pw.fit(shape, quality="draft", contain=True, max_parts=2, threads=1)
+    bound = result.report["bounds"]
+    assert bound["contain"]["kept"]
+    assert len(result.assembly) <= 2
+    assert result.assembly.distance(shape.vertices).max() <= 1e-4
+    assert 1.0 <= bound["volume_ratio"] < 1.1
+
+
+def test_a_tolerance_takes_the_fewest_parts(shape: pw.Shape) -> None:
+    result = pw.fit(shape, quality="draft", tolerance="0.06mm", threads=1)
+    assert result.outcome == "target_reached"
+    assert result.scores.max_deviation <= 0.063
+    assert len(result.assembly) == 2
+
+
+def test_what_is_out_of_reach_is_said(shape: pw.Shape) -> None:
+    result = pw.fit(shape, quality="draft", tolerance="1%", max_parts=1, threads=1)
+    assert result.outcome == "budget_reached"
+    assert not result.report["bounds"]["tolerance"]["kept"]
+    assert any("tolerance 0.02 mm is not kept" in warning for warning in result.warnings)
