@@ -1,6 +1,6 @@
 """Collision bodies of one shape, side by side: fitted primitives, CoACD's hulls, and one box a hull.
 
-    python benchmarks/collision.py --shapes FOLDER --names ur5e/forearm,ur5e/wrist_1
+    python benchmarks/collision.py --shapes FOLDER --names parts/robot_arm/ur5e/forearm,toys/mug
 
 Needs MuJoCo and CoACD: pip install mujoco coacd. Each body is dropped five times over onto a plane. The table
 goes to benchmarks/results/collision.md.
@@ -9,6 +9,7 @@ goes to benchmarks/results/collision.md.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import tempfile
 import time
@@ -201,7 +202,7 @@ def document(rows: list[Row], command: str) -> str:
     lines = [
         "# Collision bodies in MuJoCo",
         "",
-        f"`{command}`; MuJoCo {mujoco.__version__}, CoACD with its defaults.",
+        f"`{command}`; MuJoCo {mujoco.__version__}, CoACD with its defaults; {os.cpu_count()} cores.",
         "",
         "Missing and extra: volume that the body lacks or adds, in % of the shape's own. Step time and",
         f"contacts: means over {STEPS} steps of {COPIES} copies that fall onto a plane and one another.",

@@ -18,7 +18,6 @@ from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly
-    from partwright.shapes import Shape
 
 SUFFIXES = (".ply", ".glb")
 _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3), ("colour", "u1", 3), ("label", "<i4")])
@@ -33,9 +32,14 @@ def check_suffix(path: str | Path) -> None:
 
 
 def write_segments(
-    path: str | Path, shape: Shape, labels: NDArray[Any], names: Sequence[str], assembly: Assembly
+    path: str | Path,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    labels: NDArray[Any],
+    names: Sequence[str],
+    assembly: Assembly,
 ) -> None:
-    """Write the input's faces in one colour a label, and `labels_path` with `labels` and `names`.
+    """Write faces in one colour a label, and `labels_path` with `labels` and `names`.
 
     A .ply keeps order and number of the faces, with the label as a property of each; a .glb has a named node
     label, in metres and Y up as far as the assembly's unit and up axis are known.
@@ -46,20 +50,31 @@ def write_segments(
     """
     check_suffix(path)
     is_ply = Path(path).suffix.lower() == ".ply"
-    write_bytes(path, _ply(shape, labels, names) if is_ply else _glb(shape, labels, names, assembly))
+    write_bytes(
+        path,
+        _ply(vertices, faces, labels, names, assembly.unit)
+        if is_ply
+        else _glb(vertices, faces, labels, names, assembly),
+    )
     about = {"faces": len(labels), "names": list(names), "labels": labels.tolist()}
     write_bytes(labels_path(path), (json.dumps(about) + "\n").encode())
 
 
-def _ply(shape: Shape, labels: NDArray[Any], names: Sequence[str]) -> bytes:
+def _ply(
+    vertices: NDArray[Any],
+    corners: NDArray[Any],
+    labels: NDArray[Any],
+    names: Sequence[str],
+    unit: str | None,
+) -> bytes:
     faces = np.empty(len(labels), dtype=_FACE)
-    faces["count"], faces["corners"], faces["label"] = 3, shape.input_faces, labels
+    faces["count"], faces["corners"], faces["label"] = 3, corners, labels
     faces["colour"] = palette(len(names))[labels]
     header = [
         "ply",
         "format binary_little_endian 1.0",
-        f"comment unit {shape.unit or 'unknown'}",
-        f"element vertex {len(shape.input_vertices)}",
+        f"comment unit {unit or 'unknown'}",
+        f"element vertex {len(vertices)}",
         *(f"property double {axis}" for axis in "xyz"),
         f"element face {len(faces)}",
         "property list uchar int vertex_indices",
@@ -67,17 +82,23 @@ def _ply(shape: Shape, labels: NDArray[Any], names: Sequence[str]) -> bytes:
         "property int label",
         "end_header\n",
     ]
-    return "\n".join(header).encode() + shape.input_vertices.astype("<f8").tobytes() + faces.tobytes()
+    return "\n".join(header).encode() + vertices.astype("<f8").tobytes() + faces.tobytes()
 
 
-def _glb(shape: Shape, labels: NDArray[Any], names: Sequence[str], assembly: Assembly) -> bytes:
+def _glb(
+    vertices: NDArray[Any],
+    faces: NDArray[Any],
+    labels: NDArray[Any],
+    names: Sequence[str],
+    assembly: Assembly,
+) -> bytes:
     import trimesh
     from trimesh.exchange.gltf import export_glb
 
     scene = trimesh.Scene(base_frame="world")
     colours = palette(len(names))
     for label in np.unique(labels):
-        mesh = trimesh.Trimesh(shape.input_vertices, shape.input_faces[labels == label], process=False)
+        mesh = trimesh.Trimesh(vertices, faces[labels == label], process=False)
         mesh.remove_unreferenced_vertices()
         mesh = coloured(mesh, colours[label])
         scene.add_geometry(mesh, names[label], names[label], transform=to_gltf(assembly).matrix())

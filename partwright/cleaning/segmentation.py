@@ -33,11 +33,21 @@ def segment(
     Raises:
         SettingError: `within` has another length than the shape has faces, or holds no strings or integers.
     """
-    labels = _nearest_part(shape, assembly)
+    return segment_faces(shape.input_vertices, shape.input_faces, assembly, within)
+
+
+def segment_faces(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    assembly: Assembly,
+    within: Sequence[str] | Sequence[int] | NDArray | None = None,
+) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+    """`segment` of triangles, in the assembly's units and place."""
+    labels = _nearest_part(vertices, faces, assembly)
     names = tuple(part.name for part in assembly.parts)
     if within is None:
         return labels, names
-    coarse_names, coarse = np.unique(_coarse(within, len(labels)), return_inverse=True)
+    coarse_names, coarse = np.unique(check_within(within, len(labels)), return_inverse=True)
     pairs, crossed = np.unique(coarse * len(names) + labels, return_inverse=True)
     crossed_names = (f"{coarse_names[pair // len(names)]}/{names[pair % len(names)]}" for pair in pairs)
     return crossed.astype(np.int64), tuple(crossed_names)
@@ -48,7 +58,12 @@ def node_labels(shape: Shape) -> list[str]:
     return [node.name for node in shape.nodes for _ in range(node.start, node.stop)]
 
 
-def _coarse(within: Sequence[str] | Sequence[int] | NDArray, faces: int) -> NDArray:
+def check_within(within: Sequence[str] | Sequence[int] | NDArray, faces: int) -> NDArray:
+    """Labels as an array (F,), one a face.
+
+    Raises:
+        SettingError: their number is another, or they are no strings or integers.
+    """
     coarse = np.asarray(within)
     if coarse.ndim != 1 or coarse.dtype.kind not in "iuU":
         raise SettingError(
@@ -59,9 +74,11 @@ def _coarse(within: Sequence[str] | Sequence[int] | NDArray, faces: int) -> NDAr
     return coarse
 
 
-def _nearest_part(shape: Shape, assembly: Assembly) -> NDArray[np.int64]:
-    corners = shape.input_vertices[shape.input_faces]
-    longest = 1.8 / shape.frame.scale
+def _nearest_part(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], assembly: Assembly
+) -> NDArray[np.int64]:
+    corners = vertices[faces]
+    longest = float(np.ptp(corners, axis=(0, 1)).max())
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     level = np.clip(np.ceil(edge / (_SAMPLE_SPACING * longest)), 2, _FINEST).astype(int)
     labels = np.empty(len(corners), dtype=np.int64)

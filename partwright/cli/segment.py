@@ -25,14 +25,17 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="labels that parts must not cross: a file with one a face (.json, .npy or text), "
         f"or {NODES!r} for the nodes of the scene",
     )
+    command.add_argument(
+        "--split", action="store_true", help="cut faces along the borders between parts; their number grows"
+    )
     command.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
-    from partwright.cleaning import segment
     from partwright.cleaning.label_files import check_suffix, write_segments
-    from partwright.cleaning.segmentation import node_labels
+    from partwright.cleaning.segmentation import check_within, node_labels, segment_faces
+    from partwright.cleaning.splitting import split_at_borders
     from partwright.shapes import load_shape
     from partwright.shapes.labels import read_labels
 
@@ -42,7 +45,11 @@ def run(arguments: argparse.Namespace) -> int:
     within = None
     if arguments.within is not None:
         within = node_labels(shape) if str(arguments.within) == NODES else read_labels(arguments.within)
-    labels, names = segment(shape, assembly, within)
-    write_segments(arguments.output, shape, labels, names, assembly)
+    vertices, faces = shape.input_vertices, shape.input_faces
+    if arguments.split:
+        vertices, faces, source = split_at_borders(vertices, faces, assembly)
+        within = None if within is None else check_within(within, len(shape.input_faces))[source]
+    labels, names = segment_faces(vertices, faces, assembly, within)
+    write_segments(arguments.output, vertices, faces, labels, names, assembly)
     print(f"{len(labels)} faces, {len(set(labels.tolist()))} labels: {arguments.output}")
     return 0
