@@ -29,8 +29,8 @@ def split_at_borders(
     """Vertices (V, 3), faces (F, 3), and which face (F,) each was cut from; the surface stays the same.
 
     Faces that straddle a border are halved until they are small, then all edges whose ends are nearest to
-    different parts are cut where both are equally near. Neighbours are cut at the same points, so that what was
-    closed stays closed.
+    different parts are cut where both are equally near. Neighbours are cut at the same points, so that what
+    was closed stays closed.
     """
     source = np.arange(len(faces))
     longest = float(np.ptp(vertices, axis=0).max())

@@ -1,4 +1,4 @@
-"""Coarse faces cut along the borders between parts: the same closed surface, and each face within one part."""
+"""Coarse faces cut along the borders between parts: the same closed surface, each face within one part."""
 
 from __future__ import annotations
 
