@@ -24,9 +24,9 @@ from fit import Entry, find_shapes
 from PIL import Image
 
 import partwright as pw
-from partwright.fitting import Result
 from partwright.render import preview
 from partwright.render.output import write
+from partwright.results import Result
 from partwright.shapes import Shape
 from partwright.superfrusta import Settings
 from partwright.writing import write_bytes

@@ -1,31 +1,28 @@
-"""`fit`: a shape in, a result out. Picks the method, scores what it made, writes the result's files."""
+"""`fit`: a shape in, a result out. Picks the method, cleans or bounds what it made, and scores it."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
-import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from partwright import __version__
-from partwright.assembly import Assembly, Similarity
+from partwright.assembly import Assembly
 from partwright.assembly.checks import MAX_NAME
 from partwright.bounding import Bounds, bounds_report, bounds_warnings, check_alone, promise
 from partwright.errors import SettingError
-from partwright.shapes import METRES, Shape
-from partwright.writing import finishing, replacing_files, write_bytes
+from partwright.reporting import about_input, check_density_of, masses, warnings
+from partwright.results import Result
+from partwright.shapes import Shape
+from partwright.writing import finishing
 
 if TYPE_CHECKING:
     import trimesh
 
     from partwright.cleaning import Cleaned
     from partwright.metrics import Scores
-    from partwright.superfrusta import CurvePoint
 
 # method -> the module whose `fit(shape, settings, progress=...)` and `Settings` do it
 METHODS = {
@@ -38,69 +35,6 @@ DEVICES = ("auto", "cpu", "cuda")
 CLEANABLE = ("superfrusta", "solids")  # methods whose parts have numbers that relations can bind
 # A result stands for the worst of its pieces, in this order.
 OUTCOMES = ("interrupted", "budget_reached", "converged", "target_reached")
-FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
-
-CURVE_SIZES = (1, 2, 4, 8, 16, 32, 64)
-
-POOR_IOU = 0.85
-POOR_DEVIATION = 0.1  # of the longest side
-UNSURE = 0.5
-SAME_VOLUME = 0.01  # of the input's triangles and of its inside: then no surface runs through it twice
-
-
-@dataclass(frozen=True)
-class Result:
-    """What a fit returns.
-
-    assembly: in the shape's own units and place. outcome: "converged", "budget_reached", "target_reached" or
-    "interrupted". report: what report.json holds. surface: the blended surface's mesh, in the shape's units.
-    curve: assemblies of falling size, whose parts name their parent in the next smaller one by
-    `metadata["parent"]`. clean: what `clean=True` found, with `.relations`.
-    """
-
-    shape: Shape
-    assembly: Assembly
-    outcome: str
-    scores: Scores
-    surface: trimesh.Trimesh
-    report: dict[str, Any]
-    curve: tuple[CurvePoint, ...] = ()
-    clean: Cleaned | None = None
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user should be told about the result, a sentence each; empty where it is good."""
-        return tuple(self.report["warnings"])
-
-    def save(self, folder: str | Path) -> None:
-        """Write assembly.json, parts.glb, surface.ply, report.json and preview.png, all or none.
-
-        Raises:
-            OutputError: they cannot be written there.
-        """
-        from partwright.export import export
-        from partwright.export.ply import write_mesh
-        from partwright.render import preview
-
-        with finishing(), replacing_files(folder) as staging:
-            self.assembly.save(staging / "assembly.json")
-            export(self.assembly, staging / "parts.glb")
-            write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
-            write_bytes(staging / "report.json", (json.dumps(self.report, indent=2) + "\n").encode())
-            preview(self.shape, self.assembly, self.surface, staging / "preview.png", title=self.shape.name)
-            if self.curve:
-                self._save_curve(staging)
-
-    def _save_curve(self, folder: Path) -> None:
-        """curve_NN.json for sizes that double, and a picture of them."""
-        from partwright.render import curve_sheet
-
-        shown = [p for p in self.curve if p.parts in CURVE_SIZES or p is self.curve[0]][::-1]
-        for point in shown:
-            point.assembly.save(folder / f"curve_{point.parts:02d}.json")
-        captions = [f"{p.parts} parts, IoU {p.iou:.3f}" for p in shown]
-        assemblies = [dataclasses.replace(p.assembly, up=self.assembly.up) for p in shown]
-        curve_sheet(assemblies, captions, folder / "curve.png", title=self.shape.name)
 
 
 def fit(
@@ -156,7 +90,7 @@ def fit(
         BoundsError: tolerance, contain or inside contradict each other, or are finer than can be told.
         SettingError: an option has a value that cannot be used.
     """
-    _check_density(density, shape.unit)
+    check_density_of(density, shape.unit)
     started = time.perf_counter()
     if method not in METHODS:
         raise SettingError(f"unknown method {method!r}; expected one of {', '.join(METHODS)}")
@@ -219,13 +153,13 @@ def fit(
         "method": method,
         "seed": seed,
         "settings": {"quality": quality, "per_node": per_node, **dataclasses.asdict(settings)},
-        "input": _input(shape, source),
+        "input": about_input(shape, source),
         "seconds": {stage: round(spent, 3) for stage, spent in seconds.items()},
         "parts": len(assembly),
         "instances": sum(len(part.copies) for part in assembly.parts),
         "scores": scores.to_dict(),
-        "mass_properties": _mass(surface, shape, density),
-        "warnings": _warnings(shape, scores) + (bounds_warnings(bounded, shape) if bounded else []),
+        "mass_properties": masses(surface, shape, density),
+        "warnings": warnings(shape, scores) + (bounds_warnings(bounded, shape) if bounded else []),
     }
     if bounded is not None:
         report["bounds"] = bounds_report(bounded, shape, float(surface.volume))
@@ -319,49 +253,6 @@ def _seconds(fitted: list[Any]) -> dict[str, float]:
     return seconds
 
 
-def _input(shape: Shape, source: str | None) -> dict[str, Any]:
-    return {
-        "file": source or shape.name,
-        "unit": shape.unit,
-        "up": shape.up,
-        "triangles": len(shape.input_faces),
-        "repairs": list(shape.repairs),
-        "confidence": shape.confidence,
-    }
-
-
-def _check_density(density: float | None, unit: str | None) -> None:
-    from partwright.meshing.mass import check_density
-
-    if density is None:
-        return
-    check_density(density)
-    if unit is None:
-        raise SettingError(
-            "density: the shape's length unit is unknown, so it has no mass; state it by --unit"
-        )
-
-
-def _mass(surface: trimesh.Trimesh, shape: Shape, density: float | None) -> dict[str, Any]:
-    """Mass properties of the fitted surface and, where it encloses one volume, of the input's own.
-
-    In metres and kilograms where a density is given, else in the shape's unit and per density.
-    """
-    import trimesh
-
-    from partwright.meshing.mass import mass_properties
-
-    given = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
-    simple = math.isclose(given.volume, shape.volume, rel_tol=SAME_VOLUME)
-    to_metres = Similarity(METRES[shape.unit]) if density is not None and shape.unit else Similarity()
-    unit = shape.unit if density is None else "m"
-    fitted, *asked = (
-        mass_properties(mesh).transformed(to_metres).to_dict(unit, density)
-        for mesh in ([surface, given] if simple else [surface])
-    )
-    return fitted | ({"input": asked[0]} if asked else {})
-
-
 def _scored(
     shape: Shape, assembly: Assembly, seed: int, seconds: dict[str, float]
 ) -> tuple[Scores, trimesh.Trimesh]:
@@ -374,20 +265,3 @@ def _scored(
     scores = evaluate(assembly, shape, seed=seed, emd=False, surface=surface)
     seconds |= {"meshing": meshed - start, "scores": time.perf_counter() - meshed}
     return scores, surface
-
-
-def _warnings(shape: Shape, scores: Scores) -> list[str]:
-    result = []
-    side = float((shape.vertices.max(axis=0) - shape.vertices.min(axis=0)).max())
-    if scores.iou < POOR_IOU or scores.max_deviation > POOR_DEVIATION * side:
-        unit = f" {shape.unit}" if shape.unit else ""
-        result.append(
-            f"the fit is poor in places: IoU {scores.iou:.3f}; it is furthest off, by "
-            f"{scores.max_deviation:.3g}{unit}, at the {scores.worst_place}; try --quality high or more parts"
-        )
-    if shape.confidence < UNSURE:
-        repairs = "; ".join(shape.repairs)
-        result.append(
-            f"it is unsure what lies inside this surface (confidence {shape.confidence:.2f}): {repairs}"
-        )
-    return result

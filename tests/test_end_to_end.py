@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 import partwright as pw
-from partwright.fitting import FILES, Result
+from partwright.results import FILES, Result
 
 CENTRE = np.array([100.0, -40.0, 7.0])
 

@@ -10,7 +10,8 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from partwright.errors import PartwrightError, SettingError
-from partwright.fitting import Result, fit
+from partwright.fitting import fit
+from partwright.results import Result
 from partwright.shapes import Shape
 
 _ON_A_DEVICE = 4

@@ -14,8 +14,8 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from partwright.cleaning import Cleaned
-    from partwright.fitting import Result
     from partwright.metrics import CadScores, Scores
+    from partwright.results import Result
 
 
 def print_result(result: Result, folder: Path) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from partwright.superfrusta.resfit import CurvePoint, Fitted, Progress, fit
+from partwright.superfrusta.outcome import CurvePoint, Fitted, Progress
+from partwright.superfrusta.resfit import fit
 from partwright.superfrusta.settings import Settings
 
 __all__ = ["CurvePoint", "Fitted", "Progress", "Settings", "fit"]

@@ -10,76 +10,32 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 
-from partwright.assembly import Assembly, Part, Similarity
-from partwright.assembly.rows import parts_from_rows
-from partwright.assembly.rows import rows as rows_of
-from partwright.errors import EmptyShapeError, SettingError
-from partwright.fields import kernel
+from partwright.assembly import Assembly
+from partwright.errors import EmptyShapeError
 from partwright.shapes import Shape
 from partwright.superfrusta.carving import body
 from partwright.superfrusta.constrained import Leaf, expanded
-from partwright.superfrusta.curve import with_parents
 from partwright.superfrusta.evidence import NOTHING, Evidence, Rows
 from partwright.superfrusta.growing import grow
-from partwright.superfrusta.kinds import SIGN, is_solid, solid
 from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
+from partwright.superfrusta.outcome import CurvePoint, Fitted, Outcome, Progress, Step, assembly_of
 from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
 from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimise
 from partwright.superfrusta.repeats import repeat
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.settling import cut_through, plainer_kinds
+from partwright.superfrusta.starting import starting_rows
 from partwright.superfrusta.symmetry import symmetries
-from partwright.superfrusta.tree import flattened, nested
-
-Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"]
 
 # In growth, parts need only pay this; the settings' alpha decides when the assembly is thinned out.
 GROWTH_ALPHA = 1e-3
 PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
 _OPENING = 4  # rounds
-_STEM = {True: "part", False: "cut"}  # of the names of parts that are added, and subtracted
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a fit is: `fraction` of the expected work, and the best assembly so far in numbers."""
-
-    stage: str
-    round: int
-    rounds: int
-    parts: int
-    iou: float
-    fraction: float
-
-
-@dataclass(frozen=True)
-class CurvePoint:
-    """The assembly of one size on the way down: R of the objective, and IoU at the fit's own samples."""
-
-    parts: int
-    score: float
-    iou: float
-    assembly: Assembly
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """A fit's result: the assembly in the shape's own units and place, and how it came about.
-
-    curve: from many parts to few, where the settings asked for it.
-    """
-
-    assembly: Assembly
-    outcome: Outcome
-    seconds: dict[str, float]
-    history: list[dict[str, float | str]]
-    curve: tuple[CurvePoint, ...] = ()
 
 
 def fit(
@@ -120,22 +76,13 @@ def fit(
         )
     leaves = run.leaves or [Leaf(row) for row in run.best]
     moves = [leaf.moves for leaf in leaves]
-    assembly = _assembly(shape, np.stack([leaf.row for leaf in leaves]), settings, fixed, moves=moves)
+    assembly = assembly_of(shape, np.stack([leaf.row for leaf in leaves]), settings, fixed, moves=moves)
     curve: list[CurvePoint] = []
     for step in run.curve:
         smaller = curve[-1].assembly if curve else None
-        one = _assembly(shape, step.rows, settings, fixed, smaller)
+        one = assembly_of(shape, step.rows, settings, fixed, smaller)
         curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
     return Fitted(assembly, outcome, run.seconds, run.history, tuple(reversed(curve)))
-
-
-@dataclass(frozen=True)
-class Step:
-    """One size on the way down."""
-
-    rows: Rows
-    score: float
-    iou: float
 
 
 @dataclass
@@ -363,67 +310,3 @@ class Run:
             return False
         reached = volume_iou(evidence, self.best)
         return iou > reached if reached < target else iou >= target and len(rows) < len(self.best)
-
-
-def starting_rows(
-    shape: Shape, start: Assembly | None, locked: Sequence[str], settings: Settings
-) -> tuple[Rows, tuple[str, ...]]:
-    """Rows of an assembly in the shape's unit frame, locked parts first, and their names in that order.
-
-    For a fit of solids, parts that are none become the nearest one.
-    """
-    if start is None:
-        if locked:
-            raise SettingError("locked parts need an assembly to start from")
-        return NOTHING, ()
-    unit = start.translated([-c for c in shape.frame.centre]).scaled(shape.frame.scale)
-    unknown = set(locked) - {part.name for part in unit.parts}
-    if unknown:
-        names = ", ".join(part.name for part in unit.parts)
-        raise SettingError(f"no part is named {', '.join(sorted(unknown))}; the start has {names}")
-    leaves = [(copy, plus) for part, plus in flattened(unit) for copy in part.copies]
-    if not settings.subtract and not all(plus for _, plus in leaves):
-        raise SettingError("the start subtracts parts; allow it to the fit with --subtract")
-    leaves.sort(key=lambda leaf: leaf[0].name not in locked)
-    fixed = tuple(part.name for part, _ in leaves if part.name in locked)
-    if settings.family == "solid":
-        leaves = [(part if part.name in locked else nearest_part(part), plus) for part, plus in leaves]
-    signs = np.array([[1.0 if plus else -1.0] for _, plus in leaves])
-    rows = np.hstack([rows_of([part for part, _ in leaves]), signs]).astype(np.float32)
-    if not settings.smooth:
-        rows[len(fixed) :, kernel.COLUMNS.index("blend")] = 0
-    return rows, fixed
-
-
-def nearest_part(part: Part) -> Part:
-    """The part as the nearest named solid."""
-    from partwright.export.nearest import nearest_solid
-
-    return nearest_solid(part).part_with_solid
-
-
-def _assembly(
-    shape: Shape,
-    rows: Rows,
-    settings: Settings,
-    fixed: Sequence[str] = (),
-    smaller: Assembly | None = None,
-    moves: Sequence[tuple[Similarity, ...]] = (),
-) -> Assembly:
-    """Rows as an assembly in the shape's own units; parts name their parent in a smaller assembly.
-
-    moves: those of each part's further copies, if any.
-    """
-    added = rows[:, SIGN] > 0
-    names = [*fixed, *(f"{_STEM[bool(added[i])]}_{i + 1:02d}" for i in range(len(fixed), len(rows)))]
-    parts = parts_from_rows(rows[:, :SIGN], names)
-    if settings.family == "solid":
-        parts = tuple(
-            replace(part, field=solid(row)) if is_solid(row) else part
-            for part, row in zip(parts, rows, strict=True)
-        )
-    if moves:
-        parts = tuple(replace(part, instances=m) for part, m in zip(parts, moves, strict=True))
-    whole = replace(nested(parts, added.tolist(), plain=not settings.smooth), unit=shape.unit)
-    whole = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
-    return whole if smaller is None else with_parents(whole, smaller)

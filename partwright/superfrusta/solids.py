@@ -16,7 +16,7 @@ from partwright.errors import SettingError
 from partwright.shapes import Shape
 from partwright.superfrusta import resfit, settings
 from partwright.superfrusta.families import Family
-from partwright.superfrusta.resfit import Fitted, Progress
+from partwright.superfrusta.outcome import Fitted, Progress
 
 
 @dataclass(frozen=True)

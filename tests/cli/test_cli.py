@@ -17,7 +17,8 @@ from partwright.assembly import load_assembly
 from partwright.cli.main import main
 from partwright.errors import PartwrightError
 from partwright.fields import Box
-from partwright.fitting import FILES, fit
+from partwright.fitting import fit
+from partwright.results import FILES
 from partwright.shapes import load_shape
 from tests.cli.conftest import BoxMethod
 

@@ -1,0 +1,80 @@
+"""What a fit's report says of its input, its masses, and what a user should be told."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from partwright.assembly import Similarity
+from partwright.errors import SettingError
+from partwright.shapes import METRES, Shape
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from partwright.metrics import Scores
+
+POOR_IOU = 0.85
+POOR_DEVIATION = 0.1  # of the longest side
+UNSURE = 0.5
+SAME_VOLUME = 0.01  # of the input's triangles and of its inside: then no surface runs through it twice
+
+
+def about_input(shape: Shape, source: str | None) -> dict[str, Any]:
+    return {
+        "file": source or shape.name,
+        "unit": shape.unit,
+        "up": shape.up,
+        "triangles": len(shape.input_faces),
+        "repairs": list(shape.repairs),
+        "confidence": shape.confidence,
+    }
+
+
+def check_density_of(density: float | None, unit: str | None) -> None:
+    from partwright.meshing.mass import check_density
+
+    if density is None:
+        return
+    check_density(density)
+    if unit is None:
+        raise SettingError(
+            "density: the shape's length unit is unknown, so it has no mass; state it by --unit"
+        )
+
+
+def masses(surface: trimesh.Trimesh, shape: Shape, density: float | None) -> dict[str, Any]:
+    """Mass properties of the fitted surface and, where it encloses one volume, of the input's own.
+
+    In metres and kilograms where a density is given, else in the shape's unit and per density.
+    """
+    import trimesh
+
+    from partwright.meshing.mass import mass_properties
+
+    given = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
+    simple = math.isclose(given.volume, shape.volume, rel_tol=SAME_VOLUME)
+    to_metres = Similarity(METRES[shape.unit]) if density is not None and shape.unit else Similarity()
+    unit = shape.unit if density is None else "m"
+    fitted, *asked = (
+        mass_properties(mesh).transformed(to_metres).to_dict(unit, density)
+        for mesh in ([surface, given] if simple else [surface])
+    )
+    return fitted | ({"input": asked[0]} if asked else {})
+
+
+def warnings(shape: Shape, scores: Scores) -> list[str]:
+    result = []
+    side = float((shape.vertices.max(axis=0) - shape.vertices.min(axis=0)).max())
+    if scores.iou < POOR_IOU or scores.max_deviation > POOR_DEVIATION * side:
+        unit = f" {shape.unit}" if shape.unit else ""
+        result.append(
+            f"the fit is poor in places: IoU {scores.iou:.3f}; it is furthest off, by "
+            f"{scores.max_deviation:.3g}{unit}, at the {scores.worst_place}; try --quality high or more parts"
+        )
+    if shape.confidence < UNSURE:
+        repairs = "; ".join(shape.repairs)
+        result.append(
+            f"it is unsure what lies inside this surface (confidence {shape.confidence:.2f}): {repairs}"
+        )
+    return result

@@ -1,0 +1,78 @@
+"""What a fit returns, and the files it writes."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from partwright.assembly import Assembly
+from partwright.shapes import Shape
+from partwright.writing import finishing, replacing_files, write_bytes
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from partwright.cleaning import Cleaned
+    from partwright.metrics import Scores
+    from partwright.superfrusta import CurvePoint
+
+FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
+CURVE_SIZES = (1, 2, 4, 8, 16, 32, 64)
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a fit returns.
+
+    assembly: in the shape's own units and place. outcome: "converged", "budget_reached", "target_reached" or
+    "interrupted". report: what report.json holds. surface: the blended surface's mesh, in the shape's units.
+    curve: assemblies of falling size, whose parts name their parent in the next smaller one by
+    `metadata["parent"]`. clean: what `clean=True` found, with `.relations`.
+    """
+
+    shape: Shape
+    assembly: Assembly
+    outcome: str
+    scores: Scores
+    surface: trimesh.Trimesh
+    report: dict[str, Any]
+    curve: tuple[CurvePoint, ...] = ()
+    clean: Cleaned | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should be told about the result, a sentence each; empty where it is good."""
+        return tuple(self.report["warnings"])
+
+    def save(self, folder: str | Path) -> None:
+        """Write assembly.json, parts.glb, surface.ply, report.json and preview.png, all or none.
+
+        Raises:
+            OutputError: they cannot be written there.
+        """
+        from partwright.export import export
+        from partwright.export.ply import write_mesh
+        from partwright.render import preview
+
+        with finishing(), replacing_files(folder) as staging:
+            self.assembly.save(staging / "assembly.json")
+            export(self.assembly, staging / "parts.glb")
+            write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
+            write_bytes(staging / "report.json", (json.dumps(self.report, indent=2) + "\n").encode())
+            preview(self.shape, self.assembly, self.surface, staging / "preview.png", title=self.shape.name)
+            if self.curve:
+                self._save_curve(staging)
+
+    def _save_curve(self, folder: Path) -> None:
+        """curve_NN.json for sizes that double, and a picture of them."""
+        from partwright.render import curve_sheet
+
+        shown = [p for p in self.curve if p.parts in CURVE_SIZES or p is self.curve[0]][::-1]
+        for point in shown:
+            point.assembly.save(folder / f"curve_{point.parts:02d}.json")
+        captions = [f"{p.parts} parts, IoU {p.iou:.3f}" for p in shown]
+        assemblies = [dataclasses.replace(p.assembly, up=self.assembly.up) for p in shown]
+        curve_sheet(assemblies, captions, folder / "curve.png", title=self.shape.name)

@@ -1,0 +1,91 @@
+"""What a fit tells on its way and returns in the end, and rows of the kernel as an assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from partwright.assembly import Assembly, Similarity
+from partwright.assembly.rows import parts_from_rows
+from partwright.shapes import Shape
+from partwright.superfrusta.curve import with_parents
+from partwright.superfrusta.evidence import Rows
+from partwright.superfrusta.kinds import SIGN, is_solid, solid
+from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.tree import nested
+
+Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"]
+_STEM = {True: "part", False: "cut"}  # of the names of parts that are added, and subtracted
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a fit is: `fraction` of the expected work, and the best assembly so far in numbers."""
+
+    stage: str
+    round: int
+    rounds: int
+    parts: int
+    iou: float
+    fraction: float
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """The assembly of one size on the way down: R of the objective, and IoU at the fit's own samples."""
+
+    parts: int
+    score: float
+    iou: float
+    assembly: Assembly
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fit's result: the assembly in the shape's own units and place, and how it came about.
+
+    curve: from many parts to few, where the settings asked for it.
+    """
+
+    assembly: Assembly
+    outcome: Outcome
+    seconds: dict[str, float]
+    history: list[dict[str, float | str]]
+    curve: tuple[CurvePoint, ...] = ()
+
+
+@dataclass(frozen=True)
+class Step:
+    """One size on the way down."""
+
+    rows: Rows
+    score: float
+    iou: float
+
+
+def assembly_of(
+    shape: Shape,
+    rows: Rows,
+    settings: Settings,
+    fixed: Sequence[str] = (),
+    smaller: Assembly | None = None,
+    moves: Sequence[tuple[Similarity, ...]] = (),
+) -> Assembly:
+    """Rows as an assembly in the shape's own units; parts name their parent in a smaller assembly.
+
+    moves: those of each part's further copies, if any.
+    """
+    added = rows[:, SIGN] > 0
+    names = [*fixed, *(f"{_STEM[bool(added[i])]}_{i + 1:02d}" for i in range(len(fixed), len(rows)))]
+    parts = parts_from_rows(rows[:, :SIGN], names)
+    if settings.family == "solid":
+        parts = tuple(
+            replace(part, field=solid(row)) if is_solid(row) else part
+            for part, row in zip(parts, rows, strict=True)
+        )
+    if moves:
+        parts = tuple(replace(part, instances=m) for part, m in zip(parts, moves, strict=True))
+    whole = replace(nested(parts, added.tolist(), plain=not settings.smooth), unit=shape.unit)
+    whole = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
+    return whole if smaller is None else with_parents(whole, smaller)
