@@ -22,7 +22,8 @@ _PUBLIC = {
     "evaluate": "partwright.metrics",
     "clean": "partwright.cleaning",
 }
-_MODULES = ("fields", "shapes", "assembly", "meshing", "render", "metrics", "errors", "datasets", "capri")
+_METHODS = ("capri", "partsdf")
+_MODULES = ("fields", "shapes", "assembly", "meshing", "render", "metrics", "errors", "datasets", *_METHODS)
 
 __all__ = ["__version__", "export", *_PUBLIC, *_MODULES]
 

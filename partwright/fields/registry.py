@@ -7,7 +7,7 @@ from importlib import import_module
 from reprlib import repr as brief
 from typing import Any
 
-from partwright.errors import MissingDependencyError, ParameterError
+from partwright.errors import ParameterError
 from partwright.fields.base import Field
 from partwright.fields.quadric import Quadric
 from partwright.fields.solids import (
@@ -60,9 +60,5 @@ def from_dict(data: object) -> Field:
 
 def _learned(kind: str) -> type[Field]:
     module, name = LEARNED[kind]
-    try:
-        return getattr(import_module(module), name)
-    except ImportError as error:
-        raise MissingDependencyError(
-            f'a part of kind {kind} needs PyTorch: pip install "partwright[torch]"'
-        ) from error
+    found: type[Field] = getattr(import_module(module), name)
+    return found

@@ -1,1 +1,37 @@
 """Method 3, PartSDF: a learned prior over shapes made of parts (Talabot et al. 2025)."""
+
+from __future__ import annotations
+
+from partwright.errors import MissingDependencyError
+
+try:
+    import torch  # noqa: F401
+except ImportError as error:
+    raise MissingDependencyError('partsdf needs PyTorch: pip install "partwright[torch]"') from error
+
+from partwright.partsdf import editing
+from partwright.partsdf.assemblies import from_assembly, to_assembly
+from partwright.partsdf.config import Config, config_from, read_config
+from partwright.partsdf.meshing import mesh_shape
+from partwright.partsdf.model import Model, load_model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct
+from partwright.partsdf.results import reconstruct_shape
+from partwright.partsdf.training import train
+
+__all__ = [
+    "Config",
+    "Model",
+    "NeuralShape",
+    "ReconstructionSettings",
+    "config_from",
+    "editing",
+    "from_assembly",
+    "load_model",
+    "mesh_shape",
+    "read_config",
+    "reconstruct",
+    "reconstruct_shape",
+    "to_assembly",
+    "train",
+]

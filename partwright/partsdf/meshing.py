@@ -74,6 +74,22 @@ def mesh_shape(shape: NeuralShape, resolution: int = 128, parts: bool = True) ->
     return Surfaces(meshes[0], found, lattice.evaluations, lattice.dense)
 
 
+@dataclass(frozen=True)
+class LabelledSurface:
+    """vertices (V, 3), faces (F, 3) and the number of the model's part of each face, label (F,)."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    label: np.ndarray
+
+
+def labelled_surface(shape: NeuralShape, mesh: trimesh.Trimesh) -> LabelledSurface:
+    """The whole shape's mesh (unit frame) with the nearest part of every face, as the metrics want it."""
+    numbers = np.flatnonzero(shape.present.numpy())
+    nearest = shape.part_distances(mesh.triangles_center.astype(np.float32)).argmin(axis=0)
+    return LabelledSurface(np.asarray(mesh.vertices), np.asarray(mesh.faces), numbers[nearest])
+
+
 def box(shape: NeuralShape) -> float:
     """Half the side of a cube around the origin that holds [-1, 1]^3 and every part's cuboid."""
     turned = rotation_matrices(shape.poses.rotation).abs() @ shape.poses.scale[..., None]
