@@ -165,7 +165,7 @@ def _plain_itself(rotation: Floats, field: Field, frames: Frames) -> bool:
         return known or plain_rotation(along(rotation[:, 2], freely))
     if isinstance(field, Box) and aligned(np.eye(3), rotation, freely) is not None:
         return angle(rotation, np.eye(3), "box") < _SAME  # its sides in the frame's order
-    lying = any(aligned(frame, rotation, freely) is not None for frame in frames.rotations)
+    lying = any(angle(frame @ turn, rotation) < _SAME for frame in frames.rotations for turn in CUBE)
     return lying or plain_rotation(rotation)
 
 

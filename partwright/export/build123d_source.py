@@ -1,4 +1,5 @@
-"""build123d source to go on with by hand: parameters on top, one function a part, the tree at the end.
+"""build123d source to go on with by hand: parameters on top, one function a part with a loop over its
+copies, the tree at the end.
 
 Named solids are exact B-reps when the source runs; other parts become the nearest solid, and blends sharp
 edges: FILE.report.json lists them.
@@ -12,11 +13,10 @@ from pathlib import Path
 
 from partwright.assembly import Assembly, Node, Part
 from partwright.export.approximation import write_report
+from partwright.export.copies import Poses, Row
 from partwright.export.identifiers import comment
 from partwright.export.solid_source import (
-    MEANING,
     SourcePart,
-    number,
     own_axes_angles,
     plain_unions,
     source_parts,
@@ -48,12 +48,12 @@ def write(assembly: Assembly, path: str | Path) -> None:
         SettingError: the assembly's unit is unknown.
         OutputError: the file cannot be written.
     """
-    tree, changes = solid_tree(assembly)
+    tree, changes = solid_tree(assembly, loops=True)
     parts = source_parts(tree.parts, own_axes_angles, _RESERVED)
-    unit = canonical_unit(assembly.unit) if assembly.unit else "unknown unit"
+    unit = canonical_unit(assembly.unit) if assembly.unit else None
     lines = [
         f"# {comment(assembly.name) or 'Assembly'}: {len(parts)} parts. "
-        f"Lengths in {unit}, angles in degrees.",
+        f"Lengths in {unit or 'an unknown unit'}, angles in degrees.",
         "",
         "from pathlib import Path",
         "",
@@ -77,13 +77,11 @@ def _unit_argument(assembly: Assembly) -> str:
     return f", unit=bd.Unit.{name}" if name else ""
 
 
-def _table(part: SourcePart, unit: str) -> Iterator[str]:
-    yield f"# {comment(part.part.name)}: {part.part.field.kind}"
+def _table(part: SourcePart, unit: str | None) -> Iterator[str]:
+    yield f"# {part.title}: {part.part.field.kind}"
     for parameter in part.parameters:
-        value = parameter.value
-        text = f"({', '.join(map(number, value))})" if isinstance(value, tuple) else number(value)
-        measure = "degrees" if parameter.name == "turn" else unit
-        yield f"{parameter.variable.upper()} = {text}  # {measure}: {MEANING[parameter.name]}"
+        text, meaning = parameter.line("()", unit)
+        yield f"{parameter.variable.upper()} = {text}  # {meaning}"
     yield ""
 
 
@@ -91,9 +89,25 @@ def _function(part: SourcePart) -> Iterator[str]:
     names = {name: variable.upper() for name, variable in part.variables().items()}
     yield f"def {part.function}():"
     yield f"    solid = {_SOLIDS[part.part.field.kind].format(**names)}"
-    yield f"    return bd.Location({names['place']}, {names['turn']}) * solid"
+    yield f"    return {_placed(part, names)}"
     yield ""
     yield ""
+
+
+def _placed(part: SourcePart, names: dict[str, str]) -> str:
+    """The solid in its place, or all of its copies in theirs."""
+    if isinstance(part.copies, Row):
+        return f"bd.Part() + [bd.Location(place, {names['turn']}) * solid for place in {names['places']}]"
+    if isinstance(part.copies, Poses):
+        return f"bd.Part() + [bd.Location(*pose) * solid for pose in {names['poses']}]"
+    first = f"bd.Location({names['place']}, {names['turn']}) * solid"
+    if part.copies is None:
+        return first
+    turn = f"bd.Rot({part.copies.axis.upper()}=360 / {names['count']} * i)"
+    if "centre" in names:
+        centre = f"bd.Pos({names['centre']})"
+        turn = f"{centre} * {turn} * {centre}.inverse()"
+    return f"bd.Part() + [{turn} * {first} for i in range({names['count']})]"
 
 
 def _tree(node: Node, functions: dict[str, str], indent: str) -> str:

@@ -1,4 +1,5 @@
-"""OpenSCAD source to go on with by hand: parameters on top, one module a part, the tree at the end.
+"""OpenSCAD source to go on with by hand: parameters on top, one module a part with a loop over its copies,
+the tree at the end.
 
 Named solids are exact, to the facets of `$fn`, and so are planes, cylinders, cones and spheres given as
 quadrics. Other quadrics are written as polyhedra, other parts become the nearest solid, and blends sharp
@@ -16,10 +17,10 @@ import numpy as np
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.export.approximation import Change, write_report
 from partwright.export.closed_quadrics import Ball
+from partwright.export.copies import Poses, Ring, Row
 from partwright.export.identifiers import comment
 from partwright.export.nearest import Approximation
 from partwright.export.solid_source import (
-    MEANING,
     SourcePart,
     fixed_axes_angles,
     number,
@@ -64,14 +65,14 @@ def write(assembly: Assembly, path: str | Path, facets: int = 128) -> None:
         SettingError: the assembly's unit is unknown.
         OutputError: the file cannot be written.
     """
-    tree, changes = solid_tree(assembly, keep=_quadric)
+    tree, changes = solid_tree(assembly, keep=_quadric, loops=True)
     ball = Ball.around(tree)
     changes += [Change((part.name,), "mesh", note=f"{facets} facets to a full turn") for part in _kept(tree)]
     parts = source_parts(tree.parts, fixed_axes_angles, _RESERVED.split())
-    unit = canonical_unit(assembly.unit) if assembly.unit else "unknown unit"
+    unit = canonical_unit(assembly.unit) if assembly.unit else None
     lines = [
         f"// {comment(assembly.name) or 'Assembly'}: {len(parts)} parts. "
-        f"Lengths in {unit}, angles in degrees.",
+        f"Lengths in {unit or 'an unknown unit'}, angles in degrees.",
         "",
         f"$fn = {facets};  // facets of a full circle",
         "",
@@ -84,13 +85,11 @@ def write(assembly: Assembly, path: str | Path, facets: int = 128) -> None:
     write_report(assembly, path, changes)
 
 
-def _table(part: SourcePart, unit: str) -> Iterator[str]:
-    yield f"// {comment(part.part.name)}: {part.part.field.kind}"
+def _table(part: SourcePart, unit: str | None) -> Iterator[str]:
+    yield f"// {part.title}: {part.part.field.kind}"
     for parameter in part.parameters:
-        value = parameter.value
-        text = f"[{', '.join(map(number, value))}]" if isinstance(value, tuple) else number(value)
-        measure = "degrees" if parameter.name == "turn" else unit
-        yield f"{parameter.variable} = {text};  // {measure}: {MEANING[parameter.name]}"
+        text, meaning = parameter.line("[]", unit)
+        yield f"{parameter.variable} = {text};  // {meaning}"
     yield ""
 
 
@@ -109,11 +108,27 @@ def _module(part: SourcePart, ball: Ball, facets: int) -> Iterator[str]:
         if isinstance(field, Quadric)
         else _SOLIDS[field.kind].format(**names)
     )
-    yield f"module {part.function}() {{  // {comment(part.part.name)}"
-    yield f"    translate({names['place']}) rotate({names['turn']})"
+    yield f"module {part.function}() {{  // {part.title}"
+    yield from (f"    {line}" for line in _loop(part, names))
     yield f"        {solid}"
     yield "}"
     yield ""
+
+
+def _loop(part: SourcePart, names: dict[str, str]) -> Iterator[str]:
+    """What puts the solid, or each of its copies, in its place."""
+    if isinstance(part.copies, Row):
+        yield f"for (place = {names['places']}) translate(place) rotate({names['turn']})"
+    elif isinstance(part.copies, Poses):
+        yield f"for (pose = {names['poses']}) translate(pose[0]) rotate(pose[1])"
+    else:
+        if isinstance(part.copies, Ring):
+            angle = f"360 / {names['count']} * i"
+            turn = f"rotate([{', '.join(angle if axis == part.copies.axis else '0' for axis in 'xyz')}])"
+            centre = names.get("centre")
+            turn = f"translate({centre}) {turn} translate(-{centre})" if centre else turn
+            yield f"for (i = [0 : {names['count']} - 1]) {turn}"
+        yield f"translate({names['place']}) rotate({names['turn']})"
 
 
 def _polyhedron(part: Part, ball: Ball, facets: int) -> str:

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
-from partwright.export.identifiers import identifiers
+from partwright.assembly.similarity import rotation_matrix
+from partwright.export.copies import Poses, Ring, Row, pattern
+from partwright.export.identifiers import comment, identifiers
 from partwright.fields import Field, Quadric
 
 MEANING = {
@@ -25,25 +27,47 @@ MEANING = {
     "minor_radius": "radius of the ring itself",
     "place": "where the part's origin lies",
     "turn": "turned about x, y and z",
+    "places": "where the origins of the copies lie",
+    "poses": "where the origin of each copy lies, and its turn about x, y and z in degrees",
+    "count": "copies, by equal turns",
+    "centre": "through which the axis of these turns runs",
 }
+Value = float | tuple[Any, ...]
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One line of the table on top: `variable` = `value`, a number or three."""
+    """One line of the table on top: `variable` = `value`, a number, three, or a list of such."""
 
     variable: str
     name: str
-    value: float | tuple[float, ...]
+    value: Value
+
+    def line(self, brackets: str, unit: str | None) -> tuple[str, str]:
+        """The value in the language's brackets, and what is said of it."""
+        measure = {"turn": "degrees", "count": None, "poses": None}.get(self.name, unit)
+        return literal(self.value, brackets), f"{measure}: {MEANING[self.name]}" if measure else MEANING[
+            self.name
+        ]
 
 
 @dataclass(frozen=True)
 class SourcePart:
-    """A part of the source: the name of its function, and its parameters, place and turn last."""
+    """A part of the source: the name of its function, and its parameters, those of its place last.
+
+    copies: the pattern of a repeated part.
+    """
 
     function: str
     part: Part
     parameters: tuple[Parameter, ...]
+    copies: Ring | Row | Poses | None = None
+
+    @property
+    def title(self) -> str:
+        """The part's name, and how often it is there."""
+        times = f", {len(self.part.copies)} times" if self.copies else ""
+        return f"{comment(self.part.name)}{times}"
 
     def variables(self) -> dict[str, str]:
         """Name of the parameter -> name of the variable."""
@@ -54,26 +78,58 @@ def source_parts(
     parts: Sequence[Part], turn: Callable[[np.ndarray], tuple[float, ...]], reserved: Collection[str]
 ) -> list[SourcePart]:
     """The parts with identifiers of which none is used twice; `turn` gives angles of a (3, 3) rotation."""
-    from partwright.assembly.similarity import rotation_matrix
-
-    values = []
-    for part in parts:
-        own = _parameters(part.field)
-        values.append(own | {"place": part.translation, "turn": turn(rotation_matrix(part.rotation))})
+    patterns = [pattern(part) for part in parts]
+    values = [
+        _parameters(part.field) | _placed(part, copies, turn)
+        for part, copies in zip(parts, patterns, strict=True)
+    ]
     functions = identifiers([part.name for part in parts], reserved)
     wanted = [f"{f}_{name}" for f, own in zip(functions, values, strict=True) for name in own]
     variables = iter(identifiers(wanted, [*reserved, *functions]))
     return [
-        SourcePart(f, part, tuple(Parameter(next(variables), name, value) for name, value in own.items()))
-        for f, part, own in zip(functions, parts, values, strict=True)
+        SourcePart(
+            f, part, tuple(Parameter(next(variables), name, value) for name, value in own.items()), copies
+        )
+        for f, part, own, copies in zip(functions, parts, values, patterns, strict=True)
     ]
 
 
-def _parameters(field: Field) -> dict[str, Any]:
+def _placed(
+    part: Part, copies: Ring | Row | Poses | None, turn: Callable[[np.ndarray], tuple[float, ...]]
+) -> dict[str, Value]:
+    """What says where the part and its copies are."""
+    turned = turn(rotation_matrix(part.rotation))
+    if isinstance(copies, Row):
+        return {"places": tuple(map(_tidy, copies.places)), "turn": turned}
+    if isinstance(copies, Poses):
+        poses = ((_tidy(c.translation), turn(rotation_matrix(c.rotation))) for c in copies.copies)
+        return {"poses": tuple(poses)}
+    placed: dict[str, Value] = {"place": _tidy(part.translation), "turn": turned}
+    if copies is not None:
+        placed["count"] = copies.count
+        if any(copies.centre):
+            placed["centre"] = copies.centre
+    return placed
+
+
+def _tidy(place: tuple[float, ...]) -> tuple[float, ...]:
+    """Without the dust of rounding beside what is there."""
+    least = 1e-12 * max(map(abs, place))
+    return tuple(0.0 if abs(v) <= least else v for v in place)
+
+
+def _parameters(field: Field) -> dict[str, Value]:
     """By name; a quadric's coefficients mean nothing to a reader."""
     if isinstance(field, Quadric):
         return {}
     return {entry.name: getattr(field, entry.name) for entry in dataclasses.fields(field)}  # type: ignore[arg-type]
+
+
+def literal(value: Value, brackets: str) -> str:
+    """A number, or a list of lists of them, in such brackets."""
+    if not isinstance(value, tuple):
+        return number(value)
+    return f"{brackets[0]}{', '.join(literal(one, brackets) for one in value)}{brackets[1]}"
 
 
 def number(value: float) -> str:
@@ -84,7 +140,7 @@ def number(value: float) -> str:
 def fixed_axes_angles(rotation: np.ndarray) -> tuple[float, float, float]:
     """Degrees about the fixed axes x, then y, then z, of a (3, 3) rotation."""
     r = rotation
-    pitch = math.asin(min(1.0, max(-1.0, -r[2, 0])))
+    pitch = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
     if abs(r[2, 0]) > 1 - 1e-12:  # x and z then turn about the same line: all of it goes to z
         roll, yaw = 0.0, math.atan2(-r[0, 1], r[1, 1])
     else:

@@ -1,4 +1,4 @@
-"""An assembly as CAD formats can hold it: exact solids, sharp edges, every copy a part of its own.
+"""An assembly as CAD formats can hold it: exact solids, sharp edges, every copy a part of its own or a loop.
 
 Parts that are no exact solid become the nearest one, blends are dropped, parts without volume are left out;
 each such change is listed for FILE.report.json.
@@ -15,7 +15,8 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export.approximation import Change, of_part
 from partwright.export.closed_quadrics import with_closed_quadrics
-from partwright.export.nearest import Approximation, nearest_solid
+from partwright.export.copies import expanded_but
+from partwright.export.nearest import SOLIDS, Approximation, nearest_solid
 from partwright.fields import Cone, Cylinder, Field, Frustum, HollowBox, HollowFrustum
 
 Keep = Callable[[Part], Approximation | None]
@@ -26,19 +27,21 @@ def _keep_none(_: Part) -> None:
 
 
 def solid_tree(
-    assembly: Assembly, keep: Keep = _keep_none, length: float = 1.0
+    assembly: Assembly, keep: Keep = _keep_none, length: float = 1.0, loops: bool = False
 ) -> tuple[Assembly, list[Change]]:
     """The assembly of exact solids alone, with no blend, and what was changed for it.
 
     keep: the part as the format holds it though it is none of the named solids, if it does.
     length: of the assembly's unit of length in the unit that changes are to be told in.
+    loops: named solids of one piece stay repeated, for formats that can say so.
 
     Raises:
         NoSurfaceError: no part has a volume, so nothing would be left.
         ParameterError: a part's field has no solid near it.
     """
     changes: list[Change] = []
-    tree = _solid(_with_holes(with_closed_quadrics(assembly.expanded())), True, keep, length, changes)
+    copies = expanded_but(assembly, SOLIDS) if loops else assembly.expanded()
+    tree = _solid(_with_holes(with_closed_quadrics(copies)), True, keep, length, changes)
     if tree is None:
         raise NoSurfaceError("nothing to export: no part of the assembly has a volume")
     return tree, changes  # type: ignore[return-value]  # an assembly stays one
