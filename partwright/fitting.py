@@ -30,7 +30,6 @@ METHODS = {
     "solids": "partwright.superfrusta.solids",
     "capri": "partwright.capri",
 }
-QUALITIES = ("draft", "normal", "high")
 DEVICES = ("auto", "cpu", "cuda")
 CLEANABLE = ("superfrusta", "solids")  # methods whose parts have numbers that relations can bind
 # A result stands for the worst of its pieces, in this order.
