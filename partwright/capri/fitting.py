@@ -16,6 +16,7 @@ from partwright.capri import samples as sampling
 from partwright.capri import surface as surfaces
 from partwright.capri.candidates import Pool, candidates
 from partwright.capri.detection import detect
+from partwright.capri.overlap import overlapped
 from partwright.capri.samples import Samples
 from partwright.capri.selection import Problem
 from partwright.capri.settings import Settings
@@ -92,7 +93,7 @@ def fit(
             "can see. Check its thickness, or use --quality high"
         )
     corners = shape.frame.to_unit(shape.vertices)
-    tree = run.tree().closed(corners.min(axis=0), corners.max(axis=0))
+    tree = overlapped(run.tree(), run.samples).closed(corners.min(axis=0), corners.max(axis=0))
     whole = replace(tree.assembly(), unit=shape.unit)
     assembly = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
     details = {

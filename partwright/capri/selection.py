@@ -9,7 +9,7 @@ drop a convex) changes the objective by a sum over the samples: one matrix produ
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,46 +97,64 @@ class Problem:
 def improve(problem: Problem, outside: Matrix, worth: Matrix, convex: Convex) -> tuple[Convex, float]:
     """Local search over one convex: adds, drops, exchanges while its value rises; the convex, its value.
 
-    outside (N, K) and worth (N,): the samples at which it matters whether the convex covers them.
+    outside (N, K) and worth (N,): the samples at which it matters whether the convex covers them. What each
+    quadric would take from the convex is kept up to date by the samples that a move changes: weights are
+    whole numbers, so the sums stay exact.
     """
     chosen = list(convex)
     count = outside[:, chosen].sum(axis=1)
+    taken = _sums(outside, worth, count == 0)
     while True:
-        within = count == 0
-        gain = -(worth[within] @ outside[within]) - problem.price
+        gain = -taken - problem.price
         gain[chosen] = -np.inf
         best_add = int(np.argmax(gain))
         best, move = float(gain[best_add]), cast(Move, (None, best_add))
+        single = np.flatnonzero(count == 1)
+        alone = outside[np.ix_(single, chosen)] > 0
         if chosen:
-            single = count == 1
-            back = worth[single] @ outside[single][:, chosen] + problem.price[chosen]
+            back = worth[single] @ alone + problem.price[chosen]
             if back.max() > best:
                 best, move = float(back.max()), (int(np.argmax(back)), None)
         if best <= _EPSILON:
-            best, move = _exchange(problem, outside, worth, chosen, count)
+            opened = [single[alone[:, i]] for i in range(len(chosen))]
+            best, move = _exchange(problem, outside, worth, chosen, taken, opened)
             if best <= _EPSILON:
                 break
         drop, add = move
         if drop is not None:
-            count = count - outside[:, chosen.pop(drop)]
+            taken += _sums(outside, worth, single[alone[:, drop]])
+            count -= outside[:, chosen.pop(drop)]
         if add is not None:
+            taken -= _sums(outside, worth, (count == 0) & (outside[:, add] > 0))
             chosen.append(add)
-            count = count + outside[:, add]
+            count += outside[:, add]
     convex = tuple(sorted(chosen))
     return convex, float(worth[count == 0].sum()) - problem.length(convex)
 
 
+def _sums(outside: Matrix, worth: Matrix, which: NDArray[Any]) -> Matrix:
+    """(K,) worth of the samples `which` (indices or mask) that each quadric leaves out."""
+    return np.asarray(worth[which] @ outside[which])
+
+
 def _exchange(
-    problem: Problem, outside: Matrix, worth: Matrix, chosen: list[int], count: Matrix
+    problem: Problem,
+    outside: Matrix,
+    worth: Matrix,
+    chosen: list[int],
+    taken: Matrix,
+    opened: list[NDArray[np.int64]],
 ) -> tuple[float, Move]:
-    """The best exchange of one quadric for another, and its gain."""
+    """The best exchange of one quadric for another, and its gain.
+
+    taken (K,): worth of the covered samples that each quadric leaves out; opened: for each chosen quadric the
+    samples that it alone leaves out.
+    """
     best: float = 0.0
     move: Move = (None, None)
-    for i, k in enumerate(chosen):
-        opened = (count == 1) & (outside[:, k] > 0)
-        within = (count == 0) | opened
-        back = float(worth[opened].sum()) + problem.price[k]
-        gain = back - worth[within] @ outside[within] - problem.price
+    for i, (k, rows) in enumerate(zip(chosen, opened, strict=True)):
+        back = float(worth[rows].sum()) + problem.price[k]
+        gain = back - taken - _sums(outside, worth, rows) - problem.price
         gain[chosen] = -np.inf
         add = int(np.argmax(gain))
         if gain[add] > best:

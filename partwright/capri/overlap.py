@@ -1,0 +1,49 @@
+"""Convexes that touch made to overlap, so that their union is one solid.
+
+Where two convexes meet in one face, a boolean of their meshes may keep a sheet between them, as thin as the
+rounding of their corners. A face with the shape's inside beyond it is internal: it moves out a little.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.capri import rows
+from partwright.capri.samples import Samples
+from partwright.capri.tree import Tree
+
+_STEP = 0.002  # unit frame: by how much an internal face moves out
+_BEYOND = 0.01  # how far beyond a face samples tell whether it is internal
+_EXPOSED = 0.3  # share of them that may be of the other side: corners, details that the tree leaves out
+
+
+def overlapped(tree: Tree, samples: Samples) -> Tree:
+    """The tree with the internal faces of its convexes moved out."""
+    values = rows.values(tree.rows, samples.points)
+    covered = [[(values[:, list(c)] <= 0).all(axis=1) for c in layer] for layer in tree.layers]
+    table, complement = list(tree.rows), list(tree.complement)
+    layers = []
+    for at, layer in enumerate(tree.layers):
+        later = [mask for above in covered[at + 1 :] for mask in above]
+        free = ~np.any(later, axis=0) if later else np.ones(len(values), dtype=bool)
+        harmed = free & (samples.inside != (at % 2 == 0))
+        convexes = []
+        for convex in layer:
+            moved = list(convex)
+            for i in np.flatnonzero(_internal(values[:, convex], harmed)):
+                moved[i] = len(table)
+                table.append(tree.rows[convex[i]] - _STEP * np.eye(10)[6])
+                complement.append(tree.complement[convex[i]])
+            convexes.append(tuple(moved))
+        layers.append(tuple(convexes))
+    return Tree(np.stack(table), np.array(complement), tuple(layers))
+
+
+def _internal(values: NDArray[np.float64], harmed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(k,) whether the samples just beyond a face of a convex with these values (N, k) are on its side."""
+    left_out = values > 0
+    single = left_out.sum(axis=1) == 1
+    beyond = left_out & single[:, None] & (values < _BEYOND)
+    count = beyond.sum(axis=0)
+    return np.asarray((count > 0) & ((beyond & harmed[:, None]).sum(axis=0) <= _EXPOSED * count))
