@@ -109,10 +109,10 @@ def find_shapes(folder: Path, sets: set[str], names: set[str]) -> list[Entry]:
     return chosen
 
 
-def fit_once(entry: Entry, seed: int, options: list[str]) -> Run:
-    """One fit in a process of its own."""
+def fit_once(entry: Entry, seed: int, options: list[str], keep: Path | None = None) -> Run:
+    """One fit in a process of its own; its files stay in the folder `keep`, if given."""
     with tempfile.TemporaryDirectory() as folder:
-        out, log = Path(folder) / "out", Path(folder) / "log"
+        out, log = keep or Path(folder) / "out", Path(folder) / "log"
         command = [sys.executable, "-m", "partwright", "fit", str(entry.path), "-o", str(out)]
         with log.open("wb") as stream:
             start = time.perf_counter()

@@ -53,10 +53,10 @@ SCORES = ("iou", "bi_surface_iou", "parts", "instances", "overlap", "deviation")
 NUMBERS = (*SCORES, "seconds", "cpu_seconds")
 
 
-def run(variant: str, entry: Entry) -> Row:
+def run(variant: str, entry: Entry, keep: Path | None) -> Row:
     """One process; its CPU seconds are those of all threads, the start of Python and the files included."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    made = fit_once(entry, 0, VARIANTS[variant])
+    made = fit_once(entry, 0, VARIANTS[variant], keep)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     scores = {name: float("nan") if (v := getattr(made, name)) is None else float(v) for name in SCORES}
@@ -147,7 +147,8 @@ def main() -> int:
             rows = recorded(path)
             if any(row.variant == variant and row.name == entry.name for row in rows):
                 continue
-            row = run(variant, entry)
+            keep = options.fits / variant / entry.name if options.fits else None
+            row = run(variant, entry, keep)
             append(path, row)
             print(
                 f"{variant}: {entry.name}: IoU {row.iou:.3f}, {row.parts:g} parts, {row.seconds:.1f} s",
@@ -171,6 +172,7 @@ def parser() -> argparse.ArgumentParser:
     option("--sets", default="cad", metavar="A,B", help="only these sets (default: %(default)s)")
     option("--names", default="", metavar="A,B", help="only these shapes")
     option("--variants", nargs="*", choices=tuple(VARIANTS), help="only these")
+    option("--fits", type=Path, metavar="FOLDER", help="keep all fits, as FOLDER/VARIANT/NAME")
     option("-o", "--output", type=Path, default=RESULTS / "solids.md", metavar="FILE")
     return result
 

@@ -103,7 +103,7 @@ def fit(
         if method == "capri":
             raise SettingError("capri keeps no tolerance and no bound; use method superfrusta or solids")
         bounds = Bounds.of(shape, tolerance, contain, inside)
-    _check_cleaning(method, clean, clean_tolerance, locked, bounds is not None)
+    _check_cleaning(method, shape, clean, clean_tolerance, locked, bounds is not None)
     module = import_module(METHODS[method])
     settings = module.Settings.for_quality(
         quality,
@@ -173,7 +173,7 @@ def fit(
 
 
 def _check_cleaning(
-    method: str, clean: bool, tolerance: float | None, locked: Sequence[str], bounded: bool
+    method: str, shape: Shape, clean: bool, tolerance: float | None, locked: Sequence[str], bounded: bool
 ) -> None:
     if not clean:
         if tolerance is not None:
@@ -185,6 +185,10 @@ def _check_cleaning(
         raise SettingError("cleaning may change every part, so no part can be locked; clean or lock")
     if bounded:
         raise SettingError("cleaning moves surfaces, which bounds do not allow; clean, or bound the fit")
+    if tolerance is not None:
+        from partwright.cleaning import checked_tolerance
+
+        checked_tolerance(tolerance, shape)
 
 
 def _cleaned(assembly: Assembly, shape: Shape, tolerance: float | None) -> tuple[Cleaned | None, float]:

@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from partwright.cleaning.relations import Relation
 from partwright.cleaning.segmentation import segment
-from partwright.cleaning.tidying import Cleaned, clean
+from partwright.cleaning.tidying import Cleaned, checked_tolerance, clean
 
-__all__ = ["Cleaned", "Relation", "clean", "segment"]
+__all__ = ["Cleaned", "Relation", "checked_tolerance", "clean", "segment"]

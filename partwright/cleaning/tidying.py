@@ -25,10 +25,10 @@ from partwright.cleaning.repeats import collapsed, tidy, unchanged
 from partwright.cleaning.snapping import snapped
 from partwright.errors import SettingError
 from partwright.metrics.iou import RESOLUTION, iou
+from partwright.shapes import Shape
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly
-    from partwright.shapes import Shape
 
 TOLERANCE = 5e-4  # of the longest side
 _COARSEST = 0.05  # of the longest side
@@ -87,9 +87,9 @@ def clean(assembly: Assembly, shape: Shape | None = None, tolerance: float | Non
         NoSurfaceError: nothing is left of the assembly.
     """
     model = Model.of(assembly)
-    longest = _longest(assembly, shape)
-    tolerance = _checked(tolerance, longest, shape, assembly.unit)
-    grid = Grid.of(longest)
+    target = assembly if shape is None else shape
+    tolerance = checked_tolerance(tolerance, target)
+    grid = Grid.of(_longest(target))
     evidence = Evidence.of(model, shape)
     given = State.of(evidence, model)
     judge = Judge.of(given, tolerance * evidence.scale)
@@ -104,13 +104,24 @@ def clean(assembly: Assembly, shape: Shape | None = None, tolerance: float | Non
     return Cleaned(result, relations(result, frames, grid), tolerance, before, after, changed)
 
 
-def _longest(assembly: Assembly, shape: Shape | None) -> float:
-    lower, upper = (shape.vertices.min(axis=0), shape.vertices.max(axis=0)) if shape else assembly.bounds()
+def _longest(of: Assembly | Shape) -> float:
+    lower, upper = (
+        (of.vertices.min(axis=0), of.vertices.max(axis=0)) if isinstance(of, Shape) else of.bounds()
+    )
     return float((upper - lower).max())
 
 
-def _checked(tolerance: float | None, longest: float, shape: Shape | None, unit: str | None) -> float:
-    length = f" {unit}" if unit else ""
+def checked_tolerance(tolerance: float | None, of: Assembly | Shape) -> float:
+    """The tolerance of cleaning against a shape, or an assembly by itself, in own units; the default if None.
+
+    Below the mesh's own noise nothing can be told, but the default is always allowed: it is a mean over many
+    samples.
+
+    Raises:
+        SettingError: it is no positive length, too large, or too small.
+    """
+    longest = _longest(of)
+    length = f" {of.unit}" if of.unit else ""
     if tolerance is None:
         return TOLERANCE * longest
     if not (math.isfinite(tolerance) and 0 < tolerance <= _COARSEST * longest):
@@ -118,15 +129,18 @@ def _checked(tolerance: float | None, longest: float, shape: Shape | None, unit:
             f"clean tolerance {tolerance:g}: expected a length above 0 and at most "
             f"{_COARSEST * longest:.3g}{length}, a twentieth of the longest side"
         )
-    noise = _FINEST * longest
-    if shape is not None:
-        noise = max(noise, roughness(shape) / shape.frame.scale)
-    if tolerance < noise:
-        what = "the mesh's own noise" if shape is not None else "what distances are computed to"
+    if tolerance < _FINEST * longest:
         raise SettingError(
-            f"clean tolerance {tolerance:g}{length} is below {what}, {noise:.3g}{length}; "
-            "allow more than that"
+            f"clean tolerance {tolerance:g}{length} is below what distances are computed to; "
+            f"give at least {_FINEST * longest:.3g}{length}"
         )
+    if isinstance(of, Shape) and tolerance < TOLERANCE * longest:
+        noise = roughness(of) / of.frame.scale
+        if tolerance < noise:
+            raise SettingError(
+                f"clean tolerance {tolerance:g}{length} is below the mesh's own noise, {noise:.3g}{length}; "
+                f"give at least {min(noise, TOLERANCE * longest):.3g}{length}"
+            )
     return tolerance
 
 

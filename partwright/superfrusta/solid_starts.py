@@ -82,5 +82,5 @@ _BOX, _CYLINDER = _square(0.0), _round(1.0, 0.0)
 def _forms(sign: float) -> list[tuple[int, Form]]:
     """The axes of a basis and what starts along them. Of hollow kinds, only tubes are subtracted: grooves."""
     every = [_CYLINDER, _round(_LEAN, 0.0), _round(1.0, _HOLE), _capsule]
-    every += [_square(_HOLE), _torus] if sign > 0 else []
+    every += [_square(_HOLE), _torus, _round(_LEAN, _HOLE)] if sign > 0 else []
     return [(0, _BOX), (0, _sphere), *((axis, form) for axis in range(3) for form in every)]

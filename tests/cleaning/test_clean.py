@@ -208,6 +208,18 @@ def test_a_tolerance_below_the_meshs_noise_is_refused() -> None:
     with pytest.raises(SettingError, match="the mesh's own noise, 0"):
         clean(fitted, ball, tolerance=0.005)
     assert clean(fitted, ball, tolerance=0.2).changed
+    assert clean(fitted, ball).tolerance == pytest.approx(0.01, rel=0.02)  # the default is always allowed
+
+
+def test_a_fit_to_be_cleaned_fails_before_it_starts() -> None:
+    import trimesh
+
+    from partwright.fitting import fit
+
+    block = load_shape(trimesh.creation.box((3, 2, 1)))
+    for tolerance in (1e-9, 1.0, math.nan):
+        with pytest.raises(SettingError, match="clean tolerance"):
+            fit(block, "solids", clean=True, clean_tolerance=tolerance, progress=pytest.fail)
 
 
 def test_a_field_of_another_kind_is_refused() -> None:
