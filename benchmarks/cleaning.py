@@ -1,9 +1,10 @@
 """What cleaning costs and finds on fitted shapes, and pictures of it before and after.
 
-    python benchmarks/cleaning.py --shapes FOLDER --fits FOLDER [--pictures]
+    python benchmarks/cleaning.py --shapes FOLDER --fits FITS/solids FITS/superfrusta [--pictures]
 
-Every shape of `--shapes` that has a fit NAME/assembly.json in `--fits` (as `partwright fit SHAPE -o
-FITS/NAME` writes it) is cleaned against the shape at the default tolerance. The table goes to
+Every shape of `--shapes` that has a fit NAME/assembly.json in one of the folders of `--fits` (as `partwright
+fit SHAPE -o FITS/solids/NAME` writes it) is cleaned against the shape at the default tolerance; a folder's
+name says what its fits are. The table goes to
 benchmarks/results/cleaning.md; with --pictures, docs/clean-gallery.md shows each result with its numbers.
 Seconds are CPU seconds.
 """
@@ -14,6 +15,7 @@ import argparse
 import sys
 import time
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +45,7 @@ class Row:
     """One shape: its fit, what cleaning made of it, and how both score."""
 
     name: str
+    method: str
     fitted: pw.Assembly
     cleaned: Cleaned
     before: Scores
@@ -50,12 +53,12 @@ class Row:
     seconds: float
 
 
-def run(name: str, shape: pw.Shape, fitted: pw.Assembly) -> Row:
+def run(name: str, method: str, shape: pw.Shape, fitted: pw.Assembly) -> Row:
     start = time.process_time()
     cleaned = pw.clean(fitted, shape)
     seconds = time.process_time() - start
     before, after = (pw.evaluate(one, shape, emd=False) for one in (fitted, cleaned.assembly))
-    return Row(name, fitted, cleaned, before, after, seconds)
+    return Row(name, method, fitted, cleaned, before, after, seconds)
 
 
 def named(assembly: pw.Assembly) -> int:
@@ -75,17 +78,17 @@ def table(rows: list[Row], command: str) -> str:
         "",
         f"`{command}`",
         "",
-        "Before and after, at the default tolerance of half a thousandth of the longest side. Plain numbers",
-        "have at most four digits. CPU seconds.",
+        "Before and after, at the default tolerance of half a thousandth of the longest side. Plain: numbers",
+        "have at most four digits; bi: bi-surface IoU. CPU seconds.",
         "",
-        "| shape | parts | named solids | plain numbers | relations | IoU | bi-surface IoU | 95 % off | s |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| shape | fitted as | parts | named solids | plain | relations | IoU | bi | 95 % off | s |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in rows:
         a, b = row.fitted, row.cleaned.assembly
         lines.append(
-            f"| {row.name} | {len(a)} -> {len(b)} | {named(a)} -> {named(b)} | {plain_share(a):.0%} -> "
-            f"{plain_share(b):.0%} | {len(row.cleaned.relations)} | "
+            f"| {row.name} | {row.method} | {len(a)} -> {len(b)} | {named(a)} -> {named(b)} | "
+            f"{plain_share(a):.0%} -> {plain_share(b):.0%} | {len(row.cleaned.relations)} | "
             f"{row.before.iou:.3f} -> {row.after.iou:.3f} | "
             f"{row.before.bi_surface_iou:.3f} -> {row.after.bi_surface_iou:.3f} | "
             f"{row.before.deviation_95:.4f} -> {row.after.deviation_95:.4f} | {row.seconds:.1f} |"
@@ -143,7 +146,8 @@ def page(rows: list[Row], command: str) -> str:
     ]
     for row in rows:
         made = row.cleaned.assembly.parts
-        lines += ["", f"## {row.name}", "", f"![input, fit, clean](images/clean/{row.name}.png)", "", "```"]
+        lines += ["", f"## {row.name}, fitted as {row.method}", ""]
+        lines += [f"![input, fit, clean](images/clean/{row.method}_{row.name}.png)", "", "```"]
         lines += [f"before  {typed(row.fitted.parts[0])}", ""]
         lines += [typed(part) for part in made[:LONGEST_LIST]]
         if len(made) > LONGEST_LIST:
@@ -156,24 +160,25 @@ def page(rows: list[Row], command: str) -> str:
 
 def main() -> int:
     options = parser().parse_args()
-    command = "python benchmarks/cleaning.py --shapes SHAPES --fits FITS --pictures"
+    command = "python benchmarks/cleaning.py --shapes SHAPES --fits FITS/solids FITS/superfrusta --pictures"
     chosen = set(filter(None, options.names.split(",")))
     rows = []
     pictures = options.docs / "images" / "clean"
-    for path in sorted(options.shapes.iterdir()):
-        fit = options.fits / path.stem / "assembly.json"
+    for folder, path in product(options.fits, sorted(options.shapes.iterdir())):
+        fit = folder / path.stem / "assembly.json"
         if not fit.is_file() or (chosen and path.stem not in chosen):
             continue
         fitted = pw.load_assembly(fit)
         shape = pw.load_shape(path, unit=fitted.unit, up=fitted.up)
-        rows.append(run(path.stem, shape, fitted))
+        rows.append(run(path.stem, folder.name, shape, fitted))
         print(f"{path.stem}: IoU {rows[-1].before.iou:.3f} -> {rows[-1].after.iou:.3f}", flush=True)
         if options.pictures:
             pictures.mkdir(parents=True, exist_ok=True)
-            draw(rows[-1], shape, pictures / f"{path.stem}.png")
+            draw(rows[-1], shape, pictures / f"{folder.name}_{path.stem}.png")
     if not rows:
         raise SystemExit(
-            f"no shape of {options.shapes} has a fit in {options.fits}; run partwright fit first"
+            f"no shape of {options.shapes} has a fit in {', '.join(map(str, options.fits))}; "
+            "run partwright fit first"
         )
     write_bytes(options.output, table(rows, command).encode())
     if options.pictures:
@@ -187,7 +192,7 @@ def parser() -> argparse.ArgumentParser:
     )
     option = result.add_argument
     option("--shapes", type=Path, required=True, metavar="FOLDER", help="meshes, NAME.ply or other")
-    option("--fits", type=Path, required=True, metavar="FOLDER", help="NAME/assembly.json of each")
+    option("--fits", type=Path, required=True, nargs="+", metavar="FOLDER", help="NAME/assembly.json of each")
     option("--names", default="", metavar="A,B", help="only these shapes")
     option("--pictures", action="store_true", help="also draw docs/clean-gallery.md")
     option("--docs", type=Path, default=DOCS, metavar="FOLDER", help="where page and pictures go")

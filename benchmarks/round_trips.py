@@ -5,17 +5,19 @@
 A known part comes back where the fit has one of the same sign that shares most of its volume: by kind where
 the two are of one kind, by size where each number that is seen in the shape is right to 1 %. A relation that
 `partwright clean` finds in the known assembly comes back by the share of its members that the clean fit
-relates in the same way. Every case is appended to benchmarks/results/round_trips.csv as it ends, and those
-that are there are not made again: delete the file, or rows of it, to measure anew.
+relates in the same way; members whose ends are not seen, such as a hole's that goes through, do not count.
+Every case is appended to benchmarks/results/round_trips.csv as it ends, and those that are there are not made
+again: delete the file, or rows of it, to measure anew.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import re
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from statistics import mean, median
@@ -29,7 +31,7 @@ from scipy.optimize import linear_sum_assignment
 import partwright as pw
 from partwright.assembly.similarity import rotation_matrix
 from partwright.cleaning import Relation
-from partwright.cleaning.dimensions import values
+from partwright.cleaning.dimensions import dimensions, values
 from partwright.fields import Box, Field, HollowBox
 from partwright.meshing import mesh_assembly
 from partwright.superfrusta.tree import flattened
@@ -87,11 +89,12 @@ def run(known: Known, keep: Path | None) -> Row:
     pairs = matched(own, made, shape)
     alike = [(a, b) for a, b in pairs if kind(a.part.field) == kind(b.part.field)]
     images = {a.name: b.name for a, b in pairs}
-    groups = [members(relation, own) for relation in truth.relations]
     found = [(relation.kind, members(relation, made)) for relation in result.clean.relations]
+    asked = [(relation.kind, shown(relation, own, seen)) for relation in truth.relations]
     shares = [
-        share({images.get(name, "") for name in group}, [g for kind_, g in found if kind_ == relation.kind])
-        for relation, group in zip(truth.relations, groups, strict=True)
+        share({images.get(name, "") for name in group}, [other for sort, other in found if sort == kind_])
+        for kind_, group in asked
+        if group
     ]
     return Row(
         known.name,
@@ -158,6 +161,27 @@ def members(relation: Relation, of: Sequence[Copy]) -> set[str]:
         single = "/" in entry or any(other.startswith(f"{leaf}/") for other in relation.parts)
         bound |= {entry} if single else set(own)
     return bound
+
+
+def shown(relation: Relation, own: Sequence[Copy], seen: Mapping[str, Sequence[bool]]) -> set[str]:
+    """The members whose part in the relation is seen in the shape; none where too few are left."""
+    group = members(relation, own)
+    axis = re.search(r"(?:centred on|flush at) ([xyz]) =", relation.text)
+    left = set()
+    for copy in (one for one in own if one.name in group):
+        names = [d.name for d in dimensions(type(copy.part.field))]
+        if axis is not None:
+            local = int(np.abs(rotation_matrix(copy.part.rotation)["xyz".index(axis[1])]).argmax())
+            bound = [f"size {'xyz'[local]}"] + ["height"] * (local == 2)
+        elif relation.kind == "equal":
+            entry = next(e for e in (*relation.parts, copy.leaf) if e.startswith(copy.leaf))
+            told = f"{entry} {relation.text}".replace("_", " ")
+            bound = [name for name in names if name.replace("_", " ") in told]
+        else:
+            bound = []
+        if all(seen[copy.leaf][names.index(name)] for name in bound if name in names):
+            left.add(copy.name)
+    return left if len(left) > 1 or relation.kind == "centred" or len(group) == 1 else set()
 
 
 def share(image: set[str], groups: Sequence[set[str]]) -> float:

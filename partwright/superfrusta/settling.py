@@ -21,7 +21,8 @@ _ROUNDNESS, _DILATION, _TAPER, _ONION = (
 )
 _LOSS = 5e-4  # of R: a plainer kind may cost so much
 _PROMISING = 0.01  # of R: a kind that costs more before its refit is not tried
-_BEYOND = 0.06  # unit lengths by which a cut goes beyond the solid
+_BEYOND = 0.03  # unit lengths by which a cut goes beyond the solid
+_ACROSS, _ALONG, _WITHIN = 7, 60, 0.35  # points across and along a cut, and how far out of its middle
 _HARMLESS = 2e-5  # of R
 
 
@@ -87,17 +88,19 @@ def _changed(row: Row, **values: float) -> Row:
 
 
 def cut_through(evidence: Evidence, rows: Rows, locked: int = 0) -> Rows:
-    """Subtracted parts made longer where they end in the open, so that no skin is left over a hole.
+    """Subtracted parts that end in the open end a little beyond what they cut, so that no skin is left.
 
-    A fit does not care how far a cut goes where nothing is; a CAD program does when two faces coincide.
+    A fit does not care how far a cut goes where nothing is; a CAD program does when two faces coincide, and a
+    reader when every hole through one plate has another length.
     """
     least = score(evidence, rows) - _HARMLESS
+    added = rows[rows[:, SIGN] > 0]
     for index in range(locked, len(rows)):
         if rows[index, SIGN] > 0:
             continue
         for axis, side in _ends(rows[index]):
             trial = rows.copy()
-            trial[index] = _extended(rows[index], axis, side)
+            trial[index] = _ending_beyond(evidence, added, rows[index], axis, side)
             if score(evidence, trial) >= least:
                 rows = trial
     return rows
@@ -111,9 +114,23 @@ def _ends(row: Row) -> list[tuple[int, float]]:
     return [(axis, side) for axis in axes for side in (-1.0, 1.0)]
 
 
-def _extended(row: Row, axis: int, side: float) -> Row:
-    result = row.copy()
+def _ending_beyond(evidence: Evidence, added: Rows, row: Row, axis: int, side: float) -> Row:
+    """The cut (17,) with one end `_BEYOND` further than it meets any added part; longer by as much where
+    these go on, which the caller will find costs too much."""
     w, x, y, z = (float(v) for v in row[3:7])
-    result[:3] += side * _BEYOND / 2 * rotation_matrix((w, x, y, z))[:, axis]
-    result[(SX, SY, SZ)[axis]] += _BEYOND
+    turn, size = rotation_matrix((w, x, y, z)), row[[SX, SY, SZ]].astype(np.float64)
+    end = size[axis] / 2
+    across = [np.linspace(-_WITHIN, _WITHIN, _ACROSS) * size[k] for k in range(3)]
+    across[axis] = side * np.linspace(-end, end + _BEYOND, _ALONG)
+    local = np.stack(np.meshgrid(*across, indexing="ij"), axis=-1).reshape(-1, 3)
+    distance = evidence.parts_of(added, (row[:3] + local @ turn.T).astype(np.float32)).min(axis=0)
+    inside = distance < 0
+    if not inside.any():
+        return row
+    # The outermost point inside lies as deep as the face that it lies behind is away.
+    last = float((side * local[inside, axis] - distance[inside]).max())
+    result = row.copy()
+    change = last + _BEYOND - end
+    result[:3] += side * change / 2 * turn[:, axis]
+    result[(SX, SY, SZ)[axis]] += change
     return result

@@ -198,19 +198,21 @@ def test_repeated_holes_are_subtracted_with_all_their_copies() -> None:
     assert (np.sign(inside) == (1, 1, -1)).all()
 
 
-def test_cuts_are_made_longer_in_the_open_and_nowhere_else() -> None:
+def test_cuts_end_a_little_beyond_the_solid_in_the_open_and_nowhere_else() -> None:
     mesh = plate()
     evidence = Evidence.of(load_shape(mesh), DRAFT)
     block = row(size=(1.8, 1.2, 0.2), blend=0)
     cuts = [
-        row((x, y, 0), size=(0.2, 0.2, 0.21), roundness=1, blend=0) for x in (-0.6, 0.6) for y in (-0.3, 0.3)
+        row((x, y, 0.1 * y), size=(0.2, 0.2, 0.3), roundness=1, blend=0)
+        for x in (-0.6, 0.6)
+        for y in (-0.3, 0.3)
     ]
     blind = row((0, 0, 0.1), size=(0.1, 0.1, 0.1), roundness=1, blend=0)
     rows = subtracting(np.stack([block, *cuts, blind]), 1, 2, 3, 4, 5)
     longer = cut_through(evidence, rows)
-    assert (longer[1:5, 9] > 0.3).all()
-    assert longer[5, 9] == pytest.approx(0.16)  # upwards only
-    assert longer[5, 2] > 0.1
+    np.testing.assert_allclose(longer[1:5, 9], 0.26, atol=1e-4)  # 0.03 on both sides, though they lay askew
+    np.testing.assert_allclose(longer[1:5, 2], 0, atol=1e-4)
+    np.testing.assert_allclose(longer[5, [2, 9]], (0.09, 0.08), atol=1e-4)  # from 0.05, upwards only
 
 
 def test_a_cut_is_fitted_to_what_is_covered_too_much() -> None:
