@@ -1,12 +1,13 @@
 """PartSDF measured: speed against a plain implementation, reconstruction of held-out shapes, ablations.
 
     python benchmarks/partsdf.py speed [--model MODEL]
-    python benchmarks/partsdf.py reconstruct --family FOLDER --model MODEL [--model-1p MODEL] [--shapes N]
+    python benchmarks/partsdf.py reconstruct --family FOLDER --model MODEL [--config CONFIG] [--shapes N]
     python benchmarks/partsdf.py ablations --family FOLDER [--epochs N] [--shapes N]
     python benchmarks/partsdf.py robots --parts FOLDER [--epochs N]
 
 `speed` times one thread by processor time. The plain implementation (partwright/partsdf/reference.py, a
 convolution as cross-part layer, dense grid) is timed on slices and extrapolated, as the table says.
+`reconstruct` with CONFIG also trains the same on all parts as one ("1P"), in --work, for a row of its own.
 `reconstruct` and `ablations` keep every shape's scores in benchmarks/results/partsdf-*.csv and skip those
 that are there, so that they can be stopped and go on. Tables go to benchmarks/results/partsdf-*.md.
 """
@@ -31,7 +32,13 @@ import torch
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import NoSurfaceError
 from partwright.metrics.reconstruction import ReconstructionScores, mean_scores, reconstruction_scores
-from partwright.partsdf.config import Config, DecoderSettings, LossSettings, TrainingSettings
+from partwright.partsdf.config import (
+    Config,
+    DecoderSettings,
+    LossSettings,
+    TrainingSettings,
+    read_config,
+)
 from partwright.partsdf.decoder import Decoder
 from partwright.partsdf.losses import latent_penalty, terms
 from partwright.partsdf.meshing import labelled_surface, mesh_shape
@@ -49,6 +56,12 @@ from partwright.partsdf.training import train
 RESULTS = Path(__file__).parent / "results"
 PAPER = DecoderSettings()
 SMALL = DecoderSettings(latent=64, width=128)
+# As configs/ has it for the models that ship.
+LOSSES = LossSettings(latent=1e-5, ramp=20)
+TRAINING = TrainingSettings(
+    batch=2, points=512, rate=1e-3, latent_rate=2e-3, validate=0, checkpoint=1.0,
+    accelerator="cpu", precision="bf16-mixed",
+)  # fmt: skip
 PARTS, SLICE, GRID = 4, 1024, 256  # parts of a mixer, points of a slice, cells along the grid
 TABLE = ("chamfer", "iou", "image_consistency", "part_iou")
 
@@ -106,7 +119,8 @@ def measure(way: str, model: str | None) -> dict[str, float]:
     kind, _, width = way.partition("@")
     settings = PAPER if width == "512" else SMALL
     plain = kind.startswith("plain")
-    decoder = (ReferenceDecoder if plain else Decoder)(PARTS, settings)
+    parts = len(load_model(model).parts) if model else PARTS
+    decoder = (ReferenceDecoder if plain else Decoder)(parts, settings)
     whole = 1.0
     if "step" in kind:
         points = 8192 if kind.endswith("memory") else SLICE
@@ -118,15 +132,15 @@ def measure(way: str, model: str | None) -> dict[str, float]:
         whole = iterations
     elif plain:
         places = torch.from_numpy(dense_grid(GRID).reshape(-1, 3)[::64])
-        seconds = timed(lambda: dense_slice(decoder, settings, places), 1)
+        seconds = timed(lambda: dense_slice(decoder, parts, settings, places), 1)
         whole = 64
     else:
         assert model, "meshing is timed on a trained shape"
         shape = NeuralShape.trained(load_model(model), "0")
-        seconds = timed(lambda: mesh_shape(shape, GRID, parts=False), 1)
+        before = processor_seconds()
         surfaces = mesh_shape(shape, GRID, parts=False)
         return {
-            "seconds": seconds, "whole": 1.0, "evaluations": surfaces.evaluations,
+            "seconds": processor_seconds() - before, "whole": 1.0, "evaluations": surfaces.evaluations,
             "dense": surfaces.dense, "slope": shape.model.slope,
         }  # fmt: skip
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - start
@@ -134,10 +148,12 @@ def measure(way: str, model: str | None) -> dict[str, float]:
 
 
 @torch.no_grad()
-def dense_slice(decoder: torch.nn.Module, settings: DecoderSettings, places: torch.Tensor) -> None:
-    latents = torch.zeros(1, PARTS, settings.latent)
+def dense_slice(
+    decoder: torch.nn.Module, parts: int, settings: DecoderSettings, places: torch.Tensor
+) -> None:
+    latents = torch.zeros(1, parts, settings.latent)
     for chunk in places.split(SLICE * 16):
-        decoder(latents, chunk.expand(1, PARTS, -1, -1))
+        decoder(latents, chunk.expand(1, parts, -1, -1))
 
 
 STEPS = ("plain step", "step", "half step")
@@ -175,10 +191,10 @@ def speed(arguments: argparse.Namespace) -> None:
         print(lines[-1], flush=True)
     if arguments.model:
         width = str(load_model(arguments.model).config.decoder.width)
-        plain, ours = child(f"plain mesh@{width}"), child(f"mesh@{width}", arguments.model)
+        plain, ours = (child(f"{way}@{width}", arguments.model) for way in ("plain mesh", "mesh"))
         total = plain["seconds"] * plain["whole"]
         lines.append(
-            f"| mesh at {GRID}^3, width {width} | {total:.1f} | {ours['seconds']:.1f} | "
+            f"| mesh at {GRID}^3, {arguments.model}, width {width} | {total:.1f} | {ours['seconds']:.1f} | "
             f"{total / ours['seconds']:.1f} | {ours['evaluations']:,.0f} of {ours['dense']:,.0f} points, "
             f"{ours['dense'] / ours['evaluations']:.1f} times fewer; slope {ours['slope']:.2f} |"
         )
@@ -251,14 +267,27 @@ def measured(
     return scores, float(np.mean([float(row["seconds"]) for row in rows]))
 
 
-def line(label: str, scores: list[ReconstructionScores], seconds: float) -> str:
+def line(label: str, scores: list[ReconstructionScores], seconds: float, parts: bool = True) -> str:
     m = mean_scores(scores)
+    part_iou = f"{100 * m.part_iou:.2f}" if parts else ""
     return (
         f"| {label} | {1e4 * m.chamfer:.2f} | {1e4 * m.chamfer_floor:.2f} | {100 * m.iou:.2f} | "
-        f"{m.image_consistency:.3f} | {100 * m.part_iou:.2f} | {100 * m.failed:.0f} | {seconds:.0f} |"
+        f"{m.image_consistency:.3f} | {part_iou} | {100 * m.failed:.0f} | {seconds:.0f} |"
     )
 
 
+# Table 1 of the paper, on its own shapes: Ours, Ours-PC, Ours-1P.
+PUBLISHED = {
+    family: [
+        f"| paper, its own {family}, {how} | {row[0]:.2f} | | {row[1]:.2f} | {row[2]:.3f} | {row[3]} | | |"
+        for how, row in zip(("known parts", "from points", "1P"), rows, strict=True)
+    ]
+    for family, rows in {
+        "cars": ((1.27, 98.02, 0.931, 94.89), (1.28, 97.95, 0.930, 94.25), (1.37, 97.41, 0.924, "")),
+        "mixers": ((1.60, 94.43, 0.978, 90.42), (1.73, 83.38, 0.966, 78.61), (1.44, 95.16, 0.978, "")),
+        "chairs": ((1.30, 97.17, 0.942, 93.67), (1.57, 97.09, 0.942, 88.13), (3.74, 93.78, 0.913, "")),
+    }.items()
+}
 HEAD = [
     "| | CD x1e4 | floor | IoU % | IC | pIoU % | failed % | seconds |",
     "|---|---|---|---|---|---|---|---|",
@@ -282,12 +311,23 @@ def reconstruction(arguments: argparse.Namespace) -> None:
     name = f"reconstruct-{family.name}"
     for label, how in (("known parts", known), ("part-agnostic", unknown)):
         lines.append(line(label, *measured(name, label, family, model, how, arguments)))
-    if arguments.model_1p:
-        single = load_model(arguments.model_1p)
-        lines.append(line("one part", *measured(name, "one part", family, single, known, arguments)))
-    if family.name == "mixers":
-        lines.append("| paper, known parts, its own mixers | 1.60 | | 94.4 | 0.978 | 90.4 | | |")
+    if arguments.config:
+        single = one_part(arguments)
+        lines.append(
+            line("one part (1P)", *measured(name, "one part", family, single, known, arguments), parts=False)
+        )
+    lines += PUBLISHED.get(family.name, [])
     write(name, lines)
+
+
+def one_part(arguments: argparse.Namespace) -> Model:
+    """The same training with all parts as one; it goes on, or comes back, from the folder of work."""
+    config = read_config(arguments.config)
+    config = replace(
+        config, family=arguments.family, name=f"{config.name}-1p", one_part=True,
+        training=replace(config.training, validate=0),
+    )  # fmt: skip
+    return train(config, arguments.work / config.name).model
 
 
 # --- ablations -----------------------------------------------------------------------------------------
@@ -296,12 +336,10 @@ def reconstruction(arguments: argparse.Namespace) -> None:
 def ablations(arguments: argparse.Namespace) -> None:
     """Tables 3, 6 (its first row) and 7 on one family, each trained the same."""
     family = PreparedFamily(arguments.family)
-    training = TrainingSettings(
-        epochs=arguments.epochs, batch=8, points=1024, rate=2e-3, latent_rate=2e-3, validate=0,
-        checkpoint=1.0,
-        accelerator="cpu", threads=arguments.threads, samples=arguments.samples, precision="bf16-mixed",
-    )  # fmt: skip
-    base = Config(arguments.family, "base", decoder=SMALL, losses=LossSettings(ramp=20), training=training)
+    training = replace(
+        TRAINING, epochs=arguments.epochs, threads=arguments.threads, samples=arguments.samples
+    )
+    base = Config(arguments.family, "base", decoder=SMALL, losses=LOSSES, training=training)
     variants = {
         "PartSDF": base,
         "one part": replace(base, one_part=True),
@@ -314,7 +352,7 @@ def ablations(arguments: argparse.Namespace) -> None:
     }
     lines = [f"# PartSDF: ablations on {family.name}", "",
              f"Each trained alike: {len(family.split('train'))} shapes, width 128, latent 64, "
-             f"{arguments.epochs} epochs of 1,024 points a shape. Known parts, meshed at "
+             f"{arguments.epochs} epochs of {TRAINING.points} points a shape. Known parts, meshed at "
              f"{arguments.resolution}^3; seconds are those of a reconstruction.", "",
              f"    python benchmarks/partsdf.py {' '.join(sys.argv[1:])}", "", *HEAD]  # fmt: skip
     for label, config in variants.items():
@@ -341,17 +379,13 @@ def robots(arguments: argparse.Namespace) -> None:
              f"Trained on six arms of seven links, {arguments.epochs} epochs, width 128; the seventh "
              "reconstructed with known parts and without.", "",
              f"    python benchmarks/partsdf.py {' '.join(sys.argv[1:])}", "", *HEAD]  # fmt: skip
-    training = TrainingSettings(
-        epochs=arguments.epochs, batch=6, points=1024, rate=2e-3, latent_rate=2e-3, validate=0,
-        checkpoint=1.0,
-        accelerator="cpu", threads=arguments.threads, validation=True, precision="bf16-mixed",
-    )  # fmt: skip
+    training = replace(TRAINING, epochs=arguments.epochs, threads=arguments.threads)
     for held in arguments.held.split(","):
         folder = arguments.work / f"robots-{held}"
         prepare(arguments.parts, folder / "family", samples=30_000, held_out=(held,), workers=1)
         family = PreparedFamily(folder / "family")
-        config = Config(str(family.folder), f"robots-{held}", decoder=SMALL,
-                        losses=LossSettings(ramp=20), training=training)  # fmt: skip
+        config = Config(str(family.folder), f"robots-{held}", decoder=SMALL, losses=LOSSES,
+                        training=training)  # fmt: skip
         model = train(config, folder / "model").model
         for label, how in (("known parts", known), ("part-agnostic", unknown)):
             scores = measured("robots", f"{held}, {label}", family, model, how, arguments)
@@ -388,7 +422,7 @@ def main() -> None:
     one = command("reconstruct", reconstruction)
     one.add_argument("--family", required=True)
     one.add_argument("--model", required=True)
-    one.add_argument("--model-1p")
+    one.add_argument("--config", help="of the model's training: also train and measure all parts as one")
     one = command("ablations", ablations)
     one.add_argument("--family", required=True)
     one.add_argument("--only", help="variants, separated by commas")

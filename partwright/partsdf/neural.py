@@ -13,7 +13,7 @@ from partwright.partsdf.losses import aggregate
 from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, local_points
 
-CHUNK = 1 << 15  # pairs of point and part that are decoded at once, so that they stay in the cache
+CHUNK = 1 << 12  # pairs of point and part that are decoded at once, so that they stay in the cache
 
 
 @dataclass(frozen=True)
