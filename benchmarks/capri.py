@@ -219,19 +219,19 @@ def by_shape(runs: list[Run], key: str) -> Iterator[str]:
         yield f"| {run.name} | {cells([run], mean) if run.chamfer is not None else run.outcome} |"
 
 
-def document(runs: list[Run], commands: list[str]) -> str:
-    everywhere = [set(r.name for r in runs if r.row == key) for key in list(ROWS)[:5]]
+def document(runs: list[Run], command: str) -> str:
+    everywhere = [{r.name for r in runs if r.row == key} for key in list(ROWS)[:5]]
     common = sorted(set.union(*everywhere)) if runs else []
     lines = [
         "# CSG trees: CAPRI-Net's measures",
         "",
-        *(f"`{command}`" for command in commands),
+        f"`{command}`",
         "",
         f"One thread each on {machine()}; seconds are those of the processor. 30,000 points a surface.",
-        "The floor of the Chamfer distance (CD) and the ceiling of the normal consistency (NC) are what a second",
-        "sample of the shape itself reaches. ECD: edge Chamfer distance; LFD: light field distance; #P, #C:",
-        "primitives and convexes. A solid of `solids` and a SuperFrustum count as one primitive each, where a box",
-        "takes six planes.",
+        "The floor of the Chamfer distance (CD) and the ceiling of the normal consistency (NC) are what",
+        "a second sample of the shape itself reaches. ECD: edge Chamfer distance; LFD: light field",
+        "distance; #P and #C: primitives and convexes. A solid of `solids` and a SuperFrustum count as one",
+        "primitive each, where a box takes six planes.",
         "",
         "## Inputs and methods",
         "",
@@ -267,14 +267,15 @@ def main() -> int:
             append(RESULTS, run)
             print(row, entry.name, run.outcome, cells([run], mean), flush=True)
     runs = read(RESULTS)
-    write_bytes(RESULTS.with_suffix(".md"), document(runs, [_command(options)]).encode())
+    write_bytes(RESULTS.with_suffix(".md"), document(runs, _command(options, runs)).encode())
     return 0
 
 
-def _command(options: argparse.Namespace) -> str:
+def _command(options: argparse.Namespace, runs: list[Run]) -> str:
     """What to type to get these tables; of the folder of shapes only its name, wherever it lies."""
+    rows = ",".join(key for key in ROWS if any(run.row == key for run in runs))
     given = {"--shapes": options.shapes.name if options.shapes != OWN_SHAPES else "", "--sets": options.sets}
-    given |= {"--names": options.names, "--rows": options.rows, "--seed": options.seed}
+    given |= {"--rows": rows, "--seed": options.seed}
     return " ".join(["python benchmarks/capri.py", *(f"{k} {v}" for k, v in given.items() if v)])
 
 

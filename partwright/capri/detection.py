@@ -1,8 +1,8 @@
 """Surfaces of a shape as quadrics: efficient RANSAC (Schnabel, Wahl & Klein 2007) on oriented points.
 
 Planes come from one point and its normal, spheres and cylinders from two, cones from three close points. The
-hypothesis that most points bear out, by distance and by normal, is refitted to them and taken out; again and
-again, until what is left bears out nothing.
+hypothesis that most points bear out, by distance and by normal, is refitted to them, by every kind in turn,
+and the best is taken out; again and again, until what is left bears out nothing.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ _SEEDS = 48  # hypotheses of each kind in one draw
 _PROBE = 1500  # points that sift hypotheses
 _FINALISTS = 6
 _TOLERANCE = 0.006  # unit frame: how far from its quadric a point may lie
+_CLOSER = 0.125  # share of the tolerance at which the kinds are told apart
 _AGREE = np.cos(np.radians(18.0))  # and by how much its normal may differ
 _NEAR, _FAR = 6, 60  # neighbours among which partners are drawn
 _SIMPLER = {
@@ -43,12 +44,15 @@ class Surfel:
     """A quadric found on a surface: its row (10,), kind, and the points (K,) (indices) that bear it out.
 
     outward: whether the points' normals point out of f <= 0, as on a boss; on a hole's wall they do not.
+    support: how well they bear it out, at the tolerance and more closely: a narrow chamfer is within the
+    tolerance of a sphere, but closer to its cone.
     """
 
     row: Row
     kind: str
     members: NDArray[np.int64]
     outward: bool
+    support: float
 
 
 def detect(
@@ -92,17 +96,32 @@ def _draw(
         made = MAKERS[kind](draw)
         if len(made) == 0:
             continue
-        agree = _agreeing(made, points[probe], normals[probe], tolerance)
-        counts = _SIMPLER[kind] * agree.sum(axis=1)
-        scored += [(float(count), row, kind) for count, row in zip(counts, made, strict=True)]
+        support = _SIMPLER[kind] * _support(made, points[probe], normals[probe], tolerance).sum(axis=1)
+        scored += [(float(score), row, kind) for score, row in zip(support, made, strict=True)]
     scored.sort(key=lambda entry: -entry[0])
-    best: Surfel | None = None
-    reached = 0.0
-    for _, row, kind in scored[:_FINALISTS]:
-        one = _refitted(row, kind, points, normals, free, tolerance)
-        if one is not None and len(one.members) * _SIMPLER[kind] > reached:
-            best, reached = one, len(one.members) * _SIMPLER[kind]
-    return best
+    best = _best([(row, kind) for _, row, kind in scored[:_FINALISTS]], points, normals, free, tolerance)
+    if best is None:
+        return None
+    at, across = points[best.members], normals[best.members]
+    others = [(kind, FITTERS[kind](best.row, at, across)) for kind in kinds if kind != best.kind]
+    other = _best([(r, k) for k, r in others if r is not None], points, normals, free, tolerance)
+    return other if other is not None and _score(other) > _score(best) else best
+
+
+def _best(
+    given: list[tuple[Row, str]],
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    free: NDArray[np.int64],
+    tolerance: float,
+) -> Surfel | None:
+    """The best of rows of these kinds after they are refitted."""
+    fits = [_refitted(row, kind, points, normals, free, tolerance) for row, kind in given]
+    return max((one for one in fits if one is not None), key=_score, default=None)
+
+
+def _score(one: Surfel) -> float:
+    return one.support * _SIMPLER[one.kind]
 
 
 def _mate(
@@ -119,16 +138,17 @@ def _mate(
     return np.asarray(chosen[first, np.arange(len(seeds))])
 
 
-def _agreeing(
+def _support(
     made: list[Row], points: NDArray[np.float64], normals: NDArray[np.float64], tolerance: float
-) -> NDArray[np.bool_]:
-    """(M, N) whether points lie on the quadrics and their normals agree up to sign."""
-    table = np.stack(made)
-    value = rows.values(table, points).T
+) -> NDArray[np.float64]:
+    """(M, N) how well points bear out the quadrics: 1 on them, falling with the square of the distance to 0
+    at the tolerance (Torr & Zisserman 2000), and 0 where the normals do not agree up to sign."""
+    value = rows.values(np.stack(made), points).T
     slope = np.stack([rows.gradients(row, points) for row in made])
     length = np.maximum(np.linalg.norm(slope, axis=2), 1e-9)
     along = np.abs((slope * normals).sum(axis=2))
-    return np.asarray((np.abs(value) < tolerance * length) & (along > _AGREE * length))
+    near = 1 - (value / (tolerance * length)) ** 2
+    return np.where(along > _AGREE * length, np.maximum(near, 0.0), 0.0)
 
 
 def _refitted(
@@ -140,18 +160,21 @@ def _refitted(
     tolerance: float,
 ) -> Surfel | None:
     """The row fitted to the free points that agree with it, and those again."""
-    members = free[_agreeing([row], points[free], normals[free], tolerance)[0]]
+    found = _support([row], points[free], normals[free], tolerance)[0]
     for _ in range(_REFITS):
+        members = free[found > 0]
         if len(members) < _FEWEST:
             return None
         better = FITTERS[kind](row, points[members], normals[members])
         if better is None:
             break
-        again = free[_agreeing([better], points[free], normals[free], tolerance)[0]]
-        if len(again) < len(members):
+        again = _support([better], points[free], normals[free], tolerance)[0]
+        if again.sum() < found.sum():
             break
-        row, members = better, again
+        row, found = better, again
+    members = free[found > 0]
     signs = (rows.gradients(row, points[members]) * normals[members]).sum(axis=1)
     outward = bool(np.sum(np.sign(signs)) >= 0)
     same = members[(signs > 0) == outward] if kind == "plane" else members
-    return Surfel(row, kind, same, outward)
+    closely = _support([row], points[members], normals[members], _CLOSER * tolerance)
+    return Surfel(row, kind, same, outward, float(found.sum() + closely.sum()))

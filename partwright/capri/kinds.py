@@ -13,6 +13,8 @@ from partwright.capri import rows
 from partwright.capri.rows import Row
 
 _LARGEST = 4.0  # radius, unit frame
+_BENT = 0.02  # smaller curvatures, as a share of the largest, are none
+_SLANT = 0.1  # slope along a slab that still is one; a quadric's own is 1
 _GEOMETRIC = 300  # points that a geometric fit looks at
 
 
@@ -98,11 +100,22 @@ def _quadrics(draw: Draw) -> list[Row]:
     """Fitted to whole patches, half as many as seeds."""
     patches = draw.patches[::2]
     at, n = draw.points[patches], draw.normals[patches]
-    return [row for p, m in zip(at, n, strict=True) if (row := rows.fitted(p, m, 2)) is not None]
+    fits = [rows.fitted(p, m, 2) for p, m in zip(at, n, strict=True)]
+    return [row for row in fits if row is not None and not _slab(row)]
 
 
 def _fit_quadric(row: Row, points: NDArray[np.float64], normals: NDArray[np.float64]) -> Row | None:
-    return rows.fitted(points, normals)
+    found = rows.fitted(points, normals)
+    return None if found is None or _slab(found) else found
+
+
+def _slab(row: Row) -> bool:
+    """Whether a quadric is two parallel planes, or nearly: each of them is found by itself."""
+    form, slope, _ = rows.split(row)
+    bent, axes = np.linalg.eigh(form)
+    order = np.argsort(np.abs(bent))
+    flat = np.abs(bent[order[1]]) < _BENT * np.abs(bent[order[2]])
+    return bool(flat and np.abs(slope @ axes[:, order[:2]]).max() < _SLANT)
 
 
 def _closest(

@@ -110,7 +110,7 @@ def improve(problem: Problem, outside: Matrix, worth: Matrix, convex: Convex) ->
         best_add = int(np.argmax(gain))
         best, move = float(gain[best_add]), cast(Move, (None, best_add))
         single = np.flatnonzero(count == 1)
-        alone = outside[np.ix_(single, chosen)] > 0
+        alone = outside[np.ix_(single, np.array(chosen, dtype=np.int64))] > 0
         if chosen:
             back = worth[single] @ alone + problem.price[chosen]
             if back.max() > best:
