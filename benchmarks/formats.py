@@ -1,11 +1,11 @@
 """Every format of fitted assemblies: size, volume, what was approximated, what another program reads back.
 
-    python benchmarks/formats.py --shapes FOLDER --names toys/mug,cad/bd_rod_end --methods superfrusta
-    python benchmarks/formats.py --assemblies FOLDER
+    partwright fit SHAPE -o FITS/NAME          # for each shape, by each method
+    python benchmarks/formats.py FITS ... --rows rows.jsonl
 
-The first fits each shape (FOLDER/NAME.ply) by each method; the second takes FOLDER/*/assembly.json as they
-are. Readers: trimesh (GLB, OBJ, PLY, STL, 3MF), usd-core, MuJoCo, yourdfpy, OpenCASCADE, openscad, build123d,
-blender, glslangValidator; a format whose program is not installed is written only. The table goes to
+Readers: trimesh (GLB, OBJ, PLY, STL, 3MF), usd-core with all its validators, MuJoCo, yourdfpy, OpenCASCADE,
+openscad, build123d, blender, glslangValidator; a format whose program is not installed is written only. What
+--rows holds is not measured again, so a run may be cut off and go on. The table goes to
 benchmarks/results/formats.md.
 """
 
@@ -15,16 +15,17 @@ import argparse
 import dataclasses
 import json
 import os
+import resource
 import shutil
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
+import numpy as np
 import trimesh
 
 import partwright as pw
@@ -35,7 +36,8 @@ from partwright.meshing import mesh_assembly
 
 TARGET = Path(__file__).parent / "results" / "formats.md"
 SHARP = (".step", ".scad", ".build123d.py")  # no blends: held against the assembly without them
-PATIENCE = 300  # seconds for another program
+PATIENCE = 400  # seconds for another program
+CELLS = 300  # along the longest side of the mesh whose volume counts as the assembly's own
 _BLENDER = """
 import bpy
 bpy.context.view_layer.update()
@@ -46,7 +48,10 @@ _BUILD123D = "import runpy, sys; print('volume', runpy.run_path(sys.argv[1])['as
 
 @dataclass(frozen=True)
 class Row:
-    """One file. volume: the reader's over the assembly's own, minus 1; None where it tells none."""
+    """One file. volume: the reader's over the assembly's own, minus 1; None where it tells none.
+
+    write, read: CPU seconds.
+    """
 
     method: str
     name: str
@@ -75,8 +80,11 @@ def command(*words: str | Path) -> str:
 
 
 def read_mesh(path: Path) -> float:
+    """Closed also where sheets touch along an edge, which is then one of four faces."""
     mesh = trimesh.load_mesh(path)
-    if not mesh.is_watertight:
+    size = len(mesh.vertices)
+    forth, back = (np.sort(edges @ (size, 1)) for edges in (mesh.edges, mesh.edges[:, ::-1]))
+    if not np.array_equal(forth, back):
         raise RuntimeError("not watertight")
     return float(mesh.volume)
 
@@ -159,35 +167,46 @@ READERS: dict[str, tuple[str, Callable[[Path], float | None]]] = {
 }
 
 
-def measure(method: str, name: str, assembly: Assembly, folder: Path) -> Iterator[Row]:
-    blended = mesh_assembly(assembly, 200).volume
-    sharp = mesh_assembly(plain(assembly), 200).volume
-    for suffix, (program, reader) in READERS.items():
-        path = folder / f"assembly{suffix}"
-        start = time.perf_counter()
+def cpu_seconds() -> float:
+    """Of this process and of the programs that it ran."""
+    usages = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(usage.ru_utime + usage.ru_stime for usage in usages)
+
+
+def measure(method: str, name: str, assembly: Assembly, suffix: str, own: float, path: Path) -> Row:
+    """own: the volume of what the format should hold."""
+    program, reader = READERS[suffix]
+    start = cpu_seconds()
+    try:
+        pw.export(assembly, path)
+    except PartwrightError as error:
+        return Row(method, name, suffix, 0, 0.0, None, None, 0, None, f"not written: {error}")
+    wrote, start = cpu_seconds() - start, cpu_seconds()
+    problem, volume, read = "", None, None
+    if not program or shutil.which(program):
         try:
-            pw.export(assembly, path)
-        except PartwrightError as error:
-            yield Row(method, name, suffix, 0, 0.0, None, None, 0, None, f"not written: {error}")
-            continue
-        wrote, start = time.perf_counter() - start, time.perf_counter()
-        problem, volume, read = "", None, None
-        if not program or shutil.which(program):
-            try:
-                volume = reader(path)
-                read = time.perf_counter() - start
-            except (RuntimeError, subprocess.TimeoutExpired) as error:
-                problem = f"not read: {error}"[:120]
-        if volume is not None:
-            volume = volume / (sharp if suffix in SHARP else blended) - 1
-        report = report_path(path)
-        told = json.loads(report.read_text())["approximated"] if report.exists() else []
-        shares = [change["volume_error_ratio"] for change in told if "volume_error_ratio" in change]
-        changed = sum(len(change["parts"]) for change in told)
-        size = path.stat().st_size
-        yield Row(
-            method, name, suffix, size, wrote, read, volume, changed, max(shares, default=None), problem
-        )
+            volume = reader(path)
+            read = cpu_seconds() - start
+        except subprocess.TimeoutExpired:
+            problem = f"not read within {PATIENCE} s"
+        except (RuntimeError, ValueError) as error:
+            problem = f"not read: {error}"[:120]
+    report = report_path(path)
+    told = json.loads(report.read_text())["approximated"] if report.exists() else []
+    shares = [change["volume_error_ratio"] for change in told if "volume_error_ratio" in change]
+    changed = sum(len(change["parts"]) for change in told)
+    return Row(
+        method,
+        name,
+        suffix,
+        path.stat().st_size,
+        wrote,
+        read,
+        None if volume is None else volume / own - 1,
+        changed,
+        max(shares, default=None),
+        problem,
+    )
 
 
 def cells(rows: list[Row]) -> str:
@@ -209,39 +228,35 @@ def cells(rows: list[Row]) -> str:
     )
 
 
-def document(rows: list[Row], line: str) -> str:
-    names = ", ".join(dict.fromkeys(row.name for row in rows))
+def document(rows: list[Row]) -> str:
     lines = [
         "# Every format, written and read back",
         "",
-        f"`{line}`; {os.cpu_count()} cores. Assemblies: {names}.",
-        "",
-        "Medians over the assemblies, the worst in brackets. Volume: of what the reader sees, off the",
-        "assembly's own (STEP, OpenSCAD and build123d: off the assembly's without its blends, which they",
-        "cannot hold). Changed: parts in FILE.report.json, dropped blends included; by: the most that one",
-        "part was changed by, in % of its volume. Seconds are wall-clock and other work was going on.",
-        "",
-        "| method | format | kB | s to write | s to read | volume off % | changed parts | by % | failed |",
-        "|---|---|---:|---:|---:|---:|---:|---:|---:|",
+        f"`python benchmarks/formats.py`; {os.cpu_count()} cores. Medians over the assemblies, the worst in",
+        "brackets. Volume: of what the reader sees, off the assembly's own (STEP, OpenSCAD and build123d:",
+        f"the assembly's without its blends, which they cannot hold), by a mesh of {CELLS} cells along its",
+        "longest side. Changed: parts in FILE.report.json, dropped blends included; by: the most that one",
+        "part was changed by, in % of its volume. Seconds are CPU seconds, with the start of other programs.",
     ]
     for method in dict.fromkeys(row.method for row in rows):
+        names = sorted({row.name for row in rows if row.method == method})
+        lines += [
+            "",
+            f"## {method}",
+            "",
+            f"{len(names)} assemblies: {', '.join(names)}.",
+            "",
+            "| format | kB | s to write | s to read | volume off % | changed parts | by % | failed |",
+            "|---|---:|---:|---:|---:|---:|---:|---:|",
+        ]
         for suffix in READERS:
             own = [row for row in rows if (row.method, row.suffix) == (method, suffix)]
-            lines.append(f"| {method} | `{suffix}` | {cells(own)} |")
+            if own:
+                lines.append(f"| `{suffix}` | {cells(own)} |")
     problems = [f"- {row.method}, {row.name}, `{row.suffix}`: {row.problem}" for row in rows if row.problem]
-    return "\n".join([*lines, "", *problems]).rstrip() + "\n"
-
-
-def assemblies(options: argparse.Namespace) -> Iterator[tuple[str, str, Assembly]]:
-    if options.assemblies:
-        for path in sorted(options.assemblies.glob("*/assembly.json")):
-            method = json.loads((path.parent / "report.json").read_text())["method"]
-            yield method, path.parent.name, pw.load_assembly(path)
-        return
-    for name in options.names.split(","):
-        shape = pw.load_shape(options.shapes / f"{name}.ply", unit="m", up="z")
-        for method in options.methods.split(","):
-            yield method, name, pw.fit(shape, method, seed=0).assembly
+    if problems:
+        lines += ["", "## What failed", "", *problems]
+    return "\n".join(lines) + "\n"
 
 
 def main() -> int:
@@ -249,24 +264,32 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     option = parser.add_argument
-    source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument("--shapes", type=Path, metavar="FOLDER", help="holds NAME.ply, in metres")
-    source.add_argument("--assemblies", type=Path, metavar="FOLDER", help="holds results of partwright fit")
-    option("--names", default="", metavar="A,B", help="shapes to fit")
-    option("--methods", default="superfrusta", metavar="A,B", help="default: %(default)s")
+    option("folders", nargs="+", type=Path, metavar="FITS", help="each holds results of partwright fit")
+    option("--rows", type=Path, required=True, help="measured rows, kept between runs")
+    option("--formats", default=",".join(READERS), metavar="A,B", help="suffixes (default: all)")
     options = parser.parse_args()
-    line = "python benchmarks/formats.py " + (
-        f"--assemblies {options.assemblies.name}"
-        if options.assemblies
-        else f"--shapes {options.shapes.name} --names {options.names} --methods {options.methods}"
-    )
-    rows: list[Row] = []
-    for method, name, assembly in assemblies(options):
-        with tempfile.TemporaryDirectory() as folder:
-            rows += measure(method, name, assembly, Path(folder))
-        TARGET.write_text(document(rows, line), encoding="utf-8")
-        print(f"{method} {name}", flush=True)
-    print(document(rows, line))
+    kept = options.rows.read_text().splitlines() if options.rows.exists() else []
+    rows = [Row(**json.loads(line)) for line in kept]
+    done = {(row.method, row.name, row.suffix) for row in rows}
+    for path in sorted(
+        (path for f in options.folders for path in f.glob("*/assembly.json")), key=lambda p: p.parent.name
+    ):
+        method, name = json.loads(path.with_name("report.json").read_text())["method"], path.parent.name
+        wanted = [s for s in options.formats.split(",") if (method, name, s) not in done]
+        if not wanted:
+            continue
+        assembly = pw.load_assembly(path)
+        blended, sharp = (mesh_assembly(tree, CELLS).volume for tree in (assembly, plain(assembly)))
+        for suffix in wanted:
+            with tempfile.TemporaryDirectory() as folder:
+                own = sharp if suffix in SHARP else blended
+                row = measure(method, name, assembly, suffix, own, Path(folder) / f"assembly{suffix}")
+            rows.append(row)
+            with options.rows.open("a") as file:
+                file.write(json.dumps(dataclasses.asdict(row)) + "\n")
+            TARGET.write_text(document(rows), encoding="utf-8")
+            print(row, flush=True)
+    print(document(rows))
     return 0
 
 

@@ -1,12 +1,13 @@
 """build123d source to go on with by hand: parameters on top, one function a part with a loop over its
 copies, the tree at the end.
 
-Named solids are exact B-reps when the source runs; other parts become the nearest solid, and blends sharp
-edges: FILE.report.json lists them.
+Named solids are exact B-reps when the source runs, and SuperFrusta lofts; what `drawn` refuses becomes the
+nearest solid, and blends sharp edges: FILE.report.json lists them.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import keyword
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,13 +16,17 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.export.approximation import write_report
 from partwright.export.copies import Poses, Row
 from partwright.export.identifiers import comment
+from partwright.export.nearest import Approximation, compared
 from partwright.export.solid_source import (
     SourcePart,
+    drawn,
     own_axes_angles,
     plain_unions,
     source_parts,
+    superfrustum_source,
 )
 from partwright.export.solid_tree import solid_tree
+from partwright.fields import SuperFrustum
 from partwright.shapes import canonical_unit
 from partwright.writing import write_bytes
 
@@ -35,9 +40,11 @@ _SOLIDS = {
     " + [bd.Pos(0, 0, end * {height} / 2) * bd.Sphere({radius}) for end in (-1, 1)]",
     "tube": "bd.Cylinder({radius}, {height}) - bd.Cylinder({radius} - {thickness}, {height})",
     "torus": "bd.Torus({major_radius}, {minor_radius})",
+    "superfrustum": "superfrustum({size}, {roundness}, {dilation}, {taper}, {bulge}, {onion})",
 }
 _OPERATORS = {"union": "+", "difference": "-", "intersection": "&"}
-_RESERVED = (*keyword.kwlist, "bd", "path", "assembly", "print")
+_RESERVED = (*keyword.kwlist, "bd", "math", "path", "assembly", "print", "superfrustum")
+_NEARLY = 0.01  # of a frame's width
 
 
 def write(assembly: Assembly, path: str | Path) -> None:
@@ -48,19 +55,22 @@ def write(assembly: Assembly, path: str | Path) -> None:
         SettingError: the assembly's unit is unknown.
         OutputError: the file cannot be written.
     """
-    tree, changes = solid_tree(assembly, loops=True)
+    tree, changes = solid_tree(assembly, keep=_lofted, loops=True)
     parts = source_parts(tree.parts, own_axes_angles, _RESERVED)
     unit = canonical_unit(assembly.unit) if assembly.unit else None
+    drawing = superfrustum_source(parts, "build123d_superfrustum.txt")
     lines = [
         f"# {comment(assembly.name) or 'Assembly'}: {len(parts)} parts. "
         f"Lengths in {unit or 'an unknown unit'}, angles in degrees.",
         "",
+        *(["import math"] if drawing else []),
         "from pathlib import Path",
         "",
         "import build123d as bd",
         "",
         *(line for part in parts for line in _table(part, unit)),
         "",
+        *([*drawing, "", ""] if drawing else []),
         *(line for part in parts for line in _function(part)),
         f"assembly = {_tree(plain_unions(tree), {p.part.name: p.function for p in parts}, '')}",
         "",
@@ -69,6 +79,18 @@ def write(assembly: Assembly, path: str | Path) -> None:
     ]
     write_bytes(path, ("\n".join(lines) + "\n").encode())
     write_report(assembly, path, changes)
+
+
+def _lofted(part: Part) -> Approximation | None:
+    """As `drawn`; round where it nearly is, because OpenCASCADE fails at unions of thread-like faces."""
+    near, f = drawn(part), part.field
+    if near is None or not isinstance(f, SuperFrustum) or (f.size[0] == f.size[1] and f.roundness == 1):
+        return near
+    x, y, z = f.size
+    if abs(x - y) > _NEARLY * max(x, y) or f.roundness < 1 - _NEARLY:
+        return near
+    turned = dataclasses.replace(f, size=((x + y) / 2, (x + y) / 2, z), roundness=1.0)
+    return compared(part, turned)
 
 
 def _unit_argument(assembly: Assembly) -> str:

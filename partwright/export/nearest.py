@@ -11,6 +11,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -25,9 +26,10 @@ from partwright.fields import Box, Capsule, Cone, Cylinder, Field, Frustum, Sphe
 
 SOLIDS: tuple[type[Field], ...] = (Box, Cylinder, Cone, Frustum, Sphere, Capsule, Tube, Torus)
 
-_CELLS, _MARGIN, _STRIDE = 24, 4, 2  # of the lattice; every second point of it is fitted to
+_CELLS, _MARGIN, _STRIDE = 24, 3, 3  # of the lattice; every third point of it is fitted to
 _BAND = 2.0  # cells of the coarse lattice in which distances count
 _FINALISTS, _STEPS = 3, 4
+_A_LENGTH = 2e-3  # of IoU: what a solid with one more length must be better by
 _STEP = 1e-3  # of the finite differences; the part's longest side is 1
 _THIRD = (0.5, 0.5, 0.5, 0.5)  # z to x, x to y, y to z
 _AXES = (NO_ROTATION, _THIRD, (0.5, -0.5, -0.5, -0.5))
@@ -69,10 +71,10 @@ def nearest_solid(part: Part, kinds: Sequence[type[Field]] = SOLIDS) -> Approxim
         is_superfrustum(part.field) and as_superfrustum(part.field).thinnest < SAME * longest
     ):
         raise NoSurfaceError(f"part {part.name!r} has no volume, so no solid is near it")
-    lattice = _Lattice.of(part.field.scaled(1 / longest))
-    if lattice.volume <= 0:
+    found = _nearest(part.field.scaled(1 / longest), tuple(kinds))
+    if found is None:
         raise NoSurfaceError(f"part {part.name!r} is too thin to be measured, so no solid is near it")
-    best = _best(lattice, kinds)
+    best, error, deviation = found
     solid = best.field.scaled(longest)
     pose = Similarity(1.0, part.rotation, part.translation)
     placed = dataclasses.replace(
@@ -81,8 +83,17 @@ def nearest_solid(part: Part, kinds: Sequence[type[Field]] = SOLIDS) -> Approxim
         translation=tuple(pose(longest * best.centre).tolist()),
         rotation=quaternion_product(part.rotation, best.rotation),
     )
-    error, deviation = lattice.compare(best)
     return Approximation(solid, placed, error, longest * deviation)
+
+
+def compared(part: Part, field: Field) -> Approximation:
+    """Another field in the part's stead, in the same place."""
+    lower, upper = part.field.bounds()
+    longest = float((upper - lower).max())
+    lattice = _Lattice.of(part.field.scaled(1 / longest))
+    placed = _Placed(field.scaled(1 / longest), NO_ROTATION, np.zeros(3))
+    error, deviation = lattice.compare(placed)
+    return Approximation(field, dataclasses.replace(part, field=field), error, longest * deviation)
 
 
 @dataclass(frozen=True)
@@ -175,11 +186,22 @@ class _Lattice:
         return best
 
 
+@lru_cache(maxsize=256)  # copies of a part, and segments of a bent one, are often the same
+def _nearest(field: Field, kinds: tuple[type[Field], ...]) -> tuple[_Placed, float, float] | None:
+    """The solid, its volume error and deviation, for a field whose longest side is 1; None if too thin."""
+    lattice = _Lattice.of(field)
+    if lattice.volume <= 0:
+        return None
+    best = _best(lattice, kinds)
+    return best, *lattice.compare(best)
+
+
 def _best(lattice: _Lattice, kinds: Sequence[type[Field]]) -> _Placed:
     starts = sorted(_starts(lattice, kinds), key=lattice.iou, reverse=True)[:_FINALISTS]
     if not starts:
         raise ParameterError(f"no solid of {', '.join(k.kind for k in kinds)} can be fitted to the part")
-    return max((lattice.fitted(start) for start in starts), key=lattice.iou)
+    fitted = (lattice.fitted(start) for start in starts)
+    return max(fitted, key=lambda solid: lattice.iou(solid) - _A_LENGTH * len(_lengths(solid.field)))
 
 
 def _starts(lattice: _Lattice, kinds: Sequence[type[Field]]) -> Iterator[_Placed]:

@@ -1,9 +1,9 @@
 """OpenSCAD source to go on with by hand: parameters on top, one module a part with a loop over its copies,
 the tree at the end.
 
-Named solids are exact, to the facets of `$fn`, and so are planes, cylinders, cones and spheres given as
-quadrics. Other quadrics are written as polyhedra, other parts become the nearest solid, and blends sharp
-edges: FILE.report.json lists them.
+Named solids and SuperFrusta are exact, to the facets of `$fn`, and so are planes, cylinders, cones and
+spheres given as quadrics. Other quadrics are written as polyhedra, what `drawn` refuses becomes the nearest
+solid, and blends sharp edges: FILE.report.json lists them.
 """
 
 from __future__ import annotations
@@ -22,10 +22,12 @@ from partwright.export.identifiers import comment
 from partwright.export.nearest import Approximation
 from partwright.export.solid_source import (
     SourcePart,
+    drawn,
     fixed_axes_angles,
     number,
     plain_unions,
     source_parts,
+    superfrustum_source,
 )
 from partwright.export.solid_tree import solid_tree
 from partwright.fields import Quadric
@@ -48,16 +50,17 @@ _SOLIDS = {
     "            cylinder(r = {radius} - {thickness}, h = 2 * {height}, center = true);\n"
     "        }}",
     "torus": "rotate_extrude() translate([{major_radius}, 0]) circle(r = {minor_radius});",
+    "superfrustum": "superfrustum({size}, {roundness}, {dilation}, {taper}, {bulge}, {onion});",
 }
 _RESERVED = (
     "module function if else for let assert echo each true false undef include use union difference "
     "intersection translate rotate scale mirror hull minkowski cube sphere cylinder polyhedron circle "
     "square polygon text color offset resize render children import projection surface linear_extrude "
-    "rotate_extrude multmatrix intersection_for group version end"
+    "rotate_extrude multmatrix intersection_for group version end superfrustum"
 )
 
 
-def write(assembly: Assembly, path: str | Path, facets: int = 128) -> None:
+def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
     """Write the source; `facets` is the number of facets of a full circle.
 
     Raises:
@@ -65,9 +68,10 @@ def write(assembly: Assembly, path: str | Path, facets: int = 128) -> None:
         SettingError: the assembly's unit is unknown.
         OutputError: the file cannot be written.
     """
-    tree, changes = solid_tree(assembly, keep=_quadric, loops=True)
+    tree, changes = solid_tree(assembly, keep=_kept, loops=True)
     ball = Ball.around(tree)
-    changes += [Change((part.name,), "mesh", note=f"{facets} facets to a full turn") for part in _kept(tree)]
+    polyhedra = [part for part in tree.parts if isinstance(part.field, Quadric)]
+    changes += [Change((part.name,), "mesh", note=f"{facets} facets to a full turn") for part in polyhedra]
     parts = source_parts(tree.parts, fixed_axes_angles, _RESERVED.split())
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     lines = [
@@ -80,6 +84,7 @@ def write(assembly: Assembly, path: str | Path, facets: int = 128) -> None:
         *_tree(plain_unions(tree), {p.part.name: p.function for p in parts}, ""),
         "",
         *(line for part in parts for line in _module(part, ball, facets)),
+        *superfrustum_source(parts, "superfrustum.scad"),
     ]
     write_bytes(path, ("\n".join(lines).rstrip() + "\n").encode())
     write_report(assembly, path, changes)
@@ -93,12 +98,8 @@ def _table(part: SourcePart, unit: str | None) -> Iterator[str]:
     yield ""
 
 
-def _quadric(part: Part) -> Approximation | None:
-    return Approximation(part.field, part, 0.0, 0.0) if isinstance(part.field, Quadric) else None
-
-
-def _kept(tree: Assembly) -> list[Part]:
-    return [part for part in tree.parts if isinstance(part.field, Quadric)]
+def _kept(part: Part) -> Approximation | None:
+    return Approximation(part.field, part, 0.0, 0.0) if isinstance(part.field, Quadric) else drawn(part)
 
 
 def _module(part: SourcePart, ball: Ball, facets: int) -> Iterator[str]:

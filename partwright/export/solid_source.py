@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,9 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.similarity import rotation_matrix
 from partwright.export.copies import Poses, Ring, Row, pattern
 from partwright.export.identifiers import comment, identifiers
-from partwright.fields import Field, Quadric
+from partwright.export.nearest import Approximation
+from partwright.export.recognise import SAME, exact_solid
+from partwright.fields import Field, Quadric, SuperFrustum
 
 MEANING = {
     "size": "full extents x, y, z",
@@ -25,6 +28,11 @@ MEANING = {
     "top_radius": "radius at the upper end",
     "major_radius": "from the axis to the middle of the ring",
     "minor_radius": "radius of the ring itself",
+    "roundness": "of the corners of the cross-section, 0 to 1",
+    "dilation": "grown by",
+    "taper": "the top leans in (below 1) or out (to 2)",
+    "bulge": "bent into an arc towards -x, 0 to 1",
+    "onion": "hollow, from 0 to 1",
     "place": "where the part's origin lies",
     "turn": "turned about x, y and z",
     "places": "where the origins of the copies lie",
@@ -32,6 +40,7 @@ MEANING = {
     "count": "copies, by equal turns",
     "centre": "through which the axis of these turns runs",
 }
+_NO_UNIT = ("roundness", "taper", "bulge", "onion", "count", "poses")
 Value = float | tuple[Any, ...]
 
 
@@ -45,10 +54,9 @@ class Parameter:
 
     def line(self, brackets: str, unit: str | None) -> tuple[str, str]:
         """The value in the language's brackets, and what is said of it."""
-        measure = {"turn": "degrees", "count": None, "poses": None}.get(self.name, unit)
-        return literal(self.value, brackets), f"{measure}: {MEANING[self.name]}" if measure else MEANING[
-            self.name
-        ]
+        measure = None if self.name in _NO_UNIT else "degrees" if self.name == "turn" else unit
+        meaning = MEANING[self.name]
+        return literal(self.value, brackets), f"{measure}: {meaning}" if measure else meaning
 
 
 @dataclass(frozen=True)
@@ -130,6 +138,30 @@ def literal(value: Value, brackets: str) -> str:
     if not isinstance(value, tuple):
         return number(value)
     return f"{brackets[0]}{', '.join(literal(one, brackets) for one in value)}{brackets[1]}"
+
+
+def drawn(part: Part) -> Approximation | None:
+    """A SuperFrustum as the sources' `superfrustum` draws it; None where a named solid is the same, or where
+    it does not: without volume, with a hole that the dilation closes at one end only, or bent about a centre
+    within itself."""
+    f = part.field
+    if not isinstance(f, SuperFrustum) or exact_solid(f) is not None:
+        return None
+    longest, half_width = max(*f.size, f.dilation), min(f.size[:2]) / 2
+    open_throughout = min(1.0, f.taper) * half_width * f.onion > f.dilation + SAME * longest
+    flare = max(0.0, f.taper - 1) * half_width + f.dilation
+    angle = f.bulge * math.pi / 2
+    folds = (f.size[0] / 2 + flare + SAME * longest) * math.sin(angle) >= f.size[2] / 2
+    if f.thinnest < SAME * longest or (f.hollow and not open_throughout) or (angle > 0 and folds):
+        return None
+    return Approximation(f, part, 0.0, 0.0)
+
+
+def superfrustum_source(parts: Sequence[SourcePart], name: str) -> list[str]:
+    """The lines of the file beside this one that draws a SuperFrustum, where one of the parts is that."""
+    if not any(isinstance(part.part.field, SuperFrustum) for part in parts):
+        return []
+    return files("partwright.export").joinpath(name).read_text("utf-8").splitlines()
 
 
 def number(value: float) -> str:

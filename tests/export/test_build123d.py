@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import runpy
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from partwright.assembly import Assembly, Part
 from partwright.errors import NoSurfaceError, SettingError, UnsupportedFormatError
 from partwright.export import export
 from partwright.fields import Field, Sphere, SuperFrustum
-from tests.export.trees import SOLIDS, flange, lone
+from partwright.meshing import mesh_part
+from tests.export.trees import SOLIDS, SUPERFRUSTA, UNDRAWN, flange, lone
 
 
 def run(path: Path):  # type: ignore[no-untyped-def]
@@ -30,6 +32,34 @@ def test_named_solids_are_exact(tmp_path: Path, field: Field, volume: float) -> 
     assert solid.volume == pytest.approx(volume, rel=1e-6)
     corners = np.array([[tuple(v)] for v in solid.vertices()], dtype=float).reshape(-1, 3)
     assert np.abs(assembly.distance(corners)).max(initial=0) < 1e-5
+
+
+@pytest.mark.parametrize("field", SUPERFRUSTA, ids=str)
+def test_superfrusta_are_lofts(tmp_path: Path, field: SuperFrustum) -> None:
+    assembly = lone(field)
+    export(assembly, tmp_path / "a.build123d.py")
+    solid = run(tmp_path / "a.build123d.py")
+    assert solid.is_valid
+    assert solid.volume == pytest.approx(mesh_part(Part(field), 128).volume, rel=7e-3)
+    corners = np.array([tuple(v) for v in solid.vertices()], dtype=float)
+    assert np.abs(assembly.distance(corners)).max() < 1e-3
+    assert not (tmp_path / "a.build123d.py.report.json").exists()
+
+
+def test_nearly_round_parts_are_round_and_told(tmp_path: Path) -> None:
+    nearly = SuperFrustum((1.0, 0.996, 1.0), 0.995, 0.05, 0.8)
+    export(lone(nearly), tmp_path / "a.build123d.py")
+    (entry,) = json.loads((tmp_path / "a.build123d.py.report.json").read_text())["approximated"]
+    assert 0 < entry["max_deviation"] < 2e-3
+    assert "A_PART_SIZE = (0.998, 0.998, 1)" in (tmp_path / "a.build123d.py").read_text()
+
+
+@pytest.mark.parametrize("field", UNDRAWN, ids=str)
+def test_what_is_approximated_is_reported(tmp_path: Path, field: SuperFrustum) -> None:
+    export(lone(field), tmp_path / "a.build123d.py")
+    (entry,) = json.loads((tmp_path / "a.build123d.py.report.json").read_text())["approximated"]
+    assert entry["to"] != "superfrustum"
+    assert entry["max_deviation"] > 0
 
 
 def test_a_tree_with_hostile_names(tmp_path: Path) -> None:

@@ -19,7 +19,8 @@ from partwright.errors import NoSurfaceError, OutputError, SettingError
 from partwright.export import export
 from partwright.export.solid_source import fixed_axes_angles, own_axes_angles
 from partwright.fields import Field, Sphere, SuperFrustum
-from tests.export.trees import SOLIDS, flange, lone
+from partwright.meshing import mesh_assembly, mesh_part
+from tests.export.trees import SOLIDS, SUPERFRUSTA, UNDRAWN, flange, lone
 
 
 def rendered(path: Path) -> trimesh.Trimesh:
@@ -62,8 +63,29 @@ def test_the_source_reads_well(tmp_path: Path) -> None:
     assert text.count("module ") == 5
 
 
-def test_what_is_approximated_is_reported(tmp_path: Path) -> None:
-    bent = Part(SuperFrustum((1, 1, 4), 0.5, 0.05, bulge=0.3), name="bent")
+@pytest.mark.parametrize("field", SUPERFRUSTA, ids=str)
+def test_superfrusta_are_exact_to_their_facets(tmp_path: Path, field: SuperFrustum) -> None:
+    assembly = lone(field)
+    export(assembly, tmp_path / "a.scad")
+    mesh = rendered(tmp_path / "a.scad")
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(mesh_part(Part(field), 128).volume, rel=3e-3)
+    assert np.abs(assembly.distance(mesh.vertices)).max() < 1e-4
+    assert not (tmp_path / "a.scad.report.json").exists()
+
+
+def test_openscad_subtracts_superfrusta(tmp_path: Path) -> None:
+    """The boolean operations of OpenSCAD take closed solids only."""
+    first, second = SUPERFRUSTA[2:4]
+    parts = Part(first, name="a"), Part(second, (0.3, 0, 0), name="b")
+    export(parts[0] - parts[1], tmp_path / "a.scad", facets=48)
+    wanted = mesh_assembly(parts[0] - parts[1], 128).volume
+    assert rendered(tmp_path / "a.scad").volume == pytest.approx(wanted, rel=5e-3)
+
+
+@pytest.mark.parametrize("field", UNDRAWN, ids=str)
+def test_what_is_approximated_is_reported(tmp_path: Path, field: SuperFrustum) -> None:
+    bent = Part(field, name="bent")
     export(Assembly((Part(Sphere(1.0), name="ball"), bent)), tmp_path / "a.scad")
     (entry,) = json.loads((tmp_path / "a.scad.report.json").read_text())["approximated"]
     assert entry["parts"] == ["bent"]

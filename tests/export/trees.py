@@ -5,7 +5,18 @@ from __future__ import annotations
 import math
 
 from partwright.assembly import Assembly, Part
-from partwright.fields import Box, Capsule, Cone, Cylinder, Field, Frustum, Sphere, Torus, Tube
+from partwright.fields import (
+    Box,
+    Capsule,
+    Cone,
+    Cylinder,
+    Field,
+    Frustum,
+    Sphere,
+    SuperFrustum,
+    Torus,
+    Tube,
+)
 
 TURNED = (0.8, 0.2, 0.4, 0.4)
 PI = math.pi
@@ -21,6 +32,20 @@ SOLIDS: dict[Field, float] = {
     Tube(0.5, 0.1, 1): PI * (0.25 - 0.16),
     Torus(0.5, 0.1): 2 * PI**2 * 0.5 * 0.01,
 }
+# The sources draw these themselves: rounded, sharp above its middle, hollow, bent, bent and hollow, a ring.
+SUPERFRUSTA = (
+    SuperFrustum((1, 1, 2), 1.0, 0.05, 0.6),
+    SuperFrustum((1, 0.7, 2), 0.3, 0.0, 0.0),
+    SuperFrustum((1, 0.7, 1), 0.3, 0.02, 1.4, 0.0, 0.6),
+    SuperFrustum((0.3, 0.4, 2), 0.2, 0.05, 1.0, 0.8),
+    SuperFrustum((0.3, 0.4, 2), 0.2, 0.02, 0.6, 0.5, 0.5),
+    SuperFrustum((0.5, 0.5, 0), 1.0, 0.1, 1.0, 0.0, 0.6),
+)
+# Their holes close at one end, or they bend about a centre within themselves.
+UNDRAWN = (
+    SuperFrustum((0.3, 0.4, 2), 0.2, 0.05, 0.4, 0.0, 0.5),
+    SuperFrustum((1, 1, 0.5), 0.2, 0.05, 1.0, 1.0),
+)
 
 
 def lone(field: Field, **about: str) -> Assembly:
