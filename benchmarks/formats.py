@@ -37,7 +37,7 @@ from partwright.meshing import mesh_assembly
 TARGET = Path(__file__).parent / "results" / "formats.md"
 SHARP = (".step", ".scad", ".build123d.py")  # no blends: held against the assembly without them
 PATIENCE = 400  # seconds for another program
-CELLS = 300  # along the longest side of the mesh whose volume counts as the assembly's own
+CELLS = 256  # along the longest side of the mesh whose volume counts as the assembly's own
 _BLENDER = """
 import bpy
 bpy.context.view_layer.update()
@@ -217,6 +217,7 @@ def cells(rows: list[Row]) -> str:
     shares = [row.worst for row in rows if row.worst is not None]
     return " | ".join(
         (
+            f"{len(rows)}",
             f"{size:.0f}",
             f"{median(row.write for row in rows):.2f}",
             f"{median(reads):.2f}" if reads else "",
@@ -246,8 +247,8 @@ def document(rows: list[Row]) -> str:
             "",
             f"{len(names)} assemblies: {', '.join(names)}.",
             "",
-            "| format | kB | s to write | s to read | volume off % | changed parts | by % | failed |",
-            "|---|---:|---:|---:|---:|---:|---:|---:|",
+            "| format | files | kB | s to write | s to read | volume off % | changed parts | by % | failed |",
+            "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
         ]
         for suffix in READERS:
             own = [row for row in rows if (row.method, row.suffix) == (method, suffix)]
