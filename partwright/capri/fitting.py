@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from importlib import import_module
+from types import ModuleType
 from typing import Any, Literal
 
 import numpy as np
@@ -16,15 +18,17 @@ from partwright.capri import samples as sampling
 from partwright.capri import surface as surfaces
 from partwright.capri.candidates import Pool, candidates
 from partwright.capri.detection import detect
+from partwright.capri.given import surface_of
 from partwright.capri.overlap import overlapped
 from partwright.capri.samples import Samples
 from partwright.capri.selection import Problem
 from partwright.capri.settings import Settings
 from partwright.capri.tree import Tree
-from partwright.errors import EmptyShapeError, SettingError
+from partwright.errors import EmptyShapeError, MissingDependencyError, SettingError
 from partwright.shapes import Shape
 
 Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"]
+ORIGINS = {"seeds": "detected surfaces", "weights": "pre-trained network"}
 
 _MOST = 64  # convexes: the paper's c (section 4.1)
 _STEP = 1.5  # factor between the prices that are tried for a budget or a target
@@ -68,57 +72,73 @@ def fit(
 ) -> Fitted:
     """Fits a CSG tree of quadrics to a shape.
 
-    `start`: its quadrics and named solids join the detected surfaces, and its tree competes with the others.
+    `start`: quadrics detected on its surface join those on the shape's.
     Ctrl-C ends the fit with the best tree so far and the outcome "interrupted".
 
     Raises:
         EmptyShapeError: no tree explains anything (the shape is thinner than the samples can see).
-        SettingError: parts are locked, or the start's parts are no quadrics or named solids.
+        SettingError: parts are locked.
+        NoSurfaceError: the start has no surface.
+        MissingDependencyError: the paper's schedule or the pre-trained network is asked for without PyTorch.
     """
-    settings = settings or Settings()
+    settings = (settings or Settings()).of_schedule()
     if locked:
         raise SettingError("capri keeps no part locked; give the start alone, or use method superfrusta")
-    run = Run(settings, progress)
-    outcome: Outcome = "converged"
+    origins = ("seeds", "weights") if settings.start == "auto" else (settings.start,)
+    runs = [Run(settings, progress, origin, (i, len(origins))) for i, origin in enumerate(origins)]
+    interrupted = False
     try:
-        run.prepare(shape, start)
-        outcome = run.search()
+        for run in runs:
+            run.prepare(shape, start)
+            run.make(shape)
     except KeyboardInterrupt:
-        if run.best is None:
+        interrupted = True
+        if not any(run.placed for run in runs):
             raise
-        outcome = "interrupted"
-    if run.best is None or not any(run.best):
+    done = [run for run in runs if run.placed]
+    if not done:
         raise EmptyShapeError(
             f"{shape.name}: no convex could be placed; the shape has no volume that {settings.near} samples "
             "can see. Check its thickness, or use --quality high"
         )
+    run = min(done, key=Run.cost)
     corners = shape.frame.to_unit(shape.vertices)
     tree = overlapped(run.tree(), run.samples).closed(corners.min(axis=0), corners.max(axis=0))
     whole = replace(tree.assembly(), unit=shape.unit)
     assembly = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
     details = {
         "schedule": settings.schedule,
-        "start": run.start,
+        "start": ORIGINS[run.origin],
+        "costs": {ORIGINS[one.origin]: round(one.cost(), 5) for one in done},
         "candidates": len(run.pool.rows),
         "primitives": tree.primitives,
         "convexes": tree.convexes,
     }
-    return Fitted(assembly, outcome, run.seconds, run.history, tree, details)
+    seconds: dict[str, float] = {}
+    for one in runs:
+        seconds |= {stage: seconds.get(stage, 0.0) + spent for stage, spent in one.seconds.items()}
+    outcome: Outcome = "interrupted" if interrupted else run.outcome
+    return Fitted(assembly, outcome, seconds, run.history, tree, details)
 
 
 @dataclass
 class Run:
-    """State of one fit: the samples, the pool, and the cheapest layers so far."""
+    """State of one fit from one origin: the samples, the pool, and the cheapest layers so far.
+
+    turn: which of how many runs this is. tuned: what the paper's schedule made.
+    """
 
     settings: Settings
     report: Callable[[Progress], None] | None = None
+    origin: str = "seeds"
+    turn: tuple[int, int] = (0, 1)
     best: selection.Layers | None = None
-    start: str = ""
+    tuned: Tree | None = None
+    outcome: Outcome = "converged"
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
     pool: Pool = field(init=False)
     samples: Samples = field(init=False)
-    given: selection.Layers = field(default_factory=list)
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -134,10 +154,55 @@ class Run:
         with self.timed("prepare"):
             self.samples = sampling.sample(shape, s.near, s.uniform, s.seed)
             surface = surfaces.sample(shape, s.surface, s.seed)
-        with self.timed("detect"):
-            found = detect(surface, s.kinds, s.least, s.seed)
-            self.pool = Pool.of(candidates(found, surface), nested=s.nested, oriented=s.oriented)
+        with self.timed("detect" if self.origin == "seeds" else "predict"):
+            found = detect(surface, s.kinds, s.least, s.seed) if self.origin == "seeds" else []
+            if start is not None:
+                seen = surface_of(start, shape, s.surface, s.seed)
+                found = [*found, *detect(seen, s.kinds, s.least, s.seed)]
+            given = candidates(found, surface)
+            if self.origin == "weights":
+                given += list(_paper().predicted(shape, s))
+            pool = Pool.of(given, nested=s.nested, oriented=s.oriented)
+            held = rows.expressible(pool.rows) | (s.schedule == "search")
+            self.pool = Pool(pool.rows[held], pool.complement[held])
             self.outside = (rows.values(self.pool.rows, self.samples.points) > 0).astype(np.float32)
+
+    def make(self, shape: Shape) -> None:
+        """The tree: by search, by the paper's schedule, or by this from that."""
+        s = self.settings
+        if s.schedule == "search" or self.origin == "seeds":
+            self.outcome = self.search()
+        if s.schedule == "paper":
+            with self.timed("fine-tune"):
+                seeds = self.tree() if self.placed else None
+                if seeds is not None or self.origin == "weights":
+                    _paper().fine_tuned(shape, seeds, s, self.samples.points, self.take, self.tell)
+
+    @property
+    def placed(self) -> bool:
+        """Whether there is a tree."""
+        return bool(self.tuned.layers[0]) if self.tuned else bool(self.best and any(self.best))
+
+    def take(self, tree: Tree) -> None:
+        """The result of fine-tuning, where it is no empty tree."""
+        if tree.layers[0]:
+            self.tuned = tree
+
+    def tell(self, stage: str, done: float) -> None:
+        """Progress of fine-tuning."""
+        if self.report is not None:
+            self.report(Progress(stage, 1, 1, 0, 0.0, self.fraction(0.3 + 0.7 * done)))
+
+    def fraction(self, done: float) -> float:
+        """Of all runs, where this one has done so much."""
+        return (self.turn[0] + done) / self.turn[1]
+
+    def cost(self) -> float:
+        """Of the tree: weight on the wrong side as a share of the shape's, and the description length."""
+        tree, s = self.tree(), self.settings
+        wrong = self.samples.weight[tree.occupancy(self.samples.points) != self.samples.inside]
+        error = float(wrong.sum(dtype=np.float64)) / self.samples.volume
+        return error + s.price * tree.primitives + s.convex_price * tree.convexes
 
     def problem(self, dearer: float = 1.0) -> Problem:
         """The selection at the settings' prices, times a factor."""
@@ -160,12 +225,13 @@ class Run:
         with self.timed("select"):
             for i, strict in enumerate(selection.SEVERITIES):
                 layers = selection.polish(problem, selection.fill(problem, empty, strict, _MOST), _MOST)
-                self.keep(problem, layers, "select", i + 1, len(selection.SEVERITIES), "detected surfaces")
-        assert self.best is not None
+                self.keep(problem, layers, "select", i + 1, len(selection.SEVERITIES))
+        if self.best is None:
+            return "converged"
         with self.timed("recreate"):
             for i in range(s.tries):
                 layers = selection.ruin_and_recreate(problem, self.best, _MOST)
-                self.keep(problem, layers, "recreate", i + 1, s.tries, self.start)
+                self.keep(problem, layers, "recreate", i + 1, s.tries)
         return self.meet_demands()
 
     def meet_demands(self) -> Outcome:
@@ -194,18 +260,17 @@ class Run:
                 return "target_reached"
         return "converged"
 
-    def keep(
-        self, problem: Problem, layers: selection.Layers, stage: str, round_: int, rounds: int, start: str
-    ) -> None:
+    def keep(self, problem: Problem, layers: selection.Layers, stage: str, round_: int, rounds: int) -> None:
         """Keeps layers that are cheaper than the best so far, and tells."""
         if any(layers) and (self.best is None or problem.cost(layers) < problem.cost(self.best)):
-            self.best, self.start = layers, start
+            self.best = layers
         tree = self.tree() if self.best else None
         parts, iou = (tree.primitives, self.iou(self.best)) if tree and self.best else (0, 0.0)
         self.history.append({"stage": stage, "round": round_, "parts": parts, "iou": iou})
         if self.report is not None:
             done = 0.1 + 0.3 * round_ / rounds if stage == "select" else 0.4 + 0.6 * round_ / rounds
-            self.report(Progress(stage, round_, rounds, parts, iou, done))
+            done *= 0.3 if self.settings.schedule == "paper" else 1.0
+            self.report(Progress(stage, round_, rounds, parts, iou, self.fraction(done)))
 
     def iou(self, layers: selection.Layers) -> float:
         """IoU over the uniform samples."""
@@ -214,6 +279,19 @@ class Run:
         return float((occupied & inside).sum() / max((occupied | inside).sum(), 1))
 
     def tree(self) -> Tree:
+        if self.tuned is not None:
+            return self.tuned
         assert self.best is not None
         layers = tuple(tuple(layer) for layer in self.best)
         return Tree(self.pool.rows, self.pool.complement, layers)
+
+
+def _paper() -> ModuleType:
+    """The module of the network, which needs PyTorch."""
+    try:
+        return import_module("partwright.capri.paper")
+    except ModuleNotFoundError as error:
+        if error.name != "torch":
+            raise
+        message = 'the network of CAPRI-Net needs PyTorch: pip install "partwright[torch]"'
+        raise MissingDependencyError(message) from error

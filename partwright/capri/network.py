@@ -33,6 +33,9 @@ class Sizes:
     channels: int = 32
 
 
+SMALL = Sizes(primitives=256, convexes=32, code=128, hidden=256, channels=4)  # a few megabytes
+
+
 class Encoder(nn.Module):
     """64^3 voxels (B, 1, 64, 64, 64) to a code (B, code), as in IM-Net: four halvings, then to a point."""
 
@@ -74,14 +77,10 @@ class CapriNet(nn.Module):
         return torch.cat([p[..., :3].abs(), p[..., 3:]], dim=-1)
 
     def seed(self, rows: NDArray[np.float64], code: Tensor) -> None:
-        """The first primitives become these rows (K, 10) of the unit frame for this code (1, code), so that
-        fine-tuning starts from them. Rows that eq. 1 cannot hold (cross terms, a, b or c < 0) are left out.
-        """
-        kept = (np.abs(rows[:, 7:]).max(axis=1) < 1e-6) & (rows[:, :3] >= -1e-9).all(axis=1)
-        rows = rows[kept][: self.sizes.primitives]
+        """The first primitives become these `expressible` rows (K, 10) for this code (1, code)."""
         last = cast(nn.Linear, self.primitives[2])
         with torch.no_grad():
-            wanted = torch.from_numpy(rows[:, :7] / _scale()).to(last.bias).flatten()
+            wanted = torch.from_numpy(coefficients_of(rows)).to(last.bias).flatten()
             last.bias[: len(wanted)] += wanted - self.primitives(code)[0, : len(wanted)]
 
 
@@ -95,6 +94,11 @@ def rows_of(coefficients: Tensor) -> NDArray[np.float64]:
     """P (p, 7) as rows (p, 10) of the unit frame."""
     seven = coefficients.detach().cpu().double().numpy() * _scale()
     return np.concatenate([seven, np.zeros((len(seven), 3))], axis=1)
+
+
+def coefficients_of(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows (K, 10) of the unit frame, without cross terms, as P (K, 7)."""
+    return np.asarray(rows[:, :7] / _scale())
 
 
 def _scale() -> NDArray[np.float64]:

@@ -131,6 +131,12 @@ def is_plane(rows: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(np.abs(rows[:, [0, 1, 2, 7, 8, 9]]).max(axis=1) == 0)
 
 
+def expressible(rows: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(M,) whether the paper's eq. 1 can hold rows (M, 10): no cross terms, a, b, c >= 0."""
+    rows = np.atleast_2d(rows)
+    return np.asarray((np.abs(rows[:, 7:]).max(axis=1) < 1e-6) & (rows[:, :3] >= -1e-9).all(axis=1))
+
+
 def _about(form: NDArray[np.float64], centre: ArrayLike, radius: float) -> Row:
     p = np.asarray(centre, dtype=np.float64)
     form = form / (2 * radius)

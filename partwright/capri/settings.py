@@ -12,6 +12,14 @@ from partwright.errors import SettingError
 
 Quality = Literal["draft", "normal", "high"]
 Schedule = Literal["search", "paper"]
+Start = Literal["seeds", "weights", "auto"]
+
+
+CHOICES = {
+    "schedule": ("search", "paper"),
+    "start": ("seeds", "weights", "auto"),
+    "supervision": ("voxels", "points", "samples"),
+}
 
 
 @dataclass(frozen=True)
@@ -20,6 +28,9 @@ class Settings:
 
     schedule: "search", ours: quadrics detected on the surface, the tree by discrete search; seconds, not
         hours. "paper": the network of sections 3.1-3.3, fine-tuned by gradient descent in three stages.
+    start: where the quadrics come from. "seeds": surfaces detected on the shape; in the paper's schedule, the
+        tree that a search among them finds. "weights": the pre-trained network. "auto": both, the cheaper
+        tree is kept; the report says which.
 
     The tree (section 3.2):
         kinds: quadrics that are looked for; the paper's abc >= 0 leaves out cones.
@@ -37,12 +48,15 @@ class Settings:
         tries: convexes are taken out and replaced so many times.
 
     schedule "paper" (section 4.1 and the supplement; stages and thresholds: `partwright.capri.stages`):
-        iterations: of each of the three stages (paper: 12,000). weights: a pre-trained network's file.
+        iterations: of each of the three stages (paper: 12,000). supervision: "voxels" or "points", as in the
+        paper, or "samples" of the surface itself, whose detail is not lost between voxels. weights: file of a
+        pre-trained network; None for the one that comes along.
 
     symmetry and threads are options of all methods that a tree has no use for; curve is refused.
     """
 
     schedule: Schedule = "search"
+    start: Start = "seeds"
     kinds: tuple[str, ...] = KINDS
     oriented: bool = True
     subtract: bool = True
@@ -57,6 +71,7 @@ class Settings:
     uniform: int = 20_000
     tries: int = 20
     iterations: int = 12_000
+    supervision: str = "samples"
     weights: str | None = None
     curve: bool = False
     symmetry: bool = True
@@ -77,8 +92,12 @@ class Settings:
             _check("max_parts", self.max_parts, low=1)
         if self.min_iou is not None:
             _check("min_iou", self.min_iou, low=0.0, high=1.0)
-        if self.schedule not in ("search", "paper"):
-            raise SettingError(f'schedule: expected "search" or "paper", got {self.schedule!r}')
+        for name, known in CHOICES.items():
+            if getattr(self, name) not in known:
+                expected = " or ".join(f'"{one}"' for one in known)
+                raise SettingError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
+        if self.schedule == "paper" and (self.max_parts is not None or self.min_iou is not None):
+            raise SettingError("the paper's schedule knows no max_parts and no min_iou; use schedule search")
         unknown = set(self.kinds) - set(KINDS)
         if unknown or "plane" not in self.kinds:
             raise SettingError(f"kinds: expected plane and any of {', '.join(KINDS[1:])}, got {self.kinds}")
@@ -86,6 +105,14 @@ class Settings:
             raise SettingError("curve: a CAPRI tree has no curve of sizes; give max_parts or min_iou")
         if self.weights is not None and not Path(self.weights).is_file():
             raise SettingError(f"weights: there is no file {self.weights}")
+
+    def of_schedule(self) -> Settings:
+        """These settings; for the paper's schedule without what eq. 1 and 5 cannot hold: cones, cross terms,
+        nesting."""
+        if self.schedule == "search":
+            return self
+        kinds = tuple(kind for kind in self.kinds if kind != "cone")
+        return replace(self, kinds=kinds, oriented=False, nested=False)
 
     @classmethod
     def for_quality(cls, quality: Quality = "normal", **changes: Any) -> Settings:

@@ -130,7 +130,7 @@ def _drop_shared_walls(
     probe = order[rank < _PROBES]
     parts = _facing(MeshDistance(vertices, faces, faces, closed=True), corners[probe]) != 0
     kept = faces[(np.bincount(patch[probe], parts) > 0)[patch]]
-    if len(kept) == len(faces) or EdgeTable(kept).balance.any():
+    if len(kept) in (0, len(faces)) or EdgeTable(kept).balance.any():
         return faces
     notes.append(f"dropped {len(faces) - len(kept)} triangles of walls between bodies")
     return kept

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 import trimesh
 
-from partwright.assembly import Assembly
-from partwright.capri import Progress, Settings, fit
+from partwright.assembly import Assembly, Part
+from partwright.capri import Progress, Settings, fit, rows
+from partwright.capri.fitting import Run
 from partwright.capri.tree import Tree
-from partwright.errors import GridError, NeedsSurfaceError, PartwrightError, SettingError
+from partwright.errors import (
+    GridError,
+    MissingDependencyError,
+    NeedsSurfaceError,
+    PartwrightError,
+    SettingError,
+)
+from partwright.fields import Cylinder
 from partwright.meshing import mesh_csg
 from partwright.shapes import Shape, load_shape
 from tests.capri.meshes import bracket, drilled_plate, tilted_rod
@@ -189,3 +199,23 @@ def test_settings_that_cannot_be_used_are_named(plate: Shape) -> None:
             Settings.for_quality("draft", **changes)
     with pytest.raises(SettingError, match="locked"):
         fit(plate, Settings(**FAST), locked=("a",))
+
+
+def test_surfaces_of_a_given_assembly_join(plate: Shape) -> None:
+    """A cylinder that the shape does not show is among the quadrics, in the shape's frame."""
+    rod = Part(Cylinder(0.37, 1.0), (0.3, 0.2, 0.1))
+    run = Run(Settings(**FAST))
+    run.prepare(plate, None)
+    before = run.pool.rows
+    run.prepare(plate, Assembly((rod,)))
+    new = [row for row in run.pool.rows if np.abs(before - row).max(axis=1).min() > 0.02]
+    expected = rows.cylinder(0.9 * np.array([0.3, 0.2, 0.1]), (0, 0, 1), 0.9 * 0.37)
+    assert min(np.abs(row - expected).max() for row in new) < 0.02
+
+
+def test_without_torch_the_network_is_asked_for_by_name(plate: Shape, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    for name in ("partwright.capri.paper", "partwright.capri.network"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    with pytest.raises(MissingDependencyError, match="needs PyTorch"):
+        fit(plate, Settings(**FAST, start="weights"))

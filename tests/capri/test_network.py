@@ -7,12 +7,20 @@ import pytest
 import torch
 
 from partwright.capri import layers, rows, stages
-from partwright.capri.network import HALF, CapriNet, Sizes, distances, load_network, rows_of, save_network
+from partwright.capri.network import (
+    HALF,
+    CapriNet,
+    Sizes,
+    distances,
+    load_network,
+    rows_of,
+    save_network,
+)
 from partwright.capri.stages import STAGES, Stage
 from partwright.errors import UnreadableFileError
 
 POINTS, PRIMITIVES, CONVEXES = 50, 7, 6
-SMALL = Sizes(primitives=12, convexes=4, code=8, hidden=16, channels=2)
+TINY = Sizes(primitives=12, convexes=4, code=8, hidden=16, channels=2)
 
 
 def problem(seed: int = 0) -> dict[str, torch.Tensor]:
@@ -135,8 +143,8 @@ def test_a_drilled_slab_by_hand() -> None:
 
 def test_primitives_are_rows_of_the_unit_frame() -> None:
     torch.manual_seed(0)
-    network = CapriNet(SMALL).double()
-    coefficients = network.coefficients(torch.rand(1, SMALL.code, dtype=torch.double))
+    network = CapriNet(TINY).double()
+    coefficients = network.coefficients(torch.rand(1, TINY.code, dtype=torch.double))
     assert coefficients.shape == (1, 12, 7)
     assert bool((coefficients[..., :3] >= 0).all())
     points = np.random.default_rng(0).uniform(-1, 1, (100, 3))
@@ -146,7 +154,7 @@ def test_primitives_are_rows_of_the_unit_frame() -> None:
 
 def test_seeded_primitives_are_the_rows_given() -> None:
     torch.manual_seed(0)
-    network = CapriNet(SMALL)
+    network = CapriNet(TINY)
     given = np.stack(
         [
             rows.plane((0.0, 0.6, 0.8), 0.3),
@@ -155,29 +163,36 @@ def test_seeded_primitives_are_the_rows_given() -> None:
         ]
     )
     tilted = rows.cylinder((0, 0, 0), np.array([1, 1, 0]) / 2**0.5, 0.2)
-    code = torch.rand(1, SMALL.code)
-    network.seed(np.concatenate([[tilted, -given[1]], given]), code)
+    code = torch.rand(1, TINY.code)
+    assert rows.expressible(np.stack([tilted, -given[1], *given])).tolist() == [
+        False,
+        False,
+        True,
+        True,
+        True,
+    ]
+    network.seed(given, code)
     made = rows_of(network.coefficients(code)[0])[:3]
     np.testing.assert_allclose(made, given, atol=1e-6)
 
 
 def test_codes_of_voxels() -> None:
-    network = CapriNet(SMALL)
+    network = CapriNet(TINY)
     voxels = torch.zeros(2, 1, 64, 64, 64)
     voxels[0, 0, 20:40, 20:40, 20:40] = 1
     voxels[1, 0, 10:50, 30:34, 20:60] = 1
     codes = network.encoder(voxels)
-    assert codes.shape == (2, SMALL.code)
-    assert float((codes[0] - codes[1]).abs().max()) > 1e-4
+    assert codes.shape == (2, TINY.code)
+    assert float((codes[0] - codes[1]).detach().abs().max()) > 1e-4
     assert sum(p.numel() for p in CapriNet(Sizes()).primitives.parameters()) == 257 * 512 + 513 * 7168
 
 
 def test_files_keep_the_network_to_half_precision(tmp_path) -> None:
-    network = CapriNet(SMALL)
+    network = CapriNet(TINY)
     for half, accuracy in ((True, 1e-3), (False, 0.0)):
         save_network(network, tmp_path / "n.safetensors", half)
         back = load_network(tmp_path / "n.safetensors")
-        assert back.sizes == SMALL
+        assert back.sizes == TINY
         for a, b in zip(network.state_dict().values(), back.state_dict().values(), strict=True):
             assert float((a - b).abs().max()) <= accuracy * float(a.abs().max())
     assert (tmp_path / "n.safetensors").stat().st_size < 400_000

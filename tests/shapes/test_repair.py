@@ -8,7 +8,7 @@ import trimesh
 from solids import box, inverted, sphere, together, without
 
 from partwright.errors import EmptyShapeError, FlatShapeError, OpenShellError
-from partwright.shapes import load_shape
+from partwright.shapes import load_shape, repair
 
 
 def test_a_sound_mesh_is_used_as_it_is():
@@ -164,3 +164,10 @@ def test_sizes_do_not_matter(size):
     )
     assert shape.volume == pytest.approx(1.72 * size**3)
     assert shape.signed_distance([[0, 0, 2 * size]])[0] > size
+
+
+def test_a_surface_that_seems_to_part_nothing_is_kept_whole(monkeypatch):
+    """Two boxes with a common edge, were their triangles too close to others to see what is behind them."""
+    monkeypatch.setattr(repair, "_facing", lambda source, corners: np.zeros(len(corners), dtype=np.int64))
+    shape = load_shape(together(box(), box(centre=(1, 1, 0))))
+    assert shape.volume == pytest.approx(2)

@@ -1,0 +1,48 @@
+"""`python -m partwright.capri FOLDER`: pre-trains the network on CAD parts that the project makes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+from partwright.errors import PartwrightError
+
+
+def main() -> int:
+    import torch
+
+    from partwright.capri.network import SMALL
+    from partwright.capri.training import NETWORK, Report, Training, train
+
+    parser = argparse.ArgumentParser(
+        prog="python -m partwright.capri",
+        description=f"Pre-trains the network of CAPRI-Net and writes {NETWORK}; the same command goes on "
+        "from where it was stopped.",
+    )
+    parser.add_argument("folder", metavar="FOLDER", type=Path, help="where to write")
+    for entry in fields(Training):
+        kind = float if isinstance(entry.default, float) else int
+        parser.add_argument(f"--{entry.name}", metavar="X", type=kind, default=entry.default)
+    parser.add_argument("--threads", metavar="N", type=int, default=0, help="default: one per core")
+    given = vars(parser.parse_args())
+    folder, threads = given.pop("folder"), given.pop("threads")
+    if threads:
+        torch.set_num_threads(threads)
+
+    def tell(report: Report) -> None:
+        line = f"step {report.step}/{report.steps}  loss {report.loss:.5f}  {report.seconds:.0f} s"
+        print(f"partwright: {line}", file=sys.stderr, flush=True)
+
+    try:
+        outcome = train(folder, Training(**given), SMALL, tell)
+    except PartwrightError as error:
+        print(f"partwright: error: {error}", file=sys.stderr)
+        return error.exit_code
+    print(f"{outcome}: {folder / NETWORK}")
+    return 130 if outcome == "interrupted" else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

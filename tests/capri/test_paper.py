@@ -1,0 +1,160 @@
+"""The paper's schedule: what supervises it, seeds that keep their tree, fine-tuning that helps, fits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from partwright.capri import Progress, Settings, fit, rows, stages
+from partwright.capri.network import HALF, CapriNet, Sizes, rows_of, save_network
+from partwright.capri.settings import CHOICES
+from partwright.capri.supervision import supervision
+from partwright.capri.tree import Tree
+from partwright.capri.tuning import Tuning, seeded, straightened
+from partwright.errors import SettingError
+from partwright.meshing import mesh_csg
+from partwright.shapes import Shape, load_shape
+from tests.capri.meshes import drilled_plate
+
+PAPER = {"schedule": "paper", "iterations": 3, "surface": 6000, "near": 6000, "uniform": 5000, "tries": 0}
+TINY = Sizes(primitives=32, convexes=8, code=8, hidden=16, channels=1)
+
+
+@pytest.fixture(scope="module")
+def plate() -> Shape:
+    return load_shape(drilled_plate())
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory) -> str:
+    path = tmp_path_factory.mktemp("weights") / "n.safetensors"
+    torch.manual_seed(0)
+    save_network(CapriNet(TINY), path)
+    return str(path)
+
+
+@pytest.mark.parametrize("kind", CHOICES["supervision"])
+def test_supervision_is_near_the_surface_and_right(plate: Shape, kind: str) -> None:
+    given = supervision(kind, plate, 0)
+    assert given.points.shape == (65_536 if kind == "points" else 32_768, 3)
+    distance = plate.unit_distance(given.points / HALF)
+    sure = np.abs(distance) > {"voxels": 1e-5, "points": 0.15, "samples": 1e-5}[kind]
+    agreed = ((distance < 0) == (given.inside > 0))[np.abs(distance) < 0.04]
+    assert agreed.mean() > 0.97  # along a normal of 1/64, the far side of something thin may come near
+    if kind != "points":
+        assert ((distance < 0) == (given.inside > 0))[sure].all()
+    assert np.mean(np.abs(distance) < 5 / 64) > 0.5
+
+
+def known() -> Tree:
+    """A slab minus a cylinder and a ball, of expressible rows, in no order."""
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    table = [rows.plane(axis, offset) for axis, offset in zip(axes, (0.9, 0.6, 0.2) * 2, strict=True)]
+    table += [rows.sphere((0.4, 0.1, 0.2), 0.2), rows.cylinder((-0.3, 0, 0), (0, 0, 1), 0.25)]
+    table = [rows.plane(axes[0], 0.1), *table]
+    return Tree(np.stack(table), np.zeros(9, bool), (((1, 2, 3, 4, 5, 6),), ((8,), (7,))))
+
+
+def test_a_seeded_network_is_the_tree() -> None:
+    tree = known()
+    network, code = seeded(tree, 0)
+    points = np.random.default_rng(0).uniform(-1, 1, (5000, 3))
+    made = tuned(network, code).tree()
+    assert [len(layer) for layer in made.layers] == [16, 16]
+    np.testing.assert_array_equal(made.occupancy(points), tree.occupancy(points))
+
+
+def tuned(network: CapriNet, code: torch.Tensor, tree: Tree | None = None) -> Tuning:
+    from partwright.capri.supervision import Supervision
+
+    points = np.random.default_rng(1).uniform(-1, 1, (20_000, 3))
+    inside = (tree or known()).occupancy(points).astype(np.float32)
+    return Tuning(network, code, Supervision((HALF * points).astype(np.float32), inside), 0)
+
+
+@pytest.mark.parametrize("stage", stages.STAGES)
+def test_fine_tuning_mends_a_tree(stage: stages.Stage) -> None:
+    """Seeds that are a little off: every stage lowers its own loss."""
+    off = known()
+    off.rows[:, 6] += np.random.default_rng(0).uniform(-0.02, 0.02, len(off.rows))
+    network, code = seeded(off, 0)
+    tuning = tuned(network, code)
+    before = tuning.loss(stage, tuning.points[None], tuning.inside[None]).item()
+    fixed = network.selection.detach().clone()
+    seen: list[float] = []
+    tuning.run(stage, 8, seen.append)
+    after = tuning.loss(stage, tuning.points[None], tuning.inside[None]).item()
+    assert after < 0.97 * before
+    assert seen == [1.0]
+    assert torch.equal(network.selection, fixed) == (stage == "binary_selection")
+
+
+def test_straight_rows_keep_their_surface() -> None:
+    """Nearly flat quadrics become planes; nothing moves by more than the tolerance."""
+    given = np.stack([1e-3 * rows.sphere((0, 0, 50.0), 49.9), 30 * rows.sphere((0, 0, 0), 0.5)])
+    made = straightened(given)
+    assert rows.is_plane(made).tolist() == [False, False]
+    flat = straightened(np.array([[1e-4, 0, 2e-4, 0, 0.6, 0.8, 0.1, 0, 0, 0]]))
+    assert rows.is_plane(flat).all()
+    np.testing.assert_allclose(np.abs(made).max(axis=1), 1)
+    points = np.random.default_rng(0).uniform(-1, 1, (1000, 3))
+    np.testing.assert_array_equal(rows.values(made, points) > 0, rows.values(given, points) > 0)
+    network = CapriNet(TINY)
+    assert straightened(rows_of(network.coefficients(torch.rand(1, 8))[0])).shape == (32, 10)
+
+
+def test_seeds_go_through_the_paper_s_schedule(plate: Shape) -> None:
+    seen: list[Progress] = []
+    fitted = fit(plate, Settings(**PAPER), seen.append)
+    made = mesh_csg(fitted.assembly)
+    assert made.is_watertight
+    assert made.volume == pytest.approx(drilled_plate().volume, rel=0.02)
+    assert made.euler_number == -2
+    assert fitted.details["start"] == "detected surfaces"
+    assert fitted.tree.primitives <= 12
+    fractions = [step.fraction for step in seen]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == pytest.approx(1.0)
+    assert {"weighted union", "exact union", "binary selection"} < {step.stage for step in seen}
+
+
+@pytest.mark.parametrize("schedule", CHOICES["schedule"])
+def test_the_cheaper_start_wins_and_is_named(plate: Shape, weights: str, schedule: str) -> None:
+    fitted = fit(plate, Settings(**PAPER | {"schedule": schedule, "start": "auto", "weights": weights}))
+    costs = fitted.details["costs"]
+    assert fitted.details["start"] == min(costs, key=costs.__getitem__) == "detected surfaces"
+    alone = fit(plate, Settings(**PAPER | {"schedule": schedule}))
+    assert alone.details["costs"]["detected surfaces"] == costs["detected surfaces"]
+    assert mesh_csg(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.02)
+
+
+def test_an_interruption_keeps_what_there_is(plate: Shape) -> None:
+    def stop(step: Progress) -> None:
+        if step.stage == "weighted union":
+            raise KeyboardInterrupt
+
+    fitted = fit(plate, Settings(**PAPER), stop)
+    assert fitted.outcome == "interrupted"
+    assert mesh_csg(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"start": "nothing"}, 'start: expected "seeds" or "weights" or "auto"'),
+        ({"supervision": "mesh"}, 'supervision: expected "voxels" or "points" or "samples"'),
+        ({"max_parts": 5}, "knows no max_parts"),
+    ],
+)
+def test_settings_that_cannot_be_used_are_named(changes: dict[str, object], message: str) -> None:
+    with pytest.raises(SettingError, match=message):
+        Settings(**PAPER | changes)
+
+
+def test_points_and_grids_supervise_as_well() -> None:
+    points, face = trimesh.sample.sample_surface(drilled_plate(), 10_000, seed=0)
+    cloud = np.concatenate([points, drilled_plate().face_normals[face]], axis=1)
+    fitted = fit(load_shape(cloud), Settings(**PAPER | {"supervision": "points"}))
+    assert mesh_csg(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.06)
