@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from partwright.capri import stages
+from partwright.capri import rows, stages
 from partwright.capri.network import SMALL, VOXELS, CapriNet, distances, rows_of
 from partwright.capri.supervision import Supervision
 from partwright.capri.tree import Tree
@@ -19,6 +20,7 @@ BATCH = 8_192  # points an iteration, drawn anew
 RATE, BETAS = 1e-4, (0.5, 0.999)
 _SHARP = 256.0  # what seeded rows are multiplied by: a quarter of a voxel off counts in full (eq. 4)
 _NOTHING = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # a quadric that holds no point
+_NEAREST = 16  # points that tell how steep a quadric is
 _FLAT = 2e-3  # unit lengths that a quadric may bend over the box and still count as a plane
 
 
@@ -58,19 +60,23 @@ class Tuning:
     def tree(self) -> Tree:
         """The tree of T_hard, in the unit frame. A convex of no primitives is left out."""
         net = self.network
-        rows = straightened(rows_of(net.coefficients(self.code)[0]))
+        made = straightened(rows_of(net.coefficients(self.code)[0]))
         chosen = stages.binary(net.selection.detach()).cpu().numpy() > 0
         convexes = [tuple(np.flatnonzero(column).tolist()) for column in chosen.T]
         half = len(convexes) // 2
         layers = tuple(tuple(c for c in side if c) for side in (convexes[:half], convexes[half:]))
-        return Tree(rows, np.zeros(len(rows), dtype=bool), layers)
+        return Tree(made, np.zeros(len(made), dtype=bool), layers)
 
 
-def straightened(rows: np.ndarray) -> np.ndarray:
-    """Rows (p, 10) scaled to numbers of about 1; those that hardly bend within the box become planes."""
-    slope = np.linalg.norm(rows[:, 3:6], axis=1)
-    rows = np.where((rows[:, :3].max(axis=1) < _FLAT * slope)[:, None] & (np.arange(10) < 3), 0.0, rows)
-    return np.asarray(rows / np.maximum(np.abs(rows).max(axis=1, keepdims=True), 1e-12))
+def straightened(given: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows (p, 10) scaled to |grad f| = 1 where they are nearest to 0 in the unit cube, as the rest of the
+    fit has them; those that hardly bend within it become planes."""
+    slope = np.linalg.norm(given[:, 3:6], axis=1)
+    flat = given[:, :3].max(axis=1) < _FLAT * slope
+    bent = np.where(flat[:, None] & (np.arange(10) < 3), 0.0, given)
+    grid = np.stack(np.meshgrid(*[np.linspace(-0.9, 0.9, 10)] * 3), axis=-1).reshape(-1, 3)
+    nearest = np.argsort(np.abs(rows.values(bent, grid)), axis=0)[:_NEAREST].T
+    return np.stack([rows.normalised(row, grid[near]) for row, near in zip(bent, nearest, strict=True)])
 
 
 def encoded(network: CapriNet, shape: Shape) -> Tensor:
