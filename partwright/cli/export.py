@@ -7,7 +7,7 @@ from pathlib import Path
 
 from partwright.export import WRITERS
 
-OPTIONS = ("density", "tolerance", "free_joint", "by_part", "resolution")
+OPTIONS = ("density", "tolerance", "free_joint", "by_part", "resolution", "facets", "separate")
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -26,6 +26,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option("--free-joint", action="store_true", default=None, help="let the body move (MJCF, URDF)")
     option("--by-part", action="store_true", default=None, help="each part by itself (OBJ, PLY, STL, 3MF)")
     option("--resolution", metavar="N", type=int, help="cells along the longest side of what is meshed")
+    option("--facets", metavar="N", type=int, help="facets of a full circle (OpenSCAD; default: 96)")
+    option("--separate", action="store_true", default=None, help="each part a product of its own (STEP)")
     command.set_defaults(run=run)
 
 

@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from partwright.errors import SettingError, UnsupportedFormatError
+from partwright.errors import ParameterError, SettingError, UnsupportedFormatError
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly
@@ -49,6 +49,7 @@ def export(assembly: Assembly, path: str | Path, **options: Any) -> None:
     Raises:
         UnsupportedFormatError: the suffix names no known format.
         SettingError: the format has no such option.
+        ParameterError: an option's value makes no sense.
         OutputError: the file cannot be written.
     """
     suffix = _suffix(Path(path))
@@ -59,6 +60,9 @@ def export(assembly: Assembly, path: str | Path, **options: Any) -> None:
             raise SettingError(
                 f"{suffix} has no option {name!r}; it has {', '.join(known) if known else 'none'}"
             )
+    cells = options.get("resolution", 1)
+    if isinstance(cells, bool) or not isinstance(cells, int) or cells < 1:
+        raise ParameterError(f"resolution: expected a number of cells, at least 1, got {cells!r}")
     write(assembly, path, **options)
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from partwright.assembly import Assembly, Node, Part, Similarity
+from partwright.errors import ParameterError
 from partwright.export.approximation import Change, write_report
 from partwright.export.closed_quadrics import Ball
 from partwright.export.copies import Poses, Ring, Row
@@ -66,8 +67,11 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
     Raises:
         NoSurfaceError: nothing to export.
         SettingError: the assembly's unit is unknown.
+        ParameterError: fewer than 3 facets.
         OutputError: the file cannot be written.
     """
+    if facets < 3:
+        raise ParameterError(f"facets: expected at least 3 of a full circle, got {facets}")
     tree, changes = solid_tree(assembly, keep=_kept, loops=True)
     ball = Ball.around(tree)
     polyhedra = [part for part in tree.parts if isinstance(part.field, Quadric)]

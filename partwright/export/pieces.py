@@ -101,7 +101,22 @@ def surfaces(assembly: Assembly, by_part: bool, resolution: int | None) -> list[
     """Named closed meshes: of each piece, or of the whole blended surface, which has no name."""
     if by_part:
         return [(piece.name, mesh) for piece, mesh in piece_meshes(assembly, resolution or 32)]
-    return [("", mesh_assembly(assembly, resolution or 128))]
+    return [("", whole_surface(assembly, resolution or 128))]
+
+
+def whole_surface(assembly: Assembly, resolution: int) -> trimesh.Trimesh:
+    """The blended surface; resolution: cells along its longest side.
+
+    Raises:
+        NothingToExportError: it has none.
+    """
+    try:
+        return mesh_assembly(assembly, resolution)
+    except NoSurfaceError as error:
+        raise NothingToExportError(
+            f"nothing to export: the assembly has no surface at {resolution} cells along its longest side; "
+            "give its parts a size, or take more cells (--resolution)"
+        ) from error
 
 
 def one_surface(assembly: Assembly, by_part: bool, resolution: int | None) -> trimesh.Trimesh:

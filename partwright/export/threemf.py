@@ -19,8 +19,7 @@ from partwright import __version__
 from partwright.assembly import Assembly
 from partwright.errors import UnitError
 from partwright.export.axes import to_metres_z_up
-from partwright.export.pieces import piece_meshes
-from partwright.meshing import mesh_assembly
+from partwright.export.pieces import piece_meshes, whole_surface
 from partwright.shapes import canonical_unit
 from partwright.writing import write_bytes
 
@@ -79,7 +78,7 @@ def _objects(assembly: Assembly, by_part: bool, resolution: int | None) -> list[
     if by_part:
         found = piece_meshes(assembly, resolution or 32)
         return [(piece.name, piece.colour, mesh) for piece, mesh in found]
-    return [(assembly.name or "assembly", _GREY, mesh_assembly(assembly, resolution or 128))]
+    return [(assembly.name or "assembly", _GREY, whole_surface(assembly, resolution or 128))]
 
 
 def _model(assembly: Assembly, unit: str, objects: list[_Object]) -> xml.Element:

@@ -1,0 +1,102 @@
+"""What an export cannot do is one line, exit code 2, and no file."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from partwright.assembly import Assembly, Part
+from partwright.cli.main import main
+from partwright.export import WRITERS
+from partwright.fields import Box, SuperFrustum
+
+CUBE = Assembly((Part(Box((1, 1, 1)), name="box"),), unit="mm", up="z")
+SHEET = Assembly((Part(SuperFrustum((1, 1, 1), onion=1.0), name="sheet"),), unit="mm", up="z")
+NEEDS = {".step": "OCP.TopoDS", ".usdc": "pxr"}  # suffix -> module without which it is not written
+SOLID = (
+    ".step",
+    ".scad",
+    ".build123d.py",
+    ".mjcf.xml",
+    ".urdf",
+    ".ply",
+    ".stl",
+    ".obj",
+    ".3mf",
+    ".blender.py",
+)
+
+
+def error(capsys: Any, assembly: Assembly, folder: Path, name: str, *options: str) -> str:
+    """The one line; nothing else is printed or written."""
+    source = folder.parent / "source.json"
+    assembly.save(source)
+    before = sorted(folder.rglob("*"))
+    assert main(["export", str(source), "-o", str(folder / name), *options]) == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len(said) == 1
+    assert said[0].startswith("partwright: error: ")
+    assert sorted(folder.rglob("*")) == before
+    return said[0]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "out").mkdir()
+    return tmp_path / "out"
+
+
+def skip_without(suffix: str) -> None:
+    if suffix in NEEDS:
+        pytest.importorskip(NEEDS[suffix].split(".")[0])
+
+
+@pytest.mark.parametrize("suffix", SOLID)
+def test_nothing_to_export(capsys: Any, folder: Path, suffix: str) -> None:
+    skip_without(suffix)
+    line = error(capsys, SHEET, folder, f"a{suffix}")
+    assert "nothing to export" in line
+
+
+@pytest.mark.parametrize("suffix", [suffix for suffix in WRITERS if suffix not in (".stp", ".mjcf", ".usd")])
+def test_a_place_that_cannot_be_written(capsys: Any, folder: Path, suffix: str) -> None:
+    skip_without(suffix)
+    assert "nowhere" in error(capsys, CUBE, folder, f"nowhere/a{suffix}")
+
+
+@pytest.mark.parametrize(("suffix", "module"), NEEDS.items())
+def test_a_missing_dependency(
+    capsys: Any, folder: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, module: str
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    assert "pip install 'partwright[" in error(capsys, CUBE, folder, f"a{suffix}")
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("a.dwg", (), "names no format"),
+        ("a", (), "names no format"),
+        ("a.py", (), "names no format"),
+        ("a.stl", ("--density", "1000"), "has no option 'density'"),
+        ("a.mjcf.xml", ("--density", "-1"), "density: expected"),
+        ("a.mjcf.xml", ("--tolerance", "-1"), "tolerance: expected"),
+        ("a.scad", ("--facets", "2"), "facets: expected"),
+        ("a.ply", ("--resolution", "0"), "resolution: expected"),
+        ("a.glb", ("--resolution", "0"), "resolution: expected"),
+    ],
+)
+def test_what_the_format_does_not_know(
+    capsys: Any, folder: Path, name: str, options: tuple[str, ...], message: str
+) -> None:
+    assert message in error(capsys, CUBE, folder, name, *options)
+
+
+def test_a_unit_that_the_format_cannot_say(capsys: Any, folder: Path) -> None:
+    kilometres = Assembly(CUBE.children, unit="km", up="z")
+    assert "3MF cannot say km" in error(capsys, kilometres, folder, "a.3mf")
+    micrometres = Assembly(CUBE.children, unit="um", up="z")
+    assert "too small for MuJoCo" in error(capsys, micrometres, folder, "a.mjcf.xml")
