@@ -21,7 +21,7 @@ from partwright.capri.surface import Surface
 _SEEDS = 48  # hypotheses of each kind in one draw
 _PROBE = 1500  # points that sift hypotheses
 _FINALISTS = 6
-_TOLERANCE = 0.006  # unit frame: how far from its quadric a point may lie
+TOLERANCE = 0.006  # unit frame: how far from its quadric a point may lie
 _CLOSER = 0.125  # share of the tolerance at which the kinds are told apart
 _AGREE = np.cos(np.radians(18.0))  # and by how much its normal may differ
 _NEAR, _FAR = 6, 60  # neighbours among which partners are drawn
@@ -56,7 +56,7 @@ class Surfel:
 
 
 def detect(
-    surface: Surface, kinds: tuple[str, ...], least: int, seed: int, tolerance: float = _TOLERANCE
+    surface: Surface, kinds: tuple[str, ...], least: int, seed: int, tolerance: float = TOLERANCE
 ) -> list[Surfel]:
     """Quadrics of these kinds (of `KINDS`) that `least` points bear out."""
     rng = np.random.default_rng(seed)
@@ -176,5 +176,11 @@ def _refitted(
     signs = (rows.gradients(row, points[members]) * normals[members]).sum(axis=1)
     outward = bool(np.sum(np.sign(signs)) >= 0)
     same = members[(signs > 0) == outward] if kind == "plane" else members
-    closely = _support([row], points[members], normals[members], _CLOSER * tolerance)
-    return Surfel(row, kind, same, outward, float(found.sum() + closely.sum()))
+    return Surfel(row, kind, same, outward, support(row, points[members], normals[members], tolerance))
+
+
+def support(
+    row: Row, points: NDArray[np.float64], normals: NDArray[np.float64], tolerance: float = TOLERANCE
+) -> float:
+    """How well oriented points (N, 3), (N, 3) bear out a quadric, at the tolerance and more closely."""
+    return float(sum(_support([row], points, normals, t).sum() for t in (tolerance, _CLOSER * tolerance)))

@@ -16,6 +16,7 @@ from partwright.assembly import Assembly
 from partwright.capri import rows, selection
 from partwright.capri import samples as sampling
 from partwright.capri import surface as surfaces
+from partwright.capri.alignment import aligned
 from partwright.capri.candidates import Pool, candidates
 from partwright.capri.detection import detect
 from partwright.capri.given import surface_of
@@ -156,9 +157,10 @@ class Run:
             surface = surfaces.sample(shape, s.surface, s.seed)
         with self.timed("detect" if self.origin == "seeds" else "predict"):
             found = detect(surface, s.kinds, s.least, s.seed) if self.origin == "seeds" else []
+            found = aligned(found, surface)
             if start is not None:
                 seen = surface_of(start, shape, s.surface, s.seed)
-                found = [*found, *detect(seen, s.kinds, s.least, s.seed)]
+                found = [*found, *aligned(detect(seen, s.kinds, s.least, s.seed), seen)]
             given = candidates(found, surface)
             if self.origin == "weights":
                 given += list(_paper().predicted(shape, s))
