@@ -63,8 +63,10 @@ ROWS = {
     "seven": Row("without cones and general quadrics", changes={"kinds": ("plane", "cylinder", "sphere")}),
     "first": Row("without ruin and recreate", changes={"tries": 0}),
     "cheap": Row("a tenth of the prices", changes={"price": 6e-5, "convex_price": 3e-4}),
-    "paper": Row("the paper's schedule from random weights, 3 x 1,000 iterations",
+    "paper": Row("the paper's schedule from the tree found, 3 x 1,000 iterations",
                  changes={"schedule": "paper", "iterations": 1000}),
+    "paper-voxels": Row("the same, supervised by voxel centres", given="voxels",
+                        changes={"schedule": "paper", "iterations": 1000, "supervision": "voxels"}),
 }  # fmt: skip
 
 

@@ -18,12 +18,11 @@ from partwright.capri.tree import Tree
 from partwright.capri.tuning import Tuning, encoded, seeded, straightened
 from partwright.shapes import Shape
 
-NETWORK = Path(__file__).parent / "models" / "cad-parts.safetensors"
-
 
 def network_of(settings: Settings) -> CapriNet:
-    """The pre-trained network: the given file's, or the one that comes along."""
-    return load_network(Path(settings.weights) if settings.weights else NETWORK)
+    """The pre-trained network of the given file."""
+    assert settings.weights is not None  # the settings see to it
+    return load_network(Path(settings.weights))
 
 
 def predicted(shape: Shape, settings: Settings) -> NDArray[np.float64]:

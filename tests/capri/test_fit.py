@@ -218,4 +218,4 @@ def test_without_torch_the_network_is_asked_for_by_name(plate: Shape, monkeypatc
     for name in ("partwright.capri.paper", "partwright.capri.network"):
         monkeypatch.delitem(sys.modules, name, raising=False)
     with pytest.raises(MissingDependencyError, match="needs PyTorch"):
-        fit(plate, Settings(**FAST, start="weights"))
+        fit(plate, Settings(**FAST, schedule="paper"))

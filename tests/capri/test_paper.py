@@ -145,6 +145,8 @@ def test_an_interruption_keeps_what_there_is(plate: Shape) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"start": "weights"}, "needs a pre-trained network; make one by python -m partwright.capri"),
+        ({"start": "auto"}, "needs a pre-trained network"),
         ({"start": "nothing"}, 'start: expected "seeds" or "weights" or "auto"'),
         ({"supervision": "mesh"}, 'supervision: expected "voxels" or "points" or "samples"'),
         ({"max_parts": 5}, "knows no max_parts"),
