@@ -28,7 +28,6 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 
-import numpy as np
 import torch
 
 from partwright.datasets.prepared import PreparedFamily
@@ -243,8 +242,8 @@ def measured(
     model: Model,
     how: Callable[[Model, object, ReconstructionSettings], NeuralShape],
     arguments: argparse.Namespace,
-) -> tuple[list[ReconstructionScores], float]:
-    """Scores of the test shapes, from the file where it has them, and mean seconds of a reconstruction."""
+) -> list[ReconstructionScores]:
+    """Scores of the test shapes, from the file where it has them."""
     path = RESULTS / f"partsdf-{file}.csv"
     names = list(ReconstructionScores.__dataclass_fields__)
     if not path.exists():
@@ -265,23 +264,22 @@ def measured(
                 out.write(",".join(done[key].values()) + "\n")
             print(", ".join(done[key].values()), flush=True)
         rows.append(done[key])
-    scores = [ReconstructionScores(**{n: float(row[n]) for n in names}) for row in rows]
-    return scores, float(np.mean([float(row["seconds"]) for row in rows]))
+    return [ReconstructionScores(**{n: float(row[n]) for n in names}) for row in rows]
 
 
-def line(label: str, scores: list[ReconstructionScores], seconds: float, parts: bool = True) -> str:
+def line(label: str, scores: list[ReconstructionScores], parts: bool = True) -> str:
     m = mean_scores(scores)
     part_iou = f"{100 * m.part_iou:.2f}" if parts else ""
     return (
         f"| {label} | {1e4 * m.chamfer:.2f} | {1e4 * m.chamfer_floor:.2f} | {100 * m.iou:.2f} | "
-        f"{m.image_consistency:.3f} | {part_iou} | {100 * m.failed:.0f} | {seconds:.0f} |"
+        f"{m.image_consistency:.3f} | {part_iou} | {100 * m.failed:.0f} |"
     )
 
 
 # Table 1 of the paper, on its own shapes: Ours, Ours-PC, Ours-1P.
 PUBLISHED = {
     family: [
-        f"| paper, its own {family}, {how} | {row[0]:.2f} | | {row[1]:.2f} | {row[2]:.3f} | {row[3]} | | |"
+        f"| paper, its own {family}, {how} | {row[0]:.2f} | | {row[1]:.2f} | {row[2]:.3f} | {row[3]} | |"
         for how, row in zip(("known parts", "from points", "1P"), rows, strict=True)
     ]
     for family, rows in {
@@ -291,8 +289,8 @@ PUBLISHED = {
     }.items()
 }
 HEAD = [
-    "| | CD x1e4 | floor | IoU % | IC | pIoU % | failed % | seconds |",
-    "|---|---|---|---|---|---|---|---|",
+    "| | CD x1e4 | floor | IoU % | IC | pIoU % | failed % |",
+    "|---|---|---|---|---|---|---|",
 ]
 
 
@@ -308,15 +306,16 @@ def reconstruction(arguments: argparse.Namespace) -> None:
     family, model = PreparedFamily(arguments.family), load_model(arguments.model)
     lines = [f"# PartSDF: reconstruction of held-out {family.name}", "",
              f"Trained on {scale_of(model)}. {min(arguments.shapes, len(family.split('test')))} test shapes, "
-             f"meshed at {arguments.resolution}^3; failures count as worst.", "",
+             f"{arguments.iterations} iterations of 2,048 points, meshed at {arguments.resolution}^3; "
+             "failures count as worst.", "",
              f"    python benchmarks/partsdf.py {' '.join(sys.argv[1:])}", "", *HEAD]  # fmt: skip
     name = f"reconstruct-{family.name}"
     for label, how in (("known parts", known), ("part-agnostic", unknown)):
-        lines.append(line(label, *measured(name, label, family, model, how, arguments)))
+        lines.append(line(label, measured(name, label, family, model, how, arguments)))
     if arguments.config:
         single = one_part(arguments)
         lines.append(
-            line("one part (1P)", *measured(name, "one part", family, single, known, arguments), parts=False)
+            line("one part (1P)", measured(name, "one part", family, single, known, arguments), parts=False)
         )
     lines += PUBLISHED.get(family.name, [])
     write(name, lines)
@@ -338,10 +337,10 @@ def one_part(arguments: argparse.Namespace) -> Model:
 def training(arguments: argparse.Namespace) -> None:
     """A row a training, from its log and its model as it ships."""
     lines = ["# PartSDF: the models that ship", "",
-             "Trained by `partwright parts train configs/NAME.toml --half`, on one core. Errors are means over "
-             "the last epoch's samples, clamped at 0.1 of the unit frame (longest side 1.8); IoUs those of "
-             "held-out shapes reconstructed with known parts, at samples near the surface that were not fitted. "
-             "Logs: partsdf-training-NAME.csv.", "",
+             "Trained by `partwright parts train configs/NAME.toml --half`, on one core. Errors are means "
+             "over the last epoch's samples, clamped at 0.1 of the unit frame (longest side 1.8); IoUs those "
+             "of held-out shapes reconstructed with known parts, at samples near the surface that were not "
+             "fitted. Logs: partsdf-training-NAME.csv.", "",
              f"    python benchmarks/partsdf.py {' '.join(sys.argv[1:])}", "",
              "| | trained on | minutes | whole | part | overlap | IoU % | pIoU % | file, MB |",
              "|---|---|---|---|---|---|---|---|---|"]  # fmt: skip
@@ -352,8 +351,8 @@ def training(arguments: argparse.Namespace) -> None:
         row = {name: float(value) for name, value in last.items()}
         file = folder / "model-half.safetensors"
         lines.append(
-            f"| {folder.name} | {scale_of(load_model(file))} | {row['seconds'] / 60:.0f} | {row['whole']:.4f} | "
-            f"{row['part']:.4f} | {row['inter']:.4f} | {100 * row['val_iou']:.1f} | "
+            f"| {folder.name} | {scale_of(load_model(file))} | {row['seconds'] / 60:.0f} | "
+            f"{row['whole']:.4f} | {row['part']:.4f} | {row['inter']:.4f} | {100 * row['val_iou']:.1f} | "
             f"{100 * row['val_part_iou']:.1f} | {file.stat().st_size / 1e6:.2f} |"
         )
     write("training", lines)
@@ -381,8 +380,8 @@ def ablations(arguments: argparse.Namespace) -> None:
     }
     lines = [f"# PartSDF: ablations on {family.name}", "",
              f"Each trained alike: {len(family.split('train'))} shapes, width 128, latent 64, "
-             f"{arguments.epochs} epochs of {TRAINING.points} points a shape. Known parts, meshed at "
-             f"{arguments.resolution}^3; seconds are those of a reconstruction.", "",
+             f"{arguments.epochs} epochs of {TRAINING.points} points a shape. Known parts, "
+             f"{arguments.iterations} iterations, meshed at {arguments.resolution}^3.", "",
              f"    python benchmarks/partsdf.py {' '.join(sys.argv[1:])}", "", *HEAD]  # fmt: skip
     for label, config in variants.items():
         if arguments.only and label not in arguments.only.split(","):
@@ -390,7 +389,7 @@ def ablations(arguments: argparse.Namespace) -> None:
         folder = arguments.work / f"{family.name}-{label.replace(' ', '-')}"
         model = train(replace(config, name=label.replace(" ", "-")), folder).model
         lines.append(
-            line(label, *measured(f"ablations-{family.name}", label, family, model, known, arguments))
+            line(label, measured(f"ablations-{family.name}", label, family, model, known, arguments))
         )
         print(lines[-1], flush=True)
     write(f"ablations-{family.name}", lines)
@@ -406,7 +405,8 @@ def robots(arguments: argparse.Namespace) -> None:
     arguments.shapes = 1
     lines = ["# PartSDF: robot arms", "",
              f"Trained on six arms of seven links, {arguments.epochs} epochs, width 128; the seventh "
-             "reconstructed with known parts and without.", "",
+             f"reconstructed with known parts and without, in {arguments.iterations} iterations, meshed at "
+             f"{arguments.resolution}^3.", "",
              f"    python benchmarks/partsdf.py {' '.join(sys.argv[1:])}", "", *HEAD]  # fmt: skip
     training = replace(TRAINING, epochs=arguments.epochs, threads=arguments.threads)
     for held in arguments.held.split(","):
@@ -418,7 +418,7 @@ def robots(arguments: argparse.Namespace) -> None:
         model = train(config, folder / "model").model
         for label, how in (("known parts", known), ("part-agnostic", unknown)):
             scores = measured("robots", f"{held}, {label}", family, model, how, arguments)
-            lines.append(line(f"{held}, {label}", *scores))
+            lines.append(line(f"{held}, {label}", scores))
             print(lines[-1], flush=True)
     write("robots", lines)
 
