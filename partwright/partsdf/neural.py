@@ -57,7 +57,7 @@ class NeuralShape:
         """(Q, N) float32 of the Q parts that are there, at points (N, 3) of the unit frame, in one pass."""
         conditioned = self.model.condition(self.latents[None])
         size = max(256, CHUNK // len(self.latents))
-        chunks = torch.from_numpy(np.ascontiguousarray(points, np.float32)).split(size)
+        chunks = torch.from_numpy(np.array(points, np.float32, order="C")).split(size)
         values = [conditioned(local_points(chunk, self.poses)[None])[0][self.present] for chunk in chunks]
         return torch.cat(values, dim=1).numpy()
 
