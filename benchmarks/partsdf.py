@@ -339,8 +339,8 @@ def training(arguments: argparse.Namespace) -> None:
     lines = ["# PartSDF: the models that ship", "",
              "Trained by `partwright parts train configs/NAME.toml --half`, on one core. Errors are means "
              "over the last epoch's samples, clamped at 0.1 of the unit frame (longest side 1.8); IoUs those "
-             "of held-out shapes reconstructed with known parts, at samples near the surface that were not "
-             "fitted. Logs: partsdf-training-NAME.csv.", "",
+             "of the first held-out shape, reconstructed with known parts, at samples near the surface that "
+             "were not fitted. Logs: partsdf-training-NAME.csv.", "",
              f"    python benchmarks/partsdf.py {' '.join(sys.argv[1:])}", "",
              "| | trained on | minutes | whole | part | overlap | IoU % | pIoU % | file, MB |",
              "|---|---|---|---|---|---|---|---|---|"]  # fmt: skip

@@ -1,0 +1,50 @@
+"""The models that ship: small, of the made families, and close to the shapes that they were trained on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import partwright as pw
+from partwright.cli.main import main
+from partwright.datasets.families.recipes import FAMILIES, make_shape
+from partwright.partsdf.model import SHIPPED, Model, load_model
+from partwright.partsdf.neural import NeuralShape
+
+# Mean IoU; the small model has not learned the thin blades of mixers.
+LEAST = {"mixers": 0.6, "chairs": 0.93, "cars": 0.96}
+
+
+@pytest.fixture(params=FAMILIES)
+def shipped(request: pytest.FixtureRequest) -> Model:
+    return load_model(request.param)
+
+
+def test_they_are_small_and_know_their_family(shipped: Model) -> None:
+    assert (SHIPPED / f"{shipped.name}.safetensors").stat().st_size < 4e6
+    assert shipped.parts == FAMILIES[shipped.name].parts
+    assert len(shipped.shapes) >= 100
+
+
+def test_training_shapes_are_those_that_were_made(shipped: Model) -> None:
+    """Of points inside the made shape or the neural one, how many are inside both."""
+    ious = []
+    for name in shipped.shapes[:3]:
+        made = make_shape(shipped.name, FAMILIES[shipped.name], 0, int(name.rpartition("_")[2]))
+        assert made.name == name
+        samples = pw.load_shape(made.whole).samples(0, 20_000, 0)
+        inside = samples.distance < 0
+        found = NeuralShape.trained(shipped, name).distances(samples.points) < 0
+        ious.append(np.count_nonzero(inside & found) / np.count_nonzero(inside | found))
+    assert np.mean(ious) > LEAST[shipped.name]
+
+
+def test_they_are_edited_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("PARTWRIGHT_MODELS", raising=False)
+    assert main(["parts", "edit", "mixers:0", "-o", "wide.json", "--scale", "tube=1.2,1.2,1"]) == 0
+    plain, wide = NeuralShape.trained(load_model("mixers"), "0"), pw.load_assembly("wide.json")
+    half = [part.field.half_lengths for part in wide.parts if part.name == "tube"]
+    np.testing.assert_allclose(half[0], plain.poses.scale[0].numpy() * [1.2, 1.2, 1.0], rtol=1e-6)
