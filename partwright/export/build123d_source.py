@@ -39,6 +39,10 @@ _SOLIDS = {
     "capsule": "bd.Cylinder({radius}, {height})"
     " + [bd.Pos(0, 0, end * {height} / 2) * bd.Sphere({radius}) for end in (-1, 1)]",
     "tube": "bd.Cylinder({radius}, {height}) - bd.Cylinder({radius} - {thickness}, {height})",
+    "hollow_box": "bd.Box(*{size})"
+    " - bd.Box({size}[0] - 2 * {thickness}, {size}[1] - 2 * {thickness}, {size}[2])",
+    "hollow_frustum": "bd.Cone({bottom_radius}, {top_radius}, {height})"
+    " - bd.Cone({bottom_radius} - {thickness}, {top_radius} * (1 - {thickness} / {bottom_radius}), {height})",
     "torus": "bd.Torus({major_radius}, {minor_radius})",
     "superfrustum": "superfrustum({size}, {roundness}, {dilation}, {taper}, {bulge}, {onion})",
 }
@@ -55,7 +59,7 @@ def write(assembly: Assembly, path: str | Path) -> None:
         SettingError: the assembly's unit is unknown.
         OutputError: the file cannot be written.
     """
-    tree, changes = solid_tree(assembly, keep=_lofted, loops=True)
+    tree, changes = solid_tree(assembly, keep=_lofted, source=True)
     parts = source_parts(tree.parts, own_axes_angles, _RESERVED)
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     drawing = superfrustum_source(parts, "build123d_superfrustum.txt")
@@ -118,11 +122,12 @@ def _function(part: SourcePart) -> Iterator[str]:
 
 def _placed(part: SourcePart, names: dict[str, str]) -> str:
     """The solid in its place, or all of its copies in theirs."""
+    turned = f", {names['turn']}" if "turn" in names else ""
     if isinstance(part.copies, Row):
-        return f"bd.Part() + [bd.Location(place, {names['turn']}) * solid for place in {names['places']}]"
+        return f"bd.Part() + [bd.Location(place{turned}) * solid for place in {names['places']}]"
     if isinstance(part.copies, Poses):
         return f"bd.Part() + [bd.Location(*pose) * solid for pose in {names['poses']}]"
-    first = f"bd.Location({names['place']}, {names['turn']}) * solid"
+    first = f"bd.Location({names['place']}{turned}) * solid"
     if part.copies is None:
         return first
     turn = f"bd.Rot({part.copies.axis.upper()}=360 / {names['count']} * i)"

@@ -50,6 +50,16 @@ _SOLIDS = {
     "            cylinder(r = {radius}, h = {height}, center = true);\n"
     "            cylinder(r = {radius} - {thickness}, h = 2 * {height}, center = true);\n"
     "        }}",
+    "hollow_box": "linear_extrude(height = {size}[2], center = true) difference() {{\n"
+    "            square([{size}[0], {size}[1]], center = true);\n"
+    "            square([{size}[0] - 2 * {thickness}, {size}[1] - 2 * {thickness}], center = true);\n"
+    "        }}",
+    "hollow_frustum": "rotate_extrude() polygon([\n"
+    "            [{bottom_radius} - {thickness}, -{height} / 2],\n"
+    "            [{bottom_radius}, -{height} / 2],\n"
+    "            [{top_radius}, {height} / 2],\n"
+    "            [{top_radius} * (1 - {thickness} / {bottom_radius}), {height} / 2]\n"
+    "        ]);",
     "torus": "rotate_extrude() translate([{major_radius}, 0]) circle(r = {minor_radius});",
     "superfrustum": "superfrustum({size}, {roundness}, {dilation}, {taper}, {bulge}, {onion});",
 }
@@ -72,7 +82,7 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
     """
     if facets < 3:
         raise ParameterError(f"facets: expected at least 3 of a full circle, got {facets}")
-    tree, changes = solid_tree(assembly, keep=_kept, loops=True)
+    tree, changes = solid_tree(assembly, keep=_kept, source=True)
     ball = Ball.around(tree)
     polyhedra = [part for part in tree.parts if isinstance(part.field, Quadric)]
     changes += [Change((part.name,), "mesh", note=f"{facets} facets to a full turn") for part in polyhedra]
@@ -122,8 +132,9 @@ def _module(part: SourcePart, ball: Ball, facets: int) -> Iterator[str]:
 
 def _loop(part: SourcePart, names: dict[str, str]) -> Iterator[str]:
     """What puts the solid, or each of its copies, in its place."""
+    turned = f" rotate({names['turn']})" if "turn" in names else ""
     if isinstance(part.copies, Row):
-        yield f"for (place = {names['places']}) translate(place) rotate({names['turn']})"
+        yield f"for (place = {names['places']}) translate(place){turned}"
     elif isinstance(part.copies, Poses):
         yield f"for (pose = {names['poses']}) translate(pose[0]) rotate(pose[1])"
     else:
@@ -133,7 +144,7 @@ def _loop(part: SourcePart, names: dict[str, str]) -> Iterator[str]:
             centre = names.get("centre")
             turn = f"translate({centre}) {turn} translate(-{centre})" if centre else turn
             yield f"for (i = [0 : {names['count']} - 1]) {turn}"
-        yield f"translate({names['place']}) rotate({names['turn']})"
+        yield f"translate({names['place']}){turned}"
 
 
 def _polyhedron(part: Part, ball: Ball, facets: int) -> str:

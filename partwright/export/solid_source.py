@@ -17,7 +17,7 @@ from partwright.export.copies import Poses, Ring, Row, pattern
 from partwright.export.identifiers import comment, identifiers
 from partwright.export.nearest import Approximation
 from partwright.export.recognise import SAME, exact_solid
-from partwright.fields import Field, Quadric, SuperFrustum
+from partwright.fields import Field, HollowBox, HollowFrustum, Quadric, SuperFrustum
 
 MEANING = {
     "size": "full extents x, y, z",
@@ -105,14 +105,15 @@ def source_parts(
 def _placed(
     part: Part, copies: Ring | Row | Poses | None, turn: Callable[[np.ndarray], tuple[float, ...]]
 ) -> dict[str, Value]:
-    """What says where the part and its copies are."""
-    turned = turn(rotation_matrix(part.rotation))
+    """What says where the part and its copies are; no turn where there is none."""
+    angles = turn(rotation_matrix(part.rotation))
+    turned: dict[str, Value] = {"turn": angles} if any(angles) else {}
     if isinstance(copies, Row):
-        return {"places": tuple(map(_tidy, copies.places)), "turn": turned}
+        return {"places": tuple(map(_tidy, copies.places)), **turned}
     if isinstance(copies, Poses):
         poses = ((_tidy(c.translation), turn(rotation_matrix(c.rotation))) for c in copies.copies)
         return {"poses": tuple(poses)}
-    placed: dict[str, Value] = {"place": _tidy(part.translation), "turn": turned}
+    placed: dict[str, Value] = {"place": _tidy(part.translation), **turned}
     if copies is not None:
         placed["count"] = copies.count
         if any(copies.centre):
@@ -141,10 +142,12 @@ def literal(value: Value, brackets: str) -> str:
 
 
 def drawn(part: Part) -> Approximation | None:
-    """A SuperFrustum as the sources' `superfrustum` draws it; None where a named solid is the same, or where
-    it does not: without volume, with a hole that the dilation closes at one end only, or bent about a centre
-    within itself."""
+    """A hollow solid, or a SuperFrustum as the sources' `superfrustum` draws it; None where a named solid is
+    the same, or where it does not: without volume, with a hole that the dilation closes at one end only, or
+    bent about a centre within itself."""
     f = part.field
+    if isinstance(f, HollowBox | HollowFrustum):
+        return Approximation(f, part, 0.0, 0.0)
     if not isinstance(f, SuperFrustum) or exact_solid(f) is not None:
         return None
     longest, half_width = max(*f.size, f.dilation), min(f.size[:2]) / 2

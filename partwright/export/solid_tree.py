@@ -17,8 +17,10 @@ from partwright.export.approximation import Change, of_part
 from partwright.export.closed_quadrics import with_closed_quadrics
 from partwright.export.copies import expanded_but
 from partwright.export.nearest import SOLIDS, Approximation, nearest_solid
-from partwright.fields import Cone, Cylinder, Field, Frustum, HollowBox, HollowFrustum
+from partwright.fields import Cone, Cylinder, Field, Frustum, HollowBox, HollowFrustum, SuperFrustum, Tube
 
+# Their repeats stay repeats in a source.
+LOOPED: tuple[type[Field], ...] = (*SOLIDS, HollowBox, HollowFrustum, SuperFrustum)
 Keep = Callable[[Part], Approximation | None]
 
 
@@ -27,21 +29,24 @@ def _keep_none(_: Part) -> None:
 
 
 def solid_tree(
-    assembly: Assembly, keep: Keep = _keep_none, length: float = 1.0, loops: bool = False
+    assembly: Assembly, keep: Keep = _keep_none, length: float = 1.0, source: bool = False
 ) -> tuple[Assembly, list[Change]]:
     """The assembly of exact solids alone, with no blend, and what was changed for it.
 
     keep: the part as the format holds it though it is none of the named solids, if it does.
     length: of the assembly's unit of length in the unit that changes are to be told in.
-    loops: named solids of one piece stay repeated, for formats that can say so.
+    source: for a program's source, which can say it: repeated and hollow solids stay one part.
 
     Raises:
         NoSurfaceError: no part has a volume, so nothing would be left.
         ParameterError: a part's field has no solid near it.
     """
     changes: list[Change] = []
-    copies = expanded_but(assembly, SOLIDS) if loops else assembly.expanded()
-    tree = _solid(_with_holes(with_closed_quadrics(copies)), True, keep, length, changes)
+    if source:
+        whole: Node = with_closed_quadrics(expanded_but(assembly, LOOPED))
+    else:
+        whole = _with_holes(with_closed_quadrics(assembly.expanded()))
+    tree = _solid(whole, True, keep, length, changes)
     if tree is None:
         raise NoSurfaceError("nothing to export: no part of the assembly has a volume")
     return tree, changes  # type: ignore[return-value]  # an assembly stays one
@@ -99,4 +104,6 @@ def _plain(solid: Field) -> Field:
         return Cylinder(solid.bottom_radius, solid.height)
     if isinstance(solid, Frustum) and solid.top_radius == 0:
         return Cone(solid.bottom_radius, solid.height)
+    if isinstance(solid, HollowFrustum) and solid.top_radius == solid.bottom_radius:
+        return Tube(solid.bottom_radius, solid.thickness, solid.height)
     return solid

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.export import export
 from partwright.export.copies import Poses, Ring, Row, pattern
-from partwright.fields import Box, Cylinder, HollowBox
+from partwright.fields import Box, Cylinder, HollowBox, HollowFrustum
 from tests.export.test_openscad import rendered
 
 
@@ -28,7 +28,7 @@ def about(axis: int, degrees: float, centre: tuple[float, ...] = (0, 0, 0)) -> S
 
 
 def machine() -> Assembly:
-    """A plate drilled around a circle and at its corners, with feet that are mirror images: 22 copies."""
+    """A plate drilled around a circle and at its corners, with feet that are mirror images: 23 copies."""
     ring = tuple(about(2, 72 * k, (10, 0, 0)) for k in range(1, 5))
     corners = tuple(Similarity(translation=move) for move in ((-80, 0, 0), (-80, -60, 0), (0, -60, 0)))
     plate = Part(Box((100, 80, 10)), name="plate")
@@ -37,7 +37,8 @@ def machine() -> Assembly:
     tilt = (math.cos(0.2), math.sin(0.2), 0, 0)
     foot = Part(Box((10, 10, 20)), (0, 30, -12), tilt, name="foot", instances=(about(2, 170),))
     cage = Part(HollowBox((10, 8, 20), 1), (0, 0, 10), name="cage", instances=(about(1, 180),))
-    return Assembly((Assembly((plate, foot, cage)), key, drill), operation="difference", unit="mm")
+    funnel = Part(HollowFrustum(6, 3, 1, 20), (-20, 0, 10), name="funnel")
+    return Assembly((Assembly((plate, foot, cage, funnel)), key, drill), operation="difference", unit="mm")
 
 
 def test_patterns_have_their_names() -> None:
@@ -49,6 +50,7 @@ def test_patterns_have_their_names() -> None:
     assert parts["cage"] == Ring(2, "y", (0, 0, 0))
 
 
+@settings(deadline=None)
 @given(
     st.integers(2, 12),
     st.integers(0, 2),
@@ -71,7 +73,8 @@ def test_openscad_builds_the_loops(tmp_path: Path) -> None:
     text = (tmp_path / "a.scad").read_text("ascii")
     assert "// drill, 4 times: cylinder\n" in text
     assert "drill_places = [[40, 30, 0], [-40, 30, 0], [-40, -30, 0], [40, -30, 0]];  // mm: where" in text
-    assert "for (place = drill_places) translate(place) rotate(drill_turn)\n" in text
+    assert "for (place = drill_places) translate(place)\n" in text
+    assert "cage_thickness = 1;  // mm: thickness of the wall\n" in text
     assert "key_count = 5;  // copies, by equal turns\n" in text
     mesh = rendered(tmp_path / "a.scad")
     assert mesh.is_watertight
