@@ -53,13 +53,15 @@ def candidates(found: list[Surfel], surface: Surface) -> list[Row]:
 
 
 def parting_planes(found: list[Surfel]) -> list[Row]:
-    """Planes through the axis of a cylinder where it runs smoothly into a plane, square to that plane.
+    """Planes through the axis of a cylinder that a plane touches or cuts, square to that plane.
 
-    A rounded end or edge ends there without a surface of its own; a union of convexes needs it as a face.
+    A rounded end or edge ends there without a surface of its own, and an arm that runs into a round eye ends
+    somewhere within it; a union of convexes needs a face there. Those that touch come first.
     """
     planes = np.array([one.row for one in found if one.kind == "plane"]).reshape(-1, 10)
-    made: list[Row] = []
-    for one in found:
+    touching: list[Row] = []
+    cutting: list[Row] = []
+    for one in sorted(found, key=lambda one: -len(one.members)):
         if one.kind != "cylinder" or len(planes) == 0:
             continue
         form, slope, _ = rows.split(one.row)
@@ -67,9 +69,14 @@ def parting_planes(found: list[Surfel]) -> list[Row]:
         axis, radius = vectors[:, 0], 1 / (2 * bent[-1])
         centre = -np.linalg.pinv(2 * form, rcond=1e-6) @ slope
         normal, offset = planes[:, 3:6], planes[:, 6]
-        reach = np.abs(normal @ centre + offset)
-        for n in normal[(np.abs(normal @ axis) < _TANGENT) & (np.abs(reach - radius) < _TANGENT)]:
+        reach = np.abs(normal @ centre + offset) - radius
+        for n, over in zip(normal, reach, strict=True):
+            if np.abs(n @ axis) > _TANGENT or over > _TANGENT:
+                continue
             across = np.cross(n, axis)
             across /= np.linalg.norm(across)
-            made.append(rows.plane(across, float(across @ centre)))
-    return made[:_CUTS]
+            row = rows.plane(across, float(across @ centre))
+            made = touching if over > -_TANGENT else cutting
+            if not any(min(np.abs(row - k).max(), np.abs(row + k).max()) < _SAME for k in made):
+                made.append(row)
+    return (touching + cutting)[:_CUTS]

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from partwright.capri import detection, rows, surface
-from partwright.capri.candidates import Pool, candidates
+from partwright.capri.candidates import Pool, candidates, parting_planes
 from partwright.capri.kinds import KINDS
 from partwright.shapes import load_shape
 from tests.capri.meshes import drilled_plate, tilted_rod
@@ -93,3 +93,14 @@ def test_without_cross_terms_a_tilted_rod_has_no_cylinder() -> None:
     found, drawn = found_on(tilted_rod())
     pool = Pool.of(candidates(found, drawn), nested=False, oriented=False)
     assert rows.is_plane(pool.rows).all()
+
+
+def test_an_arm_that_runs_into_an_eye_may_end_at_its_axis() -> None:
+    """No surface shows where the arm ends; planes through the eyes' axes part it."""
+    arm = trimesh.creation.box((1.2, 0.3, 0.2))
+    eyes = [trimesh.creation.cylinder(0.3, 0.4, sections=64) for _ in range(2)]
+    for eye, x in zip(eyes, (-0.6, 0.6), strict=True):
+        eye.apply_translation((x, 0, 0))
+    found, _ = found_on(trimesh.boolean.union([arm, *eyes]))  # 1.8 long: in the unit frame already
+    parting = {tuple(np.round(np.abs(row[3:7]), 3)) for row in parting_planes(found)}
+    assert parting == {(1.0, 0.0, 0.0, 0.6)}
