@@ -25,7 +25,8 @@ import trimesh
 import partwright as pw
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.export.axes import to_metres_z_up
-from partwright.export.mjcf import DENSITY, GEOMS
+from partwright.export.bodies import DENSITY
+from partwright.export.mjcf import GEOMS
 from partwright.export.primitives import TOLERANCE, geometries
 from partwright.fields import Box
 from partwright.meshing.mass import MassProperties, mass_properties

@@ -8,28 +8,23 @@ and inertia are those of the blended surface, overlaps counted once, not the sum
 from __future__ import annotations
 
 import xml.etree.ElementTree as xml
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright import __version__
 from partwright.errors import UnitError
-from partwright.export.approximation import write_report
-from partwright.export.axes import to_metres_z_up, unknowns
+from partwright.export.bodies import DENSITY, Body, numbers
 from partwright.export.ellipsoid import Ellipsoid
-from partwright.export.primitives import TOLERANCE, Geometry, geometries
+from partwright.export.primitives import TOLERANCE, Geometry
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
-from partwright.meshing.mass import MassProperties, check_density, mass_properties
-from partwright.writing import write_bytes
+from partwright.meshing.mass import MassProperties
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly
 
 GEOMS: tuple[type[Field], ...] = (Box, Cylinder, Sphere, Capsule, Ellipsoid)
 SMALLEST_INERTIA = 1e-14  # kg m2; MuJoCo's own limit is mjMINVAL, 1e-15
-DENSITY = 1000.0  # kg/m3: water
 
 
 def write(
@@ -46,42 +41,21 @@ def write(
     side, before a mesh stands for it. free_joint: whether the body may move; else it is fixed to the world.
     resolution: cells along a part that becomes a mesh.
     """
-    check_density(density)
-    frame = to_metres_z_up(assembly)
-    local = assembly.transformed(frame)
-    geoms, changes = geometries(local, GEOMS, tolerance, resolution, convex=True, length=1 / frame.scale)
-    name = assembly.name or "assembly"
-    root = xml.Element("mujoco", model=name)
-    notes = unknowns(assembly)
-    for text in (f"Partwright {__version__}; density {density:g} kg/m3", *notes):
-        root.append(xml.Comment(f" {text} "))
+    made = Body.of(assembly, GEOMS, density, tolerance, resolution, convex=True)
+    _check_size(made.properties, density)
+    root = made.root("mujoco", model=made.name)
     xml.SubElement(root, "compiler", angle="radian")
-    meshes = [geom for geom in geoms if geom.mesh is not None]
+    meshes = [geom for geom in made.geometries if geom.mesh is not None]
     asset = xml.SubElement(root, "asset") if meshes else root
     for geom in meshes:
         _add_mesh(asset, geom)
-    body = xml.SubElement(xml.SubElement(root, "worldbody"), "body", name=name)
+    body = xml.SubElement(xml.SubElement(root, "worldbody"), "body", name=made.name)
     if free_joint:
         xml.SubElement(body, "freejoint")
-    properties = mass_properties(local)
-    _check_size(properties, density)
-    _add_inertial(body, properties, density)
-    for geom in geoms:
+    _add_inertial(body, made.properties, density)
+    for geom in made.geometries:
         _add_geom(body, geom)
-    xml.indent(root)
-    write_bytes(path, xml.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
-    write_report(
-        assembly,
-        path,
-        changes,
-        notes,
-        mass_properties=properties.to_dict("m" if assembly.unit else None, density),
-    )
-
-
-def numbers(values: Iterable[float]) -> str:
-    """As XML attributes hold them."""
-    return " ".join(f"{value:.9g}" for value in values)
+    made.write(root, path)
 
 
 def _check_size(properties: MassProperties, density: float) -> None:

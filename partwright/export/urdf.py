@@ -14,15 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright import __version__
 from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import rotation_matrix
-from partwright.export.approximation import write_report
-from partwright.export.axes import to_metres_z_up, unknowns
-from partwright.export.mjcf import DENSITY, numbers
-from partwright.export.primitives import TOLERANCE, Geometry, geometries
+from partwright.export.bodies import DENSITY, Body, numbers
+from partwright.export.primitives import TOLERANCE, Geometry
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
-from partwright.meshing.mass import MassProperties, check_density, mass_properties
+from partwright.meshing.mass import MassProperties
 from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
@@ -46,32 +43,16 @@ def write(
     side. free_joint: whether a floating joint ties it to a link "world"; else the link is the root.
     resolution: cells along a part that becomes a mesh.
     """
-    check_density(density)
-    frame = to_metres_z_up(assembly)
-    local = assembly.transformed(frame)
-    found, changes = geometries(local, SOLIDS, tolerance, resolution, convex=False, length=1 / frame.scale)
-    name = assembly.name or "assembly"
-    root = xml.Element("robot", name=name)
-    notes = unknowns(assembly)
-    for text in (f"Partwright {__version__}; density {density:g} kg/m3", *notes):
-        root.append(xml.Comment(f" {text} "))
-    link = xml.SubElement(root, "link", name=name)
-    properties = mass_properties(local)
-    _add_inertial(link, properties, density)
-    files = _write_meshes([geometry for geometry in found if geometry.part is None], Path(path))
-    for geometry in found:
+    body = Body.of(assembly, SOLIDS, density, tolerance, resolution, convex=False)
+    root = body.root("robot", name=body.name)
+    link = xml.SubElement(root, "link", name=body.name)
+    _add_inertial(link, body.properties, density)
+    files = _write_meshes([geometry for geometry in body.geometries if geometry.part is None], Path(path))
+    for geometry in body.geometries:
         _add_geometry(link, geometry, files)
     if free_joint:
-        _add_free_joint(root, name)
-    xml.indent(root)
-    write_bytes(path, xml.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
-    write_report(
-        assembly,
-        path,
-        changes,
-        notes,
-        mass_properties=properties.to_dict("m" if assembly.unit else None, density),
-    )
+        _add_free_joint(root, body.name)
+    body.write(root, path)
 
 
 def roll_pitch_yaw(rotation: np.ndarray) -> tuple[float, float, float]:
