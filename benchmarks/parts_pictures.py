@@ -1,0 +1,97 @@
+"""Pictures of the page on learned parts: what the models that ship find, and how they are edited.
+
+    python benchmarks/parts_pictures.py --families FOLDER [--only cars]
+
+FOLDER holds the prepared families chairs and cars, as configs/ name them. The first test shapes are
+reconstructed without labels or poses; edits and interpolations are of training shapes. Pictures go
+to docs/images/parts/, one a family.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import torch
+import trimesh
+
+from partwright.datasets.prepared import PreparedFamily, PreparedShape
+from partwright.partsdf import Model, NeuralShape, ReconstructionSettings, editing, load_model
+from partwright.partsdf.pictures import picture
+from partwright.partsdf.reconstruction import Target, reconstruct_unknown
+from partwright.render import Camera, render_mesh, sheet, write_png
+
+TARGET = Path(__file__).parents[1] / "docs" / "images" / "parts"
+CAMERA = Camera(margin=0.12)
+PANEL, RESOLUTION, ITERATIONS = 220, 96, 200
+TESTED, STEPS = 2, 6  # test shapes, pictures of an interpolation
+
+
+def larger_wheels(car: NeuralShape) -> NeuralShape:
+    for part in (name for name in car.model.parts if name.startswith("wheel")):
+        car = editing.scaled(car, part, (1.3, 1.3, 1.0))
+    return car
+
+
+def another_back(chair: NeuralShape) -> NeuralShape:
+    return editing.swapped(chair, "back", NeuralShape.trained(chair.model, "5"))
+
+
+EDITS: dict[str, tuple[str, Callable[[NeuralShape], NeuralShape]]] = {
+    "chairs": ("another's back", another_back),
+    "cars": ("larger wheels", larger_wheels),
+}
+WAYS = {"chairs": ("0", "1"), "cars": ("0", "11")}  # ends of interpolations
+
+
+def page(name: str, family: PreparedFamily) -> np.ndarray:
+    """Above what is found in shapes not trained on, and an edit; below the way from one shape to another."""
+    model = load_model(name)
+    panels, captions = [], []
+    for index in family.split("test")[:TESTED]:
+        shape = family.load(index)
+        panels += [given(shape), found(model, shape)]
+        captions += ["given", "parts found"]
+    what, edit = EDITS[name]
+    first, last = (NeuralShape.trained(model, number) for number in WAYS[name])
+    panels += [drawn(first), drawn(edit(first))]
+    captions += ["learned", what]
+    ways = np.linspace(0, 1, STEPS)
+    panels += [drawn(editing.interpolated(first, last, t)) for t in ways]
+    captions += [f"{t:.1f}" for t in ways]
+    return sheet(panels, captions, columns=STEPS)
+
+
+def given(shape: PreparedShape) -> np.ndarray:
+    mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
+    return render_mesh(mesh, CAMERA, (PANEL, PANEL))
+
+
+def found(model: Model, shape: PreparedShape) -> np.ndarray:
+    target = Target(torch.tensor(shape.points), torch.tensor(shape.sdf))
+    return drawn(reconstruct_unknown(model, target, ReconstructionSettings(iterations=ITERATIONS)))
+
+
+def drawn(shape: NeuralShape) -> np.ndarray:
+    return picture(shape, RESOLUTION, PANEL, CAMERA)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--families", type=Path, required=True, metavar="FOLDER", help="of prepared families")
+    parser.add_argument("--only", default=",".join(EDITS), metavar="A,B", help="of these families")
+    arguments = parser.parse_args()
+    torch.set_num_threads(1)
+    TARGET.mkdir(parents=True, exist_ok=True)
+    for name in arguments.only.split(","):
+        write_png(TARGET / f"{name}.png", page(name, PreparedFamily(arguments.families / name)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
