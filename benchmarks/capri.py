@@ -270,9 +270,15 @@ def main() -> int:
             run = fit_once(entry, row, options.seed, options.threads)
             append(RESULTS, run)
             print(row, entry.name, run.outcome, cells([run], mean), flush=True)
+            write_tables(options)
+    write_tables(options)
+    return 0
+
+
+def write_tables(options: argparse.Namespace) -> None:
+    """capri.md, of what the CSV file holds."""
     runs = read(RESULTS)
     write_bytes(RESULTS.with_suffix(".md"), document(runs, _command(options, runs)).encode())
-    return 0
 
 
 def _command(options: argparse.Namespace, runs: list[Run]) -> str:

@@ -11,6 +11,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.capri import rows
 from partwright.fields import Quadric
 
+_FAR = 4.0  # unit frame: what reaches further was judged by no sample there
 Convex = tuple[int, ...]
 Layers = tuple[tuple[Convex, ...], ...]
 
@@ -47,14 +48,14 @@ class Tree:
         return result
 
     def closed(self, lower: ArrayLike, upper: ArrayLike) -> Tree:
-        """Added convexes that do not end are cut off at the box (3,), (3,) around the shape."""
+        """Added convexes that do not end, or far off, are cut off at the box (3,), (3,) around the shape."""
         sides = [rows.plane(-e, float(-c)) for e, c in zip(np.eye(3), np.asarray(lower), strict=True)]
         sides += [rows.plane(e, float(c)) for e, c in zip(np.eye(3), np.asarray(upper), strict=True)]
         table = np.concatenate([self.rows, sides])
         complement = np.r_[self.complement, np.zeros(6, dtype=bool)]
 
         def ended(convex: Convex) -> Convex:
-            open_ = np.flatnonzero(~np.isfinite(self._node(convex, "").bounds()))
+            open_ = np.flatnonzero(~(np.abs(self._node(convex, "").bounds()) < _FAR))
             return (*convex, *(int(i) + len(self.rows) for i in open_))
 
         layers = tuple(c if k % 2 else tuple(map(ended, c)) for k, c in enumerate(self.layers))
