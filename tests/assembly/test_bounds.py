@@ -41,7 +41,7 @@ def test_half_ring() -> None:
     assert np.allclose(bounds, [[-1.1, -0.1, -1.1], [0.0, 0.1, 1.1]], atol=2e-3)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(PARTS | ASSEMBLIES)
 def test_nothing_lies_outside(node: Part | Assembly) -> None:
     lower, upper = node.bounds()
@@ -51,7 +51,7 @@ def test_nothing_lies_outside(node: Part | Assembly) -> None:
     assert node.distance(points[outside]).min() > -1e-4
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(PARTS)
 def test_every_side_is_reached(part: Part) -> None:
     """No face of the box stands further off than a tenth of its longest side."""

@@ -46,7 +46,7 @@ def test_nested_node_joins_with_its_own_blend() -> None:
     assert np.allclose(got, smooth_union(length(POINTS) - 1.0, inner, 0.3), atol=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(ASSEMBLIES)
 def test_kernel_and_reference_agree(assembly: Assembly) -> None:
     reference = assembly.distance(torch.tensor(POINTS, dtype=torch.float64)).numpy()
@@ -60,7 +60,7 @@ def test_torch_points_get_gradients() -> None:
     assert torch.allclose(points.grad, torch.tensor([[1.0, 0, 0], [0, 1.0, 0]], dtype=torch.float64))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(ASSEMBLIES, SIMILARITIES)
 def test_distance_moves_with_the_assembly(assembly: Assembly, move: Similarity) -> None:
     before = assembly.distance(POINTS)

@@ -20,7 +20,7 @@ from tests.assembly.strategies import ASSEMBLIES
 SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "assembly.schema.json").read_text())
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(ASSEMBLIES)
 def test_round_trip_is_exact_and_the_schema_holds(tmp_path: Path, assembly: Assembly) -> None:
     assembly.save(tmp_path / "a.json")

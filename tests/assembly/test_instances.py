@@ -42,7 +42,7 @@ def test_a_repeated_part_is_one_leaf() -> None:
     assert np.allclose(values[1], LEG.distance(POINTS), atol=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(ASSEMBLIES)
 def test_instances_equal_the_union_of_the_moved_copies(assembly: Assembly) -> None:
     apart = assembly.expanded()
@@ -52,7 +52,7 @@ def test_instances_equal_the_union_of_the_moved_copies(assembly: Assembly) -> No
     assert np.abs(assembly.distance(POINTS) - apart.distance(POINTS)).max() < 2e-5 * size
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(PARTS)
 def test_a_part_is_the_blended_union_of_its_copies(part: Part) -> None:
     expected = Assembly(part.copies).distance(POINTS)
@@ -61,7 +61,7 @@ def test_a_part_is_the_blended_union_of_its_copies(part: Part) -> None:
     assert np.allclose(torched, expected, atol=1e-4)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(PARTS, SIMILARITIES)
 def test_similarities_take_the_copies_along(part: Part, move: Similarity) -> None:
     moved = part.transformed(move)

@@ -38,7 +38,7 @@ def test_given_names_win_over_numbered_ones() -> None:
     ]  # fmt: skip
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(ASSEMBLIES)
 def test_leaf_names_are_unique_and_stay(assembly: Assembly) -> None:
     assert all(names(assembly))
@@ -82,7 +82,7 @@ def test_edits_that_cannot_be(mug: Assembly) -> None:
         (BALL - Part(Sphere(0.5), name="hole")).without("ball")
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SIMILARITIES, SIMILARITIES, PARTS)
 def test_similarities_form_a_group(a: Similarity, b: Similarity, part: Part) -> None:
     points = np.random.default_rng(0).normal(size=(5, 3))
@@ -101,7 +101,7 @@ def test_matrices_that_are_no_similarity() -> None:
             Similarity.from_matrix(np.diag(diagonal))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(PARTS)
 def test_rows_round_trip(part: Part) -> None:
     back, *copies = parts_from_rows(rows([part]))

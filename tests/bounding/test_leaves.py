@@ -68,7 +68,7 @@ def test_slopes_are_finite_differences_of_the_whole(name: str) -> None:
 
 
 @pytest.mark.parametrize("field", SOLIDS, ids=lambda field: field.kind)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(by=st.floats(-0.05, 0.1))
 def test_a_grown_part_lies_that_much_further_out(field, by: float) -> None:
     """Everywhere that the part reached, and only a little beyond."""

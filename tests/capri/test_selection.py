@@ -30,7 +30,7 @@ layers = st.lists(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 20), layers, st.sets(st.integers(0, 7), min_size=1, max_size=4), st.integers(0, 1))
 def test_worth_is_the_fall_of_the_error(seed: int, given: Layers, new: set[int], at: int) -> None:
     p = problem(seed)
@@ -40,7 +40,7 @@ def test_worth_is_the_fall_of_the_error(seed: int, given: Layers, new: set[int],
     assert p.error(given) - p.error(with_it) == fall
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 20), st.sets(st.integers(0, 7), min_size=1, max_size=4))
 def test_improving_never_loses_and_ends_where_no_single_move_gains(seed: int, start: set[int]) -> None:
     p = problem(seed)

@@ -33,7 +33,7 @@ def best(fits: list[PrimitiveFit], kind: str) -> PrimitiveFit:
     return min((fit for fit in fits if fit.kind == kind), key=lambda fit: fit.chamfer)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(turns)
 def test_a_turned_cuboid_is_found(turn: np.ndarray) -> None:
     scale, place = np.array([0.3, 0.5, 0.1]), np.array([0.1, -0.2, 0.3])
@@ -46,7 +46,7 @@ def test_a_turned_cuboid_is_found(turn: np.ndarray) -> None:
     assert np.linalg.det(fit.rotation) == pytest.approx(1)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(turns)
 def test_a_turned_cylinder_is_found_and_is_no_cuboid(turn: np.ndarray) -> None:
     made = trimesh.creation.cylinder(radius=0.3, height=0.8, sections=48)

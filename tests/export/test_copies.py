@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from partwright.assembly import Assembly, Part, Similarity
@@ -50,7 +50,6 @@ def test_patterns_have_their_names() -> None:
     assert parts["cage"] == Ring(2, "y", (0, 0, 0))
 
 
-@settings(deadline=None)
 @given(
     st.integers(2, 12),
     st.integers(0, 2),

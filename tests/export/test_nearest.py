@@ -44,7 +44,7 @@ MEMBERS = st.one_of(
 )
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(MEMBERS)
 def test_exact_members_are_recognised(solid: Solid) -> None:
     part = Part(solid.superfrustum(), (1, 2, 3), (0.5, 0.5, 0.5, 0.5), blend=0.1, name="x")

@@ -202,7 +202,7 @@ def test_threads_do_not_change_a_bit() -> None:
         )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.integers(0, 2**32 - 1))
 def test_no_nan_at_the_ends_of_the_ranges(seed: int) -> None:
     generator = np.random.default_rng(seed)

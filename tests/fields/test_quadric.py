@@ -65,7 +65,7 @@ def test_an_ellipsoids_distance_is_a_lower_bound_and_first_order(radii: tuple[fl
 
 
 @given(COEFFICIENTS)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_distance_is_finite_has_the_polynomials_sign_and_agrees_in_torch(c: tuple[float, ...]) -> None:
     quadric = Quadric(c)
     value, distance = quadric.polynomial(POINTS), quadric(POINTS)
@@ -82,7 +82,7 @@ def test_the_gradient_in_torch_is_that_of_finite_differences() -> None:
 
 
 @given(COEFFICIENTS, st.integers(0, 50), st.floats(0.1, 8))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_moving_and_scaling_take_the_field_along(c: tuple[float, ...], seed: int, factor: float) -> None:
     quadric, turn, shift = Quadric(c), rotation(seed), np.array([0.3, -0.8, 0.5])
     moved = quadric.moved(turn, shift)

@@ -46,7 +46,7 @@ def polygon_distance(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     return np.where(crossings % 2 == 1, -1, 1) * np.sqrt(np.min(squares, axis=0))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seeds)
 def test_profile_is_the_distance_to_the_quad(seed: int) -> None:
     generator = np.random.default_rng(seed)
@@ -66,7 +66,7 @@ def test_profile_is_the_distance_to_the_quad(seed: int) -> None:
     np.testing.assert_allclose(found, polygon_distance(plane, corners), atol=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seeds)
 def test_bend_follows_the_arc(seed: int) -> None:
     generator = np.random.default_rng(seed)
@@ -95,7 +95,7 @@ def test_half_ring_is_exact() -> None:
     np.testing.assert_allclose(distance(ring, points), truth, atol=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seeds)
 def test_pose_moves_the_field_rigidly(seed: int) -> None:
     generator = np.random.default_rng(seed)
@@ -110,7 +110,7 @@ def test_pose_moves_the_field_rigidly(seed: int) -> None:
     assert ((posed - own).abs() < 1e-9).double().mean() > 0.95
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seeds, st.floats(1e-3, 1e3))
 def test_scaling_law(seed: int, factor: float) -> None:
     generator = np.random.default_rng(seed)
@@ -121,7 +121,7 @@ def test_scaling_law(seed: int, factor: float) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-6 * factor)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(seeds)
 def test_straight_fields_are_one_lipschitz(seed: int) -> None:
     generator = np.random.default_rng(seed)
@@ -135,7 +135,7 @@ def test_straight_fields_are_one_lipschitz(seed: int) -> None:
     assert (change <= (first - second).norm(dim=1) + 1e-10).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seeds)
 def test_a_vanishing_bulge_is_no_bulge(seed: int) -> None:
     generator = np.random.default_rng(seed)
@@ -163,7 +163,7 @@ def test_a_straight_axis_feels_which_way_to_bend(dtype: torch.dtype) -> None:
         assert abs(numeric) > 0.1
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seeds, st.floats(0, 0.4))
 def test_dilation_is_an_offset(seed: int, more: float) -> None:
     generator = np.random.default_rng(seed)
@@ -178,7 +178,7 @@ def test_dilation_is_an_offset(seed: int, more: float) -> None:
         np.testing.assert_allclose(after, before - more, atol=1e-12)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(seeds, st.sampled_from([torch.float32, torch.float64]))
 def test_finite_at_the_ends_of_all_ranges(seed: int, dtype: torch.dtype) -> None:
     """Values and every gradient at centre, axis, corners, ends and arc centre of degenerate primitives."""

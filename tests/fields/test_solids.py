@@ -85,7 +85,7 @@ def test_scaling_and_files_keep_the_field(solid: Field) -> None:
         solid.scaled(0)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.integers(0, 2**32 - 1))
 def test_bounds_hold_the_inside(seed: int) -> None:
     generator = np.random.default_rng(seed)

@@ -51,7 +51,7 @@ def test_thin_hollow_and_bent_parts_are_complete(field: object, euler: int, volu
         assert mesh.volume == pytest.approx(volume, rel=0.06)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     size=st.tuples(*[st.floats(0.05, 1.0)] * 3),
     roundness=st.floats(0, 1),
@@ -118,7 +118,7 @@ def test_nothing_left_is_named() -> None:
         mesh_assembly(Part(Sphere(0.5)) - Part(Sphere(1.0)), 24)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     places=st.lists(st.tuples(*[st.floats(-0.5, 0.5)] * 3), min_size=1, max_size=4),
     bulge=st.floats(0, 1),

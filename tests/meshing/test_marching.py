@@ -41,7 +41,7 @@ def assert_closed(mesh: trimesh.Trimesh) -> None:
 
 
 @pytest.mark.parametrize("sharp", [False, True])
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(seed=st.integers(0, 2**31))
 def test_closed_manifold_for_random_signs(sharp: bool, seed: int) -> None:
     """Noise at the lattice holds all 256 patterns with every ambiguous face."""

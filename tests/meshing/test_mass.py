@@ -70,7 +70,7 @@ def test_overlaps_count_once() -> None:
     assert mass_properties(Assembly((box, box))).volume == pytest.approx(1, rel=1e-3)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.floats(0.01, 100.0),
     st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1),

@@ -72,7 +72,7 @@ def test_chamfer_by_hand() -> None:
     assert chamfer(pair, single) == pytest.approx((4 + 5) / 2 + 4)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(shift=st.tuples(*[st.floats(-2, 2)] * 3), seed=st.integers(0, 99))
 def test_emd_of_a_shifted_set_is_the_shift(shift: tuple[float, float, float], seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -108,7 +108,7 @@ def test_an_intersection_counts_as_one_part() -> None:
     assert overlap(Assembly((lens, box(0.0)))) == pytest.approx(0.5, abs=0.01)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(scale=st.floats(1e-5, 1e5), x=st.floats(-100, 100))
 def test_overlap_does_not_change_with_size_and_place(scale: float, x: float) -> None:
     pair = box(0.0) | box(0.5)

@@ -35,7 +35,7 @@ def test_a_part_across_a_border_nests_as_far_as_it_keeps_to_its_side() -> None:
     assert nesting(shifted, HALVES) == pytest.approx(7 / 8, abs=0.03)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(scale=st.floats(1e-3, 1e3), x=st.floats(-50, 50))
 def test_nesting_does_not_change_with_size_and_place(scale: float, x: float) -> None:
     shifted = Assembly((bar("a", 0, 5, "left"), bar("b", 5, 8, "right")))

@@ -97,7 +97,7 @@ def test_what_cannot_be_edited_is_said(model: Model, lamp: NeuralShape) -> None:
         editing.interpolated(lamp, stranger, 0.5)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(quaternions, quaternions, st.floats(0, 1))
 def test_slerp_runs_at_constant_speed_the_short_way(a: tuple, b: tuple, t: float) -> None:
     first, last = (torch.tensor(q, dtype=torch.float64) / math.hypot(*q) for q in (a, b))
@@ -108,7 +108,7 @@ def test_slerp_runs_at_constant_speed_the_short_way(a: tuple, b: tuple, t: float
     assert part == pytest.approx(t * whole, abs=1e-3)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(quaternions)
 def test_rotation_matrices_are_those_of_assemblies(q: tuple) -> None:
     from partwright.assembly import Similarity

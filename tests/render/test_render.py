@@ -30,7 +30,7 @@ def seen(image: np.ndarray) -> np.ndarray:
     return spread > 40
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     azimuth=st.floats(-180, 180),
     elevation=st.floats(-80, 80),

@@ -107,7 +107,7 @@ def test_occupancy_is_the_sign_at_the_cell_centres():
     assert shape.unit_occupancy(64) is occupied
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000))
 def test_scan_conversion_is_an_exact_winding_number(seed):
     rng = np.random.default_rng(seed)
@@ -122,7 +122,7 @@ def test_scan_conversion_is_an_exact_winding_number(seed):
     np.testing.assert_array_equal(counted.ravel()[clear], np.round(exact[clear]))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     centre=st.tuples(*[st.floats(-1e3, 1e3)] * 3),
     size=st.floats(1e-6, 1e6),
@@ -147,7 +147,7 @@ def test_a_fold_without_thickness_does_not_turn_signs():
     assert shape.volume == pytest.approx(1.8**3)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), dropped=st.integers(1, 40))
 def test_fans_close_any_surface(seed, dropped):
     rng = np.random.default_rng(seed)

@@ -73,7 +73,7 @@ def test_distances_follow_the_grid():
         assert abs(error.mean()) < 0.08
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 10_000))
 def test_every_voxel_centre_stays_on_its_side(seed):
     rng = np.random.default_rng(seed)
@@ -226,7 +226,7 @@ def test_binvox_files_that_lie_are_refused(tmp_path, data):
         load_shape(path)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(place=st.floats(0, 1), byte=st.integers(0, 255), suffix=st.sampled_from([".npy", ".npz", ".binvox"]))
 def test_one_broken_byte_never_escapes_as_a_library_error(tmp_path, place, byte, suffix):
     filled = np.zeros((6, 6, 6), dtype=bool)
@@ -252,7 +252,7 @@ def test_missing_and_empty_files_are_named(tmp_path, suffix):
         load_shape(tmp_path / f"zero{suffix}")
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000))
 def test_contours_of_any_values_are_closed_and_face_outwards(seed):
     rng = np.random.default_rng(seed)

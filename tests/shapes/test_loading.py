@@ -160,7 +160,7 @@ def test_truncated_files_give_a_named_error_or_a_shape(tmp_path, suffix, kept):
         load_shape(path)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.binary(min_size=1, max_size=300), suffix=st.sampled_from(MESH_SUFFIXES))
 def test_garbage_gives_a_named_error(tmp_path, data, suffix):
     path = tmp_path / f"garbage{suffix}"
@@ -169,7 +169,7 @@ def test_garbage_gives_a_named_error(tmp_path, data, suffix):
         load_shape(path)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     place=st.floats(0, 1),
     byte=st.integers(0, 255),

@@ -108,7 +108,7 @@ def test_estimated_normals_face_outwards(mesh):
     assert np.median(cosine) > 0.998
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 1000), size=st.floats(1e-5, 1e5))
 def test_turning_scaling_and_noise_change_nothing_much(seed, size):
     rng = np.random.default_rng(seed)

@@ -116,7 +116,7 @@ def test_a_field_negative_up_to_the_border_and_a_line_of_voxels() -> None:
     assert (line >= 0).all()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 10_000), regions=st.integers(1, 6), kappa=st.floats(1e-4, 0.5))
 def test_regions_are_disjoint_within_the_residual_and_repeat(seed: int, regions: int, kappa: float) -> None:
     generator = np.random.default_rng(seed)

@@ -132,7 +132,7 @@ def test_the_matrix_is_the_curvature_of_the_loss_where_it_fits() -> None:
         assert kernel.loss(near, target, beta) == pytest.approx(expected, rel=0.03)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 1000), beta=st.floats(5, 300))
 def test_the_matrix_is_symmetric_and_positive_semidefinite(seed: int, beta: float) -> None:
     target = exact_target(random_rows(3, seed), 1500, seed)
@@ -190,7 +190,7 @@ def test_weight_zero_is_not_there() -> None:
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 1000), density=st.floats(0, 1))
 def test_locked_parameters_stay_bit_for_bit(seed: int, density: float) -> None:
     generator = np.random.default_rng(seed)
@@ -220,7 +220,7 @@ def test_a_locked_bulge_stays_where_the_size_shrinks() -> None:
     assert found[0, COLUMN_OF[BULGE]] == bent[0, COLUMN_OF[BULGE]]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 1000))
 def test_bounds_are_kept_and_the_loss_never_rises(seed: int) -> None:
     rows, target = random_rows(3, seed), exact_target(random_rows(1, seed + 7), 1500)
@@ -279,7 +279,7 @@ def test_starts_are_fitted_each_to_its_own_samples() -> None:
         assert losses[i] == loss
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 1000), parts=st.integers(1, 6), minus=st.sets(st.integers(0, 5)))
 def test_removal_counts_equal_counting_again(seed: int, parts: int, minus: set[int]) -> None:
     generator = np.random.default_rng(seed)

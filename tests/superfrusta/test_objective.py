@@ -71,7 +71,7 @@ def test_nothing_scores_nothing() -> None:
     assert volume_iou(made, none) == 0.0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 1000), parts=st.integers(1, 6))
 def test_removal_scores_equal_the_scores_of_what_is_left(seed: int, parts: int) -> None:
     rows, points = random_rows(parts, seed), points_in_box(1200, seed)
@@ -85,7 +85,7 @@ def test_removal_scores_equal_the_scores_of_what_is_left(seed: int, parts: int) 
     np.testing.assert_allclose(without, left, atol=1e-5)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 1000))
 def test_the_score_is_an_iou(seed: int) -> None:
     """Between 0 and 1, 1 only for equality, and it rises with every sample put right."""

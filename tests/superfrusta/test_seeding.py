@@ -41,7 +41,7 @@ def check(rows: np.ndarray) -> None:
     assert (rows[:, SHAPE] <= upper[6:]).all()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     size=st.tuples(*[st.floats(0.1, 0.8)] * 3),
     angles=st.tuples(*[st.floats(-3, 3)] * 3),

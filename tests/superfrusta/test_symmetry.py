@@ -49,7 +49,7 @@ def kinds(found: tuple[Symmetry, ...]) -> list[tuple[str, int]]:
     return sorted((s.kind, s.order) for s in found)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SUPERFRUSTA, VECTOR, ROTATION, st.sampled_from(ISOMETRIES))
 def test_the_image_of_a_part_has_the_moved_field(field, translation, turn, isometry: Isometry) -> None:
     row = rows([Part(field, translation, turn)])[0].astype(np.float32)
