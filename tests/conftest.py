@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import signal
+
 from hypothesis import settings
 
 # A busy machine is no defect: how long an example takes is measured by benchmarks, not by tests.
 settings.register_profile("patient")
 settings.load_profile("patient")
+
+# A shell starts background jobs with Ctrl-C ignored, and Python then leaves it so.
+signal.signal(signal.SIGINT, signal.default_int_handler)

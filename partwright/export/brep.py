@@ -9,22 +9,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.assembly import Assembly, Node, Part
+from partwright.assembly import Part
 from partwright.assembly.rows import as_superfrustum
-from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import MissingDependencyError, NoSurfaceError
 from partwright.export.brep_bent import bent_solid
 from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
-from partwright.export.brep_quadrics import quadric_solid
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
-from partwright.export.closed_quadrics import Ball
 from partwright.export.nearest import Approximation
 from partwright.export.recognise import SAME
 from partwright.fields import Field, Quadric, Solid, SuperFrustum
@@ -33,9 +30,7 @@ from partwright.meshing import mesh_part
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-_LOST = 1e-4  # of the larger volume: what an operation may lose by rounding
 _INTEGRATED = 1e-6  # relative error of volumes; without it B-splines are integrated to 1 %
-_FUZZY = (0.0, 1e-5, 1e-3)  # tolerances of operations, of the cube root of the volume
 _SHORTEST = 1e-5  # of the longest side: shorter edges are left out
 _STRAIGHT = 1e-4  # radians: an arc of this half angle is none
 # What is built may be off by this share of volume and longest side; the mesh that it is held against lacks a
@@ -180,104 +175,6 @@ def _places(shape: TopoDS_Shape, chord: float) -> np.ndarray:
             places += [(node.X(), node.Y(), node.Z()) for node in nodes]
         faces.Next()
     return np.array(places, np.float32).reshape(-1, 3)
-
-
-def combined(node: Node, ball: Ball, apart: list[str]) -> TopoDS_Shape:
-    """The node's solids, of `built` fields, joined by the boolean operations of its tree.
-
-    ball: holds all of the node; quadrics that do not end are closed off outside of it.
-    apart: takes the names of what OpenCASCADE cannot unite with the rest; it stays a solid of its own.
-
-    Raises:
-        NoSurfaceError: the operations leave nothing, or OpenCASCADE cannot do them.
-    """
-    from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-
-    if isinstance(node, Part):
-        return placed(node, ball)
-    result, left = combined(node.children[0], ball, apart), []
-    for child in node.children[1:]:
-        solid = combined(child, ball, apart)
-        try:
-            result = _operated(node.operation, result, solid, _label(child))
-        except NoSurfaceError:
-            if node.operation != "union":
-                raise
-            left.append(solid)
-            apart.append(child.name or _label(child))
-    if len(node.children) > 1:
-        unify = ShapeUpgrade_UnifySameDomain(result, True, True, False)
-        unify.Build()
-        result = _side_by_side([unify.Shape(), *left])
-    if not TopExp_Explorer(result, TopAbs_ShapeEnum.TopAbs_SOLID).More():
-        raise NoSurfaceError(f"nothing to export: the {node.operation} of {_label(node)} is empty")
-    return result
-
-
-def _side_by_side(solids: list[TopoDS_Shape]) -> TopoDS_Shape:
-    from OCP.BRep import BRep_Builder
-    from OCP.TopoDS import TopoDS_Compound
-
-    if len(solids) == 1:
-        return solids[0]
-    builder, compound = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(compound)
-    for solid in solids:
-        builder.Add(compound, solid)
-    return compound
-
-
-def _operated(operation: str, first: TopoDS_Shape, second: TopoDS_Shape, label: str) -> TopoDS_Shape:
-    """The boolean operation, ever more tolerant until its volume is one that it can have.
-
-    Where surfaces nearly touch, OpenCASCADE may lose a whole solid and say nothing.
-    """
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
-    from OCP.collections import List_TopoDS_Shape as Shapes
-
-    a, b = volume_and_area(first)[0], volume_and_area(second)[0]
-    low, high = {"union": (max(a, b), a + b), "difference": (a - b, a), "intersection": (0.0, min(a, b))}[
-        operation
-    ]
-    slack = _LOST * max(a, b)
-    for tolerance in _FUZZY:
-        work = {"union": BRepAlgoAPI_Fuse, "difference": BRepAlgoAPI_Cut, "intersection": BRepAlgoAPI_Common}[
-            operation
-        ]()
-        arguments, tools = Shapes(), Shapes()
-        arguments.Append(first)
-        tools.Append(second)
-        work.SetArguments(arguments)
-        work.SetTools(tools)
-        work.SetFuzzyValue(tolerance * max(a, b) ** (1 / 3))
-        work.Build()
-        if work.IsDone() and low - slack <= volume_and_area(work.Shape())[0] <= high + slack:
-            return work.Shape()
-    raise NoSurfaceError(f"OpenCASCADE fails at the {operation} with {label}; move it a little")
-
-
-def placed(part: Part, ball: Ball) -> TopoDS_Shape:
-    """The part's solid in the part's place."""
-    if isinstance(part.field, Quadric):
-        return _moved(quadric_solid(ball.form(part), ball.radius), NO_ROTATION, ball.centre.tolist())
-    return _moved(solid_of(part.field), part.rotation, part.translation)
-
-
-def _moved(shape: TopoDS_Shape, rotation: Sequence[float], place: Sequence[float]) -> TopoDS_Shape:
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
-    from OCP.gp import gp_Quaternion, gp_Trsf, gp_Vec
-
-    w, x, y, z = rotation
-    pose = gp_Trsf()
-    pose.SetRotation(gp_Quaternion(x, y, z, w))
-    pose.SetTranslationPart(gp_Vec(*place))
-    return BRepBuilderAPI_Transform(shape, pose, True).Shape()
-
-
-def _label(node: Node) -> str:
-    return repr(node.name) if node.name else "an assembly" if isinstance(node, Assembly) else "a part"
 
 
 def _turns(f: SuperFrustum) -> bool:

@@ -1,7 +1,8 @@
 """GLSL: one self-contained `float sdf(vec3 p)`, for GLSL 3.30, GLSL ES 3.00 and later.
 
-The formula (superfrustum.glsl beside this file) is followed by a table of the parts, one constant each, and
-by the tree of operations. All lengths are in the assembly's own unit.
+The formulas (superfrustum.glsl and, where there are quadrics, quadric.glsl, beside this file) are followed by
+a table of the parts, one constant each, and by the tree of operations. All lengths are in the assembly's own
+unit.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.rows import as_superfrustum
 from partwright.export.identifiers import comment, identifiers
+from partwright.fields import Quadric
 from partwright.shapes import canonical_unit
 from partwright.writing import write_bytes
 
@@ -27,7 +29,7 @@ def write(assembly: Assembly, path: str | Path) -> None:
     """Write the assembly's exact signed distance, blends and all.
 
     Raises:
-        ParameterError: a part is no SuperFrustum.
+        ParameterError: a part is neither a SuperFrustum nor a quadric.
         OutputError: the file cannot be written.
     """
     write_bytes(path, to_glsl(assembly).encode())
@@ -43,22 +45,35 @@ def to_glsl(assembly: Assembly) -> str:
         "// float sdf(vec3 p) is the signed distance, negative inside. Put it after `#version 330` or later,",
         "// or after `#version 300 es` and `precision highp float;`.",
         "",
-        files("partwright.export").joinpath("superfrustum.glsl").read_text("utf-8"),
-        "// translation, rotation, size, roundness, dilation, taper, bulge, onion, blend",
+        _formula("superfrustum.glsl"),
     ]
+    if any(isinstance(part.field, Quadric) for part in assembly.parts):
+        head.append(_formula("quadric.glsl"))
     table = [_constant(name, part) for name, part in zip(constants, assembly.parts, strict=True)]
     functions: list[str] = []
     _function(assembly, "sdf", iter(constants), (f"group_{i}" for i in count(1)), functions)
     return "\n".join([*head, *table, "", *functions])
 
 
+def _formula(file: str) -> str:
+    return files("partwright.export").joinpath(file).read_text("utf-8")
+
+
 def _constant(name: str, part: Part) -> str:
+    """The part's row, in the order of its struct."""
     w, x, y, z = part.rotation
-    sx, sy, sz, *shape = as_superfrustum(part.field).parameters()
-    vectors = (("vec3", part.translation), ("vec4", (x, y, z, w)), ("vec3", (sx, sy, sz)))
+    vectors: list[tuple[str, Sequence[float]]] = [("vec3", part.translation), ("vec4", (x, y, z, w))]
+    if isinstance(part.field, Quadric):
+        struct, terms = "Quadric", part.field.scaled_terms
+        vectors += [("mat3", terms.square.ravel().tolist()), ("vec3", terms.linear.tolist())]
+        numbers = [terms.constant, terms.fall, terms.rise]
+    else:
+        struct = "Part"
+        sx, sy, sz, *numbers = as_superfrustum(part.field).parameters()
+        vectors.append(("vec3", (sx, sy, sz)))
     values = [f"{kind}({_numbers(v)})" for kind, v in vectors]
-    row = ", ".join((*values, _numbers((*shape, part.blend))))
-    return f"const Part {name} = Part({row});  // {comment(part.name)}"
+    row = ", ".join((*values, _numbers((*numbers, part.blend))))
+    return f"const {struct} {name} = {struct}({row});  // {comment(part.name)}"
 
 
 def _numbers(values: Sequence[float]) -> str:
@@ -85,7 +100,8 @@ def _call(
 ) -> tuple[str, str]:
     if isinstance(child, Part):
         constant = next(constants)
-        return f"part_sdf(p, {constant})", f"{constant}.blend"
+        function = "quadric_sdf" if isinstance(child.field, Quadric) else "part_sdf"
+        return f"{function}(p, {constant})", f"{constant}.blend"
     group = next(groups)
     _function(child, group, constants, groups, functions)
     return f"{group}(p)", _numbers([child.blend])

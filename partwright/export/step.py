@@ -2,8 +2,8 @@
 
 Straight parts are exact, whatever their taper, hole, rounding and dilation, and so are bent ones without
 taper, and quadrics (saddles and their like are refused). Bent ones with taper are surfaces through sections;
-what cannot be built becomes the nearest solid. Blends become sharp edges. FILE.report.json lists all but
-the exact.
+what cannot be built becomes the nearest solid, and where a boolean operation goes wrong, flat facets of the
+exact mesh stand for its result. Blends become sharp edges. FILE.report.json lists all but the exact.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from partwright import __version__
 from partwright.assembly import Assembly
 from partwright.errors import OutputError
 from partwright.export.approximation import Change, write_report
-from partwright.export.brep import built, combined, require_cad
+from partwright.export.brep import built, require_cad
+from partwright.export.brep_tree import Compromises, combined
 from partwright.export.closed_quadrics import Ball
 from partwright.export.solid_tree import solid_tree
 from partwright.shapes import METRES, canonical_unit
@@ -47,16 +48,18 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     names = [child.name or f"assembly_{i:02d}" for i, child in enumerate(children, 1)]
     if children == (scaled,):
         names = [assembly.name or Path(path).stem]
-    ball, apart = Ball.around(scaled), list[str]()
-    solids = [combined(child, ball, apart) for child in children]
+    ball, made = Ball.around(scaled), Compromises()
+    solids = [combined(child, ball, made) for child in children]
     document = _document(list(zip(names, solids, strict=True)))
     with replacing(path) as temporary:
         _write(document, temporary, unit or "mm", Path(path))
     notes = [] if unit else ["the length unit is unknown: the file says millimetres"]
-    if apart:
-        changes.append(
-            Change(tuple(apart), "a solid of its own", note="it overlaps the rest: the union failed")
-        )
+    if made.apart:
+        overlap = "it overlaps the rest: the union failed"
+        changes.append(Change(tuple(made.apart), "a solid of its own", note=overlap))
+    if made.faceted:
+        wrong = "OpenCASCADE gets their boolean operations wrong"
+        changes.append(Change(tuple(made.faceted), "flat facets", note=wrong))
     write_report(assembly, path, changes, notes)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from reprlib import repr as brief
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
@@ -19,6 +19,16 @@ _LARGEST = 1e100
 _NAMES = ("xx", "yy", "zz", "x", "y", "z", "1", "xy", "yz", "zx")
 _TINY = 1e-36  # keeps roots away from 0, where they have no slope
 _FLAT = 1e-12  # of the largest: curvatures and slopes that are smaller are rounding
+
+
+class Terms(NamedTuple):
+    """f = p^T square p + linear p + constant, and the curvatures by which f can fall, and rise."""
+
+    square: np.ndarray
+    linear: np.ndarray
+    constant: float
+    fall: float
+    rise: float
 
 
 @dataclass(frozen=True)
@@ -131,7 +141,7 @@ class Quadric(Field):
         return cast(Array, self._bound(np.asarray(points, dtype=np.float64)).astype(np.float32))
 
     def _bound(self, points: Any) -> Any:
-        xp, (square, linear, constant, fall, rise) = library(points), self._scaled_terms
+        xp, (square, linear, constant, fall, rise) = library(points), self.scaled_terms
         if is_tensor(points):
             square, linear = points.new_tensor(square), points.new_tensor(linear)
         half = points @ square
@@ -143,8 +153,8 @@ class Quadric(Field):
         return xp.where(inside, -reach, reach)
 
     @cached_property
-    def _scaled_terms(self) -> tuple[np.ndarray, np.ndarray, float, float, float]:
-        """A, b, g over the largest of A and b; the curvatures by which f can fall, and rise."""
+    def scaled_terms(self) -> Terms:
+        """What the distance is made of: the coefficients over the largest of A and b."""
         square, linear, constant = self.matrices()
         size = max(np.abs(square).max(), np.abs(linear).max())
         square, linear, constant = square / size, linear / size, constant / size
@@ -152,7 +162,7 @@ class Quadric(Field):
         slope = np.abs(axes.T @ linear)
         idle = (np.abs(curvature) <= _FLAT * np.abs(curvature).max()) & (slope <= _FLAT * slope.max())
         used = curvature[~idle] if not idle.all() else curvature
-        return square, linear, float(constant), float(-used.min()), float(used.max())
+        return Terms(square, linear, float(constant), float(-used.min()), float(used.max()))
 
     def support(self, directions: np.ndarray) -> np.ndarray:
         """(K,) how far the solid reaches along directions (K, 3); infinite where it does not end.
@@ -160,7 +170,7 @@ class Quadric(Field):
         Minus infinity where nothing is inside.
         """
         directions = np.asarray(directions, dtype=np.float64)
-        square, linear, constant = self._scaled_terms[:3]
+        square, linear, constant = self.scaled_terms[:3]
         curvature, axes = np.linalg.eigh(square)
         slope, along = axes.T @ linear, directions @ axes
         threshold = _FLAT * np.abs(curvature).max()

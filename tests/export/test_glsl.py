@@ -9,10 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Assembly, Part, Similarity
 from partwright.errors import SettingError
 from partwright.export import export
-from partwright.fields import Box, Capsule, Cone, Cylinder, Frustum, Sphere, SuperFrustum, Torus, Tube
+from partwright.fields import (
+    Box,
+    Capsule,
+    Cone,
+    Cylinder,
+    Frustum,
+    Quadric,
+    Sphere,
+    SuperFrustum,
+    Torus,
+    Tube,
+)
 from tests.export.opengl import run_sdf
 
 POINTS = np.random.default_rng(1).uniform(-1.5, 1.5, (10_000, 3)).astype(np.float32)
@@ -82,6 +93,22 @@ def tree() -> Assembly:
 def test_the_shader_gives_our_distances(tmp_path: Path, assembly: Assembly) -> None:
     values = run_sdf(written(assembly, tmp_path), POINTS)
     assert np.abs(values - assembly.distance(POINTS)).max() < 1e-5
+
+
+def test_quadrics_give_our_distances(tmp_path: Path) -> None:
+    turned = Similarity(1.0, (0.9, 0.1, -0.3, 0.2), (0.2, -0.1, 0.3))
+    fields = (
+        Quadric.plane((1, 2, 3), 0.2),
+        Quadric.sphere(0.6, (0.3, 0.2, 0.1)).complement(),
+        Quadric.cylinder(0.5),
+        Quadric.cone(0.4, (0, 0, 1), (0.1, 0, 0.3)),
+        Quadric((2, 2, 0.5, 0, 0.3, -1, 0.1, 0.2, -0.1, 0.4)),
+    )
+    parts = [Part(field, blend=0.1 * (i == 2)) for i, field in enumerate(fields)]
+    for assembly in (*(Assembly((part,)) for part in parts), Assembly(tuple(parts), "intersection")):
+        whole = Assembly((assembly.transformed(turned), Part(Sphere(0.3))))
+        values = run_sdf(written(whole, tmp_path), POINTS)
+        assert np.abs(values - whole.distance(POINTS)).max() < 1e-5
 
 
 def test_slight_bends_pass_into_none(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ import trimesh
 
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.export import export
+from partwright.export import brep_tree, export
 from partwright.export.closed_quadrics import with_closed_quadrics
 from partwright.fields import Box, Cone, Cylinder, Quadric, Sphere
 from partwright.meshing import mesh_csg
@@ -42,6 +43,37 @@ def planes(half: float = 1.0) -> tuple[Part, ...]:
 
 def placed(solid: Assembly) -> Assembly:
     return dataclasses.replace(solid.transformed(TURN), unit="mm")
+
+
+def test_step_has_facets_where_opencascade_goes_wrong(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("OCP.STEPCAFControl", reason="OpenCASCADE is missing: pip install 'partwright[cad]'")
+    bore = Part(Quadric.cylinder(0.5).complement(), name="bore")
+    solid = placed(Assembly((*planes(), bore), operation="intersection"))
+    operated = brep_tree._operated
+
+    def forgetful(operation: str, first: Any, second: Any, label: str) -> Any:
+        """Loses the bore, as it happens where surfaces nearly touch."""
+        return first if "bore" in label else operated(operation, first, second, label)
+
+    monkeypatch.setattr(brep_tree, "_operated", forgetful)
+    export(solid, tmp_path / "a.step")
+    volume, kinds = read_back(tmp_path / "a.step")
+    assert volume == pytest.approx(mesh_csg(solid).volume, rel=5e-3)
+    assert set(kinds) == {"Plane"}
+    changes = json.loads((tmp_path / "a.step.report.json").read_text())["approximated"]
+    assert [change["to"] for change in changes] == ["flat facets"]
+    assert "bore" in changes[0]["parts"]
+
+
+def test_step_leaves_out_a_quadric_that_holds_all_of_space(tmp_path: Path) -> None:
+    pytest.importorskip("OCP.STEPCAFControl", reason="OpenCASCADE is missing: pip install 'partwright[cad]'")
+    everywhere = Quadric((1, 1, 1, 0, 0, 0, 1)).complement()
+    export(placed(Assembly((*planes(), Part(everywhere)), operation="intersection")), tmp_path / "a.step")
+    volume, kinds = read_back(tmp_path / "a.step")
+    assert volume == pytest.approx(8.0, rel=1e-6)
+    assert kinds == {"Plane": 6}
 
 
 @pytest.mark.parametrize("hole", [False, True])

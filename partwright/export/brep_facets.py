@@ -1,0 +1,53 @@
+"""A B-rep solid of flat facets, for what OpenCASCADE cannot build of analytic faces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.errors import NoSurfaceError
+from partwright.meshing.csg import solid_of
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Shape
+
+    from partwright.assembly import Assembly
+
+CHORD = 1 / 400  # of the longest side: how far facets may lie from the surface
+SHORTEST = 1e-4  # of the longest side: shorter edges are collapsed, which OpenCASCADE would stumble over
+
+
+def faceted(node: Assembly) -> TopoDS_Shape:
+    """The exact mesh of a node of quadrics and named solids, its triangles sewn into a solid.
+
+    Raises:
+        NoSurfaceError: nothing is left of the node, or its triangles do not close.
+    """
+    from OCP.BRepBuilderAPI import (
+        BRepBuilderAPI_MakeFace,
+        BRepBuilderAPI_MakePolygon,
+        BRepBuilderAPI_MakeSolid,
+        BRepBuilderAPI_Sewing,
+    )
+    from OCP.gp import gp_Pnt
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    longest = float(np.ptp(np.array(node.bounds()), axis=0).max())
+    mesh = solid_of(node, CHORD * longest).simplify(SHORTEST * longest).to_mesh64()
+    places = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]
+    sewing = BRepBuilderAPI_Sewing(SHORTEST / 10 * longest)
+    for triangle in np.asarray(mesh.tri_verts, dtype=np.int64):
+        outline = BRepBuilderAPI_MakePolygon(*(gp_Pnt(*places[i].tolist()) for i in triangle), True)
+        sewing.Add(BRepBuilderAPI_MakeFace(outline.Wire(), True).Shape())
+    sewing.Perform()
+    shells = TopExp_Explorer(sewing.SewedShape(), TopAbs_ShapeEnum.TopAbs_SHELL)
+    solid = BRepBuilderAPI_MakeSolid()
+    if not shells.More():
+        raise NoSurfaceError("the facets of a node do not close; export a mesh instead")
+    while shells.More():
+        solid.Add(TopoDS.Shell(shells.Current()))
+        shells.Next()
+    return solid.Solid()
