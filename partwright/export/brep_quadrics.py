@@ -44,9 +44,6 @@ def quadric_solid(form: NormalForm, radius: float) -> TopoDS_Shape:
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
     from OCP.gp import gp_Pnt
 
-    around = BRepPrimAPI_MakeBox(gp_Pnt(-radius, -radius, -radius), gp_Pnt(radius, radius, radius))
-    if form.name == "none" and form.complement:
-        return around.Shape()  # all of space
     if form.name not in HELD:
         raise ParameterError(
             f"STEP: a {form.name} has no solid here; export the surface as GLB, 3MF, OBJ, PLY or STL instead"
@@ -55,6 +52,7 @@ def quadric_solid(form: NormalForm, radius: float) -> TopoDS_Shape:
     solid = _placed(_turned(form, half) if form.curvature[1] else _trough(form, half), form)
     if not form.complement:
         return solid
+    around = BRepPrimAPI_MakeBox(gp_Pnt(-radius, -radius, -radius), gp_Pnt(radius, radius, radius))
     return BRepAlgoAPI_Cut(around.Shape(), solid).Shape()
 
 

@@ -35,7 +35,10 @@ def with_closed_quadrics(assembly: Assembly) -> Assembly:
         if isinstance(node, Part):
             return ball.closed(node) if isinstance(node.field, Quadric) else node
         node = _holes_subtracted(node, ball)
-        return dataclasses.replace(node, children=tuple(map(closed, node.children)))
+        children = node.children
+        if node.operation == "difference":  # what has no surface takes nothing away
+            children = (children[0], *(one for one in children[1:] if not ball.is_nothing(one)))
+        return dataclasses.replace(node, children=tuple(map(closed, children)))
 
     return closed(assembly)  # type: ignore[return-value]  # an assembly stays one
 
@@ -82,6 +85,13 @@ class Ball:
     def is_hole(self, node: Node) -> bool:
         """Whether the node is the outside of a curved quadric."""
         return isinstance(node, Part) and isinstance(node.field, Quadric) and self.form(node).complement
+
+    def is_nothing(self, node: Node) -> bool:
+        """Whether the node is a quadric without surface, with no point inside."""
+        if not isinstance(node, Part) or not isinstance(node.field, Quadric):
+            return False
+        form = self.form(node)
+        return form.name == "none" and not form.complement
 
     def closed(self, part: Part) -> Node:
         """The quadric as a named solid, or as a few, or as it is."""

@@ -60,7 +60,7 @@ def test_step_has_facets_where_opencascade_goes_wrong(
     monkeypatch.setattr(brep_tree, "_operated", forgetful)
     export(solid, tmp_path / "a.step")
     volume, kinds = read_back(tmp_path / "a.step")
-    assert volume == pytest.approx(mesh_csg(solid).volume, rel=5e-3)
+    assert volume == pytest.approx(mesh_csg(solid).volume, rel=1e-2)
     assert set(kinds) == {"Plane"}
     changes = json.loads((tmp_path / "a.step.report.json").read_text())["approximated"]
     assert [change["to"] for change in changes] == ["flat facets"]
@@ -69,7 +69,7 @@ def test_step_has_facets_where_opencascade_goes_wrong(
 
 def test_step_leaves_out_a_quadric_that_holds_all_of_space(tmp_path: Path) -> None:
     pytest.importorskip("OCP.STEPCAFControl", reason="OpenCASCADE is missing: pip install 'partwright[cad]'")
-    everywhere = Quadric((1, 1, 1, 0, 0, 0, 1)).complement()
+    everywhere = Quadric((1, 1, 0, -20, 0, 0, 101)).complement()
     export(placed(Assembly((*planes(), Part(everywhere)), operation="intersection")), tmp_path / "a.step")
     volume, kinds = read_back(tmp_path / "a.step")
     assert volume == pytest.approx(8.0, rel=1e-6)
