@@ -26,6 +26,7 @@ HERE = Path(__file__).parent
 RESULTS = HERE / "results"
 VARIANTS = {
     "solids": ["--method", "solids"],
+    "solids, at most 20": ["--method", "solids", "--max-parts", "20"],
     "solids, only added": ["--method", "solids", "--no-subtract"],
     "superfrusta": [],
 }
