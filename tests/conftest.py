@@ -7,7 +7,7 @@ import signal
 from hypothesis import settings
 
 # A busy machine is no defect: how long an example takes is measured by benchmarks, not by tests.
-settings.register_profile("patient")
+settings.register_profile("patient", deadline=None)
 settings.load_profile("patient")
 
 # A shell starts background jobs with Ctrl-C ignored, and Python then leaves it so.
