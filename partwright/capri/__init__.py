@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from partwright.capri.fitting import Fitted, Progress, fit
+from partwright.capri.fitting import Fitted, fit
 from partwright.capri.settings import Settings
+from partwright.methods import Progress
 
 __all__ = ["Fitted", "Progress", "Settings", "fit"]

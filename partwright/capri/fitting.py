@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from types import ModuleType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -26,26 +25,14 @@ from partwright.capri.selection import Problem
 from partwright.capri.settings import Settings
 from partwright.capri.tree import Tree
 from partwright.errors import EmptyShapeError, MissingDependencyError, SettingError
+from partwright.methods import Outcome, Progress, timed
 from partwright.shapes import Shape
 
-Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"]
 ORIGINS = {"seeds": "detected surfaces", "weights": "pre-trained network"}
 
 _MOST = 64  # convexes: the paper's c (section 4.1)
 _STEP = 1.5  # factor between the prices that are tried for a budget or a target
 _LADDER = 16
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a fit is: `fraction` of the expected work, and the best tree so far in numbers."""
-
-    stage: str
-    round: int
-    rounds: int
-    parts: int
-    iou: float
-    fraction: float
 
 
 @dataclass(frozen=True)
@@ -141,13 +128,8 @@ class Run:
     pool: Pool = field(init=False)
     samples: Samples = field(init=False)
 
-    @contextmanager
-    def timed(self, stage: str) -> Iterator[None]:
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
+    def timed(self, stage: str) -> AbstractContextManager[None]:
+        return timed(self.seconds, stage)
 
     def prepare(self, shape: Shape, start: Assembly | None) -> None:
         """Samples, and the pool of quadrics."""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from partwright.capri.kinds import KINDS
 from partwright.errors import SettingError
+from partwright.methods import Quality, check_number, preset
 
-Quality = Literal["draft", "normal", "high"]
 Schedule = Literal["search", "paper"]
 Start = Literal["seeds", "weights", "auto"]
 
@@ -81,17 +80,17 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in ("surface", "near", "uniform"):
-            _check(name, getattr(self, name), low=1000)
+            check_number(name, getattr(self, name), low=1000)
         for name in ("least", "iterations"):
-            _check(name, getattr(self, name), low=1)
+            check_number(name, getattr(self, name), low=1)
         for name in ("tries", "seed", "threads"):
-            _check(name, getattr(self, name), low=0)
+            check_number(name, getattr(self, name), low=0)
         for name in ("price", "convex_price"):
-            _check(name, getattr(self, name), low=1e-6, high=1.0)
+            check_number(name, getattr(self, name), low=1e-6, high=1.0)
         if self.max_parts is not None:
-            _check("max_parts", self.max_parts, low=1)
+            check_number("max_parts", self.max_parts, low=1)
         if self.min_iou is not None:
-            _check("min_iou", self.min_iou, low=0.0, high=1.0)
+            check_number("min_iou", self.min_iou, low=0.0, high=1.0)
         for name, known in CHOICES.items():
             if getattr(self, name) not in known:
                 expected = " or ".join(f'"{one}"' for one in known)
@@ -126,19 +125,7 @@ class Settings:
         Raises:
             SettingError: the preset or a change is unknown or out of range.
         """
-        if quality not in PRESETS:
-            raise SettingError(f"quality: expected one of {', '.join(PRESETS)}, got {quality!r}")
-        unknown = set(changes) - set(cls.__dataclass_fields__)
-        if unknown:
-            raise SettingError(f"unknown settings: {', '.join(sorted(unknown))}")
-        return replace(PRESETS[quality], **changes)
-
-
-def _check(name: str, value: float, low: float, high: float = math.inf) -> None:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    if not number or not low <= value <= high:
-        upper = f" and at most {high:g}" if math.isfinite(high) else ""
-        raise SettingError(f"{name}: expected a number of at least {low:g}{upper}, got {value!r}")
+        return preset(PRESETS, quality, changes)
 
 
 PRESETS: dict[str, Settings] = {

@@ -13,23 +13,25 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 _QUIET = 1.0  # seconds between plain lines of one stage
 
 
+def _bar(detail: str) -> Progress | None:
+    """A bar with a time left, or None where there is no terminal."""
+    console = Console(file=sys.stderr)
+    if not console.is_terminal:
+        return None
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn(detail),
+        TimeRemainingColumn(compact=True),
+    )
+    return Progress(*columns, console=console, transient=True)
+
+
 class Display:
     """A context in which `show` takes the method's progress and `stage` names what else goes on."""
 
     def __init__(self) -> None:
-        console = Console(file=sys.stderr)
-        self._bar = (
-            Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TextColumn("{task.fields[detail]}"),
-                TimeRemainingColumn(compact=True),
-                console=console,
-                transient=True,
-            )
-            if console.is_terminal
-            else None
-        )
+        self._bar = _bar("{task.fields[detail]}")
         self._last_stage, self._last_time = "", 0.0
 
     def __enter__(self) -> Self:
@@ -71,20 +73,8 @@ class Count:
     """A context in which `show` counts things that get done one by one."""
 
     def __init__(self, name: str) -> None:
-        console = Console(file=sys.stderr)
         self._name = name
-        self._bar = (
-            Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TextColumn("{task.completed:.0f}/{task.total:.0f}  {task.fields[detail]}"),
-                TimeRemainingColumn(compact=True),
-                console=console,
-                transient=True,
-            )
-            if console.is_terminal
-            else None
-        )
+        self._bar = _bar("{task.completed:.0f}/{task.total:.0f}  {task.fields[detail]}")
         self._last_time = 0.0
 
     def __enter__(self) -> Self:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from partwright.superfrusta.outcome import CurvePoint, Fitted, Progress
+from partwright.methods import Progress
+from partwright.superfrusta.outcome import CurvePoint, Fitted
 from partwright.superfrusta.resfit import fit
 from partwright.superfrusta.settings import Settings
 

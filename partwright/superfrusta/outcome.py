@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from partwright.assembly import Assembly, Similarity
 from partwright.assembly.rows import parts_from_rows
+from partwright.methods import Outcome
 from partwright.shapes import Shape
 from partwright.superfrusta.curve import with_parents
 from partwright.superfrusta.evidence import Rows
@@ -15,20 +15,7 @@ from partwright.superfrusta.kinds import SIGN, is_solid, solid
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.tree import nested
 
-Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"]
 _STEM = {True: "part", False: "cut"}  # of the names of parts that are added, and subtracted
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a fit is: `fraction` of the expected work, and the best assembly so far in numbers."""
-
-    stage: str
-    round: int
-    rounds: int
-    parts: int
-    iou: float
-    fraction: float
 
 
 @dataclass(frozen=True)

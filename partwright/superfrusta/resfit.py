@@ -6,15 +6,15 @@ explains more than stopping early.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from partwright.assembly import Assembly
 from partwright.errors import EmptyShapeError
+from partwright.methods import Outcome, Progress, timed
 from partwright.shapes import Shape
 from partwright.superfrusta.carving import body
 from partwright.superfrusta.constrained import Leaf, expanded
@@ -22,7 +22,7 @@ from partwright.superfrusta.evidence import NOTHING, Evidence, Rows
 from partwright.superfrusta.growing import grow
 from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
-from partwright.superfrusta.outcome import CurvePoint, Fitted, Outcome, Progress, Step, assembly_of
+from partwright.superfrusta.outcome import CurvePoint, Fitted, Step, assembly_of
 from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
 from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimise
 from partwright.superfrusta.repeats import repeat
@@ -101,13 +101,8 @@ class Run:
     curve: list[Step] = field(default_factory=list)
     leaves: list[Leaf] = field(default_factory=list)
 
-    @contextmanager
-    def timed(self, stage: str) -> Iterator[None]:
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - start
+    def timed(self, stage: str) -> AbstractContextManager[None]:
+        return timed(self.seconds, stage)
 
     def through(self, evidence: Evidence, start: Rows = NOTHING) -> Outcome:
         settings = self.settings

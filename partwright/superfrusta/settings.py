@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from partwright.errors import SettingError
+from partwright.methods import Quality, check_number, preset
 from partwright.superfrusta.families import FAMILIES, Family, held
 
 _SMALL_PRICE = 2e-4
 
-Quality = Literal["draft", "normal", "high"]
 Optimiser = Literal["newton", "adam"]
 
 
@@ -76,18 +75,18 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in ("rounds", "regions", "attempts", "trials", "patience", "near", "uniform"):
-            _check(name, getattr(self, name), low=1)
-        _check("cycles", self.cycles, low=0)
-        _check("resolution", self.resolution, low=24, high=512)
-        _check("kappa", self.kappa, low=1e-4, high=1.0)
+            check_number(name, getattr(self, name), low=1)
+        check_number("cycles", self.cycles, low=0)
+        check_number("resolution", self.resolution, low=24, high=512)
+        check_number("kappa", self.kappa, low=1e-4, high=1.0)
         for name in ("alpha", "overlap", "blending"):
-            _check(name, getattr(self, name), low=0.0)
+            check_number(name, getattr(self, name), low=0.0)
         if self.max_parts is not None:
-            _check("max_parts", self.max_parts, low=1)
+            check_number("max_parts", self.max_parts, low=1)
         if self.min_iou is not None:
-            _check("min_iou", self.min_iou, low=0.0, high=1.0)
-        _check("seed", self.seed, low=0)
-        _check("threads", self.threads, low=0)
+            check_number("min_iou", self.min_iou, low=0.0, high=1.0)
+        check_number("seed", self.seed, low=0)
+        check_number("threads", self.threads, low=0)
         if self.optimiser not in ("newton", "adam"):
             raise SettingError(f'optimiser: expected "newton" or "adam", got {self.optimiser!r}')
         if self.family not in FAMILIES:
@@ -106,12 +105,7 @@ class Settings:
         Raises:
             SettingError: the preset or a change is unknown or out of range.
         """
-        if quality not in PRESETS:
-            raise SettingError(f"quality: expected one of {', '.join(PRESETS)}, got {quality!r}")
-        unknown = set(changes) - set(cls.__dataclass_fields__)
-        if unknown:
-            raise SettingError(f"unknown settings: {', '.join(sorted(unknown))}")
-        return replace(PRESETS[quality], **changes)
+        return preset(PRESETS, quality, changes)
 
     def at_once(self, round_: int, most: int) -> int:
         """Parts that one round may add: few at first where some are subtracted, for each changes what is left
@@ -122,13 +116,6 @@ class Settings:
     def price(self) -> float:
         """What a part must pay while growing: nothing where a target or a whole curve asks for more parts."""
         return _SMALL_PRICE if self.curve or self.min_iou is not None else self.alpha
-
-
-def _check(name: str, value: float, low: float, high: float = math.inf) -> None:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    if not number or not low <= value <= high:
-        upper = f" and at most {high:g}" if math.isfinite(high) else ""
-        raise SettingError(f"{name}: expected a number of at least {low:g}{upper}, got {value!r}")
 
 
 PRESETS: dict[str, Settings] = {

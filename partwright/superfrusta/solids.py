@@ -13,10 +13,11 @@ from typing import Any
 
 from partwright.assembly import Assembly
 from partwright.errors import SettingError
+from partwright.methods import Progress, Quality
 from partwright.shapes import Shape
 from partwright.superfrusta import resfit, settings
 from partwright.superfrusta.families import Family
-from partwright.superfrusta.outcome import Fitted, Progress
+from partwright.superfrusta.outcome import Fitted
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Settings(settings.Settings):
             )
 
     @classmethod
-    def for_quality(cls, quality: settings.Quality = "normal", **changes: Any) -> Settings:
+    def for_quality(cls, quality: Quality = "normal", **changes: Any) -> Settings:
         """The preset `draft`, `normal` or `high`, with `changes` on top.
 
         Raises:
