@@ -11,19 +11,18 @@ its settings change or --fresh is given: after changes of the code, give it.
 from __future__ import annotations
 
 import argparse
-import csv
 import hashlib
-import io
 import multiprocessing
 import os
 import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 
+import recorded
 from fit import OWN_SHAPES, Entry, find_shapes, machine
 from variants import BASE, NOTES, Variant, variants
 
@@ -133,21 +132,12 @@ def planned(rows: list[Variant], entries: list[Entry]) -> list[tuple[Variant, En
 
 def load(path: Path) -> dict[tuple[str, str, str], Run]:
     """Runs from earlier that worked, by their key."""
-    if not path.is_file():
-        return {}
-    with path.open(encoding="utf-8", newline="") as stream:
-        records = list(csv.DictReader(stream))
-    runs = [Run(**{k: float(v) if k in NUMBERS else v for k, v in record.items()}) for record in records]
+    runs = recorded.read(path, Run)
     return {one.key: one for one in runs if not one.failure}
 
 
 def save(path: Path, runs: dict[tuple[str, str, str], Run]) -> None:
-    text = io.StringIO()
-    writer = csv.DictWriter(text, [f.name for f in fields(Run)], lineterminator="\n")
-    writer.writeheader()
-    for one in runs.values():
-        writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in asdict(one).items()})
-    write_bytes(path, text.getvalue().encode())
+    write_bytes(path, recorded.text(runs.values(), Run).encode())
 
 
 def table(section: list[Variant], every: list[Variant], runs: dict[str, dict[str, Run]]) -> Iterator[str]:

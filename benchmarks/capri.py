@@ -13,18 +13,18 @@ benchmarks/results/capri.csv, and what is there is not fitted again, so a run ca
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from statistics import mean, median
 from typing import Any
 
 import numpy as np
+import recorded
 from fit import OWN_SHAPES, Entry, find_shapes, machine
 
 import partwright as pw
@@ -146,24 +146,8 @@ GIVEN: dict[str, Callable[[Shape], Shape]] = {
 
 def read(path: Path) -> list[Run]:
     """The runs of a CSV file that `append` wrote; the last one of the same shape and row counts."""
-    if not path.is_file():
-        return []
-    with path.open(encoding="utf-8", newline="") as stream:
-        runs = [
-            Run(d["name"], d["row"], d["outcome"], **{k: float(v) for k, v in list(d.items())[3:] if v})
-            for d in csv.DictReader(stream)
-        ]
+    runs = recorded.read(path, Run)
     return list({(run.name, run.row): run for run in runs}.values())
-
-
-def append(path: Path, run: Run) -> None:
-    """Adds a line to a CSV file, and a header to a new one."""
-    fresh = not path.is_file()
-    with path.open("a", encoding="utf-8", newline="") as stream:
-        writer = csv.DictWriter(stream, [f.name for f in fields(Run)], lineterminator="\n")
-        if fresh:
-            writer.writeheader()
-        writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in asdict(run).items()})
 
 
 # header, how many digits, times what, and the number
@@ -268,7 +252,7 @@ def main() -> int:
             if (entry.name, row) in known:
                 continue
             run = fit_once(entry, row, options.seed, options.threads)
-            append(RESULTS, run)
+            recorded.append(RESULTS, run)
             print(row, entry.name, run.outcome, cells([run], mean), flush=True)
             write_tables(options)
     write_tables(options)

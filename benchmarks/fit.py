@@ -12,8 +12,6 @@ brought up to date after each shape.
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import json
 import os
 import platform
@@ -21,11 +19,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from statistics import mean, median
+
+import recorded
 
 from partwright.writing import write_bytes
 
@@ -218,16 +218,6 @@ def document(rows: list[Run], command: str, seeds: list[int], planned: int) -> s
     return "\n".join(lines) + "\n"
 
 
-def records(runs: Iterable[Run]) -> str:
-    """CSV: a row a run."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, [f.name for f in fields(Run)], lineterminator="\n")
-    writer.writeheader()
-    for run in runs:
-        writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in asdict(run).items()})
-    return text.getvalue()
-
-
 def measure(
     entries: list[Entry], seeds: list[int], options: list[str], jobs: int
 ) -> Iterator[tuple[Entry, Run]]:
@@ -261,7 +251,9 @@ def main() -> int:
             finished = [over_seeds(of) for of in runs.values() if len(of) == len(seeds)]
             text = document(finished, _command(options), seeds, len(entries))
             write_bytes(target, text.encode())
-            write_bytes(target.with_suffix(".csv"), records(r for of in runs.values() for r in of).encode())
+            write_bytes(
+                target.with_suffix(".csv"), recorded.text(r for of in runs.values() for r in of).encode()
+            )
     except KeyboardInterrupt:
         interrupted = True
     finished = [over_seeds(of) for of in runs.values() if len(of) == len(seeds)]

@@ -13,16 +13,16 @@ again: delete the file, or rows of it, to measure anew.
 from __future__ import annotations
 
 import argparse
-import csv
 import re
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean, median
 
 import numpy as np
+import recorded
 from fit import machine
 from known_solids import NAMES, Known, known_assembly
 from numpy.typing import NDArray
@@ -233,24 +233,6 @@ def document(rows: Sequence[Row], planned: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def recorded(path: Path) -> list[Row]:
-    if not path.is_file():
-        return []
-    types = {"int": int, "float": float, "str": str}
-    with path.open(newline="", encoding="utf-8") as stream:
-        lines = list(csv.DictReader(stream))
-    return [Row(**{f.name: types[str(f.type)](line[f.name]) for f in fields(Row)}) for line in lines]
-
-
-def append(path: Path, row: Row) -> None:
-    new = not path.is_file()
-    with path.open("a", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, [f.name for f in fields(Row)], lineterminator="\n")
-        if new:
-            writer.writeheader()
-        writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in asdict(row).items()})
-
-
 def main() -> int:
     options = parser().parse_args()
     path = options.output.with_suffix(".csv")
@@ -258,18 +240,18 @@ def main() -> int:
     if options.keep:
         options.keep.mkdir(parents=True, exist_ok=True)
     for name in NAMES:
-        rows = recorded(path)
+        rows = recorded.read(path, Row)
         if any(row.name == name for row in rows) or (chosen and name not in chosen):
             continue
         row = run(known_assembly(name), options.keep)
-        append(path, row)
+        recorded.append(path, row)
         print(
             f"{row.name}: kinds {row.kinds} of {row.parts}, sizes {row.sizes} of {row.numbers}, relations "
             f"{row.relations_back:.1f} of {row.relations}, IoU {row.clean_iou:.3f}, {row.cpu_seconds:.1f} s",
             flush=True,
         )
         write_bytes(options.output, document([*rows, row], len(NAMES)).encode())
-    rows = recorded(path)
+    rows = recorded.read(path, Row)
     write_bytes(options.output, document(rows, len(NAMES)).encode())
     print("", *summary(rows), sep="\n")
     return 0

@@ -10,14 +10,14 @@ benchmark goes on where it was. Delete the file, or the rows of one variant, to 
 from __future__ import annotations
 
 import argparse
-import csv
 import resource
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean, median
 
+import recorded
 from fit import Entry, find_shapes, fit_once, machine
 
 from partwright.writing import write_bytes
@@ -62,25 +62,6 @@ def run(variant: str, entry: Entry, keep: Path | None) -> Row:
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     scores = {name: float("nan") if (v := getattr(made, name)) is None else float(v) for name in SCORES}
     return Row(variant, entry.name, made.outcome, **scores, seconds=made.seconds, cpu_seconds=cpu)
-
-
-def recorded(path: Path) -> list[Row]:
-    if not path.is_file():
-        return []
-    with path.open(newline="", encoding="utf-8") as stream:
-        return [
-            Row(**{k: float(v) if k in NUMBERS else v for k, v in line.items()})  # type: ignore[arg-type]
-            for line in csv.DictReader(stream)
-        ]
-
-
-def append(path: Path, row: Row) -> None:
-    new = not path.is_file()
-    with path.open("a", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, [f.name for f in fields(Row)], lineterminator="\n")
-        if new:
-            writer.writeheader()
-        writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in asdict(row).items()})
 
 
 def summary(rows: list[Row]) -> Iterator[str]:
@@ -145,12 +126,12 @@ def main() -> int:
     command = f"python benchmarks/solids.py --shapes {options.shapes.name} --sets {options.sets}"
     for variant in chosen:
         for entry in entries:
-            rows = recorded(path)
+            rows = recorded.read(path, Row)
             if any(row.variant == variant and row.name == entry.name for row in rows):
                 continue
             keep = options.fits / variant / entry.name if options.fits else None
             row = run(variant, entry, keep)
-            append(path, row)
+            recorded.append(path, row)
             print(
                 f"{variant}: {entry.name}: IoU {row.iou:.3f}, {row.parts:g} parts, {row.seconds:.1f} s",
                 flush=True,
@@ -158,7 +139,7 @@ def main() -> int:
             write_bytes(
                 options.output, document([*rows, row], command, len(entries) * len(VARIANTS)).encode()
             )
-    rows = recorded(path)
+    rows = recorded.read(path, Row)
     write_bytes(options.output, document(rows, command, len(entries) * len(VARIANTS)).encode())
     print("", *summary(rows), sep="\n")
     return int(any(row.iou != row.iou for row in rows))
