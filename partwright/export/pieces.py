@@ -14,6 +14,7 @@ from partwright.assembly.names import unique_names
 from partwright.assembly.palette import palette
 from partwright.assembly.tree import operands
 from partwright.errors import NoSurfaceError, NothingToExportError
+from partwright.export.decomposition import separated
 from partwright.meshing import mesh_assembly, mesh_part
 
 if TYPE_CHECKING:
@@ -40,10 +41,15 @@ class Piece:
         return (self.node.name,) if isinstance(self.node, Part) else tuple(p.name for p in self.node.parts)
 
 
-def pieces(assembly: Assembly) -> list[Piece]:
-    """In the order in which they are joined; each copy of a repeated part is one."""
+def pieces(assembly: Assembly, *, separate: bool = False) -> list[Piece]:
+    """In the order in which they are joined; each copy of a repeated part is one.
+
+    separate: a difference of several is the union of their differences, each a piece.
+    """
     colours = dict(zip((p.name for p in assembly.parts), palette(len(assembly)) / 255, strict=True))
     opened = list(_opened(assembly, 0.0))
+    if separate:
+        opened = [(one, one.blend or blend) for node, blend in opened for one in separated(node)]
     names = unique_names([_name(node) for node, _ in opened], ["piece"] * len(opened))
     return [
         Piece(node, name, colours[node.name if isinstance(node, Part) else node.parts[0].name], blend)

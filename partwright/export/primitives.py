@@ -13,6 +13,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export.approximation import Change
 from partwright.export.convex import segments, wedges
+from partwright.export.decomposition import convex_pieces
 from partwright.export.nearest import Approximation, nearest_solid
 from partwright.export.pieces import Piece, piece_mesh, pieces, require_some
 from partwright.fields import Field, Solid
@@ -64,7 +65,7 @@ def geometries(
     allowed = tolerance * float((upper - lower).max())
     result: list[Geometry] = []
     changes: list[Change] = []
-    for piece in pieces(assembly):
+    for piece in pieces(assembly, separate=True):
         try:
             found, change = _stand_ins(piece, kinds, allowed, resolution, convex)
         except NoSurfaceError as nothing:
@@ -87,7 +88,7 @@ def _stand_ins(
     """What stands for a piece, and the change that this is: the first of these that is near enough.
 
     A solid; its hull, where only hulls collide; solids along the arc of a bent part; the hulls of the pieces
-    of a bent or hollow part; its mesh.
+    of a bent or hollow part, or of a difference; its mesh.
     """
     names = piece.part_names
     part = piece.node if isinstance(piece.node, Part) else None
@@ -100,14 +101,23 @@ def _stand_ins(
             )
     mesh, error, deviation = _mesh(piece, resolution, convex)
     whole = [Geometry(piece.name, piece.colour, None, mesh)]
-    if part is None or (convex and deviation <= allowed and error <= _MOST_ERROR):
-        return whole, Change(names, "convex mesh" if convex else "mesh", error, deviation)
+    mesh_change = Change(names, "convex mesh" if convex else "mesh", error, deviation)
+    if convex and deviation <= allowed and error <= _MOST_ERROR:
+        return whole, mesh_change
+    if part is None:
+        return _decomposed(piece, allowed) if convex else (whole, mesh_change)
     chain = _chain(piece, part, kinds, allowed, resolution)
     if all(geometry.part for geometry in chain):
         return chain, _compared(piece, chain, f"chain of {len(chain)} solids")
     if not convex or len(chain) == 1:
-        return whole, Change(names, "convex mesh" if convex else "mesh", error, deviation)
+        return whole, mesh_change
     return chain, _compared(piece, chain, f"{len(chain)} convex pieces")
+
+
+def _decomposed(piece: Piece, allowed: float) -> tuple[list[Geometry], Change]:
+    """The convex pieces of a difference or intersection."""
+    found = _numbered(piece, convex_pieces(piece.node, allowed))
+    return found, _compared(piece, found, f"{len(found)} convex pieces")
 
 
 def _chain(
@@ -125,6 +135,10 @@ def _chain(
             forms.append(near.part_with_solid)
         else:
             forms += wedges(segment, allowed, resolution)
+    return _numbered(piece, forms)
+
+
+def _numbered(piece: Piece, forms: Sequence[Part | trimesh.Trimesh]) -> list[Geometry]:
     return [
         Geometry(
             f"{piece.name}/{i}", piece.colour, *((form, None) if isinstance(form, Part) else (None, form))

@@ -100,8 +100,9 @@ def test_what_has_no_native_geom_is_told(tmp_path: Path) -> None:
     assert changes["cup",]["to"] == "13 convex pieces"  # the tube stays open
     assert changes["cup",]["volume_error_ratio"] < 0.3
     assert changes["cup",]["max_deviation"] == pytest.approx(0.01, abs=0.002)  # half the wall, by the chords
-    hole = np.pi * 0.2**2 * 0.5
-    assert changes["block", "hole"]["volume_error_ratio"] == pytest.approx(hole / (0.125 - hole), rel=0.02)
+
+    assert changes["block", "hole"]["to"].endswith("convex pieces")
+    assert changes["block", "hole"]["volume_error_ratio"] < 0.25  # its hull: 1.01
     assert report(path)["mass_properties"]["mass"] == pytest.approx(loaded.body_mass[1])
 
 
