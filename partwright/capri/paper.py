@@ -18,11 +18,12 @@ from partwright.capri.tree import Tree
 from partwright.capri.tuning import Tuning, encoded, seeded, straightened
 from partwright.shapes import Shape
 
+SHIPPED = Path(__file__).parent / "models" / "cad_parts.safetensors"
+
 
 def network_of(settings: Settings) -> CapriNet:
-    """The pre-trained network of the given file."""
-    assert settings.weights is not None  # the settings see to it
-    return load_network(Path(settings.weights))
+    """The pre-trained network: of the given file, or the one that ships."""
+    return load_network(Path(settings.weights) if settings.weights else SHIPPED)
 
 
 def predicted(shape: Shape, settings: Settings) -> NDArray[np.float64]:

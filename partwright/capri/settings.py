@@ -49,7 +49,7 @@ class Settings:
     schedule "paper" (section 4.1 and the supplement; stages and thresholds: `partwright.capri.stages`):
         iterations: of each of the three stages (paper: 12,000). supervision: "voxels" or "points", as in the
         paper, or "samples" of the surface itself, whose detail is not lost between voxels. weights: file of a
-        pre-trained network, which the starts "weights" and "auto" need (`python -m partwright.capri`).
+        pre-trained network (`python -m partwright.capri`), in place of the one that ships.
 
     symmetry and threads are options of all methods that a tree has no use for; curve is refused.
     """
@@ -102,11 +102,6 @@ class Settings:
             raise SettingError(f"kinds: expected plane and any of {', '.join(KINDS[1:])}, got {self.kinds}")
         if self.curve:
             raise SettingError("curve: a CAPRI tree has no curve of sizes; give max_parts or min_iou")
-        if self.start != "seeds" and self.weights is None:
-            raise SettingError(
-                f'start: "{self.start}" needs a pre-trained network; make one by python -m partwright.capri '
-                "FOLDER, and give weights=FOLDER/network.safetensors"
-            )
         if self.weights is not None and not Path(self.weights).is_file():
             raise SettingError(f"weights: there is no file {self.weights}")
 

@@ -8,7 +8,9 @@ import torch
 import trimesh
 
 from partwright.capri import Progress, Settings, fit, rows, stages
-from partwright.capri.network import HALF, CapriNet, Sizes, rows_of, save_network
+from partwright.capri.collection import make_collection
+from partwright.capri.network import HALF, CapriNet, Sizes, distances, load_network, rows_of, save_network
+from partwright.capri.paper import SHIPPED
 from partwright.capri.settings import CHOICES
 from partwright.capri.supervision import supervision
 from partwright.capri.tree import Tree
@@ -132,6 +134,26 @@ def test_the_cheaper_start_wins_and_is_named(plate: Shape, weights: str, schedul
     assert mesh_csg(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.02)
 
 
+def test_the_network_that_ships_has_learnt_the_family() -> None:
+    """Parts of another seed than it was trained on: their inside, by eq. 4 and 6, from 64^3 voxels."""
+    held_out = make_collection(8, 1024, 4321)
+    voxels, points, inside = held_out.draw(8, 1024, True, np.random.default_rng(0))
+    network = load_network(SHIPPED)
+    with torch.no_grad():
+        distance = distances(network.coefficients(network.encoder(voxels)), points)
+        found = stages.sides("weighted_union", distance, network.selection, network.weights)
+    made, there = (found.left > stages.BETA) & ~(found.right > stages.BETA), inside > 0
+    assert float((made & there).sum() / (made | there).sum()) > 0.45  # half of them near the surface
+    assert SHIPPED.stat().st_size < 4e6
+
+
+def test_searching_among_the_shipped_network_s_quadrics(plate: Shape) -> None:
+    fitted = fit(plate, Settings(start="weights", surface=6000, near=6000, uniform=5000, tries=0))
+    assert fitted.details["start"] == "pre-trained network"
+    assert mesh_csg(fitted.assembly).is_watertight
+    assert fitted.details["costs"]["pre-trained network"] < 0.7
+
+
 def test_an_interruption_keeps_what_there_is(plate: Shape) -> None:
     def stop(step: Progress) -> None:
         if step.stage == "weighted union":
@@ -145,8 +167,6 @@ def test_an_interruption_keeps_what_there_is(plate: Shape) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"start": "weights"}, "needs a pre-trained network; make one by python -m partwright.capri"),
-        ({"start": "auto"}, "needs a pre-trained network"),
         ({"start": "nothing"}, 'start: expected "seeds" or "weights" or "auto"'),
         ({"supervision": "mesh"}, 'supervision: expected "voxels" or "points" or "samples"'),
         ({"max_parts": 5}, "knows no max_parts"),
