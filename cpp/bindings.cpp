@@ -7,6 +7,7 @@
 
 #include "evaluate.hpp"
 #include "morphology.hpp"
+#include "normal_equations.hpp"
 #include "optimise.hpp"
 
 namespace nb = nanobind;

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "evaluate.hpp"
+#include "normal_equations.hpp"
 
 namespace partwright {
 

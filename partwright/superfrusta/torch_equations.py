@@ -1,7 +1,7 @@
 """The equations of a batch of fits in PyTorch: folds, residuals, derivatives, steps, and moves in bounds.
 
 Rows are (B, M, 17): B assemblies of M parts, each with P samples. `torch_kernel` runs them on a device; the
-compiled counterparts are cpp/evaluate.cpp and cpp/optimise.cpp.
+compiled counterparts are cpp/normal_equations.cpp and cpp/optimise.cpp.
 """
 
 from __future__ import annotations

@@ -1,0 +1,126 @@
+#include "blocks.hpp"
+
+#include <cstring>
+
+namespace partwright {
+namespace {
+
+// F - G is the complement of (not F) + G, so that a sign before and after the smooth minimum makes both.
+PW_CLONES void fold_block(float* __restrict field, const float* __restrict g, float k, float sharp, float sign, float* __restrict weight) {
+  for (int i = 0; i < BLOCK; ++i) {
+    const float before = sign * field[i], w = smooth_weight(before, g[i], sharp);
+    weight[i] = w;
+    field[i] = sign * smooth_minimum(before, g[i], k, w);
+  }
+}
+
+PW_CLONES void unfold(float* __restrict carried, const float* __restrict weight, float sign, float* __restrict share, float* __restrict blend) {
+  for (int i = 0; i < BLOCK; ++i) {
+    share[i] = sign * carried[i] * (1 - weight[i]);
+    blend[i] = -share[i] * weight[i];
+    carried[i] *= weight[i];
+  }
+}
+
+// exp by the polynomial of the base-2 fraction; relative error 2e-7, no library call in the loop.
+PW_INLINE float exponential(float v) {
+  const float t = std::min(std::max(v * 1.44269504f, -120.f), 120.f);
+  const float whole = std::floor(t + 0.5f), f = t - whole;
+  float p = 0.00015403530f;
+  p = p * f + 0.0013333558f;
+  p = p * f + 0.0096181291f;
+  p = p * f + 0.0555041087f;
+  p = p * f + 0.2402265070f;
+  p = p * f + 0.6931471806f;
+  p = p * f + 1.f;
+  const int32_t bits = (int32_t(whole) + 127) << 23;
+  float scale;
+  std::memcpy(&scale, &bits, 4);
+  return p * scale;
+}
+
+}  // namespace
+
+int load(const float* points, int64_t first, int64_t count, Block& block) {
+  const int n = int(std::min<int64_t>(BLOCK, count - first));
+  for (int i = 0; i < BLOCK; ++i) {
+    const float* p = points + 3 * (first + (i < n ? i : 0));
+    block.x[i] = p[0];
+    block.y[i] = p[1];
+    block.z[i] = p[2];
+  }
+  return n;
+}
+
+PW_CLONES void values(const Part& p, const Block& b, float* __restrict out) {
+  if (p.bent && p.hollow) {
+    for (int i = 0; i < BLOCK; ++i) out[i] = value<true, true>(p, b.x[i], b.y[i], b.z[i]);
+  } else if (p.bent) {
+    for (int i = 0; i < BLOCK; ++i) out[i] = value<true, false>(p, b.x[i], b.y[i], b.z[i]);
+  } else if (p.hollow) {
+    for (int i = 0; i < BLOCK; ++i) out[i] = value<false, true>(p, b.x[i], b.y[i], b.z[i]);
+  } else {
+    for (int i = 0; i < BLOCK; ++i) out[i] = value<false, false>(p, b.x[i], b.y[i], b.z[i]);
+  }
+}
+
+PW_CLONES void derivatives(const Part& part, const Block& b, float* __restrict out) {
+  const Part p = part;
+  alignas(64) float scratch[SCRATCH_ROWS * BLOCK];
+  for (int i = 0; i < BLOCK; ++i) bend_step(p, b.x[i], b.y[i], b.z[i], scratch + i, BLOCK);
+  for (int i = 0; i < BLOCK; ++i) section_step(p, scratch + i, BLOCK);
+  if (p.hollow) {
+    for (int i = 0; i < BLOCK; ++i) profile_step<true>(p, scratch + i, BLOCK);
+  } else {
+    for (int i = 0; i < BLOCK; ++i) profile_step<false>(p, scratch + i, BLOCK);
+  }
+  for (int i = 0; i < BLOCK; ++i) chain_step(p, scratch + i, out + i, BLOCK);
+}
+
+void begin(float* field, const float* g, const Part& part) {
+  if (part.sign > 0)
+    std::memcpy(field, g, BLOCK * sizeof(float));
+  else
+    std::fill_n(field, BLOCK, FAR);
+}
+
+void fold(float* field, const float* g, const Part& part, float* weight) {
+  fold_block(field, g, part.blend > 1e-9f ? part.blend : 0.f, sharpness(part.blend), part.sign, weight);
+}
+
+PW_CLONES void occupancy(const float* __restrict field, float beta, float* __restrict out) {
+  for (int i = 0; i < BLOCK; ++i) out[i] = 1.f / (1.f + exponential(beta * field[i]));
+}
+
+PW_CLONES float largest(const float* v) {
+  float top[16] = {};
+  for (int i = 0; i < BLOCK; i += 16)
+    for (int lane = 0; lane < 16; ++lane) top[lane] = std::max(top[lane], std::fabs(v[i + lane]));
+  return *std::max_element(top, top + 16);
+}
+
+void forward(const std::vector<Part>& parts, const float* background, Workspace& w) {
+  if (background) std::memcpy(w.field, background, sizeof w.field);
+  for (size_t m = 0; m < parts.size(); ++m) {
+    float* g = w.g.data() + m * BLOCK;
+    values(parts[m], w.block, g);
+    if (m == 0 && !background) {
+      begin(w.field, g, parts[m]);
+      std::fill_n(w.weight.data(), BLOCK, parts[m].sign > 0 ? 0.f : 1.f);
+    } else {
+      fold(w.field, g, parts[m], w.weight.data() + m * BLOCK);
+    }
+  }
+}
+
+void backward(const std::vector<Part>& parts, Workspace& w) {
+  for (size_t m = parts.size(); m-- > 0;)
+    unfold(w.carried, &w.weight[m * BLOCK], parts[m].sign, &w.share[m * BLOCK], &w.blend[m * BLOCK]);
+}
+
+std::pair<int64_t, int64_t> piece_range(int64_t count, int64_t piece) {
+  const int64_t blocks = (count + BLOCK - 1) / BLOCK;
+  return {blocks * piece / PIECES, blocks * (piece + 1) / PIECES};
+}
+
+}  // namespace partwright

@@ -1,0 +1,67 @@
+// Blocks of points: parts evaluated over them, folded into an assembly, and the derivatives carried back.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "superfrustum.hpp"
+
+// One binary carries code for several instruction sets; the loader picks at start.
+#if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__)
+#define PW_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#else
+#define PW_CLONES
+#endif
+
+namespace partwright {
+
+// Points are handled in blocks that stay in the first-level cache.
+constexpr int BLOCK = 128;
+// Sums run over this many fixed pieces whatever the number of threads, so that they always round alike.
+constexpr int PIECES = 16;
+
+// The fold of no parts: farther than any point, and small enough for sums to stay finite.
+constexpr float FAR = 1e6f;
+
+struct Block {
+  alignas(64) float x[BLOCK], y[BLOCK], z[BLOCK];
+};
+
+// Missing points of the last block repeat the first one; callers ignore or zero-weight them.
+int load(const float* points, int64_t first, int64_t count, Block& block);
+
+// Of one part over a block: its signed distance, and (DERIVATIVES, BLOCK) with its derivatives.
+void values(const Part& part, const Block& block, float* out);
+void derivatives(const Part& part, const Block& block, float* out);
+
+// What the first part of a fold leaves, nothing where it is subtracted.
+void begin(float* field, const float* g, const Part& part);
+
+// The next part; `weight` is what the fold keeps of `field`.
+void fold(float* field, const float* g, const Part& part, float* weight);
+
+// 1 / (1 + exp(beta field)).
+void occupancy(const float* field, float beta, float* out);
+
+// The largest magnitude.
+float largest(const float* v);
+
+// Buffers of one thread for an assembly of M parts.
+struct Workspace {
+  explicit Workspace(size_t m) : g(m * BLOCK), weight(m * BLOCK), share(m * BLOCK), blend(m * BLOCK), occ(m * BLOCK) {}
+  std::vector<float> g, weight, share, blend, occ;
+  Block block;
+  alignas(64) float field[BLOCK], total[BLOCK], carried[BLOCK], assembled[BLOCK], weights[BLOCK];
+};
+
+// Fold of all parts over one block, keeping each part's value and fold weight.
+void forward(const std::vector<Part>& parts, const float* background, Workspace& w);
+
+// dF/dg and dF/dk of every part from the fold weights; `carried` starts as the upstream derivative.
+void backward(const std::vector<Part>& parts, Workspace& w);
+
+// Blocks first .. last of one of the fixed pieces.
+std::pair<int64_t, int64_t> piece_range(int64_t count, int64_t piece);
+
+}  // namespace partwright

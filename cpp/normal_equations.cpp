@@ -1,0 +1,220 @@
+#include "normal_equations.hpp"
+
+#include <cstring>
+
+#include "blocks.hpp"
+#include "parallel.hpp"
+#include "products.hpp"
+
+namespace partwright {
+namespace {
+
+// Reconstruction, overlap and smooth-union consistency.
+constexpr int KINDS = 3;
+
+// Residuals of one block and their derivatives by F and by each part's occupancy.
+struct Residuals {
+  alignas(64) float rec[BLOCK], over[BLOCK], blended[BLOCK];
+  alignas(64) float rec_f[BLOCK], over_o[BLOCK], blended_f[BLOCK], blended_o[BLOCK];
+};
+
+PW_CLONES double residuals(const float* __restrict target, const float* __restrict weight, const float* __restrict assembled,
+                           const float* __restrict total, float beta, Penalties penalties, Residuals& r) {
+  const float so = std::sqrt(penalties.overlap), sb = std::sqrt(penalties.blending);
+  float sums[BLOCK];
+  for (int i = 0; i < BLOCK; ++i) {
+    const float sw = std::sqrt(weight[i]), o = assembled[i], slope = -beta * o * (1 - o);
+    r.rec[i] = sw * (o - target[i]);
+    r.rec_f[i] = sw * slope;
+    const float over = total[i] - 1, wo = sw * so;
+    r.over[i] = over > 0 ? wo * over : 0.f;
+    r.over_o[i] = over > 0 ? wo : 0.f;
+    const float excess = o - std::min(total[i], 1.f), wb = sw * sb;
+    r.blended[i] = excess > 0 ? wb * excess : 0.f;
+    r.blended_f[i] = excess > 0 ? wb * slope : 0.f;
+    r.blended_o[i] = (excess > 0) & (total[i] < 1) ? -wb : 0.f;
+    sums[i] = r.rec[i] * r.rec[i] + r.over[i] * r.over[i] + r.blended[i] * r.blended[i];
+  }
+  double sum = 0;
+  for (int i = 0; i < BLOCK; ++i) sum += sums[i];
+  return 0.5 * sum;
+}
+
+PW_CLONES void by_part(const float* __restrict f, const float* __restrict share, const float* __restrict o, const float* __restrict occ,
+                       float beta, float* __restrict out) {
+  for (int i = 0; i < BLOCK; ++i) out[i] = f[i] * share[i] - o[i] * beta * occ[i] * (1 - occ[i]);
+}
+
+PW_CLONES void add(float* __restrict total, const float* __restrict v) {
+  for (int i = 0; i < BLOCK; ++i) total[i] += v[i];
+}
+
+// Loads a block of samples and evaluates residuals; padding gets weight 0.
+double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t first, float beta, Penalties penalties,
+                    Workspace& w, Residuals& r) {
+  alignas(64) float background[BLOCK], distance[BLOCK], target[BLOCK];
+  const int n = load(s.points, first, s.count, w.block);
+  for (int i = 0; i < BLOCK; ++i) {
+    const int64_t j = first + (i < n ? i : 0);
+    distance[i] = s.distance[j];
+    w.weights[i] = i < n ? s.weight[j] : 0.f;
+    if (s.background) background[i] = s.background[j];
+  }
+  forward(parts, s.background ? background : nullptr, w);
+  occupancy(distance, beta, target);
+  occupancy(w.field, beta, w.assembled);
+  if (penalties.overlap > 0 || penalties.blending > 0) {
+    if (s.background)
+      occupancy(background, beta, w.total);
+    else
+      std::fill_n(w.total, BLOCK, 0.f);
+    for (size_t m = 0; m < parts.size(); ++m) {
+      if (parts[m].sign < 0) continue;
+      occupancy(&w.g[m * BLOCK], beta, &w.occ[m * BLOCK]);
+      add(w.total, &w.occ[m * BLOCK]);
+    }
+  } else {
+    std::memcpy(w.total, w.assembled, sizeof w.total);
+  }
+  return residuals(target, w.weights, w.assembled, w.total, beta, penalties, r);
+}
+
+// Columns of a Jacobian: which points of a block have one, padded to whole lanes.
+struct Columns {
+  int index[BLOCK];
+  int count = 0, padded = 0;
+
+  void collect(const float* size, float least) {
+    count = 0;
+    for (int i = 0; i < BLOCK; ++i) {
+      index[count] = i;
+      count += size[i] > least;
+    }
+    padded = (count + 15) / 16 * 16;
+  }
+};
+
+void gather(const float* v, const Columns& columns, float* out) {
+  for (int i = 0; i < columns.count; ++i) out[i] = v[columns.index[i]];
+  std::fill(out + columns.count, out + columns.padded, 0.f);
+}
+
+PW_CLONES void gather_scaled(const float* __restrict d, const float* __restrict by, const Columns& columns, int rows, int length,
+                             float* __restrict out) {
+  for (int r = 0; r < rows; ++r) {
+    for (int i = 0; i < columns.count; ++i) out[r * length + i] = d[r * BLOCK + columns.index[i]] * by[columns.index[i]];
+    for (int i = columns.count; i < columns.padded; ++i) out[r * length + i] = 0;
+  }
+}
+
+PW_CLONES void keep_larger(float* __restrict size, const float* __restrict v) {
+  for (int i = 0; i < BLOCK; ++i) size[i] = std::max(size[i], std::fabs(v[i]));
+}
+
+}  // namespace
+
+NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples,
+                                 float beta, Penalties penalties, int threads) {
+  std::vector<NormalEquations> pieces(PIECES);
+  parallel_for(PIECES, threads, [&](int64_t piece) {
+    NormalEquations& sum = pieces[size_t(piece)];
+    sum.gradient.assign(parts.size() * DERIVATIVES, 0.0);
+    Workspace w(parts.size());
+    Residuals r;
+    alignas(64) float none[BLOCK] = {};
+    std::vector<float> d(DERIVATIVES * BLOCK), rows, coefficients;
+    std::vector<int> active;
+    const auto [first, last] = piece_range(samples.count, piece);
+    for (int64_t b = first; b < last; ++b) {
+      sum.loss += sample_block(parts, samples, b * BLOCK, beta, penalties, w, r);
+      std::fill_n(w.carried, BLOCK, 1.f);
+      backward(parts, w);
+      // Each point has up to three residuals, and each residual that moves with some part is a column of the
+      // block's Jacobian. Saturated points, most of them where beta is large, have none.
+      const bool over = penalties.overlap > 0 && largest(r.over) > 0;
+      const bool blended = penalties.blending > 0 && largest(r.blended) > 0;
+      const bool used[KINDS] = {true, over, blended};
+      const float* residual[KINDS] = {r.rec, r.over, r.blended};
+      const float *by_field[KINDS] = {r.rec_f, none, r.blended_f}, *by_occupancy[KINDS] = {none, r.over_o, r.blended_o};
+      const float least = 1e-3f * 0.25f * beta * std::sqrt(*std::max_element(w.weights, w.weights + BLOCK));
+      alignas(64) float size[KINDS][BLOCK] = {};
+      active.clear();
+      coefficients.clear();
+      for (size_t m = 0; m < parts.size(); ++m) {
+        if (!live[m]) continue;
+        coefficients.resize((active.size() + 1) * KINDS * BLOCK);
+        float* c = &coefficients[active.size() * KINDS * BLOCK];
+        float top = 0;
+        for (int kind = 0; kind < KINDS; ++kind) {
+          if (!used[kind]) continue;
+          const float* by_added = parts[m].sign > 0 ? by_occupancy[kind] : none;
+          by_part(by_field[kind], &w.share[m * BLOCK], by_added, &w.occ[m * BLOCK], beta, c + kind * BLOCK);
+          top = std::max(top, largest(c + kind * BLOCK));
+        }
+        if (top < least) continue;
+        for (int kind = 0; kind < KINDS; ++kind)
+          if (used[kind]) keep_larger(size[kind], c + kind * BLOCK);
+        active.push_back(int(m));
+      }
+      if (active.empty()) continue;
+      Columns columns[KINDS];
+      int length = 0;
+      for (int kind = 0; kind < KINDS; ++kind) {
+        if (used[kind]) columns[kind].collect(size[kind], least);
+        length += columns[kind].padded;
+      }
+      alignas(64) float errors[KINDS * BLOCK];
+      for (int kind = 0, at = 0; kind < KINDS; at += columns[kind++].padded) gather(residual[kind], columns[kind], errors + at);
+      rows.resize(active.size() * DERIVATIVES * size_t(length));
+      for (size_t i = 0; i < active.size(); ++i) {
+        const size_t m = size_t(active[i]);
+        float* out = &rows[i * DERIVATIVES * size_t(length)];
+        derivatives(parts[m], w.block, d.data());
+        for (int kind = 0, at = 0; kind < KINDS; at += columns[kind++].padded) {
+          gather_scaled(d.data(), &coefficients[(i * KINDS + size_t(kind)) * BLOCK], columns[kind], FIELD_DERIVATIVES, length, out + at);
+          gather_scaled(&w.blend[m * BLOCK], by_field[kind], columns[kind], 1, length, out + D_BLEND * length + at);
+        }
+        times_vector(out, errors, length, &sum.gradient[m * DERIVATIVES]);
+      }
+      for (size_t i = 0; i < active.size(); ++i)
+        for (size_t j = i; j < active.size(); ++j) {
+          auto& block = sum.blocks[{active[i], active[j]}];
+          if (block.empty()) block.assign(DERIVATIVES * DERIVATIVES, 0.0);
+          const float *a = &rows[i * DERIVATIVES * size_t(length)], *c = &rows[j * DERIVATIVES * size_t(length)];
+          if (i == j)
+            outer_square(a, length, block.data());
+          else
+            outer_product(a, c, length, block.data());
+        }
+    }
+  });
+  NormalEquations total = std::move(pieces[0]);
+  for (int piece = 1; piece < PIECES; ++piece) {
+    const NormalEquations& part = pieces[size_t(piece)];
+    total.loss += part.loss;
+    for (size_t i = 0; i < total.gradient.size(); ++i) total.gradient[i] += part.gradient[i];
+    for (const auto& [key, block] : part.blocks) {
+      auto& sum = total.blocks[key];
+      if (sum.empty()) sum.assign(DERIVATIVES * DERIVATIVES, 0.0);
+      for (size_t i = 0; i < block.size(); ++i) sum[i] += block[i];
+    }
+  }
+  for (auto& [pair, block] : total.blocks)
+    if (pair.first == pair.second) mirror(block);
+  return total;
+}
+
+double loss(const std::vector<Part>& parts, const Samples& samples, float beta, Penalties penalties, int threads) {
+  double sums[PIECES] = {};
+  parallel_for(PIECES, threads, [&](int64_t piece) {
+    Workspace w(parts.size());
+    Residuals r;
+    const auto [first, last] = piece_range(samples.count, piece);
+    for (int64_t b = first; b < last; ++b) sums[piece] += sample_block(parts, samples, b * BLOCK, beta, penalties, w, r);
+  });
+  double total = 0;
+  for (double sum : sums) total += sum;
+  return total;
+}
+
+}  // namespace partwright

@@ -1,0 +1,44 @@
+// The normal equations of a fit: residuals of occupancy, overlap and blending over samples of a shape.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "superfrustum.hpp"
+
+namespace partwright {
+
+// What a fit compares with: at each point the shape's signed distance, a weight, and (optionally) the field of
+// parts that stay as they are, which joins the fold first.
+struct Samples {
+  const float* points;
+  const float* distance;
+  const float* weight;
+  const float* background;  // null when there is none
+  int64_t count;
+};
+
+// Weights of the residuals that accompany the reconstruction (eq. 7): overlap and smooth-union consistency. Both
+// look at the parts that are added, for eq. 8 knows no others.
+struct Penalties {
+  float overlap;
+  float blending;
+};
+
+// J^T J by pairs of parts that share a point, J^T r, and the loss (half the sum of squares).
+struct NormalEquations {
+  using Block = std::vector<double>;  // DERIVATIVES x DERIVATIVES, row-major
+  std::map<std::pair<int, int>, Block> blocks;
+  std::vector<double> gradient;
+  double loss = 0;
+};
+
+// `live[i]` says whether part i moves; blocks and gradients of the others are not formed.
+NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples,
+                                 float beta, Penalties penalties, int threads);
+
+double loss(const std::vector<Part>& parts, const Samples& samples, float beta, Penalties penalties, int threads);
+
+}  // namespace partwright
