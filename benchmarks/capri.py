@@ -65,10 +65,15 @@ ROWS = {
     "seven": Row("without cones and general quadrics", changes={"kinds": ("plane", "cylinder", "sphere")}),
     "first": Row("without ruin and recreate", changes={"tries": 0}),
     "cheap": Row("a tenth of the prices", changes={"price": 6e-5, "convex_price": 3e-4}),
+    "dear": Row("five times the price of a convex", changes={"convex_price": 1.5e-2}),
     "paper": Row("the paper's schedule from the tree found, 3 x 1,000 iterations",
                  changes={"schedule": "paper", "iterations": 1000}),
     "paper-voxels": Row("the same, supervised by voxel centres", given="voxels",
                         changes={"schedule": "paper", "iterations": 1000, "supervision": "voxels"}),
+    "tenth": Row("the paper's schedule from the pre-trained network, 3 x 1,200 iterations",
+                 changes={"schedule": "paper", "start": "weights", "iterations": 1200}),
+    "whole": Row("the same, 3 x 12,000 iterations (the paper's)",
+                 changes={"schedule": "paper", "start": "weights"}),
 }  # fmt: skip
 
 

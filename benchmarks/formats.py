@@ -1,7 +1,7 @@
 """Every format of fitted assemblies: size, volume, what was approximated, what another program reads back.
 
     partwright fit SHAPE -o FITS/NAME          # for each shape, by each method
-    python benchmarks/formats.py FITS ... --rows rows.jsonl
+    python benchmarks/formats.py FITS ... --learned cars:0,chairs:1 --rows rows.jsonl
 
 Readers: trimesh (GLB, OBJ, PLY, STL, 3MF), usd-core with all its validators, MuJoCo, yourdfpy, OpenCASCADE,
 openscad, build123d, blender, glslangValidator; a format whose program is not installed is written only. What
@@ -20,8 +20,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -33,6 +34,7 @@ from partwright.assembly import Assembly, Node
 from partwright.errors import PartwrightError
 from partwright.export.approximation import report_path
 from partwright.meshing import mesh_assembly
+from partwright.shapes import METRES
 
 TARGET = Path(__file__).parent / "results" / "formats.md"
 SHARP = (".step", ".scad", ".build123d.py")  # no blends: held against the assembly without them
@@ -125,7 +127,7 @@ def read_step(path: Path) -> float:
     reader.TransferRoots()
     properties = GProp_GProps()
     BRepGProp.VolumeProperties_s(reader.OneShape(), properties)
-    return float(properties.Mass()) / 1e9  # cubic millimetres
+    return float(properties.Mass()) / 1e9  # cubic metres, as it reads all files in millimetres
 
 
 def read_scad(path: Path) -> float:
@@ -260,30 +262,46 @@ def document(rows: list[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def assemblies(folders: list[Path], learned: list[str]) -> Iterator[tuple[str, str, Callable[[], Assembly]]]:
+    """Method and name of every result in the folders and of every learned shape, and what loads it."""
+    paths = (path for folder in folders for path in folder.glob("*/assembly.json"))
+    for path in sorted(paths, key=lambda path: path.parent.name):
+        method = json.loads(path.with_name("report.json").read_text())["method"]
+        yield method, path.parent.name, partial(pw.load_assembly, path)
+    for name in learned:
+        yield "partsdf", name, partial(learned_assembly, name)
+
+
+def learned_assembly(name: str) -> Assembly:
+    from partwright.partsdf.sources import open_source
+
+    source = open_source(name)
+    return source.assembly(source.shape)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     option = parser.add_argument
-    option("folders", nargs="+", type=Path, metavar="FITS", help="each holds results of partwright fit")
+    option("folders", nargs="*", type=Path, metavar="FITS", help="each holds results of partwright fit")
     option("--rows", type=Path, required=True, help="measured rows, kept between runs")
+    option("--learned", default="", metavar="A,B", help="MODEL:NAME, as `partwright parts edit` has them")
     option("--formats", default=",".join(READERS), metavar="A,B", help="suffixes (default: all)")
     options = parser.parse_args()
     kept = options.rows.read_text().splitlines() if options.rows.exists() else []
     rows = [Row(**json.loads(line)) for line in kept]
     done = {(row.method, row.name, row.suffix) for row in rows}
-    for path in sorted(
-        (path for f in options.folders for path in f.glob("*/assembly.json")), key=lambda p: p.parent.name
-    ):
-        method, name = json.loads(path.with_name("report.json").read_text())["method"], path.parent.name
+    for method, name, load in assemblies(options.folders, [*filter(None, options.learned.split(","))]):
         wanted = [s for s in options.formats.split(",") if (method, name, s) not in done]
         if not wanted:
             continue
-        assembly = pw.load_assembly(path)
+        assembly = load()
         blended, sharp = (mesh_assembly(tree, CELLS).volume for tree in (assembly, plain(assembly)))
         for suffix in wanted:
             with tempfile.TemporaryDirectory() as folder:
                 own = sharp if suffix in SHARP else blended
+                own *= METRES[assembly.unit or "mm"] ** 3 if suffix == ".step" else 1
                 row = measure(method, name, assembly, suffix, own, Path(folder) / f"assembly{suffix}")
             rows.append(row)
             with options.rows.open("a") as file:
