@@ -48,10 +48,19 @@ def _about(parts: tuple[Part, ...]) -> tuple[np.ndarray, float]:
     finite = [box for box in finite if np.isfinite(box).all()]
     places = [np.mean(box, axis=0) for box in finite] + [np.array(part.translation) for part in parts]
     middle = np.mean(places, axis=0)
-    distances = [abs(float(_quadric(p)(middle[None])[0])) for p in parts if isinstance(p.field, Quadric)]
+    distances = [_reach(_quadric(part), middle) for part in parts if isinstance(part.field, Quadric)]
     corners = [float(np.abs(box - middle).max()) for box in finite]
     spread = [float(np.abs(place - middle).max()) for place in places]
     return middle, max([*distances, *corners, *spread]) or 1.0
+
+
+def _reach(quadric: Quadric, point: np.ndarray) -> float:
+    """About how far off the surface is: along the gradient, or by the curvature where that is nearer."""
+    value = abs(float(quadric.polynomial(point[None])[0]))
+    slope = float(np.linalg.norm(quadric.gradient(point[None])[0]))
+    curvature = float(np.abs(np.linalg.eigvalsh(quadric.matrices()[0])).max())
+    ways = [value / slope if slope else np.inf, np.sqrt(value / curvature) if curvature else np.inf]
+    return float(min(ways)) if np.isfinite(ways).any() else 0.0
 
 
 def _cut_by(node: Node, region: Manifold, level: float) -> Manifold:
@@ -104,7 +113,7 @@ def _trimmed_by_tangent(region: Manifold, quadric: Quadric) -> Manifold:
     corners = _corners(region)
     if not len(corners):
         return region
-    foot = _foot(quadric, corners.mean(axis=0))
+    foot = _foot(quadric, corners)
     normal = quadric.gradient(foot[None])[0]
     length = float(np.linalg.norm(normal))
     if length == 0:
@@ -114,14 +123,21 @@ def _trimmed_by_tangent(region: Manifold, quadric: Quadric) -> Manifold:
     return _trimmed(region, normal[None] / length, np.array([normal @ foot + slack]) / length)
 
 
-def _foot(quadric: Quadric, point: np.ndarray) -> np.ndarray:
-    """A point of the surface (3,), or near it, by steps along the gradient."""
+def _foot(quadric: Quadric, corners: np.ndarray) -> np.ndarray:
+    """A point of the surface (3,), or near it, by steps along the gradient from the middle of the corners.
+
+    Not beyond their box: where there is no surface the steps would go so far off that nothing but rounding
+    is left of the bound.
+    """
+    lower, upper = corners.min(axis=0), corners.max(axis=0)
+    point = np.asarray(corners.mean(axis=0))
     for _ in range(8):
         slope = quadric.gradient(point[None])[0]
         square = float(slope @ slope)
         if square == 0:
             break
-        point = point - slope * float(quadric.polynomial(point[None])[0]) / square
+        step = slope * float(quadric.polynomial(point[None])[0]) / square
+        point = np.clip(point - step, lower, upper)
     return point
 
 

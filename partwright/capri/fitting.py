@@ -84,6 +84,11 @@ def fit(
         if not any(run.placed for run in runs):
             raise
     done = [run for run in runs if run.placed]
+    if not done and settings.schedule == "paper":
+        raise EmptyShapeError(
+            f"{shape.name}: after 3 x {settings.iterations} iterations no convex holds anything; give more "
+            'iterations, or start "seeds"'
+        )
     if not done:
         raise EmptyShapeError(
             f"{shape.name}: no convex could be placed; the shape has no volume that {settings.near} samples "

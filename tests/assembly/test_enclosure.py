@@ -76,3 +76,14 @@ def test_copies_and_blends_count() -> None:
     points = np.random.default_rng(0).uniform(-3, 3, (20_000, 3))
     inside = points[joined.distance(points) < 0]
     assert ((inside >= lower) & (inside <= upper)).all()
+
+
+@pytest.mark.parametrize("turned", [1.0, 0.0])
+def test_what_holds_everything_takes_nothing_away(turned: float) -> None:
+    """-x^2 - y^2 - z^2 - 1 <= 0 has no surface, and its gradient is 0 in the midst of the cube."""
+    everything = Part(Quadric((-1, -1, -turned, 0, 0, 0, -1, 0, 0, 0)))
+    cube = Assembly((Part(Box((1, 1, 1))), everything), "intersection")
+    np.testing.assert_allclose(cube.bounds(), [[-0.5] * 3, [0.5] * 3], atol=1e-9)
+    nothing = Part(Quadric((1, 1, turned, 0, 0, 0, 1, 0, 0, 0)))
+    empty = Assembly((Part(Box((1, 1, 1))), nothing), "intersection").bounds()
+    np.testing.assert_array_equal(empty[0], empty[1])

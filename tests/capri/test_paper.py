@@ -15,7 +15,7 @@ from partwright.capri.settings import CHOICES
 from partwright.capri.supervision import supervision
 from partwright.capri.tree import Tree
 from partwright.capri.tuning import Tuning, seeded, straightened
-from partwright.errors import SettingError
+from partwright.errors import EmptyShapeError, SettingError
 from partwright.meshing import mesh_csg
 from partwright.shapes import Shape, load_shape
 from tests.capri.meshes import drilled_plate
@@ -145,6 +145,11 @@ def test_the_network_that_ships_has_learnt_the_family() -> None:
     made, there = (found.left > stages.BETA) & ~(found.right > stages.BETA), inside > 0
     assert float((made & there).sum() / (made | there).sum()) > 0.45  # half of them near the surface
     assert SHIPPED.stat().st_size < 4e6
+
+
+def test_too_few_iterations_are_named(plate: Shape) -> None:
+    with pytest.raises(EmptyShapeError, match="after 3 x 3 iterations no convex holds anything; give more"):
+        fit(plate, Settings(**PAPER | {"start": "weights"}))
 
 
 def test_searching_among_the_shipped_network_s_quadrics(plate: Shape) -> None:
