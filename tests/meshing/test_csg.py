@@ -160,3 +160,36 @@ def test_what_does_not_end_or_is_empty_is_said() -> None:
         mesh_csg(Assembly((half_spaces(), Part(Quadric.sphere(0.5, (9, 0, 0)))), "intersection"))
     with pytest.raises(NoSurfaceError):
         mesh_part(Part(Quadric.plane((0, 0, 1), 1)))
+
+
+TOUCHING = {
+    "boxes side by side": (
+        Assembly((Part(Box((1, 1, 1))), Part(Box((1, 0.8, 0.6)), (1, 0, 0)))), 1.48, 0
+    ),
+    "a hole as deep as its plate": (
+        Assembly((Part(Box((1, 1, 1))), Part(Cylinder(0.3, 1))), "difference"), 1 - 0.09 * PI, 1
+    ),
+    "a shaft that fills its bore": (
+        Assembly((
+            Assembly((Part(Box((1, 1, 1))), Part(Cylinder(0.3, 1))), "difference"), Part(Cylinder(0.3, 2))
+        )),
+        1 + 0.09 * PI, 0,
+    ),
+    "a pocket to the side": (
+        Assembly((Part(Box((1, 1, 1))), Part(Box((0.5, 0.5, 0.5)), (0.25, 0, 0.25))), "difference"), 0.875, 0
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TOUCHING)
+def test_what_touches_has_no_slit_nor_skin_however_it_is_turned(name: str) -> None:
+    whole, volume, genus = TOUCHING[name]
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        turn, move = rng.normal(size=4), rng.normal(size=3)
+        pose = Similarity(1.0, tuple(turn / np.linalg.norm(turn)), tuple(move))
+        solid = solid_of(whole.transformed(pose))
+        assert (solid.genus(), len(solid.decompose())) == (genus, 1)
+        assert solid.volume() == pytest.approx(volume, rel=2e-3)
+        mesh = mesh_csg(whole.transformed(pose))
+        assert mesh.is_watertight
