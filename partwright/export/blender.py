@@ -1,4 +1,5 @@
-"""A Blender script: one object a part in a collection, coloured, with its parameters as custom properties.
+"""A Blender script: one object a part in a collection, coloured, with its parameters as custom properties;
+quadrics, which rarely end, come as the convexes that they bound.
 
 The script holds each part's mesh in the part's own frame, so that an object's location and rotation are the
 part's. A second collection holds the surface of the whole: an object that follows the parts through a boolean
@@ -7,9 +8,10 @@ modifier each; where parts blend, a remesh modifier skins it and a smooth modifi
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -18,16 +20,33 @@ from partwright.assembly.palette import palette
 from partwright.assembly.rows import as_superfrustum
 from partwright.errors import NoSurfaceError
 from partwright.export.identifiers import comment
+from partwright.export.wholes import free_name, is_whole, whole_mesh
+from partwright.fields import Quadric
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit
 from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    import trimesh
 
 _DIGITS = 6  # of mesh coordinates
 _VOXELS = 256  # of a blended skin along the longest side
 _PARAMETERS = ("size", "roundness", "dilation", "taper", "bulge", "onion")
+
+
+@dataclass(frozen=True)
+class _Solid:
+    """One object: what the script knows of it, and its mesh."""
+
+    entry: dict[str, Any]
+    surface: trimesh.Trimesh
+
+    @property
+    def mesh(self) -> tuple[list[list[float]], list[list[int]]]:
+        """Vertices and faces."""
+        digits = f".{_DIGITS}g"
+        vertices = [[float(format(x, digits)) for x in vertex] for vertex in self.surface.vertices.tolist()]
+        return vertices, self.surface.faces.tolist()
 
 
 def write(assembly: Assembly, path: str | Path, resolution: int = 24) -> None:
@@ -38,12 +57,15 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 24) -> None:
         SettingError: the assembly's unit is unknown.
         OutputError: the file cannot be written.
     """
-    expanded = assembly.expanded()
-    colours = dict(zip((part.name for part in expanded.parts), palette(len(expanded)).tolist(), strict=True))
-    meshes = {part.name: mesh for part in expanded.parts for mesh in _mesh(part, resolution)}
-    if not meshes:
+    solids: dict[str, _Solid] = {}
+    tree = _tree(assembly.expanded(), assembly, resolution, solids)
+    if not solids:
         raise NoSurfaceError("nothing to export: no part has a surface at this resolution")
-    parts = [_entry(part, colours[part.name]) for part in expanded.parts if part.name in meshes]
+    colours = (palette(len(solids)) / 255).round(4).tolist()
+    parts = [
+        {"name": name, "colour": colour, **solid.entry}
+        for (name, solid), colour in zip(solids.items(), colours, strict=True)
+    ]
     lines = [
         f"# {comment(assembly.name) or 'Assembly'}: {len(parts)} parts, for Blender 3.4 or later.",
         "# Run it by: blender -P FILE, or from Blender's text editor.",
@@ -59,12 +81,12 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 24) -> None:
         "]",
         "",
         "# (operation, children): a child is a part's name, or a pair like this one.",
-        f"TREE = {_literal(_tree(expanded, set(meshes)))}",
+        f"TREE = {_literal(tree)}",
         "",
         files("partwright.export").joinpath("blender_scene.txt").read_text("utf-8"),
         "# name: (vertices, faces)",
         "MESHES = {",
-        *(f"    {_literal(name)}: {_literal(mesh)}," for name, mesh in meshes.items()),
+        *(f"    {_literal(name)}: {_literal(solid.mesh)}," for name, solid in solids.items()),
         "}",
         "",
         "main()",
@@ -77,38 +99,42 @@ def _longest(assembly: Assembly) -> float:
     return float(np.ptp(assembly.bounds(), axis=0).max())
 
 
-def _mesh(part: Part, resolution: int) -> Iterator[tuple[list[list[float]], list[list[int]]]]:
-    """Vertices and faces in the part's own frame; nothing for a part without volume, which only blends."""
-    try:
-        mesh = mesh_part(Part(part.field), resolution)
-    except NoSurfaceError:
-        return
-    digits = f".{_DIGITS}g"
-    vertices = [[float(format(x, digits)) for x in vertex] for vertex in mesh.vertices.tolist()]
-    yield vertices, mesh.faces.tolist()
+def _tree(node: Node, assembly: Assembly, resolution: int, solids: dict[str, _Solid]) -> Any:
+    """The node by the names of its solids, which are put into `solids`; None where it has no volume."""
+    if is_whole(node) or isinstance(node, Part):
+        try:
+            solid = _whole(node, assembly) if is_whole(node) else _part(cast(Part, node), resolution)
+        except NoSurfaceError:
+            return None  # it only blends, or nothing of it lies within the assembly
+        name = free_name(node.name or "convex", set(solids))
+        solids[name] = solid
+        return name
+    children = [_tree(child, assembly, resolution, solids) for child in node.children]
+    if children[0] is None and node.operation == "difference":
+        return None
+    kept = [child for child in children if child is not None]
+    return (node.operation, kept) if kept else None
 
 
-def _entry(part: Part, colour: list[int]) -> dict[str, Any]:
+def _part(part: Part, resolution: int) -> _Solid:
+    """In the part's own frame, with its parameters."""
     f = as_superfrustum(part.field)
-    return {
-        "name": part.name,
-        "colour": [round(channel / 255, 4) for channel in colour],
+    entry = {
         "location": list(part.translation),
         "rotation": list(part.rotation),
         "kind": part.field.kind,
         "blend": part.blend,
         **{name: list(v) if isinstance(v := getattr(f, name), tuple) else v for name in _PARAMETERS},
     }
+    return _Solid(entry, mesh_part(Part(part.field), resolution))
 
 
-def _tree(node: Node, there: set[str]) -> Any:
-    if isinstance(node, Part):
-        return node.name if node.name in there else None
-    children = [_tree(child, there) for child in node.children]
-    if children[0] is None and node.operation == "difference":
-        return None
-    kept = [child for child in children if child is not None]
-    return (node.operation, kept) if kept else None
+def _whole(node: Node, assembly: Assembly) -> _Solid:
+    """Quadrics that bound one convex, in the assembly's frame; their coefficients by name."""
+    parts = (node,) if isinstance(node, Part) else node.parts
+    quadrics = {part.name: list(part.field.coefficients) for part in parts if isinstance(part.field, Quadric)}
+    entry = {"location": [0.0] * 3, "rotation": [1.0, 0.0, 0.0, 0.0], "kind": "convex", "blend": 0.0}
+    return _Solid(entry | quadrics, whole_mesh(node, assembly))
 
 
 def _literal(value: Any) -> str:

@@ -10,7 +10,6 @@ quadrics (a convex of CAPRI-Net's) is one node, since its leaves alone have no e
 from __future__ import annotations
 
 import math
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +21,8 @@ from partwright.assembly.files import instance_dict
 from partwright.assembly.palette import palette
 from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import NoSurfaceError
-from partwright.fields import Box, Quadric
-from partwright.meshing import has_exact_mesh, mesh_csg, mesh_part
+from partwright.export.wholes import free_name, is_whole, whole_mesh
+from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
 from partwright.writing import write_bytes
 
@@ -88,7 +87,7 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
     def add_copies(part: Part) -> None:
         own = Similarity(1.0, part.rotation, part.translation)
         for i, move in enumerate(part.instances, start=2):
-            copy = _free_name(f"{part.name}/{i}", taken)
+            copy = free_name(f"{part.name}/{i}", taken)
             within = own.inverse().conjugate(move).matrix()
             extras = {"role": "copy"}
             scene.graph.update(
@@ -98,10 +97,10 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
     def add_whole(node: Node, parent: str, pose: np.ndarray, about: dict[str, Any]) -> None:
         """A leaf or an intersection, its mesh in the assembly's own frame."""
         parts = (node,) if isinstance(node, Part) else node.parts
-        name = _free_name(node.name or "convex", taken) if isinstance(node, Assembly) else node.name
+        name = free_name(node.name or "convex", taken) if isinstance(node, Assembly) else node.name
         about = about | {"operation": "intersection", "parts": [{"name": p.name} | _extras(p) for p in parts]}
         try:
-            mesh = coloured(mesh_csg(_within(node, assembly)), colours[parts[0].name])
+            mesh = coloured(whole_mesh(node, assembly), colours[parts[0].name])
         except NoSurfaceError:
             scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=about)
         else:
@@ -109,7 +108,7 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
 
     def add(node: Node, parent: str, pose: np.ndarray, role: str) -> None:
         extras: dict[str, Any] = {"role": role} if role else {}
-        if _is_whole(node):
+        if is_whole(node):
             add_whole(node, parent, pose, extras)
             return
         if isinstance(node, Part):
@@ -124,7 +123,7 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
                 scene.add_geometry(mesh, node.name, node.name, parent, placed, metadata=about)
                 add_copies(node)
             return
-        name = _free_name(node.name or "assembly", taken)
+        name = free_name(node.name or "assembly", taken)
         extras |= {"operation": node.operation, "blend": node.blend}
         scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=extras)
         for i, child in enumerate(node.children):
@@ -132,23 +131,6 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
 
     add(assembly, "world", to_gltf(assembly).matrix(), "")
     return scene
-
-
-def _is_whole(node: Node) -> bool:
-    """A quadric, or an intersection of leaves with quadrics among them that has an exact mesh."""
-    if isinstance(node, Part):
-        return isinstance(node.field, Quadric)
-    quadrics = any(isinstance(part.field, Quadric) for part in node.parts)
-    return quadrics and node.operation == "intersection" and has_exact_mesh(node)
-
-
-def _within(node: Node, assembly: Assembly) -> Node:
-    """The node where it does not end cut off at the assembly's bounds, so far as these end."""
-    lower, upper = assembly.bounds()
-    if np.isfinite(node.bounds()).all() or not np.isfinite([lower, upper]).all():
-        return node
-    x, y, z = ((lower + upper) / 2).tolist()
-    return Assembly((Part(Box(tuple((upper - lower).tolist())), (x, y, z)), node), "intersection")
 
 
 def _local_mesh(part: Part, resolution: int) -> trimesh.Trimesh | None:
@@ -183,9 +165,3 @@ def coloured(mesh: trimesh.Trimesh, colour: np.ndarray) -> trimesh.Trimesh:
     material = PBRMaterial(baseColorFactor=rgba, metallicFactor=0.0, roughnessFactor=0.7)
     mesh.visual = TextureVisuals(material=material)
     return mesh
-
-
-def _free_name(wanted: str, taken: set[str]) -> str:
-    name = next(n for i in count(1) if (n := wanted if i == 1 else f"{wanted}_{i:02d}") not in taken)
-    taken.add(name)
-    return name

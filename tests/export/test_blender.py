@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from partwright.assembly import Assembly, Part
 from partwright.errors import NoSurfaceError, SettingError
 from partwright.export import export
-from partwright.fields import Sphere, SuperFrustum
+from partwright.fields import Quadric, Sphere, SuperFrustum
 from tests.export.trees import flange, lone
 
 _MEASURE = """
@@ -51,26 +52,35 @@ def test_the_script_is_plain_python_that_needs_no_other_file(tmp_path: Path) -> 
     assert data["NAME"] == "Flansch ä"
 
 
-@pytest.mark.parametrize("unit", ["mm", None])
-def test_blender_builds_the_solid(tmp_path: Path, unit: str | None) -> None:
+def built(assembly: Assembly, folder: Path, **options: Any) -> dict[str, Any]:
+    """What Blender says of the scene that the script makes."""
     blender = shutil.which("blender")
     if blender is None:
         pytest.skip("blender is missing (Debian: blender)")
-    assembly, volume = flange(unit)
-    export(assembly, tmp_path / "a.blender.py", resolution=48)
-    (tmp_path / "measure.py").write_text(_MEASURE)
-    command = [blender, "-b", "--factory-startup", "--python-exit-code", "3"]
-    command += [
-        "-P",
-        tmp_path / "a.blender.py",
-        "-P",
-        tmp_path / "measure.py",
-        "--",
-        tmp_path / "report.json",
-    ]
+    export(assembly, folder / "a.blender.py", **options)
+    (folder / "measure.py").write_text(_MEASURE)
+    command = [blender, "-b", "--factory-startup", "--python-exit-code", "3", "-P", folder / "a.blender.py"]
+    command += ["-P", folder / "measure.py", "--", folder / "report.json"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
-    report = json.loads((tmp_path / "report.json").read_text())
+    return json.loads((folder / "report.json").read_text())
+
+
+def test_quadrics_come_as_the_convexes_that_they_bound(tmp_path: Path) -> None:
+    planes = tuple(Part(Quadric.plane(n, 0.5)) for n in np.vstack([np.eye(3), -np.eye(3)]))
+    cube = Assembly(planes, "intersection", "cube")
+    drilled = Assembly((cube, Part(Quadric.cylinder(0.3), name="bore")), "difference", "drilled")
+    report = built(drilled, tmp_path)
+    assert report["collections"]["drilled parts"] == ["cube", "bore"]
+    assert report["volumes"]["cube"] == pytest.approx(1.0)
+    assert report["volumes"]["drilled surface"] == pytest.approx(1 - 0.09 * np.pi, rel=1e-3)
+    assert "bore" in report["properties"]["bore"]
+
+
+@pytest.mark.parametrize("unit", ["mm", None])
+def test_blender_builds_the_solid(tmp_path: Path, unit: str | None) -> None:
+    assembly, volume = flange(unit)
+    report = built(assembly, tmp_path, resolution=48)
     assert report["collections"]["Flansch ä parts"] == [part.name for part in assembly.parts]
     assert report["volumes"]["Flansch ä surface"] == pytest.approx(volume, rel=0.01)
     assert report["volumes"]["boss\\"] == pytest.approx(np.pi / 2, rel=0.01)
