@@ -65,6 +65,7 @@ ROWS = {
     "seven": Row("without cones and general quadrics", changes={"kinds": ("plane", "cylinder", "sphere")}),
     "first": Row("without ruin and recreate", changes={"tries": 0}),
     "cheap": Row("a tenth of the prices", changes={"price": 6e-5, "convex_price": 3e-4}),
+    "double": Row("2.3 times the price of a convex", changes={"convex_price": 7e-3}),
     "dear": Row("five times the price of a convex", changes={"convex_price": 1.5e-2}),
     "paper": Row("the paper's schedule from the tree found, 3 x 1,000 iterations",
                  changes={"schedule": "paper", "iterations": 1000}),
