@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 TOLERANCE = 0.05  # of the longest side: how far a solid's surface may lie from its part's
 _MOST_ERROR = 0.3  # of its volume: thin parts are within any tolerance of much
+_SPACING = 0.04  # of its size: between the points of a hull that are held against what it stands for
 _COMPARED = 32  # cells along what is compared
 
 
@@ -190,7 +191,7 @@ def _hull(mesh: trimesh.Trimesh, node: Node) -> tuple[trimesh.Trimesh, float, fl
     middle, side = (lower + upper) / 2, float((upper - lower).max())
     unit = trimesh.Trimesh((mesh.vertices - middle) / side, mesh.faces, process=False)
     hull = unit.convex_hull
-    places = hull.subdivide().subdivide().triangles_center * side + middle
+    places = hull.subdivide_to_size(_SPACING).triangles_center * side + middle
     deviation = float(np.abs(node.distance(places)).max())
     placed = trimesh.Trimesh(hull.vertices * side + middle, hull.faces, process=False)
     return placed, float(hull.volume / unit.volume - 1), deviation
