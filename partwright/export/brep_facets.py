@@ -41,7 +41,9 @@ def faceted(node: Assembly) -> TopoDS_Shape:
     sewing = BRepBuilderAPI_Sewing(SHORTEST / 10 * longest)
     for triangle in np.asarray(mesh.tri_verts, dtype=np.int64):
         outline = BRepBuilderAPI_MakePolygon(*(gp_Pnt(*places[i].tolist()) for i in triangle), True)
-        sewing.Add(BRepBuilderAPI_MakeFace(outline.Wire(), True).Shape())
+        face = BRepBuilderAPI_MakeFace(outline.Wire(), True)
+        if face.IsDone():  # a needle has no plane; sewing closes the slit that it leaves
+            sewing.Add(face.Shape())
     sewing.Perform()
     shells = TopExp_Explorer(sewing.SewedShape(), TopAbs_ShapeEnum.TopAbs_SHELL)
     solid = BRepBuilderAPI_MakeSolid()

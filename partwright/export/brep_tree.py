@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 _LOST = 1e-4  # of the larger volume: what an operation may lose by rounding
 _FUZZY = (0.0, 1e-5, 1e-3)  # tolerances of operations, of the cube root of the volume
+_OVERLAP = 0.02  # of a union's volume: more of it twice, and facets stand for the union
 _SAME_MESH = 5e-3  # share of the volume by which an exact mesh may differ from what it stands for
 _ORDERS = 4  # of operands, beside the given one and its reverse
 
@@ -44,15 +45,16 @@ def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
     """The node's solids, of `built` fields, joined by the boolean operations of its tree.
 
     ball: holds all of the node; quadrics that do not end are closed off outside of it.
-    made: learns of what OpenCASCADE gets wrong. What it cannot unite stays a solid of its own; where a
-    difference or an intersection fails, flat facets of its exact mesh stand for it.
+    made: learns of what OpenCASCADE gets wrong. What it cannot unite stays a solid of its own, as long as
+    that hardly overlaps the rest; where an operation fails, flat facets of its exact mesh stand for it.
 
     Raises:
         NoSurfaceError: the operations leave nothing, or OpenCASCADE cannot do them, nor has the node an exact
             mesh.
     """
+    within = Compromises()
     try:
-        return _combined(node, ball, made)
+        solid = _combined(node, ball, within)
     except NoSurfaceError as error:
         if isinstance(node, Part) or not has_exact_mesh(node):
             raise
@@ -60,7 +62,9 @@ def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
             solid = faceted(node)
         except NoSurfaceError:
             raise error from None
-    made.faceted += [part.name for part in node.parts]
+        within = Compromises(faceted=[part.name for part in node.parts])
+    made.apart += within.apart
+    made.faceted += within.faceted
     return solid
 
 
@@ -77,7 +81,11 @@ def _combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
         except NoSurfaceError:
             left.append(solid)
             made.apart.append(child.name or _label(child))
-    return _side_by_side([_unified(node, result), *left])
+    solids = [_unified(node, result), *left]
+    right = _exact_volume(node) if left else None
+    if right is not None and sum(volume_and_area(one)[0] for one in solids) > (1 + _OVERLAP) * right:
+        raise NoSurfaceError(f"OpenCASCADE fails at the union of {_label(node)}; move its parts a little")
+    return _side_by_side(solids)
 
 
 def _ordered(node: Assembly, solids: list[TopoDS_Shape]) -> TopoDS_Shape:

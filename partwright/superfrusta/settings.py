@@ -50,7 +50,7 @@ class Settings:
     rounds: int = 10
     regions: int = 7
     kappa: float = 0.02
-    alpha: float = 3.5e-3
+    alpha: float = 3.55e-3
     optimiser: Optimiser = "newton"
     overlap: float = 0.02
     blending: float = 0.02
