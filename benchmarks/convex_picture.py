@@ -13,14 +13,13 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from PIL import Image
 from solids_picture import IMAGES, PANEL, bracket
 
 import partwright as pw
 from partwright.assembly.palette import palette
 from partwright.meshing import mesh_assembly
 from partwright.render import Camera, sheet
-from partwright.render.output import write
+from partwright.render.output import write_png
 from partwright.render.raycast import Scene
 from partwright.render.shading import NEUTRAL, look
 
@@ -74,8 +73,7 @@ def main() -> int:
         drawn(apart, palette(len(made)), around),
     ]
     captions = ["assembly", "its hull: the holes are gone", f"MJCF: {len(made)} convex pieces, drawn apart"]
-    page = Image.fromarray(sheet(panels, captions)).quantize(256, Image.Quantize.MAXCOVERAGE)
-    write(IMAGES / "convex_pieces.png", lambda name: page.save(name, format="PNG", optimize=True))
+    write_png(IMAGES / "convex_pieces.png", sheet(panels, captions))
     print(
         *(f"{one['to']}: {', '.join(one['parts'])}, {one['volume_error_ratio']:.3f}" for one in told),
         sep="\n",
