@@ -17,12 +17,13 @@ from partsdf_scores import (
     measured,
     published,
     scale_of,
+    trained,
     write,
 )
 
 from partwright.datasets.prepared import PreparedFamily
 from partwright.partsdf.config import Config
-from partwright.partsdf.training import train
+from partwright.partsdf.model import Model
 
 # Tables 3 and 7 of the paper, on its own cars; Table 1 for one part. CD x1e4, IoU %, IC, pIoU %.
 PUBLISHED = {
@@ -36,8 +37,13 @@ PUBLISHED = {
 }
 
 
+# At a small scale it is the number of steps that counts, more than the samples of each.
+STEPS = {"batch": 1, "points": 256}
+
+
 def variants(base: Config) -> dict[str, Config]:
-    """Every option that the paper's tables switch, one at a time; without L_inter is its Figure 9."""
+    """Every option that the paper's tables switch, one at a time, and L_inter, as its Figure 9; octaves are
+    ours."""
     decoder, losses = base.decoder, base.losses
     return {
         "PartSDF": base,
@@ -46,33 +52,39 @@ def variants(base: Config) -> dict[str, Config]:
         "without modulation": replace(base, decoder=replace(decoder, modulation=False)),
         "without cross-part layers": replace(base, decoder=replace(decoder, cross_part=False)),
         "softmin": replace(base, decoder=replace(decoder, aggregation="softmin")),
-        "transformer": replace(base, decoder=replace(decoder, architecture="transformer")),
         "without L_inter": replace(base, losses=replace(losses, inter=0.0)),
+        "with 2 octaves (not in the paper)": replace(base, decoder=replace(decoder, octaves=2)),
+        "transformer": replace(base, decoder=replace(decoder, architecture="transformer")),
     }
 
 
 def ablations(arguments: argparse.Namespace) -> None:
     """Each variant trained alike in a folder of its own, where a stopped training goes on, and measured."""
     family = PreparedFamily(arguments.family)
-    training = replace(TRAINING, epochs=arguments.epochs, threads=arguments.threads, validation=True)
+    training = replace(TRAINING, epochs=arguments.epochs, threads=arguments.threads, validation=True, **STEPS)
     decoder = replace(SMALL, width=arguments.width)
     base = Config(arguments.family, "base", decoder=decoder, losses=LOSSES, training=training)
-    rows, sizes = [], {}
-    for label, config in variants(base).items():
+    rows, sizes = [], []
+    for number, (label, config) in enumerate(variants(base).items()):
         if arguments.only and label not in arguments.only.split(","):
             continue
-        name = label.replace(" ", "-")
-        model = train(replace(config, name=name), arguments.work / f"{family.name}-{name}").model
+        name = f"{family.name}-{number}"
+        model = trained(replace(config, name=name), arguments.work / name)
         scores = measured(f"ablations-{family.name}", label, family, model, known, arguments)
         rows.append(line(label, scores, parts=not config.one_part))
-        sizes[label] = sum(p.numel() for p in model.decoder.parameters())
+        sizes.append(f"{label} {sum(p.numel() for p in model.decoder.parameters()):,}")
         print(rows[-1], flush=True)
-        scale = scale_of(model)
-    if family.name == "cars":
-        rows += [published(f"paper, its own cars, {label}", *row) for label, row in PUBLISHED.items()]
-    weights = ", ".join(f"{label} {size:,}" for label, size in sizes.items())
-    write(f"ablations-{family.name}", [
+        write(f"ablations-{family.name}", table(family, model, rows, sizes, arguments))
+
+
+def table(
+    family: PreparedFamily, model: Model, rows: list[str], sizes: list[str], arguments: argparse.Namespace
+) -> list[str]:
+    """What there is so far, with the paper's rows below."""
+    paper = PUBLISHED if family.name == "cars" else {}
+    return [
         f"# PartSDF: ablations on {family.name}", "",
-        f"Each trained alike: {scale}. Known parts. {how_measured(family, arguments)}", "",
-        f"Weights of the decoders: {weights}.", "", command_line(), "", *HEAD, *rows,
-    ])  # fmt: skip
+        f"Each trained alike: {scale_of(model)}. Known parts. {how_measured(family, arguments)}", "",
+        f"Weights of the decoders: {', '.join(sizes)}.", "", command_line(), "", *HEAD, *rows,
+        *(published(f"paper, its own cars, {label}", *row) for label, row in paper.items()),
+    ]  # fmt: skip

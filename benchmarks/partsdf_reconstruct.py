@@ -17,6 +17,7 @@ from partsdf_scores import (
     measured,
     published,
     scale_of,
+    trained,
     unknown,
     write,
 )
@@ -25,7 +26,6 @@ from partwright.datasets import prepare
 from partwright.datasets.prepared import PreparedFamily
 from partwright.partsdf.config import Config, read_config
 from partwright.partsdf.model import Model, load_model
-from partwright.partsdf.training import train
 
 # Table 1 of the paper, on its own shapes: Ours, Ours-PC, Ours-1P; CD x1e4, IoU %, IC, pIoU %.
 HOW = ("known parts", "from points", "1P")
@@ -60,7 +60,7 @@ def one_part(arguments: argparse.Namespace) -> Model:
         config, family=arguments.family, name=f"{config.name}-1p", one_part=True,
         training=replace(config.training, validate=0),
     )  # fmt: skip
-    return train(config, arguments.work / config.name).model
+    return trained(config, arguments.work / config.name)
 
 
 def robots(arguments: argparse.Namespace) -> None:
@@ -77,7 +77,7 @@ def robots(arguments: argparse.Namespace) -> None:
         family = PreparedFamily(folder / "family")
         config = Config(str(family.folder), f"robots-{held}", decoder=SMALL, losses=LOSSES,
                         training=training)  # fmt: skip
-        model = train(config, folder / "model").model
+        model = trained(config, folder / "model")
         for label, how in (("known parts", known), ("part-agnostic", unknown)):
             scores = measured("robots", f"{held}, {label}", family, model, how, arguments)
             lines.append(line(f"{held}, {label}", scores))

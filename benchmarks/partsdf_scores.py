@@ -15,7 +15,7 @@ import torch
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import NoSurfaceError
 from partwright.metrics.reconstruction import ReconstructionScores, mean_scores, reconstruction_scores
-from partwright.partsdf.config import DecoderSettings, LossSettings, TrainingSettings
+from partwright.partsdf.config import Config, DecoderSettings, LossSettings, TrainingSettings
 from partwright.partsdf.meshing import labelled_surface, mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
@@ -25,6 +25,7 @@ from partwright.partsdf.reconstruction import (
     reconstruct,
     reconstruct_unknown,
 )
+from partwright.partsdf.training import train
 
 RESULTS = Path(__file__).parent / "results"
 # As configs/ has it for the models that ship.
@@ -51,6 +52,14 @@ def unknown(model: Model, shape: PreparedShape, settings: ReconstructionSettings
     """Without labels and poses."""
     target = Target(torch.tensor(shape.points), torch.tensor(shape.sdf))
     return reconstruct_unknown(model, target, settings)
+
+
+def trained(config: Config, folder: Path) -> Model:
+    """The model of a training, which goes on, or comes back, from its folder; Ctrl-C also ends the table."""
+    result = train(config, folder)
+    if result.outcome == "interrupted":
+        raise KeyboardInterrupt
+    return result.model
 
 
 def score(found: NeuralShape, truth: PreparedShape, resolution: int) -> ReconstructionScores:
@@ -115,7 +124,7 @@ def scale_of(model: Model) -> str:
     c, t = model.config.decoder, model.config.training
     return (
         f"{len(model.shapes)} shapes, width {c.width}, latent {c.latent}, {t.epochs} epochs of {t.points} "
-        f"points a shape, {t.precision}"
+        f"points a shape, {t.batch} {'shape' if t.batch == 1 else 'shapes'} a step, {t.precision}"
     )
 
 
