@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import shlex
 import sys
 import time
 from collections.abc import Callable
@@ -137,7 +138,7 @@ def how_measured(family: PreparedFamily, arguments: argparse.Namespace) -> str:
 
 
 def command_line() -> str:
-    return f"    python benchmarks/partsdf.py {' '.join(sys.argv[1:])}"
+    return f"    python benchmarks/partsdf.py {shlex.join(sys.argv[1:])}"
 
 
 def write(name: str, lines: list[str]) -> None:

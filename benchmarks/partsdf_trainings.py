@@ -14,7 +14,7 @@ HEAD = [
     "Trained by `partwright parts train configs/NAME.toml --half`, on one core. Errors are means "
     "over the last epoch's samples, clamped at 0.1 of the unit frame (longest side 1.8); IoUs those "
     "of the first held-out shape, reconstructed with known parts, at samples near the surface that "
-    "were not fitted. Logs: partsdf-training-NAME.csv.", "",
+    "were not fitted. Minutes are by the clock, whatever else ran. Logs: partsdf-training-NAME.csv.", "",
 ]  # fmt: skip
 COLUMNS = [
     "| | trained on | minutes | whole | part | overlap | IoU % | pIoU % | file, MB |",
