@@ -2,9 +2,9 @@
 
     python benchmarks/parts_pictures.py --families FOLDER [--only cars]
 
-FOLDER holds the prepared families chairs and cars, as configs/ name them. The first test shapes are
-reconstructed without labels or poses; edits and interpolations are of training shapes. Pictures go
-to docs/images/parts/, one a family.
+FOLDER holds the prepared families chairs, cars and mixers, as configs/ name them. The first test shapes are
+reconstructed without labels or poses; edits and interpolations are of training shapes. A mixer's helix, which
+hides in its tube, is drawn before it. Pictures go to docs/images/parts/, one a family.
 """
 
 from __future__ import annotations
@@ -18,15 +18,18 @@ import numpy as np
 import torch
 import trimesh
 
+from partwright.assembly.palette import palette
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.partsdf import Model, NeuralShape, ReconstructionSettings, editing, load_model
-from partwright.partsdf.pictures import picture
+from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.reconstruction import Target, reconstruct_unknown
 from partwright.render import Camera, render_mesh, sheet, write_png
 
 TARGET = Path(__file__).parents[1] / "docs" / "images" / "parts"
 CAMERA = Camera(margin=0.12)
-PANEL, RESOLUTION, ITERATIONS = 220, 96, 200
+PANEL, ITERATIONS = 220, 200
+RESOLUTION = {"mixers": 160}  # of thin walls; 96 for the others
+BEFORE = {"helix": (0.0, -1.0, -0.1)}  # unit lengths that a hidden part is moved by
 TESTED, STEPS = 2, 6  # test shapes, pictures of an interpolation
 
 
@@ -40,11 +43,16 @@ def another_back(chair: NeuralShape) -> NeuralShape:
     return editing.swapped(chair, "back", NeuralShape.trained(chair.model, "5"))
 
 
+def wider_tube(mixer: NeuralShape) -> NeuralShape:
+    return editing.scaled(mixer, "tube", (1.2, 1.2, 1.0))
+
+
 EDITS: dict[str, tuple[str, Callable[[NeuralShape], NeuralShape]]] = {
     "chairs": ("another's back", another_back),
     "cars": ("larger wheels", larger_wheels),
+    "mixers": ("a wider tube", wider_tube),
 }
-WAYS = {"chairs": ("0", "1"), "cars": ("0", "11")}  # ends of interpolations
+WAYS = {"chairs": ("0", "1"), "cars": ("0", "11"), "mixers": ("0", "1")}  # ends of interpolations
 
 
 def page(name: str, family: PreparedFamily) -> np.ndarray:
@@ -76,7 +84,11 @@ def found(model: Model, shape: PreparedShape) -> np.ndarray:
 
 
 def drawn(shape: NeuralShape) -> np.ndarray:
-    return picture(shape, RESOLUTION, PANEL, CAMERA)
+    parts = mesh_shape(shape, RESOLUTION.get(shape.model.name, 96)).parts
+    colours = palette(len(shape.model.parts))
+    meshes = [mesh.copy().apply_translation(BEFORE.get(name, (0, 0, 0))) for name, mesh in parts.items()]
+    faces = [np.tile(colours[shape.model.index(name)], (len(mesh.faces), 1)) for name, mesh in parts.items()]
+    return render_mesh(trimesh.util.concatenate(meshes), CAMERA, (PANEL, PANEL), np.concatenate(faces))
 
 
 def main() -> int:

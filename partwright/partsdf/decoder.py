@@ -82,7 +82,7 @@ class Decoder(nn.Module):
     def __init__(self, parts: int, settings: DecoderSettings) -> None:
         super().__init__()
         self.parts, self.settings = parts, settings
-        widths = [3, *[settings.width] * (settings.layers - 1), 1]
+        widths = [3 + 6 * settings.octaves, *[settings.width] * (settings.layers - 1), 1]
         last = settings.layers - 1
         self.single = nn.ModuleList(
             SinglePart(i, o, parts, settings.latent, settings.modulation or n == 0, biased=n < last)
@@ -94,7 +94,7 @@ class Decoder(nn.Module):
     def condition(self, latents: Tensor) -> Conditioned:
         """Weight norm folded and latents (B, P, Z) taken in, once for any number of points."""
         layers = tuple(layer.folded(latents) for layer in self.single)  # type: ignore[operator]
-        return _Layers(layers, tuple(self.cross))
+        return _Layers(layers, tuple(self.cross), self.settings.octaves)
 
     def forward(self, latents: Tensor, local: Tensor) -> Tensor:
         """Distances (B, P, N) of latents (B, P, Z) at local points (B, P, N, 3)."""
@@ -105,10 +105,11 @@ class Decoder(nn.Module):
 class _Layers:
     layers: tuple[tuple[Tensor, Tensor], ...]
     cross: tuple[nn.Module, ...]
+    octaves: int
 
     def __call__(self, local: Tensor) -> Tensor:
         shape = local.shape[:3]
-        x = _precise(self.layers[0], local.flatten(0, 1)).relu_()
+        x = _precise(self.layers[0], with_waves(local.flatten(0, 1), self.octaves)).relu_()
         for number, layer in enumerate(self.layers[1:-1]):
             x = _linear(layer, self._crossed(number, x, shape)).relu_()
         return _precise(self.layers[-1], self._crossed(-1, x, shape)).view(shape)
@@ -117,6 +118,15 @@ class _Layers:
         if not self.cross:
             return x
         return self.cross[number](x.view(shape[0], shape[1], -1)).view(x.shape)
+
+
+def with_waves(local: Tensor, octaves: int) -> Tensor:
+    """Local points (..., 3) with the sines and cosines of pi/2 x, pi x, 2 pi x ... behind: (..., 3 + 6 O)."""
+    if not octaves:
+        return local
+    pitch = 0.5 * torch.pi * 2.0 ** torch.arange(octaves, dtype=local.dtype, device=local.device)
+    phase = (local.unsqueeze(-1) * pitch).flatten(-2)
+    return torch.cat([local, phase.sin(), phase.cos()], dim=-1)
 
 
 def _linear(layer: tuple[Tensor, Tensor], x: Tensor) -> Tensor:

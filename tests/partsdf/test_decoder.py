@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 import torch
 
+from partwright.errors import SettingError
 from partwright.partsdf.config import DecoderSettings
-from partwright.partsdf.decoder import Decoder
+from partwright.partsdf.decoder import Decoder, with_waves
 from partwright.partsdf.reference import ReferenceDecoder
 from partwright.partsdf.transformer import TransformerDecoder
 
@@ -82,6 +83,23 @@ def test_parts_hear_of_one_another_only_through_cross_part_layers() -> None:
 def test_without_modulation_the_latent_enters_once() -> None:
     decoder = Decoder(2, replace(SMALL, modulation=False))
     assert [layer.modulation is not None for layer in decoder.single] == [True, False, False, False, False]
+
+
+def test_waves_are_sines_and_cosines_in_octaves_and_the_decoder_takes_them() -> None:
+    settings = replace(SMALL, octaves=3)
+    decoder = filled(Decoder(2, settings).double())
+    z, x = inputs(2, SMALL.latent)
+    waves = with_waves(x, 3)
+    assert waves.shape == (3, 2, 7, 3 + 6 * 3)
+    torch.testing.assert_close(waves[..., :3], x)
+    for axis, octave in ((0, 0), (1, 2), (2, 1)):
+        phase = torch.pi / 2 * 2**octave * x[..., axis]
+        torch.testing.assert_close(waves[..., 3 + 3 * axis + octave], phase.sin())
+        torch.testing.assert_close(waves[..., 3 + 9 + 3 * axis + octave], phase.cos())
+    assert decoder(z, x).shape == (3, 2, 7)
+    assert torch.autograd.gradcheck(decoder, (z, x[:, :, :2].detach().requires_grad_()))
+    with pytest.raises(SettingError, match=r"decoder.octaves is 3.*mlp"):
+        replace(settings, architecture="transformer", heads=2)
 
 
 def test_transformer_is_a_decoder_of_the_same_form() -> None:

@@ -46,7 +46,11 @@ def _tube(rng: np.random.Generator, length: float, radius: float, wall: float) -
 
 
 def _helix(rng: np.random.Generator, length: float, radius: float) -> Manifold:
-    """A blade across the tube that turns along it, perhaps with a thicker middle or a second blade across."""
+    """A blade across the tube that turns along it, perhaps with a thicker middle or a second blade across.
+
+    Left- or right-handed, half a turn in 1.2 to 1.8 diameters, as static mixers are made; it stands upright
+    halfway along, between the attach points, so that both ends of a mixer are alike.
+    """
     from manifold3d import CrossSection, Manifold
 
     thickness = radius * rng.uniform(0.12, 0.24)
@@ -57,12 +61,10 @@ def _helix(rng: np.random.Generator, length: float, radius: float) -> Manifold:
     if style == "cross":
         blade = blade + blade.rotate(90)
     long = length * rng.uniform(0.6, 0.95)
-    turns = rng.uniform(0.75, 2.5) * rng.choice([-1, 1])
-    start = rng.uniform(0, 360)
+    turns = long / (4 * radius * rng.uniform(1.2, 1.8)) * rng.choice([-1, 1])
     steps = max(int(abs(turns) * 40), 24)
-    return (
-        Manifold.extrude(blade, long, steps, 360 * turns).translate((0, 0, -long / 2)).rotate((0, 0, start))
-    )
+    twisted = Manifold.extrude(blade, long, steps, 360 * turns).translate((0, 0, -long / 2))
+    return twisted.rotate((0, 0, -180 * turns))
 
 
 def _attach(rng: np.random.Generator, radius: float) -> Manifold:
