@@ -74,10 +74,11 @@ def main() -> int:
     larger = [Case(entry.path, int(most)) for most in given.parts.split(",")]
     by_triangles = exponent([one.triangles for one in finer], [one.seconds for one in finer])
     by_parts = exponent([one.parts for one in larger], [one.seconds for one in larger])
+    command = f"python benchmarks/scaling.py --shapes {given.shapes.name} --name {entry.name}"
     lines = [
         "# How the cost grows",
         "",
-        f"`python benchmarks/scaling.py {' '.join(sys.argv[1:])}` on {machine()}, one thread: {entry.name}.",
+        f"`{command}` on {machine()}, one thread.",
         "",
         f"Exponent over triangles {by_triangles:.2f}, over parts {by_parts:.2f}; 1 is linear growth.",
         "",
