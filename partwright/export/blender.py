@@ -21,7 +21,7 @@ from partwright.assembly.rows import as_superfrustum
 from partwright.errors import NoSurfaceError
 from partwright.export.identifiers import comment
 from partwright.export.wholes import free_name, is_whole, whole_mesh
-from partwright.fields import Quadric
+from partwright.fields import Quadric, Solid, SuperFrustum
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit
 from partwright.writing import write_bytes
@@ -117,15 +117,16 @@ def _tree(node: Node, assembly: Assembly, resolution: int, solids: dict[str, _So
 
 
 def _part(part: Part, resolution: int) -> _Solid:
-    """In the part's own frame, with its parameters."""
-    f = as_superfrustum(part.field)
-    entry = {
+    """In the part's own frame, with its parameters where they are numbers."""
+    entry: dict[str, Any] = {
         "location": list(part.translation),
         "rotation": list(part.rotation),
         "kind": part.field.kind,
         "blend": part.blend,
-        **{name: list(v) if isinstance(v := getattr(f, name), tuple) else v for name in _PARAMETERS},
     }
+    if isinstance(part.field, SuperFrustum | Solid):
+        f = as_superfrustum(part.field)
+        entry |= {name: list(v) if isinstance(v := getattr(f, name), tuple) else v for name in _PARAMETERS}
     return _Solid(entry, mesh_part(Part(part.field), resolution))
 
 

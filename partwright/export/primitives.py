@@ -16,7 +16,7 @@ from partwright.export.convex import segments, wedges
 from partwright.export.decomposition import convex_pieces
 from partwright.export.nearest import Approximation, nearest_solid
 from partwright.export.pieces import Piece, piece_mesh, pieces, require_some
-from partwright.fields import Field, Solid
+from partwright.fields import Field, Solid, SuperFrustum
 from partwright.meshing import mesh_part
 from partwright.shapes import MeshDistance
 
@@ -107,6 +107,8 @@ def _stand_ins(
         return whole, mesh_change
     if part is None:
         return _decomposed(piece, allowed) if convex else (whole, mesh_change)
+    if not isinstance(part.field, SuperFrustum | Solid):
+        return whole, mesh_change  # it has no arc and no hole to go by
     chain = _chain(piece, part, kinds, allowed, resolution)
     if all(geometry.part for geometry in chain):
         return chain, _compared(piece, chain, f"chain of {len(chain)} solids")
