@@ -57,8 +57,9 @@ def write(
 
 def roll_pitch_yaw(rotation: np.ndarray) -> tuple[float, float, float]:
     """Angles about the fixed x, y and z axes of a (3, 3) rotation, in that order, as URDF has them."""
-    pitch = math.atan2(-rotation[2, 0], math.hypot(rotation[0, 0], rotation[1, 0]))
-    if abs(rotation[2, 0]) > 1 - 1e-12:  # x points along z: only roll and yaw together are known
+    across = math.hypot(rotation[0, 0], rotation[1, 0])
+    pitch = math.atan2(-rotation[2, 0], across)
+    if across < 1e-9:  # x points along z: only roll and yaw together are known
         return math.atan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0
     yaw = math.atan2(rotation[1, 0], rotation[0, 0])
     return math.atan2(rotation[2, 1], rotation[2, 2]), pitch, yaw
