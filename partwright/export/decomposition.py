@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.tree import operands
 from partwright.errors import NoSurfaceError
 from partwright.export.convex import segments, wedges
-from partwright.fields import Box, Quadric
+from partwright.export.wholes import box_between
+from partwright.fields import Quadric
 from partwright.fields.quadric_forms import SAME
 from partwright.meshing import mesh_assembly, mesh_part
 from partwright.meshing.csg import has_exact_mesh, solid_of
@@ -66,8 +67,7 @@ def separated(node: Node) -> Iterator[Node]:
         first, *cutters = operands(node)
         for child in separated(first):
             cutting = [cutter for cutter in cutters if _common(child, cutter, None) is not None]
-            name = child.name or child.parts[0].name if isinstance(child, Assembly) else child.name
-            yield Assembly((child, *cutting), "difference", name) if cutting else child
+            yield Assembly((child, *cutting), "difference", child.name) if cutting else child
 
 
 def _convex_solids(node: Node, allowed: float, room: Part | None = None) -> list[Manifold]:
@@ -91,7 +91,7 @@ def _convex_solids(node: Node, allowed: float, room: Part | None = None) -> list
         if node.operation == "intersection":
             return [one.hull() for one in solid.decompose()]
     first, *cutters = operands(node)
-    box = _box(solid)
+    box = box_between(*np.reshape(solid.bounding_box(), (2, 3)))
     pieces = _convex_solids(first, allowed, box)
     for cutter in cutters:
         for hole in _convex_solids(cutter, allowed, box):
@@ -101,24 +101,24 @@ def _convex_solids(node: Node, allowed: float, room: Part | None = None) -> list
 
 def _without_concave(node: Assembly) -> Assembly:
     """An intersection with the outsides of convex quadrics, as the rest minus those quadrics."""
-    rest = [child for child in node.children if not _is_concave(child)]
-    taken = [_complement(child) for child in node.children if _is_concave(child)]
+    rest: list[Node] = []
+    taken: list[Node] = []
+    for child in node.children:
+        quadric = child.field if isinstance(child, Part) and not child.instances else None
+        if isinstance(child, Part) and isinstance(quadric, Quadric) and _is_concave(quadric):
+            taken.append(replace(child, field=quadric.complement()))
+        else:
+            rest.append(child)
     if not taken or not rest:
         return node
     return Assembly((Assembly(tuple(rest), "intersection"), *taken), "difference")
 
 
-def _is_concave(node: Node) -> TypeGuard[Part]:
-    if not isinstance(node, Part) or not isinstance(node.field, Quadric) or node.instances:
-        return False
-    bend = np.linalg.eigvalsh(node.field.matrices()[0])
-    size = np.abs(node.field.coefficients).max()
+def _is_concave(quadric: Quadric) -> bool:
+    """Whether it is the outside of something convex and curved."""
+    bend = np.linalg.eigvalsh(quadric.matrices()[0])
+    size = np.abs(quadric.coefficients).max()
     return bool(bend.max() <= SAME * size and bend.min() < -SAME * size)
-
-
-def _complement(part: Part) -> Part:
-    assert isinstance(part.field, Quadric)
-    return replace(part, field=Quadric(tuple(-c for c in part.field.coefficients)))
 
 
 def _without(solid: Manifold, hole: Manifold, allowed: float) -> list[Manifold]:
@@ -162,11 +162,6 @@ def _solid(node: Node, tolerance: float | None) -> Manifold:
     return _manifold(mesh_part(node, _CELLS) if isinstance(node, Part) else mesh_assembly(node, _CELLS))
 
 
-def _box(solid: Manifold) -> Part:
-    lower, upper = np.reshape(solid.bounding_box(), (2, 3))
-    return Part(Box(tuple((upper - lower).tolist())), tuple(((lower + upper) / 2).tolist()))
-
-
 def _manifold(mesh: trimesh.Trimesh) -> Manifold:
     from manifold3d import Manifold, Mesh64
 
@@ -182,7 +177,7 @@ def _planes(solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
     """Outward unit normals (F, 3) and offsets (F,) of a convex solid's faces, but for slivers: theirs are
     rounding."""
     mesh = solid.to_mesh64()
-    corners = _corners(solid)
+    corners = np.asarray(mesh.vert_properties)[:, :3]
     a, b, c = corners[np.asarray(mesh.tri_verts, dtype=np.int64).T]
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1)

@@ -1,10 +1,12 @@
-"""Names of parts as identifiers of a programming language, and as text that may stand in a comment."""
+"""Names of parts as identifiers of a programming language, as text that may stand in a comment,
+and beside names that are taken."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
 from collections.abc import Collection, Sequence
+from itertools import count
 
 from partwright.assembly.names import unique_names
 
@@ -24,6 +26,13 @@ def comment(text: str) -> str:
     """`text` for the rest of a comment line: ASCII, one line, and not continued by a backslash at its end."""
     plain = text.encode("ascii", "backslashreplace").decode()
     return " ".join(plain.replace("\\", "/").split())
+
+
+def free_name(wanted: str, taken: set[str]) -> str:
+    """The name, or it with the first free number behind it, which is then taken."""
+    name = next(n for i in count(1) if (n := wanted if i == 1 else f"{wanted}_{i:02d}") not in taken)
+    taken.add(name)
+    return name
 
 
 def _identifier(name: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,14 +30,10 @@ def whole_mesh(node: Node, assembly: Assembly) -> trimesh.Trimesh:
     """
     lower, upper = assembly.bounds()
     if not np.isfinite(node.bounds()).all() and np.isfinite([lower, upper]).all():
-        x, y, z = ((lower + upper) / 2).tolist()
-        box = Part(Box(tuple((upper - lower).tolist())), (x, y, z))
-        node = Assembly((box, node), "intersection")
+        node = Assembly((box_between(lower, upper), node), "intersection")
     return mesh_csg(node)
 
 
-def free_name(wanted: str, taken: set[str]) -> str:
-    """The name, or it with the first free number behind it, which is then taken."""
-    name = next(n for i in count(1) if (n := wanted if i == 1 else f"{wanted}_{i:02d}") not in taken)
-    taken.add(name)
-    return name
+def box_between(lower: np.ndarray, upper: np.ndarray) -> Part:
+    """The box of these corners (3,)."""
+    return Part(Box(tuple((upper - lower).tolist())), tuple(((lower + upper) / 2).tolist()))

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 from partwright.assembly import Assembly, Part
 from partwright.fields import Box, Capsule, Cylinder, Sphere, SuperFrustum, Tube
 
+FLOOR = '<geom type="plane" size="5 5 .1"/>'
 TURN = (0.5, 0.5, 0.5, 0.5)
 
 
@@ -33,3 +37,11 @@ def awkward() -> Assembly:
         holed.translated((-1.0, 0, 0)),
     )
     return Assembly(children, unit="m", up="z", name="awkward")
+
+
+def with_others(path: Path, others: str) -> Any:
+    """The MuJoCo model of an MJCF file with further elements in its world."""
+    import mujoco
+
+    text = path.read_text(encoding="utf-8").replace("<worldbody>", f"<worldbody>{others}")
+    return mujoco.MjModel.from_xml_string(text)

@@ -14,6 +14,7 @@ from partwright.errors import NoSurfaceError
 from partwright.export import export
 from partwright.export.decomposition import convex_pieces, separated
 from partwright.fields import Box, Cylinder, Quadric, Sphere, SuperFrustum, Tube
+from tests.export.robotics import FLOOR, with_others
 
 BLOCK = Part(Box((1, 1, 0.5)), name="block")
 
@@ -111,10 +112,7 @@ def test_a_ball_falls_through_a_drilled_plate_but_not_beside(tmp_path: Path) -> 
     balls = "".join(
         f'<body pos="{x} 0 0.8"><freejoint/><geom type="sphere" size="0.15"/></body>' for x in (0, 0.36)
     )
-    floor = '<geom type="plane" size="5 5 .1"/>'
-    loaded = mujoco.MjModel.from_xml_string(
-        path.read_text("utf-8").replace("<worldbody>", f"<worldbody>{floor}{balls}")
-    )
+    loaded = with_others(path, FLOOR + balls)
     data = mujoco.MjData(loaded)
     for _ in range(300):
         mujoco.mj_step(loaded, data)

@@ -16,19 +16,15 @@ from partwright.export.approximation import report_path
 from partwright.export.axes import to_metres_z_up
 from partwright.fields import Box, Cylinder, Sphere, SuperFrustum, Tube
 from partwright.meshing.mass import mass_properties
-from tests.export.robotics import awkward, natives
+from tests.export.robotics import FLOOR, awkward, natives, with_others
 
 mujoco = pytest.importorskip("mujoco")
-FLOOR = '<geom type="plane" size="5 5 .1"/>'
 VOLUME = 0.1 * 0.2 * 0.3 + np.pi * (0.05**2 * 0.2 + 4 / 3 * 0.06**3 + 0.04**2 * 0.12 + 4 / 3 * 0.04**3)
 
 
 def model(assembly: Assembly, path: Path, floor: bool = False, **options: Any) -> Any:
     export(assembly, path, **options)
-    text = path.read_text(encoding="utf-8")
-    return mujoco.MjModel.from_xml_string(
-        text.replace("<worldbody>", f"<worldbody>{FLOOR}") if floor else text
-    )
+    return with_others(path, FLOOR if floor else "")
 
 
 def report(path: Path) -> dict[str, Any]:
@@ -110,9 +106,7 @@ def test_a_ball_falls_into_a_hollow_part(tmp_path: Path) -> None:
     path = tmp_path / "a.mjcf"
     export(Assembly((Part(Tube(0.3, 0.05, 0.4), (0, 0, 0.2), name="ring"),), unit="m", up="z"), path)
     ball = '<body pos="0 0 0.5"><freejoint/><geom type="sphere" size="0.1"/></body>'
-    loaded = mujoco.MjModel.from_xml_string(
-        path.read_text("utf-8").replace("<worldbody>", f"<worldbody>{FLOOR}{ball}")
-    )
+    loaded = with_others(path, FLOOR + ball)
     data = mujoco.MjData(loaded)
     for _ in range(1000):
         mujoco.mj_step(loaded, data)
