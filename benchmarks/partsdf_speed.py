@@ -13,17 +13,21 @@ import resource
 import subprocess
 import sys
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import torch
 from partsdf_scores import SMALL, command_line, write
 
-from partwright.partsdf.config import DecoderSettings, LossSettings
+from partwright.partsdf.autodecoder import AutoDecoder
+from partwright.partsdf.config import Config, DecoderSettings, LossSettings, TrainingSettings
 from partwright.partsdf.decoder import Decoder
 from partwright.partsdf.losses import latent_penalty, terms
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.poses import identity
 from partwright.partsdf.reference import ReferenceDecoder, dense_grid
+from partwright.partsdf.stepping import backward
 
 PAPER = DecoderSettings()
 PARTS, SLICE, GRID = 4, 1024, 256  # parts of a mixer, points of a slice, cells along the grid
@@ -63,6 +67,19 @@ def step_of(
     return step
 
 
+def batch_step(settings: DecoderSettings, points: int, shapes: int) -> Callable[[], object]:
+    """One training step of several shapes, one of them at a time in memory."""
+    generator = torch.Generator().manual_seed(0)
+    model = AutoDecoder(shapes, PARTS, settings)
+    config = Config("", "batch", decoder=settings, training=TrainingSettings(batch=shapes, at_once=1))
+    places = torch.rand(shapes, points, 3, generator=generator) * 2 - 1
+    sdf = 0.1 * torch.randn(shapes, points, generator=generator)
+    part = torch.randint(PARTS, (shapes, points), generator=generator)
+    poses = identity(PARTS).map(lambda t: t.expand(shapes, *t.shape))
+    fabric = SimpleNamespace(backward=torch.Tensor.backward)
+    return lambda: backward(fabric, model, torch.arange(shapes), (places, sdf, part), poses, config, 0)
+
+
 def iteration_of(
     decoder: torch.nn.Module, settings: DecoderSettings, points: int, frozen: bool
 ) -> Callable[[], object]:
@@ -82,7 +99,9 @@ def measure(way: str, model: str | None) -> dict[str, float]:
     parts = len(load_model(model).parts) if model else PARTS
     decoder = (ReferenceDecoder if plain else Decoder)(parts, settings)
     whole = 1.0
-    if "step" in kind:
+    if kind == "batch step memory":
+        seconds = timed(batch_step(settings, 8192, 3), 1)
+    elif "step" in kind:
         points = 8192 if kind.endswith("memory") else SLICE
         seconds = timed(step_of(decoder, settings, points, "half" in kind), 1 if points > SLICE else 3)
         whole = 16 * 8192 / points
@@ -166,6 +185,12 @@ def speed(arguments: argparse.Namespace) -> None:
             f"{plain / ours:.1f} | |"
         )
         print(lines[-1], flush=True)
+    plain, ours = (child(f"{way}@512")["bytes"] for way in ("plain step memory", "batch step memory"))
+    lines.append(
+        f"| memory of a step, paper's size, MB | {16 * plain / 1e6:.0f}, 16 times one shape's | "
+        f"{ours / 1e6:.0f} | {16 * plain / ours:.0f} | `at_once = 1`: the gradient of the whole batch |"
+    )
+    print(lines[-1], flush=True)
     write("speed", lines)
 
 

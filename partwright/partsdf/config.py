@@ -95,16 +95,18 @@ class LossSettings:
 class TrainingSettings:
     """How long and how fast (appendix B.2).
 
-    epochs; batch: shapes a step, over all devices; points: a shape and step; samples: points of each shape
-    that are kept in memory, 0 for all; shapes: at most so many are trained on, 0 for all; validation: also
-    train on the validation shapes, as the paper's final models. rate, latent_rate: Adam's, times `decay` at
-    80 % and 90 %. accelerator, devices: as Lightning Fabric has them; precision: "32-true", "bf16-mixed" or
-    "16-mixed" (the first layer and all losses stay in float32). validate: epochs between validations, 0 for
-    none, of `validate_shapes` shapes; checkpoint: minutes between checkpoints.
+    epochs; batch: shapes a step, over all devices; at_once: at most so many of them go through the decoder
+    together, 0 for all: less memory for the same gradient; points: a shape and step; samples: points of each
+    shape that are kept in memory, 0 for all; shapes: at most so many are trained on, 0 for all; validation:
+    also train on the validation shapes, as the paper's final models. rate, latent_rate: Adam's, times `decay`
+    at 80 % and 90 %. accelerator, devices: as Lightning Fabric has them; precision: "32-true", "bf16-mixed"
+    or "16-mixed" (the first and last layer and all losses stay in float32). validate: epochs between
+    validations, 0 for none, of `validate_shapes` shapes; checkpoint: minutes between checkpoints.
     """
 
     epochs: int = 2000
     batch: int = 16
+    at_once: int = 0
     points: int = 8192
     samples: int = 0
     shapes: int = 0
@@ -124,12 +126,16 @@ class TrainingSettings:
     def __post_init__(self) -> None:
         for name in ("epochs", "batch", "points", "devices", "validate_shapes"):
             _at_least(f"training.{name}", getattr(self, name), 1)
-        for name in ("samples", "shapes", "threads", "validate", "checkpoint", "seed"):
+        for name in ("at_once", "samples", "shapes", "threads", "validate", "checkpoint", "seed"):
             _at_least(f"training.{name}", getattr(self, name), 0)
         for name in ("rate", "latent_rate", "decay"):
             _positive(f"training.{name}", getattr(self, name))
         _one_of("training.accelerator", self.accelerator, ACCELERATORS)
         _one_of("training.precision", self.precision, PRECISIONS)
+        if self.at_once and self.devices > 1:
+            raise SettingError(
+                "training.at_once is for one device; with several, each has its share of the batch"
+            )
         if self.batch % self.devices:
             raise SettingError(
                 f"training.batch is {self.batch}, which {self.devices} devices cannot share; take a multiple"

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from partwright.partsdf.config import DecoderSettings
+from partwright.partsdf.recomputing import cross_linear, linear, working_type
 
 
 class Conditioned(Protocol):
@@ -53,13 +54,13 @@ class SinglePart(nn.Module):
         self.part_bias = nn.Parameter(torch.zeros(parts, outputs)) if biased else None
 
     def folded(self, latents: Tensor) -> tuple[Tensor, Tensor]:
-        """The weight (in, out), and all that is added (B, P, out), of latents (B, P, Z)."""
+        """The weight (in, out), and all that is added (B P, out), of latents (B, P, Z)."""
         offset = self.bias.expand(*latents.shape[:2], -1)
         if self.modulation is not None:
             offset = offset + latents @ self.modulation.folded().T
         if self.part_bias is not None:
             offset = offset + self.part_bias
-        return self.weight.folded().T, offset
+        return self.weight.folded().T, offset.flatten(0, 1)
 
 
 class CrossPart(nn.Module):
@@ -70,10 +71,9 @@ class CrossPart(nn.Module):
         self.weight = nn.Parameter(torch.empty(parts, parts).uniform_(-(parts**-0.5), parts**-0.5))
         self.bias = nn.Parameter(torch.empty(parts).uniform_(-(parts**-0.5), parts**-0.5))
 
-    def forward(self, x: Tensor) -> Tensor:
-        """Features (B, P, K) to (B, P, K)."""
-        weight = self.weight.expand(len(x), -1, -1)
-        return x + torch.baddbmm(self.bias[:, None], weight, x).relu_()
+    def then(self, layer: tuple[Tensor, Tensor], x: Tensor) -> Tensor:
+        """Features (B P, N, D) through this and the folded single-part layer behind it."""
+        return cross_linear(x, (self.weight, self.bias), *layer)
 
 
 class Decoder(nn.Module):
@@ -94,7 +94,7 @@ class Decoder(nn.Module):
     def condition(self, latents: Tensor) -> Conditioned:
         """Weight norm folded and latents (B, P, Z) taken in, once for any number of points."""
         layers = tuple(layer.folded(latents) for layer in self.single)  # type: ignore[operator]
-        return _Layers(layers, tuple(self.cross), self.settings.octaves)
+        return _Layers(layers, tuple(self.cross), self.settings.octaves)  # type: ignore[arg-type]
 
     def forward(self, latents: Tensor, local: Tensor) -> Tensor:
         """Distances (B, P, N) of latents (B, P, Z) at local points (B, P, N, 3)."""
@@ -104,20 +104,22 @@ class Decoder(nn.Module):
 @dataclass(frozen=True)
 class _Layers:
     layers: tuple[tuple[Tensor, Tensor], ...]
-    cross: tuple[nn.Module, ...]
+    cross: tuple[CrossPart, ...]
     octaves: int
 
     def __call__(self, local: Tensor) -> Tensor:
-        shape = local.shape[:3]
-        x = _precise(self.layers[0], with_waves(local.flatten(0, 1), self.octaves)).relu_()
-        for number, layer in enumerate(self.layers[1:-1]):
-            x = _linear(layer, self._crossed(number, x, shape)).relu_()
-        return _precise(self.layers[-1], self._crossed(-1, x, shape)).view(shape)
+        first, *hidden, last = self.layers
+        kind = working_type(local)
+        # In full precision at both ends: half would round coordinates and distances to 1/256.
+        with torch.autocast(local.device.type, enabled=False):
+            x = linear(with_waves(local.flatten(0, 1), self.octaves), *first).to(kind).relu_()
+        for number, layer in enumerate(hidden):
+            x = self._behind_cross(number, layer, x).relu_()
+        with torch.autocast(local.device.type, enabled=False):
+            return self._behind_cross(-1, last, x.to(local.dtype)).view(local.shape[:3])
 
-    def _crossed(self, number: int, x: Tensor, shape: torch.Size) -> Tensor:
-        if not self.cross:
-            return x
-        return self.cross[number](x.view(shape[0], shape[1], -1)).view(x.shape)
+    def _behind_cross(self, number: int, layer: tuple[Tensor, Tensor], x: Tensor) -> Tensor:
+        return self.cross[number].then(layer, x) if self.cross else linear(x, *layer)
 
 
 def with_waves(local: Tensor, octaves: int) -> Tensor:
@@ -127,17 +129,3 @@ def with_waves(local: Tensor, octaves: int) -> Tensor:
     pitch = 0.5 * torch.pi * 2.0 ** torch.arange(octaves, dtype=local.dtype, device=local.device)
     phase = (local.unsqueeze(-1) * pitch).flatten(-2)
     return torch.cat([local, phase.sin(), phase.cos()], dim=-1)
-
-
-def _linear(layer: tuple[Tensor, Tensor], x: Tensor) -> Tensor:
-    """x (B P, N, in) to (B P, N, out): the product and the sum in one pass."""
-    weight, offset = layer
-    return torch.baddbmm(offset.flatten(0, 1)[:, None], x, weight.expand(len(x), -1, -1))
-
-
-def _precise(layer: tuple[Tensor, Tensor], x: Tensor) -> Tensor:
-    """The first and last layer in full precision: half would round coordinates and distances to 1/256."""
-    weight, offset = layer
-    with torch.autocast(x.device.type, enabled=False):
-        kind = torch.promote_types(x.dtype, torch.float32)
-        return _linear((weight.to(kind), offset.to(kind)), x.to(kind))

@@ -60,12 +60,16 @@ def intersection(distances: Tensor, temperature: float) -> Tensor:
 
     The softmax over the negative distances has no gradient: parts that reach in least are pushed out most.
     """
-    negative = distances < 0
-    several = negative.sum(dim=1, keepdim=True) >= 2
+    negative, several = distances < 0, held_by_several(distances)[:, None]
     with torch.no_grad():
         logits = torch.where(negative & several, distances / temperature, -torch.inf)
         weight = torch.softmax(torch.where(several, logits, 0.0), dim=1) * several
     return -(weight * distances).sum() / several.sum().clamp(min=1)
+
+
+def held_by_several(distances: Tensor) -> Tensor:
+    """(B, N) whether two parts or more hold a point, of distances (B, P, N)."""
+    return (distances < 0).sum(dim=1) >= 2
 
 
 def latent_penalty(latents: Tensor, losses: LossSettings, epoch: float) -> Tensor:

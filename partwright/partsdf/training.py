@@ -25,10 +25,10 @@ from partwright.partsdf.checkpoints import Progress, load_checkpoint, save_check
 from partwright.partsdf.config import Config
 from partwright.partsdf.data import Samples, check_training_shapes, load_samples, part_names
 from partwright.partsdf.logs import Log
-from partwright.partsdf.losses import Terms, latent_penalty, terms
 from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, identity
 from partwright.partsdf.slope import measured_slope
+from partwright.partsdf.stepping import backward
 from partwright.partsdf.validation import Validation
 from partwright.writing import check_folder
 
@@ -140,16 +140,13 @@ class Trainer:
         shapes = self._shapes()
         step = self.progress.step * self.fabric.world_size + self.fabric.global_rank
         self.generator.manual_seed((self.settings.seed << 32) + step)
-        points, sdf, part = self.samples.draw(shapes, self.settings.points, self.generator)
+        drawn = self.samples.draw(shapes, self.settings.points, self.generator)
         poses = self.samples.poses.map(lambda t: t[shapes])
-        distances, latents = self.model(shapes, points, poses)
-        found = terms(distances, sdf, part, self.config.losses, self.config.decoder)
-        penalty = latent_penalty(latents, self.config.losses, self.epoch)
         self.optimiser.zero_grad()
-        self.fabric.backward(found.total(self.config.losses) + penalty)
+        found = backward(self.fabric, self.model, shapes, drawn, poses, self.config, self.epoch)
         self.optimiser.step()
         self.plain.limit_latents()
-        self.progress.sums += torch.stack(Terms(*(t.detach() for t in found)))
+        self.progress.sums += torch.stack(found)
         self.progress.step += 1
 
     def _shapes(self) -> Tensor:

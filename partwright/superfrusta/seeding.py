@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 from partwright.superfrusta.evidence import Rows
 from partwright.superfrusta.refining import START_BLEND
 
-_ENOUGH = 600  # points that describe a region well enough for its extents
+ENOUGH = 600  # points that describe a region well enough for its extents
 _NONE = np.empty((0, 4), np.float32)
+_GOLDEN = (5**0.5 - 1) / 2
 TRIM = 3.0  # percent at either end of an extent that do not count
 _DILATION = 0.005
 _BOXY, _ROUND = 0.2, 0.9
@@ -25,7 +26,7 @@ def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float
     paper chooses one axis by its cylindricity: one start fails on bent and hollow regions. `frames` (F, 4),
     the rotations of parts that the region was covered by, add one boxy and one round start each.
     """
-    points = points[:: max(1, len(points) // _ENOUGH)].astype(np.float64)
+    points = thinned(points, ENOUGH).astype(np.float64)
     centre = points.mean(axis=0)
     local = points - centre
     _, axes = np.linalg.eigh(local.T @ local / len(local) + 1e-8 * np.eye(3))
@@ -50,6 +51,17 @@ def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float
         (roundness, _DILATION, 1.0, bulge, onion, START_BLEND, 1.0) for _, roundness, bulge, onion in guesses
     ]
     return rows
+
+
+def thinned(points: NDArray[np.float32], enough: int) -> NDArray[np.float32]:
+    """About `enough` of the points (n, 3), and no more than twice as many; all where there are fewer.
+
+    One of each `n // enough` in a row, at a place of its own by the golden ratio: voxels come in rows, and
+    where the step divides a row, every step-th of them leaves whole layers out.
+    """
+    step = max(1, len(points) // enough)
+    first = np.arange(0, len(points) - step + 1, step)
+    return points[first + (step * (np.arange(len(first)) * _GOLDEN % 1)).astype(int)]
 
 
 def extents(

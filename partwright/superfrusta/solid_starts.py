@@ -11,10 +11,9 @@ from scipy.spatial.transform import Rotation
 from partwright.fields import kernel
 from partwright.superfrusta.evidence import Rows
 from partwright.superfrusta.kinds import SIGN, SX
-from partwright.superfrusta.seeding import TRIM, along, extents
+from partwright.superfrusta.seeding import ENOUGH, TRIM, along, extents, thinned
 
 _LEAN, _HOLE = 0.8, 0.7  # taper and onion that frusta and hollow solids start with
-_ENOUGH = 600  # points that describe a region well enough for its extents
 _NONE = np.empty((0, 4), np.float32)
 
 
@@ -26,7 +25,7 @@ def starts(
     Along each principal and each coordinate axis; `frames` (F, 4), rotations (w, x, y, z), add boxes and
     cylinders. A part that is subtracted (sign -1) starts longer than its region, so that it cuts through.
     """
-    points = points[:: max(1, len(points) // _ENOUGH)].astype(np.float64)
+    points = thinned(points, ENOUGH).astype(np.float64)
     centre = points.mean(axis=0)
     local = points - centre
     _, axes = np.linalg.eigh(local.T @ local / len(local) + 1e-8 * np.eye(3))

@@ -59,6 +59,35 @@ def test_gradients_agree_with_finite_differences() -> None:
     assert torch.autograd.gradcheck(of_weight, (first.detach().clone().requires_grad_(),))
 
 
+def test_what_is_frozen_or_given_gets_no_gradient_and_the_rest_keeps_its_own() -> None:
+    """Reconstruction wants gradients of latents and points, with weights that stay."""
+    decoder = filled(Decoder(3, SMALL).double())
+    z, x = inputs(3, SMALL.latent)
+    weights = list(decoder.parameters())
+    wanted = torch.autograd.grad(decoder(z, x).square().sum(), [z, x, *weights])
+    decoder.requires_grad_(False)
+    found = torch.autograd.grad(decoder(z, x).square().sum(), [z, x])
+    torch.testing.assert_close(found, wanted[:2], rtol=0, atol=0)
+    decoder.requires_grad_(True)
+    found = torch.autograd.grad(decoder(z.detach(), x.detach()).square().sum(), weights)
+    torch.testing.assert_close(found, wanted[2:], rtol=0, atol=0)
+
+
+def test_only_one_tensor_a_layer_is_kept_for_backward() -> None:
+    settings = replace(SMALL, layers=9)
+    decoder, (z, x) = Decoder(3, settings), inputs(3, settings.latent, torch.float32)
+    kept: dict[int, int] = {}
+
+    def keep(tensor: torch.Tensor) -> torch.Tensor:
+        kept[tensor.untyped_storage().data_ptr()] = tensor.untyped_storage().nbytes()
+        return tensor
+
+    with torch.autograd.graph.saved_tensors_hooks(keep, lambda tensor: tensor):
+        decoder(z, x.repeat(1, 1, 1000, 1))
+    layer = 4 * 3 * 3 * 7000 * settings.width
+    assert 8 * layer <= sum(kept.values()) < 9 * layer
+
+
 def test_size_is_the_papers() -> None:
     """2.52 M parameters at four parts; a cross-part layer adds P^2 + P."""
     whole = sum(p.numel() for p in Decoder(4, DecoderSettings()).parameters())

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from partwright.superfrusta.refining import LIMITS
-from partwright.superfrusta.seeding import starts
+from partwright.superfrusta.seeding import starts, thinned
 
 SPACING = 0.03
 SHAPE = slice(7, 16)
@@ -42,6 +42,7 @@ def check(rows: np.ndarray) -> None:
 
 
 @settings(max_examples=30)
+@example(size=(0.5, 0.5625, 0.25), angles=(0, 0, 1), centre=(0, 0, 0))  # rows of eight voxels, a step of four
 @given(
     size=st.tuples(*[st.floats(0.1, 0.8)] * 3),
     angles=st.tuples(*[st.floats(-3, 3)] * 3),
@@ -55,6 +56,18 @@ def test_starts_are_in_range_and_cover_their_region(size, angles, centre) -> Non
     inside = (np.abs(local(straight, region)) < straight[:, None, 7:10] / 2 + SPACING).all(axis=2)
     assert inside.mean(axis=1).min() > 0.8
     assert np.linalg.norm(straight[:, :3] - np.array(centre), axis=1).max() < 0.5 * max(size)
+
+
+@pytest.mark.parametrize("count", [1, 599, 600, 1199, 1200, 1201, 2400, 9001])
+def test_thinning_takes_points_from_everywhere(count) -> None:
+    points = np.arange(count, dtype=np.float32)[:, None].repeat(3, axis=1)
+    taken = thinned(points, 600)[:, 0]
+    assert min(count, 600) <= len(taken) < 1200
+    assert np.diff(taken, prepend=-1).min() > 0
+    step = max(1, count // 600)
+    assert np.diff(taken, prepend=-1, append=count).max() <= 2 * step
+    for row in (2, 4, 8, 10):  # no layer of a grid is left out
+        assert len(np.unique(taken % row)) == min(row, count)
 
 
 def test_a_turned_bar_has_a_start_that_is_the_bar() -> None:
