@@ -28,6 +28,7 @@ Distances = Callable[[np.ndarray], np.ndarray]
 COARSEST = 8  # cells along a cube of the first level
 FINEST = 2  # cells along a cube whose corners are evaluated
 MOST = 1024  # cells along the box
+_LAST = 0.5  # of what the slope is above 1, at the last level, where growing finds what that leaves out
 _ROOM = 1.25  # a part's surface may leave its cuboid by so much
 
 
@@ -114,8 +115,8 @@ class SparseLattice:
         count = COARSEST * int(np.ceil(half / (COARSEST * self.cell)))  # so that the lattice holds that of 1
         self.origin, self.cells = -count * self.cell, 2 * count
         self.evaluations, self.dense = 0, (self.cells + 1) ** 3
-        kept, self._inside = self._refined()
-        self._corners, self._values, self._cubes = self._grown(kept)
+        kept, self._inside, middles = self._refined()
+        self._corners, self._values, self._cubes = self._grown(kept, middles)
 
     def _evaluate(self, lattice: np.ndarray) -> np.ndarray:
         """(K, N) at lattice coordinates (N, 3), which may lie between corners; beyond the box is empty."""
@@ -124,8 +125,9 @@ class SparseLattice:
         points = (self.origin + self.cell * lattice).astype(np.float32)
         return np.maximum(self._distances(points), beyond.astype(np.float32))
 
-    def _refined(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cubes (C, 3) of FINEST cells that a surface may enter, and the side (K, G, G, G) of all others."""
+    def _refined(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Cubes (C, 3) of FINEST cells that a surface may enter, the side (K, G, G, G) of all others, and the
+        values (K, C) at the cubes' middles, which are corners of cells."""
         axis = np.arange(self.cells // COARSEST)
         cubes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
         size, inside = COARSEST, None
@@ -134,21 +136,24 @@ class SparseLattice:
             if inside is None:
                 inside = np.zeros((len(values), *[len(axis)] * 3), dtype=bool)
             inside[:, cubes[:, 0], cubes[:, 1], cubes[:, 2]] = values < 0
-            reach = self._slope * size * self.cell * 3**0.5 / 2
-            cubes = cubes[(np.abs(values) <= reach).any(axis=0)]
+            slope = self._slope if size > FINEST else 1 + _LAST * (self._slope - 1)
+            near = (np.abs(values) <= slope * size * self.cell * 3**0.5 / 2).any(axis=0)
+            cubes = cubes[near]
             if size == FINEST:
-                return cubes, inside
+                return cubes, inside, values[:, near]
             size //= 2
             cubes = (2 * cubes[:, None] + CORNERS).reshape(-1, 3)
             for d in (1, 2, 3):
                 inside = inside.repeat(2, axis=d)
 
-    def _grown(self, newest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Keys (N,) of corners, sorted, their values (K, N), and all cubes (C, 3) whose corners they are."""
+    def _grown(self, newest: np.ndarray, middles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Keys (N,) of corners, sorted, their values (K, N), and all cubes (C, 3) whose corners they are; of
+        the first, `newest` (C, 3), the values (K, C) at their middles are known."""
         seen = np.zeros(self._inside.shape[1:], dtype=bool)
         seen[tuple(newest.T)] = True
-        corners = np.empty(0, dtype=np.int64)
-        values = np.empty((len(self._inside), 0), dtype=np.float32)
+        corners = self._key(newest * FINEST + FINEST // 2)
+        order = np.argsort(corners)
+        corners, values = corners[order], middles[:, order]
         cubes = newest
         while len(newest):
             keys = np.setdiff1d(self._keys(newest), corners)
@@ -183,7 +188,11 @@ class SparseLattice:
 
     def _keys(self, cubes: np.ndarray) -> np.ndarray:
         """(C * 27,) one number a corner of cubes (C, 3)."""
-        x, y, z = (cubes[:, None] * FINEST + _LATTICE).reshape(-1, 3).T
+        return self._key((cubes[:, None] * FINEST + _LATTICE).reshape(-1, 3))
+
+    def _key(self, lattice: np.ndarray) -> np.ndarray:
+        """(N,) of lattice coordinates (N, 3)."""
+        x, y, z = lattice.T
         return np.asarray((x * (self.cells + 1) + y) * (self.cells + 1) + z)
 
     def _lattice(self, keys: np.ndarray) -> np.ndarray:
