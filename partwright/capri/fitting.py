@@ -20,12 +20,14 @@ from partwright.capri.candidates import Pool, candidates
 from partwright.capri.detection import detect
 from partwright.capri.given import surface_of
 from partwright.capri.overlap import overlapped
+from partwright.capri.repeats import with_repeats
 from partwright.capri.samples import Samples
 from partwright.capri.selection import Problem
 from partwright.capri.settings import Settings
 from partwright.capri.tree import Tree
 from partwright.errors import EmptyShapeError, MissingDependencyError, SettingError
 from partwright.methods import Outcome, Progress, timed
+from partwright.metrics.complexity import convexes, primitives
 from partwright.shapes import Shape
 
 ORIGINS = {"seeds": "detected surfaces", "weights": "pre-trained network"}
@@ -97,15 +99,16 @@ def fit(
     run = min(done, key=Run.cost)
     corners = shape.frame.to_unit(shape.vertices)
     tree = overlapped(run.tree(), run.samples).closed(corners.min(axis=0), corners.max(axis=0))
-    whole = replace(tree.assembly(), unit=shape.unit)
+    whole = with_repeats(tree.assembly()) if settings.symmetry else tree.assembly()
+    whole = replace(whole, unit=shape.unit)
     assembly = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
     details = {
         "schedule": settings.schedule,
         "start": ORIGINS[run.origin],
         "costs": {ORIGINS[one.origin]: round(one.cost(), 5) for one in done},
         "candidates": len(run.pool.rows),
-        "primitives": tree.primitives,
-        "convexes": tree.convexes,
+        "primitives": primitives(assembly),
+        "convexes": convexes(assembly),
     }
     seconds: dict[str, float] = {}
     for one in runs:

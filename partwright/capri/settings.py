@@ -51,7 +51,8 @@ class Settings:
         paper, or "samples" of the surface itself, whose detail is not lost between voxels. weights: file of a
         pre-trained network (`python -m partwright.capri`), in place of the one that ships.
 
-    symmetry and threads are options of all methods that a tree has no use for; curve is refused.
+    symmetry: holes of one size and direction become one leaf with copies. threads is an option of all methods
+    that a tree has no use for; curve is refused.
     """
 
     schedule: Schedule = "search"
