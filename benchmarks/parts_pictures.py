@@ -28,7 +28,7 @@ from partwright.render import Camera, render_mesh, sheet, write_png
 TARGET = Path(__file__).parents[1] / "docs" / "images" / "parts"
 CAMERA = Camera(margin=0.12)
 PANEL, ITERATIONS = 220, 200
-RESOLUTION = {"mixers": 160}  # of thin walls; 96 for the others
+RESOLUTION = {"mixers": 192}  # of thin walls; 96 for the others
 BEFORE = {"helix": (0.0, -1.0, -0.1)}  # unit lengths that a hidden part is moved by
 TESTED, STEPS = 2, 6  # test shapes, pictures of an interpolation
 
