@@ -100,8 +100,8 @@ def _draw(
         scored += [(float(score), row, kind) for score, row in zip(support, made, strict=True)]
     scored.sort(key=lambda entry: -entry[0])
     best = _best([(row, kind) for _, row, kind in scored[:_FINALISTS]], points, normals, free, tolerance)
-    if best is None:
-        return None
+    if best is None or len(best.members) < _FEWEST:  # of a plane, those that face its way may be few
+        return best
     at, across = points[best.members], normals[best.members]
     others = [(kind, FITTERS[kind](best.row, at, across)) for kind in kinds if kind != best.kind]
     other = _best([(r, k) for k, r in others if r is not None], points, normals, free, tolerance)
