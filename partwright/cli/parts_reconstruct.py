@@ -30,8 +30,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--resolution",
         metavar="N",
         type=int,
-        default=128,
-        help="cells along the unit frame, a multiple of 8 (default: %(default)s)",
+        help="cells along the unit frame, a multiple of 8 (default: 128, up to 256 for thin walls)",
     )
     option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
     option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")

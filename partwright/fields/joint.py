@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
 from partwright.fields.base import Field
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 class Member(NamedTuple):
@@ -42,6 +45,18 @@ class JointField(Field):
     @abstractmethod
     def slope(self) -> float:
         """About how much the distance changes per length at most."""
+
+    @property
+    @abstractmethod
+    def wall(self) -> float:
+        """About how thin it is."""
+
+    @abstractmethod
+    def surface(self, resolution: int) -> trimesh.Trimesh:
+        """Closed mesh in its own frame, of at least so many cells along its longest side.
+
+        Raises NoSurfaceError where it has none.
+        """
 
     @abstractmethod
     def among(self, members: Sequence[Member]) -> Self:

@@ -53,7 +53,7 @@ def mesh_assembly(
     lower, upper = assembly.bounds()
     frame, longest = _frame(lower, upper), float((upper - lower).max())
     parts = assembly.parts if isinstance(assembly, Assembly) else (assembly,)
-    thin = [walls(as_superfrustum(part.field)).min() for part in parts if is_superfrustum(part.field)]
+    thin = [_wall(part.field) for part in parts]
     thinnest = np.array(thin) / longest
     wanted = _ACROSS / np.maximum(thinnest, 1e-9)
     counts = int(np.ceil(wanted[wanted <= _FINEST * resolution].max(initial=resolution)))
@@ -67,22 +67,25 @@ def mesh_assembly(
 def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimesh.Trimesh:
     """One part alone, watertight, in its own units and place; all copies of a repeated one, each closed.
 
-    A quadric's mesh is exact, see `mesh_assembly`.
-    It is meshed along its own axes. Cells are made shorter where the part is thin, each axis by itself, so
-    that walls come out complete, as long as that takes no more than about 100,000 cells.
+    A quadric's mesh is exact, see `mesh_assembly`, and a learned part's by its model, with more cells where
+    it is thin. Any other is meshed along its own axes. Cells are made shorter where the part is thin, each
+    axis by itself, so that walls come out complete, as long as that takes no more than about 100,000 cells.
 
     Raises NoSurfaceError for a part without volume, or without end, as most quadrics are.
     """
     if isinstance(part.field, Quadric):
         return _repeated(_exact(replace(part, instances=()), resolution), part.instances)
-    learned = isinstance(part.field, JointField)
-    field: Field = part.field if learned else as_superfrustum(part.field)
+    if isinstance(part.field, JointField):
+        mesh = part.field.surface(resolution)
+        mesh.vertices = Similarity(1.0, part.rotation, part.translation)(mesh.vertices)
+        return _repeated(mesh, part.instances)
+    field = as_superfrustum(part.field)
     lower, upper = field.bounds()
     frame = _frame(lower, upper)
     local = field.scaled(frame.scale)
     centre = np.asarray(frame.translation)
     extent = (upper - lower) * frame.scale + 2 * _ROOM
-    thin = extent if not isinstance(local, SuperFrustum) else np.maximum(walls(local), 1e-9)
+    thin = np.maximum(walls(local), 1e-9)
     counts = np.maximum(resolution * extent / extent.max(), _ACROSS_PART * extent / thin)
     surface = 4 * (counts * np.roll(counts, 1)).sum()
     counts = np.clip(counts * min(1.0, float(np.sqrt(_PART_CELLS / surface))), 4.0, _MOST)
@@ -90,9 +93,7 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     def distance(points: np.ndarray) -> np.ndarray:
         return local(points - centre.astype(np.float32))
 
-    mesh = mesh_field(
-        distance, -extent / 2, extent / 2, counts, lipschitz=_slope([part]), sharp=sharp and not learned
-    )
+    mesh = mesh_field(distance, -extent / 2, extent / 2, counts, lipschitz=LIPSCHITZ, sharp=sharp)
     pose = Similarity(1.0, part.rotation, part.translation) @ frame.inverse()
     mesh.vertices = pose(mesh.vertices)
     return _repeated(mesh, part.instances)
@@ -117,6 +118,13 @@ def _repeated(mesh: trimesh.Trimesh, moves: tuple[Similarity, ...]) -> trimesh.T
     vertices = [mesh.vertices, *(move(mesh.vertices) for move in moves)]
     faces = [mesh.faces + i * len(mesh.vertices) for i in range(len(vertices))]
     return trimesh.Trimesh(np.concatenate(vertices), np.concatenate(faces), process=False)
+
+
+def _wall(field: Field) -> float:
+    """How thin a field is, so far as it is known; else infinite."""
+    if isinstance(field, JointField):
+        return field.wall
+    return float(walls(as_superfrustum(field)).min()) if is_superfrustum(field) else np.inf
 
 
 def walls(field: SuperFrustum) -> np.ndarray:

@@ -7,25 +7,30 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import torch
 
 from partwright.assembly.similarity import Similarity
-from partwright.errors import ParameterError, SettingError
+from partwright.errors import NoSurfaceError, ParameterError, SettingError
 from partwright.fields.base import LARGEST, number, scale_lengths, vector
 from partwright.fields.joint import JointField, Member
 from partwright.fields.operations import is_tensor
+from partwright.partsdf.meshing import SparseLattice, fitting
 from partwright.partsdf.model import Model, find_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors
+
+if TYPE_CHECKING:
+    import trimesh
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 # The box around a part is looked for in so many cells an axis, twice, within its cuboid times _REACH.
 _CELLS, _REACH = 12, 1.5
+_SIDE = 1.8  # of the box around a part that is meshed
 
 
 @dataclass(frozen=True)
@@ -86,6 +91,27 @@ class NeuralField(JointField):
     @property
     def slope(self) -> float:
         return self.network.slope
+
+    @cached_property
+    def wall(self) -> float:
+        row = self.shape.names().index(self.part)
+        return float(min(self.shape.walls()[row] * self.unit, LARGEST))
+
+    def surface(self, resolution: int) -> trimesh.Trimesh:
+        lower, upper = self.bounds()
+        centre, scale = (lower + upper) / 2, _SIDE / max(float((upper - lower).max()), LARGEST**-1)
+
+        def distances(points: np.ndarray) -> np.ndarray:
+            return self((centre + points / scale).astype(np.float32))[None] * np.float32(scale)
+
+        lattice = SparseLattice(distances, 1.0, fitting(self.wall * scale, resolution), self.slope)
+        mesh = lattice.meshes()[0]
+        if mesh is None:
+            raise NoSurfaceError(
+                f"the part {self.part} of {self.model} has no surface, or it is thinner than a cell"
+            )
+        mesh.vertices = centre + mesh.vertices / scale
+        return mesh
 
     def among(self, members: Sequence[Member]) -> Self:
         return dataclasses.replace(self, members=tuple(members))

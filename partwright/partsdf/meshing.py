@@ -28,6 +28,8 @@ Distances = Callable[[np.ndarray], np.ndarray]
 COARSEST = 8  # cells along a cube of the first level
 FINEST = 2  # cells along a cube whose corners are evaluated
 MOST = 1024  # cells along the box
+_USUAL, _FINE = 128, 256
+_ACROSS = 2.0  # cells across a thin wall: a slanted one of fewer than sqrt(3) has holes
 _LAST = 0.5  # of what the slope is above 1, at the last level, where growing finds what that leaves out
 _ROOM = 1.25  # a part's surface may leave its cuboid by so much
 
@@ -39,18 +41,21 @@ _STEPS = np.concatenate([np.eye(3, dtype=np.int64), -np.eye(3, dtype=np.int64)])
 @dataclass(frozen=True)
 class Surfaces:
     """whole: the shape's mesh; parts: each part's own, by name, without those that have no surface.
-    evaluations: points at which the decoder was asked; dense: points of the full grid."""
+    resolution: cells along [-1, 1]. evaluations: points at which the decoder was asked; dense: points of the
+    full grid."""
 
     whole: trimesh.Trimesh
     parts: dict[str, trimesh.Trimesh]
+    resolution: int
     evaluations: int
     dense: int
 
 
-def mesh_shape(shape: NeuralShape, resolution: int = 128, parts: bool = True) -> Surfaces:
+def mesh_shape(shape: NeuralShape, resolution: int | None = None, parts: bool = True) -> Surfaces:
     """Mesh a neural shape in the unit frame.
 
-    resolution: cells along [-1, 1], a multiple of 8. parts: also mesh each part alone.
+    resolution: cells along [-1, 1], a multiple of 8; if not given, 128, or up to 256 so that the thinnest
+    part's wall is two cells. parts: also mesh each part alone.
 
     Raises:
         SettingError: the resolution cannot be used.
@@ -64,6 +69,8 @@ def mesh_shape(shape: NeuralShape, resolution: int = 128, parts: bool = True) ->
         whole = shape.whole(each)[None]
         return np.concatenate([whole, each]) if parts else whole
 
+    if resolution is None:
+        resolution = fitting(float(shape.walls().min(initial=np.inf)), _USUAL)
     lattice = SparseLattice(distances, box(shape), _checked(resolution), shape.model.slope)
     meshes = lattice.meshes()
     if meshes[0] is None:
@@ -72,7 +79,7 @@ def mesh_shape(shape: NeuralShape, resolution: int = 128, parts: bool = True) ->
             f"{resolution}; take a finer one"
         )
     found = {n: m for n, m in zip(names, meshes[1:], strict=False) if m is not None}
-    return Surfaces(meshes[0], found, lattice.evaluations, lattice.dense)
+    return Surfaces(meshes[0], found, resolution, lattice.evaluations, lattice.dense)
 
 
 @dataclass(frozen=True)
@@ -96,6 +103,13 @@ def box(shape: NeuralShape) -> float:
     turned = rotation_matrices(shape.poses.rotation).abs() @ shape.poses.scale[..., None]
     reach = shape.poses.translation.abs() + _ROOM * turned.squeeze(-1)
     return max(1.0, float(reach[shape.present].max()) if shape.model.config.poses else 1.0)
+
+
+def fitting(wall: float, resolution: int) -> int:
+    """Cells along [-1, 1] that put `_ACROSS` of them across a wall: at least `resolution`, in eights, and no
+    more than 256 for the wall's sake."""
+    wanted = max(resolution, min(_FINE, _ACROSS * 2 / max(wall, 1e-9)))
+    return int(min(MOST, COARSEST * np.ceil(wanted / COARSEST)))
 
 
 def _checked(resolution: int) -> int:

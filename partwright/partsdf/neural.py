@@ -8,11 +8,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from partwright.assembly.similarity import Similarity
 from partwright.errors import SettingError
 from partwright.partsdf.losses import aggregate
 from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, local_points
 
+_PLACES, _ROOM = 4000, 1.05  # where walls are looked for, in and around a part's cuboid
+_DEEP = 0.95
 CHUNK = 1 << 12  # pairs of point and part that are decoded at once, so that they stay in the cache
 
 
@@ -60,6 +63,22 @@ class NeuralShape:
         chunks = torch.from_numpy(np.array(points, np.float32, order="C")).split(size)
         values = [conditioned(local_points(chunk, self.poses)[None])[0][self.present] for chunk in chunks]
         return torch.cat(values, dim=1).numpy()
+
+    def walls(self) -> np.ndarray:
+        """(Q,) about how thin each part that is there is, unit frame: twice a depth that few places inside
+        exceed, and so at most about twice the depth at which training clamps. Infinite where no place inside
+        is found."""
+        within = np.random.default_rng(0).uniform(-_ROOM, _ROOM, (_PLACES, 3)).astype(np.float32)
+        poses = self.poses.numpy()
+        result = np.full(len(self.names()), np.inf)
+        for row, part in enumerate(np.flatnonzero(self.present.numpy())):
+            turned = Similarity(
+                1.0, tuple(poses.rotation[part].tolist()), tuple(poses.translation[part].tolist())
+            )
+            depth = -self.part_distances(turned(within * poses.scale[part]))[row]
+            if (depth > 0).any():
+                result[row] = 2 * np.quantile(depth[depth > 0], _DEEP)
+        return result
 
     def whole(self, distances: np.ndarray) -> np.ndarray:
         """(N,) distance of the whole shape, of its parts' (Q, N)."""

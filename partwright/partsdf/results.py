@@ -56,10 +56,10 @@ def reconstruct_shape(
     model: Model,
     shape: Shape,
     settings: ReconstructionSettings | None = None,
-    resolution: int = 128,
+    resolution: int | None = None,
     progress: Progress | None = None,
 ) -> Reconstruction:
-    """Find the parts of a plain shape, mesh them at `resolution` and score the whole.
+    """Find the parts of a plain shape, mesh them at `resolution` (see `mesh_shape`) and score the whole.
 
     Raises:
         NoSurfaceError: what was found has no surface.
@@ -80,7 +80,7 @@ def reconstruct_shape(
         "method": "partsdf",
         "model": {"name": model.name, "hash": model.hash},
         "seed": settings.seed,
-        "settings": {**asdict(settings), "resolution": resolution},
+        "settings": {**asdict(settings), "resolution": surfaces.resolution},
         "input": {"file": shape.name, "unit": shape.unit, "repairs": list(shape.repairs)},
         "seconds": {
             "reconstruction": round(found - started, 3),

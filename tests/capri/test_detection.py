@@ -108,7 +108,7 @@ def test_an_arm_that_runs_into_an_eye_may_end_at_its_axis() -> None:
 
 @pytest.mark.parametrize("up", [5, 6, 7])
 def test_few_points_on_either_side_of_a_wall_are_no_surface(up: int) -> None:
-    """A wall thinner than the tolerance: a plane through both sides has points enough, but few face its way."""
+    """A wall thinner than the tolerance: a plane has points enough on both sides, but few face its way."""
     rng = np.random.default_rng(up)
     sides = np.repeat([1.0, -1.0], [up, 6])
     points = np.c_[rng.uniform(-0.2, 0.2, (len(sides), 2)), 1e-4 * sides]

@@ -14,6 +14,7 @@ import trimesh
 
 import partwright as pw
 from partwright.assembly import Similarity
+from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import AssemblyFileError, ModelError
 from partwright.meshing import mesh_assembly, mesh_part
 from partwright.partsdf import model as models
@@ -180,3 +181,16 @@ def test_a_field_alone_is_as_its_model_knows_it(model: Model, assembly: pw.Assem
     twice = alone.scaled(2.0)
     local = np.random.default_rng(0).uniform(-1, 1, (50, 3)).astype(np.float32)
     np.testing.assert_allclose(twice(2 * local), 2 * alone(local), atol=1e-5)
+
+
+def test_walls_are_as_thin_as_the_parts_are(
+    lamp: NeuralShape, assembly: pw.Assembly, lamps: PreparedFamily, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plate = lamps.load(lamp.model.shapes.index("lamp1")).poses.scale[0]
+    walls = lamp.walls()
+    clamp = lamp.model.config.losses.clamp  # deeper than this nothing was learned
+    assert walls[0] == pytest.approx(2 * min(plate.min(), clamp), rel=0.1)
+    assert (walls[1:] > clamp).all()
+    assert assembly.parts[0].field.wall == pytest.approx(2 * walls[0], rel=0.1)  # in own units
+    monkeypatch.setattr(NeuralShape, "part_distances", lambda shape, points: np.ones((3, len(points))))
+    assert np.isinf(lamp.walls()).all()  # nothing is inside

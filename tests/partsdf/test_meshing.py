@@ -7,7 +7,7 @@ import pytest
 
 from partwright.meshing.cells import cell_polygons
 from partwright.meshing.tables import CORNERS
-from partwright.partsdf.meshing import SparseLattice
+from partwright.partsdf.meshing import SparseLattice, fitting
 
 
 def two_balls(points: np.ndarray) -> np.ndarray:
@@ -69,3 +69,24 @@ def test_what_reaches_the_box_ends_there_and_what_is_nowhere_is_none() -> None:
     assert cut is not None
     assert cut.is_watertight
     assert np.abs(cut.vertices).max() <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("wall", "resolution", "cells"),
+    [(0.5, 64, 64), (0.5, 60, 64), (0.02, 64, 200), (0.001, 64, 256), (np.inf, 128, 128), (0.001, 300, 304)],
+)
+def test_thin_walls_are_given_two_cells_as_far_as_that_goes(wall: float, resolution: int, cells: int) -> None:
+    assert fitting(wall, resolution) == cells
+
+
+def test_a_shell_thinner_than_a_usual_cell_comes_out_whole() -> None:
+    wall = 0.012
+
+    def shell(points: np.ndarray) -> np.ndarray:
+        radius = np.linalg.norm(points, axis=1)
+        return (np.abs(radius - 0.5) - wall / 2)[None].astype(np.float32)
+
+    usual, fine = (SparseLattice(shell, 1.0, n, 1.0).meshes()[0] for n in (128, fitting(wall, 128)))
+    assert fine.euler_number == 4  # two spheres, one in the other
+    assert abs(usual.euler_number) > 100  # shreds
+    assert fine.volume == pytest.approx(4 * np.pi * 0.5**2 * wall, rel=0.03)
