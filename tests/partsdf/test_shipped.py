@@ -13,8 +13,8 @@ from partwright.datasets.families.recipes import FAMILIES, make_shape
 from partwright.partsdf.model import SHIPPED, Model, load_model
 from partwright.partsdf.neural import NeuralShape
 
-# Mean IoU; the small model has learned the thin blades of mixers only roughly.
-LEAST = {"mixers": 0.6, "chairs": 0.93, "cars": 0.96}
+# Mean IoU; walls of mixers are so thin that little of a cell more or less counts.
+LEAST = {"mixers": 0.75, "chairs": 0.93, "cars": 0.96}
 
 
 @pytest.fixture(params=FAMILIES)
