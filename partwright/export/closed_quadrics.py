@@ -19,6 +19,7 @@ from partwright.fields import Box, Cone, Cylinder, Field, NormalForm, Quadric, S
 
 SAME = 1e-6  # of the assembly's size: curvatures that are smaller are flat
 _ROOM = 1.02
+_TURNED = 1e-9  # of a quaternion's vector: less is rounding
 
 
 def with_closed_quadrics(assembly: Assembly) -> Assembly:
@@ -41,6 +42,21 @@ def with_closed_quadrics(assembly: Assembly) -> Assembly:
         return dataclasses.replace(node, children=tuple(map(closed, children)))
 
     return closed(assembly)  # type: ignore[return-value]  # an assembly stays one
+
+
+def closes_alike(part: Part) -> bool:
+    """Whether the solid that a repeated quadric is closed to does for its copies, too: spheres, and cylinders
+    that are moved across their axis alone."""
+    if not isinstance(part.field, Quadric):
+        return False
+    if any(np.abs(move.rotation[1:]).max() > _TURNED for move in part.instances):
+        return False
+    form = normal_form(part.field.moved(rotation_matrix(part.rotation), np.array(part.translation)))
+    if form.complement or form.name not in ("sphere", "cylinder"):
+        return False
+    moves = np.array([move.translation for move in part.instances])
+    along = np.abs(moves @ form.axes[:, 2])
+    return form.name == "sphere" or bool((along <= SAME * np.linalg.norm(moves, axis=1)).all())
 
 
 def _holes_subtracted(node: Assembly, ball: Ball) -> Assembly:

@@ -4,14 +4,13 @@ places, or each placed and turned for itself."""
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.similarity import rotation_matrix
-from partwright.fields import Field
 
 _SAME = 1e-9  # of the lengths that occur, and of entries of rotations
 
@@ -76,13 +75,13 @@ def _ring(part: Part) -> Ring | None:
     return None
 
 
-def expanded_but(assembly: Assembly, kinds: Collection[type[Field]]) -> Assembly:
-    """The assembly with repeated parts as parts of their own, but for those whose field is of these kinds."""
+def expanded_but(assembly: Assembly, stays: Callable[[Part], bool]) -> Assembly:
+    """The assembly with repeated parts as parts of their own, but for those that may stay repeated."""
 
     def expand(node: Node) -> Node:
         if isinstance(node, Assembly):
             return dataclasses.replace(node, children=tuple(expand(child) for child in node.children))
-        if not node.instances or type(node.field) in kinds:
+        if not node.instances or stays(node):
             return node
         return Assembly(node.copies, blend=node.blend)
 

@@ -14,14 +14,18 @@ import numpy as np
 from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export.approximation import Change, of_part
-from partwright.export.closed_quadrics import with_closed_quadrics
+from partwright.export.closed_quadrics import closes_alike, with_closed_quadrics
 from partwright.export.copies import expanded_but
 from partwright.export.nearest import SOLIDS, Approximation, nearest_solid
 from partwright.fields import Cone, Cylinder, Field, Frustum, HollowBox, HollowFrustum, SuperFrustum, Tube
 
-# Their repeats stay repeats in a source.
-LOOPED: tuple[type[Field], ...] = (*SOLIDS, HollowBox, HollowFrustum, SuperFrustum)
+_LOOPED: tuple[type[Field], ...] = (*SOLIDS, HollowBox, HollowFrustum, SuperFrustum)
 Keep = Callable[[Part], Approximation | None]
+
+
+def _looped(part: Part) -> bool:
+    """Whether its repeats stay repeats in a source."""
+    return type(part.field) in _LOOPED or closes_alike(part)
 
 
 def _keep_none(_: Part) -> None:
@@ -43,7 +47,7 @@ def solid_tree(
     """
     changes: list[Change] = []
     if source:
-        whole: Node = with_closed_quadrics(expanded_but(assembly, LOOPED))
+        whole: Node = with_closed_quadrics(expanded_but(assembly, _looped))
     else:
         whole = _with_holes(with_closed_quadrics(assembly.expanded()))
     tree = _solid(whole, True, keep, length, changes)

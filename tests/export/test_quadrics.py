@@ -19,6 +19,7 @@ from partwright.export import brep_tree, export
 from partwright.export.closed_quadrics import with_closed_quadrics
 from partwright.fields import Box, Cone, Cylinder, Quadric, Sphere
 from partwright.meshing import mesh_csg
+from tests.export.test_openscad import rendered
 from tests.export.test_step import read_back
 
 TURN = Similarity(1.0, (0.9, 0.1, -0.3, 0.2), (4.0, -1.0, 2.0))
@@ -165,3 +166,35 @@ def test_mesh_formats_write_the_exact_mesh(tmp_path: Path, suffix: str) -> None:
     mesh = trimesh.load(path, force="mesh")
     assert len(mesh.faces) == 12
     assert mesh.volume == pytest.approx(8)
+
+
+def drilled(*holes: Part) -> Assembly:
+    body = Assembly(planes(), "intersection", "body")
+    return placed(Assembly((body, *holes), "difference"))
+
+
+ALIKE = {
+    "across the axis": (Quadric.cylinder(0.1), ((0.5, 0, 0), (0.2, 0.6, 0), (-0.6, -0.3, 0)), True),
+    "along the axis, too": (Quadric.cylinder(0.1), ((0.5, 0, 0.5), (-0.6, -0.3, -0.8)), False),
+    "spheres": (Quadric.sphere(0.2, (0, 0, 1)), ((0.5, 0, 0), (-0.5, 0.5, -0.5)), True),
+    "cones": (Quadric.cone(0.1, (0, 0, 1), (0, 0, 1.3)), ((0.5, 0, 0), (-0.5, 0.5, 0)), False),
+}
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_repeated_holes_stay_repeated_in_a_source_where_that_is_the_same(name: str, tmp_path: Path) -> None:
+    field, places, looped = ALIKE[name]
+    copies = tuple(Similarity(translation=place) for place in places)
+    solid = drilled(Part(field, name="drill", instances=copies))
+    export(solid, tmp_path / "a.scad")
+    source = (tmp_path / "a.scad").read_text()
+    assert (f"{len(places) + 1} times" in source) is looped
+    assert rendered(tmp_path / "a.scad").volume == pytest.approx(mesh_csg(solid).volume, rel=2e-3)
+
+
+def test_copies_that_are_turned_are_parts_of_their_own(tmp_path: Path) -> None:
+    quarter = Similarity(rotation=(np.sqrt(0.5), np.sqrt(0.5), 0, 0))
+    solid = drilled(Part(Quadric.cylinder(0.2), name="drill", instances=(quarter,)))
+    export(solid, tmp_path / "a.scad")
+    assert "times" not in (tmp_path / "a.scad").read_text()
+    assert rendered(tmp_path / "a.scad").volume == pytest.approx(mesh_csg(solid).volume, rel=2e-3)
