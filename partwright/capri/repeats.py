@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Assembly, Node, Part, Similarity
+from partwright.assembly.similarity import NO_ROTATION, ORIGIN
 from partwright.fields import NormalForm, Quadric, normal_form
 
 TOLERANCE = 1e-3  # unit frame: by how much sizes differ that count as one; of axes, the angle
@@ -98,6 +99,8 @@ def _form(node: Node) -> NormalForm | None:
         return _form(node.children[0])
     if not isinstance(node, Part) or not isinstance(node.field, Quadric):
         return None
+    if node.instances or node.translation != ORIGIN or node.rotation != NO_ROTATION:
+        return None  # repeated already, further down; a tree's own leaves lie where their quadric does
     form = normal_form(node.field)
     return form if form.name in _MAKERS and form.round and not form.complement else None
 

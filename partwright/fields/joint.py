@@ -53,7 +53,7 @@ class JointField(Field):
 
     @abstractmethod
     def surface(self, resolution: int) -> trimesh.Trimesh:
-        """Closed mesh in its own frame, of at least so many cells along its longest side.
+        """Closed mesh in its own frame, of about so many cells along the longest side of its bounds, or more.
 
         Raises NoSurfaceError where it has none.
         """

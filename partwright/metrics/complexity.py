@@ -6,13 +6,17 @@ from partwright.assembly import Assembly, Part
 
 
 def primitives(node: Assembly | Part) -> int:
-    """`primitives`: leaves of the tree, #P of CAPRI-Net's tables where leaves are quadrics."""
+    """`primitives`: leaves of the tree, #P of CAPRI-Net's tables where leaves are quadrics.
+
+    What repeats counts once; of `assembly.expanded()` every copy counts, as in those tables.
+    """
     return 1 if isinstance(node, Part) else len(node)
 
 
 def convexes(node: Assembly | Part) -> int:
     """`convexes`: intersections and single leaves that unions and differences join, #C of CAPRI-Net's tables.
 
+    What repeats counts once, as in `primitives`.
     An intersection counts once for each convex that its children hold beyond the one that they share.
     """
     if isinstance(node, Part):

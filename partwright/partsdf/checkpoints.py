@@ -104,7 +104,15 @@ def _check_settings(path: Path, before: dict[str, object], now: dict[str, object
         settings["family"] = ""
         training = settings["training"]
         assert isinstance(training, dict)
-        for name in ("accelerator", "devices", "threads", "validate", "validate_shapes", "checkpoint"):
+        for name in (
+            "accelerator",
+            "at_once",
+            "devices",
+            "threads",
+            "validate",
+            "validate_shapes",
+            "checkpoint",
+        ):
             training[name] = None
     if before != now:
         changed = sorted(_differences(before, now, ""))

@@ -104,7 +104,8 @@ class NeuralField(JointField):
         def distances(points: np.ndarray) -> np.ndarray:
             return self((centre + points / scale).astype(np.float32))[None] * np.float32(scale)
 
-        lattice = SparseLattice(distances, 1.0, fitting(self.wall * scale, resolution), self.slope)
+        cells = fitting(self.wall * scale, round(resolution * 2 / _SIDE))
+        lattice = SparseLattice(distances, 1.0, cells, self.slope)
         mesh = lattice.meshes()[0]
         if mesh is None:
             raise NoSurfaceError(

@@ -1,9 +1,11 @@
 """Neural shapes to meshes, coarse to fine: the decoder is asked only where a surface can be.
 
 A cube whose centre is farther from zero than `slope` times its half diagonal holds no surface, so it is left
-out with the sign of its centre; the others are halved. `slope` was measured in training, not proved, so the
-last level also grows: wherever a corner's sign is not the one that its neighbour was left out with, the
-neighbour is looked at, too. All parts are decoded in one pass, and each keeps what any of them needs.
+out with the sign of its centre; the others are halved. The last level goes by half of what the slope is
+above 1, as few places are that steep, and grows: wherever a corner's sign is not the one that its neighbour
+was left out with, the neighbour is looked at, too. What that can miss is a steep piece of surface that lies
+apart from all others and is no larger than a cube. All parts are decoded in one pass, and each keeps what any
+of them needs.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ FINEST = 2  # cells along a cube whose corners are evaluated
 MOST = 1024  # cells along the box
 _USUAL, _FINE = 128, 256
 _ACROSS = 2.0  # cells across a thin wall: a slanted one of fewer than sqrt(3) has holes
-_LAST = 0.5  # of what the slope is above 1, at the last level, where growing finds what that leaves out
+_LAST = 0.5  # of what the slope is above 1, at the last level
 _ROOM = 1.25  # a part's surface may leave its cuboid by so much
 
 
@@ -215,7 +217,9 @@ class SparseLattice:
 
     def meshes(self) -> list[trimesh.Trimesh | None]:
         """Each field's zero level as a closed mesh, None where it has none; the box cuts what reaches it."""
-        rows = np.searchsorted(self._corners, self._keys(self._cubes)).reshape(len(self._cubes), -1)
+        rows = np.searchsorted(self._corners, self._keys(self._cubes)).reshape(
+            len(self._cubes), len(_LATTICE)
+        )
         return [self._mesh(values, rows) for values in self._values]
 
     def _mesh(self, values: np.ndarray, rows: np.ndarray) -> trimesh.Trimesh | None:

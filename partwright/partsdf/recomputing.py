@@ -54,23 +54,31 @@ class _CrossLinear(torch.autograd.Function):
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, ...]:
-        x, mix, bias, weight = ctx.saved_tensors
-        for_x, for_mix, for_bias, for_weight, for_offset = ctx.needs_input_grad
-        to_x = to_mix = to_bias = to_weight = to_offset = None
-        if for_offset:
-            to_offset = gradient.sum(dim=1)
-        to_y = gradient @ weight.T
-        through = _crossed(x, mix, bias)
-        inner = _by_part(torch.ops.aten.threshold_backward(to_y, through, 0), mix)  # of C x + c
-        if for_weight:
-            to_weight = through.add_(x).flatten(0, 1).T @ gradient.flatten(0, 1)
-        if for_mix:
-            to_mix = (inner @ _by_part(x, mix).mT).sum(dim=0)
-        if for_bias:
-            to_bias = inner.sum(dim=(0, 2))
-        if for_x:
-            to_x = _by_part(to_y, mix).baddbmm_(mix.T.expand(len(inner), -1, -1), inner).view_as(x)
-        return to_x, to_mix, to_bias, to_weight, to_offset
+        with torch.autocast(gradient.device.type, enabled=False):
+            return _gradients(gradient, ctx.saved_tensors, ctx.needs_input_grad)
+
+
+def _gradients(
+    gradient: Tensor, saved: tuple[Tensor, ...], needed: tuple[bool, ...]
+) -> tuple[Tensor | None, ...]:
+    """Of x, C, c, W and o, those that are needed; `gradient` is the output's (B P, N, E)."""
+    x, mix, bias, weight = saved
+    for_x, for_mix, for_bias, for_weight, for_offset = needed
+    to_x = to_mix = to_bias = to_weight = to_offset = None
+    if for_offset:
+        to_offset = gradient.sum(dim=1)
+    to_y = gradient @ weight.T
+    through = _crossed(x, mix, bias)
+    inner = _by_part(torch.ops.aten.threshold_backward(to_y, through, 0), mix)  # of C x + c
+    if for_weight:
+        to_weight = through.add_(x).flatten(0, 1).T @ gradient.flatten(0, 1)
+    if for_mix:
+        to_mix = (inner @ _by_part(x, mix).mT).sum(dim=0)
+    if for_bias:
+        to_bias = inner.sum(dim=(0, 2))
+    if for_x:
+        to_x = _by_part(to_y, mix).baddbmm_(mix.T.expand(len(inner), -1, -1), inner).view_as(x)
+    return to_x, to_mix, to_bias, to_weight, to_offset
 
 
 def _crossed(x: Tensor, mix: Tensor, bias: Tensor) -> Tensor:

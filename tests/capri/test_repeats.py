@@ -88,6 +88,16 @@ def test_sides_of_a_convex_are_never_copies_of_one_another() -> None:
     assert with_repeats(lens) == lens
 
 
+def test_what_repeats_further_down_is_left_as_it_is() -> None:
+    balls = [Part(Quadric.sphere(0.2, (x, 0, 0))) for x in (-0.6, 0.0, 0.6)]
+    before = Assembly((Assembly(tuple(balls[:2])), Assembly((balls[2],))))
+    after = with_repeats(before)
+    assert same_solid(before, after)
+    assert copies(after) == [2, 1]
+    moved = Assembly((balls[0], Part(Quadric.sphere(0.2), (0.5, 0, 0))))
+    assert with_repeats(moved) == moved
+
+
 def test_a_fit_drills_equal_holes_once(plate) -> None:  # noqa: F811
     fitted, apart = quick(plate), quick(plate, symmetry=False)
     assert sorted(copies(fitted.assembly)) == [1] * 6 + [2]

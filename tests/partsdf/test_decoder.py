@@ -73,6 +73,16 @@ def test_what_is_frozen_or_given_gets_no_gradient_and_the_rest_keeps_its_own() -
     torch.testing.assert_close(found, wanted[2:], rtol=0, atol=0)
 
 
+def test_gradients_under_autocast_are_those_without() -> None:
+    """Callers may run backward within the autocast block; the last layer is in full precision."""
+    decoder = Decoder(3, SMALL)
+    z, x = inputs(3, SMALL.latent, torch.float32)
+    with torch.autocast("cpu", torch.bfloat16):
+        value = decoder(z, x).square().sum()
+        within = torch.autograd.grad(value, [z, x], retain_graph=True)
+    torch.testing.assert_close(within, torch.autograd.grad(value, [z, x]), rtol=0.05, atol=1e-3)
+
+
 def test_only_one_tensor_a_layer_is_kept_for_backward() -> None:
     settings = replace(SMALL, layers=9)
     decoder, (z, x) = Decoder(3, settings), inputs(3, settings.latent, torch.float32)

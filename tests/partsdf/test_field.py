@@ -15,7 +15,7 @@ import trimesh
 import partwright as pw
 from partwright.assembly import Similarity
 from partwright.datasets.prepared import PreparedFamily
-from partwright.errors import AssemblyFileError, ModelError
+from partwright.errors import AssemblyFileError, ModelError, NoSurfaceError
 from partwright.meshing import mesh_assembly, mesh_part
 from partwright.partsdf import model as models
 from partwright.partsdf.assemblies import from_assembly, to_assembly
@@ -194,3 +194,5 @@ def test_walls_are_as_thin_as_the_parts_are(
     assert assembly.parts[0].field.wall == pytest.approx(2 * walls[0], rel=0.1)  # in own units
     monkeypatch.setattr(NeuralShape, "part_distances", lambda shape, points: np.ones((3, len(points))))
     assert np.isinf(lamp.walls()).all()  # nothing is inside
+    with pytest.raises(NoSurfaceError, match=r"part plate of .* has no surface"):
+        mesh_part(dataclasses.replace(assembly.parts[0]))

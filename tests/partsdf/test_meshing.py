@@ -90,3 +90,8 @@ def test_a_shell_thinner_than_a_usual_cell_comes_out_whole() -> None:
     assert fine.euler_number == 4  # two spheres, one in the other
     assert abs(usual.euler_number) > 100  # shreds
     assert fine.volume == pytest.approx(4 * np.pi * 0.5**2 * wall, rel=0.03)
+
+
+def test_nothing_inside_is_no_surface() -> None:
+    lattice = SparseLattice(lambda points: np.full((2, len(points)), 5.0, np.float32), 1.0, 64, 1.0)
+    assert lattice.meshes() == [None, None]

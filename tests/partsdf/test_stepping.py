@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +17,7 @@ from partwright.partsdf.config import Config, DecoderSettings, TrainingSettings
 from partwright.partsdf.losses import intersection, latent_penalty, terms
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.stepping import backward
-from partwright.partsdf.training import MODEL, train
+from partwright.partsdf.training import MODEL, Report, train
 from tests.partsdf.lamps import small_config
 
 SHAPES, PARTS, POINTS = 5, 3, 40
@@ -75,6 +76,17 @@ def test_a_training_learns_the_same_a_few_shapes_at_a_time(lamps: PreparedFamily
     one, other = (train(c, tmp_path / name).model for c, name in ((whole, "one"), (slow, "other")))
     torch.testing.assert_close(one.latents, other.latents, rtol=0, atol=1e-3)
     assert load_model(tmp_path / "other" / MODEL).config.training.at_once == 2
+
+
+def test_a_stopped_training_may_go_on_with_less_memory(lamps: PreparedFamily, tmp_path: Path) -> None:
+    config = small_config(lamps, epochs=2, batch=6)
+
+    def stop(_: Report) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    assert train(config, tmp_path, progress=stop).outcome == "interrupted"
+    slow = replace(config, training=replace(config.training, at_once=2))
+    assert train(slow, tmp_path).outcome == "converged"
 
 
 def test_several_devices_share_the_batch_anyway() -> None:
