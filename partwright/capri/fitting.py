@@ -27,7 +27,7 @@ from partwright.capri.settings import Settings
 from partwright.capri.tree import Tree
 from partwright.errors import EmptyShapeError, MissingDependencyError, SettingError
 from partwright.methods import Outcome, Progress, timed
-from partwright.metrics.complexity import convexes, primitives
+from partwright.metrics.complexity import convexes, distinct_primitives, primitives
 from partwright.shapes import Shape
 
 ORIGINS = {"seeds": "detected surfaces", "weights": "pre-trained network"}
@@ -41,7 +41,8 @@ _LADDER = 16
 class Fitted:
     """A fit's result: the assembly in the shape's own units and place, and how it came about.
 
-    details: for the report: which start was best, primitives, convexes, quadrics among which was chosen.
+    details: for the report: which start was best, primitives, convexes, distinct primitives, quadrics among
+    which was chosen.
     """
 
     assembly: Assembly
@@ -109,6 +110,7 @@ def fit(
         "candidates": len(run.pool.rows),
         "primitives": primitives(assembly),
         "convexes": convexes(assembly),
+        "distinct_primitives": distinct_primitives(assembly),
     }
     seconds: dict[str, float] = {}
     for one in runs:

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from partwright.assembly import Assembly, Part
+from partwright.assembly.similarity import rotation_matrix
+from partwright.fields import Quadric
+
+_DIGITS = 9
 
 
 def primitives(node: Assembly | Part) -> int:
@@ -23,3 +29,23 @@ def convexes(node: Assembly | Part) -> int:
         return 1
     counts = [convexes(child) for child in node.children]
     return sum(counts) - (len(counts) - 1 if node.operation == "intersection" else 0)
+
+
+def distinct_primitives(node: Assembly | Part) -> int:
+    """Different quadrics among the leaves, whichever side of them is inside, and all other leaves.
+
+    A quadric that several convexes share counts once, as a row of CAPRI-Net's P that several columns of its
+    selection matrix choose (section 3.1).
+    """
+    parts = (node,) if isinstance(node, Part) else node.parts
+    found: set[tuple[float, ...]] = set()
+    others = 0
+    for part in parts:
+        if not isinstance(part.field, Quadric):
+            others += 1
+            continue
+        placed = part.field.moved(rotation_matrix(part.rotation), np.array(part.translation))
+        row = np.array(placed.coefficients)
+        row = row / row[np.abs(row).argmax()]  # of the same sign, whichever side is inside
+        found.add(tuple((row.round(_DIGITS) + 0.0).tolist()))
+    return len(found) + others

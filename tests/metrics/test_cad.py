@@ -14,7 +14,7 @@ from partwright.fields import Box, Quadric, Sphere
 from partwright.metrics import cad_scores, evaluate
 from partwright.metrics.cad import _sample
 from partwright.metrics.chamfer import chamfer
-from partwright.metrics.complexity import convexes, primitives
+from partwright.metrics.complexity import convexes, distinct_primitives, primitives
 from partwright.metrics.edge_chamfer import edge_chamfer, near_edges
 from partwright.metrics.light_field import _turns, _zernike, descriptors, light_field_distance
 from partwright.metrics.normal_consistency import normal_consistency
@@ -98,6 +98,23 @@ def test_counts_of_primitives_and_convexes() -> None:
     assert (primitives(tree), convexes(tree)) == (13, 5)
     drilled = Assembly((convex - Part(Quadric.cylinder(0.1)), Part(Box((1, 1, 1)))), "intersection")
     assert convexes(drilled) == 2
+
+
+def test_a_quadric_that_convexes_share_is_one_primitive() -> None:
+    field = Quadric.cylinder(0.3, (0, 1, 2), (0.1, 0, 0))
+    moved = Quadric.cylinder(0.3, (0, 1, 2)), (0.1, 0.0, 0.0)
+    shared = [
+        Part(field),
+        Part(field.complement()),
+        Part(*moved),
+        Part(Quadric(tuple(3 * c for c in field.coefficients))),
+    ]
+    planes = [Part(Quadric.plane(n, 1)) for n in (*np.eye(3), -np.eye(3)[0])]
+    tree = Assembly(
+        (Assembly((*shared[:2], *planes), "intersection"), Assembly(tuple(shared[2:])), Part(Sphere(1.0)))
+    )
+    assert distinct_primitives(tree) == 1 + 4 + 1
+    assert distinct_primitives(Part(field)) == distinct_primitives(Part(Sphere(1.0))) == 1
 
 
 def test_all_scores_of_a_perfect_cube_and_of_one_with_a_hole() -> None:
