@@ -32,7 +32,8 @@ Progress = Callable[[int, int, float], None]
 class ReconstructionSettings:
     """iterations, points a step, rate of Adam: the paper takes 800, 8,000 (all that it samples), 5e-3; the
     rate falls by `decay` at half time, when the whole shape's loss joins in. start: "nearest" training shape,
-    or the "mean" of all (poses unknown only). pose_rate: of poses; pose_delay: the share of the iterations
+    or the "mean" of all (poses unknown only). starts: so many nearest ones are tried for an eighth of the
+    iterations, and the best goes on. pose_rate: of poses; pose_delay: the share of the iterations
     for which they wait until latents have found the rough form. seed: of the points drawn.
     """
 
@@ -41,12 +42,13 @@ class ReconstructionSettings:
     rate: float = 5e-3
     decay: float = 0.1
     start: str = "nearest"
+    starts: int = 4
     pose_rate: float = 2e-3
     pose_delay: float = 0.1
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("iterations", "points"):
+        for name in ("iterations", "points", "starts"):
             if getattr(self, name) < 1:
                 raise SettingError(f"{name} is {getattr(self, name)}; expected 1 or more")
         if self.start not in STARTS:
@@ -74,6 +76,7 @@ class Target:
 
 
 LEAST = 1e-3
+_SCOUTED = 8  # of the iterations, the part that each start is given
 NEAR = (0.005**0.5, 0.0005**0.5)  # section B.4 gives variances
 
 
@@ -105,7 +108,7 @@ def reconstruct(
     noise = torch.Generator().manual_seed(settings.seed)
     latents = 0.01 * torch.randn(start.latents.shape, generator=noise)
     start = replace(start, latents=latents, poses=pose_tensors(shape, model.config))
-    return _optimised(start, target, settings, progress, move_poses=False)
+    return _optimised(start, target, settings, progress, move_poses=False)[0]
 
 
 def reconstruct_unknown(
@@ -115,9 +118,12 @@ def reconstruct_unknown(
     progress: Progress | None = None,
 ) -> NeuralShape:
     """Latents and poses, without knowing which part a sample belongs to."""
-    start = nearest_trained(model, target) if settings.start == "nearest" else NeuralShape.mean(model)
-    everything = replace(start, present=torch.ones_like(start.present))
-    found = _optimised(everything, target, settings, progress, move_poses=model.config.poses)
+    if settings.start == "nearest":
+        starts = nearest_trained(model, target, settings.starts)
+    else:
+        starts = [NeuralShape.mean(model)]
+    starts = [replace(start, present=torch.ones_like(start.present)) for start in starts]
+    found = _scouted(starts, target, settings, progress)
     return replace(found, present=_filling(found, target))
 
 
@@ -133,9 +139,40 @@ def _filling(shape: NeuralShape, target: Target) -> Tensor:
     return share >= LEAST
 
 
+def _scouted(
+    starts: list[NeuralShape], target: Target, settings: ReconstructionSettings, progress: Progress | None
+) -> NeuralShape:
+    """From the start that a few iterations bring closest: one that is close as it is may be a dead end, as a
+    tube with flanges is for one without."""
+    few = replace(settings, iterations=max(1, settings.iterations // _SCOUTED), decay=1.0)
+    scouts = starts if len(starts) > 1 else []
+    steps = settings.iterations + len(scouts) * few.iterations
+
+    def after(done: int) -> Progress | None:
+        return progress and (lambda step, _, loss: progress(done + step, steps, loss))
+
+    tried: list[NeuralShape] = []
+    for i, start in enumerate(scouts):
+        shape, finished = _optimised(start, target, few, after(i * few.iterations), start.model.config.poses)
+        tried.append(shape)
+        if not finished:
+            return min(tried, key=lambda one: _error(one, target))
+    best = min(tried or starts, key=lambda one: _error(one, target))
+    told = after(len(scouts) * few.iterations)
+    return _optimised(best, target, settings, told, best.model.config.poses)[0]
+
+
 @torch.no_grad()
-def nearest_trained(model: Model, target: Target, count: int = 512) -> NeuralShape:
-    """The training shape whose distances differ least from the target's, at `count` of its samples."""
+def _error(shape: NeuralShape, target: Target, count: int = 8192) -> float:
+    """Mean error of the whole shape's distance, at `count` of the target's samples."""
+    rows = torch.linspace(0, len(target.sdf) - 1, min(count, len(target.sdf))).long()
+    whole = torch.from_numpy(shape.distances(target.points[rows].numpy()))
+    return float(clamped_error(whole, target.sdf[rows], shape.model.config.losses).mean())
+
+
+@torch.no_grad()
+def nearest_trained(model: Model, target: Target, most: int = 1, count: int = 512) -> list[NeuralShape]:
+    """The `most` training shapes whose distances differ least from the target's, at `count` of its points."""
     rows = torch.linspace(0, len(target.sdf) - 1, count).long()
     points, sdf = target.points[rows], target.sdf[rows]
     errors = []
@@ -145,7 +182,8 @@ def nearest_trained(model: Model, target: Target, count: int = 512) -> NeuralSha
         each = model.condition(model.latents[some])(local_points(points, poses))
         whole = aggregate(each, model.config.decoder)
         errors.append(clamped_error(whole, sdf.expand_as(whole), model.config.losses).mean(dim=1))
-    return NeuralShape.trained(model, str(int(torch.cat(errors).argmin())))
+    order = torch.cat(errors).argsort()[:most]
+    return [NeuralShape.trained(model, str(int(i))) for i in order]
 
 
 def _optimised(
@@ -154,8 +192,9 @@ def _optimised(
     settings: ReconstructionSettings,
     progress: Progress | None,
     move_poses: bool,
-) -> NeuralShape:
-    """Adam on the latents, and on the poses if they are to move; Ctrl-C keeps what was found."""
+) -> tuple[NeuralShape, bool]:
+    """Adam on the latents, and on the poses if they are to move; Ctrl-C keeps what was found. Also whether
+    all iterations were done."""
     losses = start.model.config.losses
     latents = start.latents.clone().requires_grad_()
     poses = start.poses.map(lambda t: t.clone().requires_grad_(move_poses))
@@ -167,6 +206,7 @@ def _optimised(
     optimiser = torch.optim.Adam(groups)
     generator = torch.Generator().manual_seed(settings.seed)
     halves = target.halves()
+    finished = False
     try:
         for i in range(settings.iterations):
             if i == settings.iterations // 2:
@@ -182,11 +222,13 @@ def _optimised(
             optimiser.step()
             if progress:
                 progress(i + 1, settings.iterations, float(loss.detach()))
+        finished = True
     except KeyboardInterrupt:
         pass
     final = PoseTensors(poses.translation, poses.rotation, size.exp()) if move_poses else start.poses
     unit = final.rotation / final.rotation.norm(dim=-1, keepdim=True)
-    return replace(start, latents=latents.detach(), poses=final._replace(rotation=unit).map(Tensor.detach))
+    poses = final._replace(rotation=unit).map(Tensor.detach)
+    return replace(start, latents=latents.detach(), poses=poses), finished
 
 
 def _loss(

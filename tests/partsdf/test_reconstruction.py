@@ -21,6 +21,9 @@ from partwright.partsdf.poses import rotation_matrices
 from partwright.partsdf.reconstruction import (
     ReconstructionSettings,
     Target,
+    _error,
+    _scouted,
+    nearest_trained,
     reconstruct,
     reconstruct_unknown,
 )
@@ -129,3 +132,39 @@ def test_sparse_meshes_are_the_dense_ones(model: Model) -> None:
     # Marching cubes has a vertex on every lattice edge whose ends differ.
     assert len(sparse.whole.vertices) == crossings
     assert sparse.evaluations < 0.35 * sparse.dense
+
+
+def held_out(lamps: PreparedFamily) -> Target:
+    shape = lamps.load(lamps.split("test")[0])
+    return Target(torch.tensor(shape.points), torch.tensor(shape.sdf))
+
+
+def test_the_start_that_a_few_iterations_bring_closest_goes_on(model: Model, lamps: PreparedFamily) -> None:
+    target, few = held_out(lamps), replace(QUICK, iterations=8)
+    good = nearest_trained(model, target)[0]
+    generator = torch.Generator().manual_seed(0)
+    bad = replace(good, latents=torch.randn(good.latents.shape, generator=generator))
+    alone, together = (_scouted(starts, target, few, None) for starts in ([bad], [bad, good]))
+    assert _error(together, target) < 0.7 * _error(alone, target)
+    order = nearest_trained(model, target, 3)
+    assert len(order) == 3
+    assert not torch.equal(order[0].latents, order[1].latents)
+    errors = [_error(one, target, 512) for one in order]
+    assert errors == sorted(errors)
+
+
+def test_progress_counts_all_starts_and_ctrl_c_ends_at_once(model: Model, lamps: PreparedFamily) -> None:
+    target, settings = held_out(lamps), replace(QUICK, iterations=16, starts=3)
+    seen: list[tuple[int, int]] = []
+    reconstruct_unknown(model, target, settings, lambda step, of, _: seen.append((step, of)))
+    assert seen == [(step, 22) for step in range(1, 23)]  # three times two, and sixteen
+
+    def stop(step: int, of: int, loss: float) -> None:
+        seen.append((step, of))
+        if step == 3:  # the second start's first
+            raise KeyboardInterrupt
+
+    seen.clear()
+    found = reconstruct_unknown(model, target, settings, stop)
+    assert len(seen) == 3
+    assert np.isfinite(found.distances(target.points[:10].numpy())).all()
