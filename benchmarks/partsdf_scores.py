@@ -138,7 +138,12 @@ def how_measured(family: PreparedFamily, arguments: argparse.Namespace) -> str:
 
 
 def command_line() -> str:
-    return f"    python benchmarks/partsdf.py {shlex.join(sys.argv[1:])}"
+    """What was typed, but for where trainings are kept."""
+    typed = sys.argv[1:]
+    if "--work" in typed:
+        at = typed.index("--work")
+        typed = typed[:at] + typed[at + 2 :]
+    return f"    python benchmarks/partsdf.py {shlex.join(typed)}"
 
 
 def write(name: str, lines: list[str]) -> None:
