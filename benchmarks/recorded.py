@@ -31,10 +31,12 @@ def _value(text: str, kind: str) -> Any:
 
 
 def append(path: Path, run: Any) -> None:
-    """Adds a line to the file, and a header to a new one."""
-    lines = text([run])
-    if path.is_file():
-        lines = lines[lines.index("\n") + 1 :]
+    """Adds a line to the file, and a header to a new one; a file of fewer columns gets what it lacks."""
+    header, lines = text([run]).split("\n", 1)
+    if not path.is_file():
+        lines = f"{header}\n{lines}"
+    elif path.read_text(encoding="utf-8").split("\n", 1)[0] != header:
+        path.write_text(text(read(path, type(run)), type(run)), encoding="utf-8")
     with path.open("a", encoding="utf-8", newline="") as stream:
         stream.write(lines)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.placed import placed_quadric
 from partwright.assembly.tree import Node, Part
 from partwright.fields import NormalForm, Quadric, normal_form
 
@@ -33,8 +33,7 @@ def _lines(node: Node, digits: int, first: str, rest: str) -> Iterator[str]:
 
 def _leaf(part: Part, digits: int) -> str:
     if isinstance(part.field, Quadric):
-        moved = part.field.moved(rotation_matrix(part.rotation), np.array(part.translation))
-        own = _quadric(normal_form(moved), digits)
+        own = _quadric(normal_form(placed_quadric(part)), digits)
     else:
         values = ((f.name, getattr(part.field, f.name)) for f in dataclasses.fields(part.field))  # type: ignore[arg-type]
         numbers = [f"{name} {_numbers(value, digits)}" for name, value in values]
@@ -55,7 +54,7 @@ def _quadric(form: NormalForm, digits: int) -> str:
     radii = radii[np.isfinite(radii) & (radii > 0)]
     size = f" radius {_numbers(radii, digits)}," if len(radii) and form.level else ""
     if form.name == "cone":
-        size = f" slope {_number(float(np.sqrt(-form.curvature[2] / form.curvature[0])), digits)},"
+        size = f" slope {_number(form.widening, digits)},"
     axis = "" if form.name == "sphere" else f", axis {_numbers(w, digits)}"
     return f"{outside}{form.name}{size} centre {_numbers(form.centre, digits)}{axis}"
 

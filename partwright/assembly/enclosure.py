@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.placed import placed_quadric
 from partwright.assembly.tree import Node, Part, operands
 from partwright.fields import Quadric
 
@@ -48,7 +48,7 @@ def _about(parts: tuple[Part, ...]) -> tuple[np.ndarray, float]:
     finite = [box for box in finite if np.isfinite(box).all()]
     places = [np.mean(box, axis=0) for box in finite] + [np.array(part.translation) for part in parts]
     middle = np.mean(places, axis=0)
-    distances = [_reach(_quadric(part), middle) for part in parts if isinstance(part.field, Quadric)]
+    distances = [_reach(placed_quadric(part), middle) for part in parts if isinstance(part.field, Quadric)]
     corners = [float(np.abs(box - middle).max()) for box in finite]
     spread = [float(np.abs(place - middle).max()) for place in places]
     return middle, max([*distances, *corners, *spread]) or 1.0
@@ -91,7 +91,7 @@ def _cut_by_part(part: Part, region: Manifold, level: float) -> Manifold:
     if not isinstance(part.field, Quadric):
         box = part.bounds() + level * np.array([[-1.0], [1.0]])
         return _trimmed(region, _AXES, np.concatenate([-box[0], box[1]]))
-    quadric, corners = _quadric(part), _corners(region)
+    quadric, corners = placed_quadric(part), _corners(region)
     if not len(corners):
         return region
     square, linear, constant = quadric.matrices()
@@ -196,10 +196,3 @@ def _trimmed(region: Manifold, normals: np.ndarray, reach: np.ndarray) -> Manifo
 
 def _corners(region: Manifold) -> np.ndarray:
     return np.asarray(region.to_mesh64().vert_properties, dtype=np.float64)[:, :3]
-
-
-def _quadric(part: Part) -> Quadric:
-    """The quadric in the place of the part."""
-    field = part.field
-    assert isinstance(field, Quadric)
-    return field.moved(rotation_matrix(part.rotation), np.array(part.translation))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -107,13 +107,11 @@ def _form(node: Node) -> NormalForm | None:
 
 def _size(form: NormalForm) -> float:
     """Radius, or the slope of a cone."""
-    if form.name == "cone":
-        return float(np.sqrt(-form.curvature[2] / form.curvature[0]))
-    return float(form.radii[0])
+    return form.widening if form.name == "cone" else float(form.radii[0])
 
 
-_MAKERS = {
-    "sphere": lambda size, axis, place: Quadric.sphere(size, place),
-    "cylinder": lambda size, axis, place: Quadric.cylinder(size, axis, place),
-    "cone": lambda size, axis, place: Quadric.cone(size, axis, place),
+_MAKERS: dict[str, Callable[..., Quadric]] = {  # of a size, an axis and a place
+    "sphere": lambda size, _, place: Quadric.sphere(size, place),
+    "cylinder": Quadric.cylinder,
+    "cone": Quadric.cone,
 }

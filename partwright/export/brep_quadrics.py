@@ -84,7 +84,7 @@ def _round(form: NormalForm, half: float) -> TopoDS_Shape:
     if form.name == "elliptic cylinder":
         return BRepPrimAPI_MakeCylinder(_along(-half), float(form.radii[0]), 2 * half).Shape()
     if form.name == "elliptic cone":
-        wide = half * math.sqrt(-form.curvature[2] / form.curvature[0])
+        wide = half * form.widening
         nappes = [
             BRepPrimAPI_MakeCone(_along(0.0), 0.0, wide, half),
             BRepPrimAPI_MakeCone(_along(-half), wide, 0.0, half),

@@ -7,12 +7,12 @@ that no named solid has (ellipsoids, elliptic cylinders, paraboloids ...) stay q
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable
 
 import numpy as np
 
 from partwright.assembly import Assembly, Node, Part, Similarity
+from partwright.assembly.placed import placed_quadric
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import NoSurfaceError
 from partwright.fields import Box, Cone, Cylinder, Field, NormalForm, Quadric, Sphere, normal_form
@@ -51,7 +51,7 @@ def closes_alike(part: Part) -> bool:
         return False
     if any(np.abs(move.rotation[1:]).max() > _TURNED for move in part.instances):
         return False
-    form = normal_form(part.field.moved(rotation_matrix(part.rotation), np.array(part.translation)))
+    form = normal_form(placed_quadric(part))
     if form.complement or form.name not in ("sphere", "cylinder"):
         return False
     moves = np.array([move.translation for move in part.instances])
@@ -165,13 +165,14 @@ def _sphere(form: NormalForm, _: float) -> Solids:
 def _cone(form: NormalForm, radius: float) -> Solids:
     """A cone for each nappe that reaches into the ball; the tip of a named cone is on top."""
     u, v, w = form.axes.T
-    slope = math.sqrt(-form.curvature[2] / form.curvature[0])
     solids: Solids = []
     for up in (1.0, -1.0):
         height = radius - up * float(form.centre @ w)
         if height > 1e-9 * radius:
             axes = np.stack([u, -up * v, -up * w], axis=1)
-            solids.append((Cone(slope * height, height), _pose(axes, form.centre + up * height / 2 * w)))
+            solids.append(
+                (Cone(form.widening * height, height), _pose(axes, form.centre + up * height / 2 * w))
+            )
     return solids
 
 

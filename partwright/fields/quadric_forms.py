@@ -49,6 +49,11 @@ class NormalForm:
         with np.errstate(divide="ignore"):
             return np.sqrt(np.abs(self.level) / np.abs(self.curvature))
 
+    @property
+    def widening(self) -> float:
+        """Of a cone: its radius along u at a height of 1 above the apex."""
+        return float(np.sqrt(-self.curvature[2] / self.curvature[0]))
+
     def quadric(self) -> Quadric:
         """The solid again."""
         own = Quadric.from_matrices(np.diag(self.curvature), np.array([0, 0, self.slope]), -self.level)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import trimesh
 
 # Cells across the thinnest wall. Under sqrt(3) a slanted wall would show holes; 3 also keep a thin rod round.
-_ACROSS, _ACROSS_PART = 2.0, 3.0
+ACROSS, _ACROSS_PART = 2.0, 3.0
 _FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin walls
 _PART_CELLS = 120_000  # a part's surface is given at most this many cells
 _MOST = 1024.0  # cells along one axis of a part
@@ -55,7 +55,7 @@ def mesh_assembly(
     parts = assembly.parts if isinstance(assembly, Assembly) else (assembly,)
     thin = [_wall(part.field) for part in parts]
     thinnest = np.array(thin) / longest
-    wanted = _ACROSS / np.maximum(thinnest, 1e-9)
+    wanted = ACROSS / np.maximum(thinnest, 1e-9)
     counts = int(np.ceil(wanted[wanted <= _FINEST * resolution].max(initial=resolution)))
     local = assembly.transformed(frame)
     room = _ROOM + (upper - lower) * frame.scale / 2

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly import Assembly, Part
+from partwright.assembly.placed import placed_quadric
 from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Node, operands
 from partwright.errors import NoSurfaceError, ParameterError
@@ -130,8 +131,7 @@ class _Builder:
 
     def leaf(self, part: Part) -> Manifold:
         if isinstance(part.field, Quadric):
-            moved = part.field.moved(rotation_matrix(part.rotation), np.array(part.translation))
-            return quadric_solid(moved, self.box, self.tolerance)
+            return quadric_solid(placed_quadric(part), self.box, self.tolerance)
         assert isinstance(part.field, Solid)
         return _placed(named_solid(part.field, self.tolerance), part)
 
@@ -165,7 +165,7 @@ def _plane(node: Node) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     if any(node.field.coefficients[:3]) or any(node.field.coefficients[7:]):
         return None
-    form = normal_form(node.field.moved(rotation_matrix(node.rotation), np.array(node.translation)))
+    form = normal_form(placed_quadric(node))
     return form.axes[:, 2] * (-1.0 if form.complement else 1.0), form.centre
 
 

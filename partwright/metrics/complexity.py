@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from partwright.assembly import Assembly, Part
-from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.placed import placed_quadric
 from partwright.fields import Quadric
 
 _DIGITS = 9
@@ -44,8 +44,7 @@ def distinct_primitives(node: Assembly | Part) -> int:
         if not isinstance(part.field, Quadric):
             others += 1
             continue
-        placed = part.field.moved(rotation_matrix(part.rotation), np.array(part.translation))
-        row = np.array(placed.coefficients)
+        row = np.array(placed_quadric(part).coefficients)
         row = row / row[np.abs(row).argmax()]  # of the same sign, whichever side is inside
         found.add(tuple((row.round(_DIGITS) + 0.0).tolist()))
     return len(found) + others

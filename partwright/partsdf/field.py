@@ -94,8 +94,7 @@ class NeuralField(JointField):
 
     @cached_property
     def wall(self) -> float:
-        row = self.shape.names().index(self.part)
-        return float(min(self.shape.walls()[row] * self.unit, LARGEST))
+        return min(self.shape.wall(self.part) * self.unit, LARGEST)
 
     def surface(self, resolution: int) -> trimesh.Trimesh:
         lower, upper = self.bounds()

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.errors import NoSurfaceError, SettingError
+from partwright.meshing.assemblies import ACROSS
 from partwright.meshing.cells import cell_polygons
 from partwright.meshing.tables import CORNERS
 from partwright.partsdf.neural import NeuralShape
@@ -31,7 +32,6 @@ COARSEST = 8  # cells along a cube of the first level
 FINEST = 2  # cells along a cube whose corners are evaluated
 MOST = 1024  # cells along the box
 _USUAL, _FINE = 128, 256
-_ACROSS = 2.0  # cells across a thin wall: a slanted one of fewer than sqrt(3) has holes
 _LAST = 0.5  # of what the slope is above 1, at the last level
 _ROOM = 1.25  # a part's surface may leave its cuboid by so much
 
@@ -108,9 +108,9 @@ def box(shape: NeuralShape) -> float:
 
 
 def fitting(wall: float, resolution: int) -> int:
-    """Cells along [-1, 1] that put `_ACROSS` of them across a wall: at least `resolution`, in eights, and no
+    """Cells along [-1, 1] that put `ACROSS` of them across a wall: at least `resolution`, in eights, and no
     more than 256 for the wall's sake."""
-    wanted = max(resolution, min(_FINE, _ACROSS * 2 / max(wall, 1e-9)))
+    wanted = max(resolution, min(_FINE, ACROSS * 2 / max(wall, 1e-9)))
     return int(min(MOST, COARSEST * np.ceil(wanted / COARSEST)))
 
 

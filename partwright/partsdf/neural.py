@@ -65,20 +65,17 @@ class NeuralShape:
         return torch.cat(values, dim=1).numpy()
 
     def walls(self) -> np.ndarray:
-        """(Q,) about how thin each part that is there is, unit frame: twice a depth that few places inside
-        exceed, and so at most about twice the depth at which training clamps. Infinite where no place inside
-        is found."""
+        """(Q,) about how thin each part that is there is."""
+        return np.array([self.wall(name) for name in self.names()])
+
+    def wall(self, name: str) -> float:
+        """About how thin a part is, unit frame: twice a depth that few places inside exceed, and so at most
+        about twice the depth at which training clamps. Infinite where no place inside is found."""
         within = np.random.default_rng(0).uniform(-_ROOM, _ROOM, (_PLACES, 3)).astype(np.float32)
-        poses = self.poses.numpy()
-        result = np.full(len(self.names()), np.inf)
-        for row, part in enumerate(np.flatnonzero(self.present.numpy())):
-            turned = Similarity(
-                1.0, tuple(poses.rotation[part].tolist()), tuple(poses.translation[part].tolist())
-            )
-            depth = -self.part_distances(turned(within * poses.scale[part]))[row]
-            if (depth > 0).any():
-                result[row] = 2 * np.quantile(depth[depth > 0], _DEEP)
-        return result
+        pose = self.poses.map(lambda t: t[self.model.index(name)]).numpy()
+        turned = Similarity(1.0, tuple(pose.rotation.tolist()), tuple(pose.translation.tolist()))
+        depth = -self.part_distances(turned(within * pose.scale))[self.names().index(name)]
+        return float(2 * np.quantile(depth[depth > 0], _DEEP)) if (depth > 0).any() else np.inf
 
     def whole(self, distances: np.ndarray) -> np.ndarray:
         """(N,) distance of the whole shape, of its parts' (Q, N)."""

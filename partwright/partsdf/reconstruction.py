@@ -156,10 +156,14 @@ def _scouted(
         shape, finished = _optimised(start, target, few, after(i * few.iterations), start.model.config.poses)
         tried.append(shape)
         if not finished:
-            return min(tried, key=lambda one: _error(one, target))
-    best = min(tried or starts, key=lambda one: _error(one, target))
+            return _closest(tried, target)
+    best = _closest(tried or starts, target)
     told = after(len(scouts) * few.iterations)
     return _optimised(best, target, settings, told, best.model.config.poses)[0]
+
+
+def _closest(shapes: list[NeuralShape], target: Target) -> NeuralShape:
+    return shapes[0] if len(shapes) == 1 else min(shapes, key=lambda one: _error(one, target))
 
 
 @torch.no_grad()

@@ -70,7 +70,7 @@ def reconstruct_shape(
     found = time.perf_counter()
     with finishing():
         assembly = to_assembly(neural, shape.frame, shape.unit, shape.up, shape.name)
-        surfaces = mesh_shape(neural, resolution)
+        surfaces = mesh_shape(neural, resolution, parts=False)
         surface = surfaces.whole
         surface.vertices = shape.frame.from_unit(surface.vertices)
         meshed = time.perf_counter()
