@@ -26,8 +26,8 @@ import recorded
 from fit import OWN_SHAPES, Entry, find_shapes, machine
 from variants import BASE, NOTES, Variant, variants
 
+from partwright.atomic_io import write_bytes
 from partwright.errors import PartwrightError
-from partwright.writing import write_bytes
 
 RESULT = Path(__file__).parent / "results" / "ablations.md"
 NAMES = (

@@ -19,7 +19,7 @@ from typing import Any
 
 from fit import OWN_SHAPES, find_shapes, machine
 
-from partwright.writing import write_bytes
+from partwright.atomic_io import write_bytes
 
 RESULT = Path(__file__).parent / "results" / "bounds.md"
 CASES: tuple[tuple[str, dict[str, Any]], ...] = (

@@ -28,13 +28,13 @@ import recorded
 from fit import OWN_SHAPES, Entry, find_shapes, machine
 
 import partwright as pw
+from partwright.atomic_io import write_bytes
 from partwright.errors import PartwrightError
 from partwright.fitting import METHODS
 from partwright.metrics.cad import cad_scores
 from partwright.metrics.complexity import convexes, distinct_primitives, primitives
 from partwright.shapes import Shape
 from partwright.shapes.sampling import sample_triangles
-from partwright.writing import write_bytes
 
 RESULTS = Path(__file__).parent / "results" / "capri.csv"
 VOXELS = 64  # along a side of [-1, 1]^3 (section 4.2)

@@ -23,6 +23,7 @@ from PIL import Image
 
 import partwright as pw
 from partwright.assembly.palette import palette
+from partwright.atomic_io import write_bytes
 from partwright.cleaning import Cleaned
 from partwright.cleaning.dimensions import dimensions, values
 from partwright.export.solid_source import fixed_axes_angles, number
@@ -32,7 +33,6 @@ from partwright.render import Camera, sheet
 from partwright.render.output import write
 from partwright.render.raycast import Scene
 from partwright.render.shading import look
-from partwright.writing import write_bytes
 
 HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"

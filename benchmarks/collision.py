@@ -24,6 +24,7 @@ import trimesh
 
 import partwright as pw
 from partwright.assembly import Assembly, Part, Similarity
+from partwright.atomic_io import write_bytes
 from partwright.export.axes import to_metres_z_up
 from partwright.export.bodies import DENSITY
 from partwright.export.mjcf import GEOMS
@@ -31,7 +32,6 @@ from partwright.export.primitives import TOLERANCE, geometries
 from partwright.fields import Box
 from partwright.meshing.mass import MassProperties, mass_properties
 from partwright.shapes import Shape
-from partwright.writing import write_bytes
 
 HERE = Path(__file__).parent
 OWN_SHAPES = HERE.parent / "examples" / "shapes"

@@ -23,9 +23,9 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from partwright.assembly.palette import palette
+from partwright.atomic_io import write_bytes
 from partwright.datasets import FAMILIES, FamilyShape, PreparedFamily, family, prepare
 from partwright.render import Camera, render_mesh, sheet, write_png
-from partwright.writing import write_bytes
 
 HERE = Path(__file__).parent
 SAMPLES = 525_000

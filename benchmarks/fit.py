@@ -27,7 +27,7 @@ from statistics import mean, median
 
 import recorded
 
-from partwright.writing import write_bytes
+from partwright.atomic_io import write_bytes
 
 HERE = Path(__file__).parent
 OWN_SHAPES = HERE.parent / "examples" / "shapes"

@@ -24,12 +24,12 @@ from fit import Entry, find_shapes
 from PIL import Image
 
 import partwright as pw
+from partwright.atomic_io import write_bytes
 from partwright.render import preview
 from partwright.render.output import write
 from partwright.results import Result
 from partwright.shapes import Shape
 from partwright.superfrusta import Settings
-from partwright.writing import write_bytes
 
 HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"

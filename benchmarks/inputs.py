@@ -20,11 +20,11 @@ from statistics import median
 
 import numpy as np
 
+from partwright.atomic_io import write_bytes
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import iou, occupancy_iou
 from partwright.shapes import MESH_SUFFIXES, Shape, load_shape
 from partwright.superfrusta import Settings, fit
-from partwright.writing import write_bytes
 
 HERE = Path(__file__).parent
 POINTS, RESOLUTION = 30_000, 128

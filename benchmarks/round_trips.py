@@ -30,12 +30,12 @@ from scipy.optimize import linear_sum_assignment
 
 import partwright as pw
 from partwright.assembly.similarity import rotation_matrix
+from partwright.atomic_io import write_bytes
 from partwright.cleaning import Relation
 from partwright.cleaning.dimensions import dimensions, values
 from partwright.fields import Box, Field, HollowBox
 from partwright.meshing import mesh_assembly
 from partwright.superfrusta.tree import flattened
-from partwright.writing import write_bytes
 
 HERE = Path(__file__).parent
 _SAME = 0.5  # of volume shared over volume of either: the same part

@@ -22,7 +22,7 @@ import trimesh
 from fit import OWN_SHAPES, find_shapes, machine
 
 import partwright as pw
-from partwright.writing import write_bytes
+from partwright.atomic_io import write_bytes
 
 RESULT = Path(__file__).parent / "results" / "scaling.md"
 LINEAR, NEARLY_LINEAR = 1.0, 1.2

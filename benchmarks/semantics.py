@@ -21,10 +21,10 @@ import numpy as np
 
 import partwright as pw
 from partwright.assembly import Assembly
+from partwright.atomic_io import write_bytes
 from partwright.metrics import owners, purity, stability
 from partwright.metrics.purity import COUNT
 from partwright.shapes import MeshDistance, Shape
-from partwright.writing import write_bytes
 
 TARGET = Path(__file__).parent / "results" / "semantics.md"
 WHOLE = "_whole.ply"

@@ -20,7 +20,7 @@ from statistics import mean, median
 import recorded
 from fit import Entry, find_shapes, fit_once, machine
 
-from partwright.writing import write_bytes
+from partwright.atomic_io import write_bytes
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results"

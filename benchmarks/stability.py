@@ -29,8 +29,8 @@ import numpy as np
 from fit import OWN_SHAPES, Entry, find_shapes, machine
 from scipy.spatial.transform import Rotation
 
+from partwright.atomic_io import write_bytes
 from partwright.errors import MissingDependencyError
-from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     import trimesh

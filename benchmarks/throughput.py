@@ -20,8 +20,8 @@ from ablations import NAMES
 from fit import OWN_SHAPES, find_shapes, machine
 
 import partwright as pw
+from partwright.atomic_io import write_bytes
 from partwright.results import Result
-from partwright.writing import write_bytes
 
 RESULTS = Path(__file__).parent / "results"
 HEAD = "| at once | seconds | seconds a shape | shapes an hour | x one at a time | mean IoU | parts |"

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 from partwright import __version__
 from partwright.assembly import Assembly
 from partwright.assembly.checks import MAX_NAME
+from partwright.atomic_io import finishing
 from partwright.bounding import Bounds, bounds_report, bounds_warnings, check_alone, promise
 from partwright.errors import SettingError
 from partwright.reporting import about_input, check_density_of, masses, warnings
 from partwright.results import Result
 from partwright.shapes import Shape
-from partwright.writing import finishing
 
 if TYPE_CHECKING:
     import trimesh

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from partwright.assembly import Assembly
+from partwright.atomic_io import finishing, replacing_files, write_bytes
 from partwright.shapes import Shape
-from partwright.writing import finishing, replacing_files, write_bytes
 
 if TYPE_CHECKING:
     import trimesh

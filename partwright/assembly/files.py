@@ -13,9 +13,9 @@ from typing import Any, NoReturn
 
 from partwright.assembly.similarity import Similarity
 from partwright.assembly.tree import MAX_DEPTH, Assembly, Node, Part
+from partwright.atomic_io import write_bytes
 from partwright.errors import AssemblyFileError, NewerVersionError, ParameterError, UnreadableFileError
 from partwright.fields import from_dict
-from partwright.writing import write_bytes
 
 FORMAT = "partwright-assembly"
 VERSION = 1

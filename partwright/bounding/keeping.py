@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from partwright.assembly import Assembly, Similarity
+from partwright.atomic_io import finishing
 from partwright.bounding.check import Checked, check
 from partwright.bounding.closing import close
 from partwright.bounding.limits import Bounds
@@ -16,7 +17,6 @@ from partwright.errors import NoSurfaceError
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import occupancy_iou
 from partwright.shapes import Shape
-from partwright.writing import finishing
 
 _DENSE, _ROUGH = 40_000, 12_000
 _CELLS = 96

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from partwright.assembly import Assembly
+from partwright.atomic_io import finishing
 from partwright.bounding.check import check, place_of
 from partwright.bounding.keeping import Bounded, bound
 from partwright.bounding.limits import Bounds, Length, said
@@ -13,7 +14,6 @@ from partwright.bounding.thinning import fewest
 from partwright.errors import BoundsError
 from partwright.metrics.frames import in_unit_frame
 from partwright.shapes import Shape
-from partwright.writing import finishing
 
 # A tolerance that the fit does not reach is tried again with parts that cost this share of their price.
 CHEAPER = (1 / 3, 1 / 10)

@@ -52,7 +52,7 @@ class Collection:
         """As safetensors, beside what it was made by."""
         from safetensors.numpy import save
 
-        from partwright.writing import write_bytes
+        from partwright.atomic_io import write_bytes
 
         arrays: dict[str, NDArray[Any]] = {"voxels": self.voxels, "points": self.points}
         arrays["inside"] = np.packbits(self.inside, axis=1)

@@ -112,7 +112,7 @@ def save_network(network: CapriNet, path: Path, half: bool = True) -> None:
 
     from safetensors.torch import save
 
-    from partwright.writing import replacing, write_bytes
+    from partwright.atomic_io import replacing, write_bytes
 
     state = {k: (v.half() if half else v).contiguous().cpu() for k, v in network.state_dict().items()}
     with replacing(path) as staging:

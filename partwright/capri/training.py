@@ -17,12 +17,12 @@ from typing import Literal
 import numpy as np
 import torch
 
+from partwright.atomic_io import check_folder, write_bytes
 from partwright.capri import stages
 from partwright.capri.collection import Collection, load_collection, make_collection
 from partwright.capri.network import SMALL, CapriNet, Sizes, distances, save_network
 from partwright.capri.scattering import scatter
 from partwright.errors import SettingError, UnreadableFileError
-from partwright.writing import check_folder, write_bytes
 
 NETWORK, CHECKPOINT, COLLECTION = "network.safetensors", "checkpoint.safetensors", "collection.safetensors"
 _MOMENTS = ("exp_avg", "exp_avg_sq")

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly.palette import palette
+from partwright.atomic_io import write_bytes
 from partwright.errors import UnsupportedFormatError
 from partwright.export.glb import coloured, to_gltf
 from partwright.shapes.labels import labels_path
-from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly

@@ -103,11 +103,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
+    from partwright.atomic_io import check_folder
     from partwright.cli.progress import Display
     from partwright.cli.tables import print_relations, print_result, warn
     from partwright.fitting import fit
     from partwright.shapes import load_shape
-    from partwright.writing import check_folder
 
     folder: Path = arguments.output or Path(f"{arguments.shape.stem}-parts")
     check_folder(folder)

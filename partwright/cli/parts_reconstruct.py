@@ -39,11 +39,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from partwright.atomic_io import check_folder
     from partwright.partsdf.model import load_model
     from partwright.partsdf.reconstruction import ReconstructionSettings
     from partwright.partsdf.results import reconstruct_shape
     from partwright.shapes import load_shape
-    from partwright.writing import check_folder
 
     folder: Path = arguments.output or Path(f"{arguments.shape.stem}-parts")
     check_folder(folder)

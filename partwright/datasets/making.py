@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.writing import write_bytes
+from partwright.atomic_io import write_bytes
 
 if TYPE_CHECKING:
     import trimesh

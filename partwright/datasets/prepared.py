@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.atomic_io import write_bytes
 from partwright.datasets.poses import Poses
 from partwright.errors import FamilyError, NewerVersionError, OutputError, UnreadableFileError
 from partwright.shapes import UnitFrame
-from partwright.writing import write_bytes
 
 FORMAT, VERSION = "partwright-family", 1
 MANIFEST, SHAPES = "family.json", "shapes"

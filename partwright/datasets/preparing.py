@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.atomic_io import check_folder
 from partwright.datasets.agreement import agreed
 from partwright.datasets.families.recipes import FAMILIES
 from partwright.datasets.inputs import MadeShape, PartedSource, find_shapes
@@ -38,7 +39,6 @@ from partwright.datasets.prepared import (
 )
 from partwright.datasets.primitives import PrimitiveFit, fit_primitives
 from partwright.errors import FamilyError, OutputError, PartwrightError, SettingError
-from partwright.writing import check_folder
 
 VALIDATION, TEST = 0.2, 0.2  # shares of the shapes; the rest trains (PartSDF, B.4)
 FEWEST_SAMPLES = 1000

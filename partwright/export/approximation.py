@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from partwright import __version__
+from partwright.atomic_io import write_bytes
 from partwright.errors import OutputError
-from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly, Part

@@ -18,13 +18,13 @@ import numpy as np
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.palette import palette
 from partwright.assembly.rows import as_superfrustum
+from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
 from partwright.export.identifiers import comment, free_name
 from partwright.export.wholes import is_whole, whole_mesh
 from partwright.fields import Quadric, Solid, SuperFrustum
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit
-from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     import trimesh

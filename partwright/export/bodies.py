@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from partwright import __version__
+from partwright.atomic_io import write_bytes
 from partwright.export.approximation import Change, write_report
 from partwright.export.axes import to_metres_z_up, unknowns
 from partwright.export.primitives import Geometry, geometries
 from partwright.fields import Field
 from partwright.meshing.mass import MassProperties, check_density, mass_properties
-from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from partwright.assembly import Assembly, Node, Part
+from partwright.atomic_io import write_bytes
 from partwright.export.approximation import write_report
 from partwright.export.copies import Poses, Row
 from partwright.export.identifiers import comment
@@ -28,7 +29,6 @@ from partwright.export.solid_source import (
 from partwright.export.solid_tree import solid_tree
 from partwright.fields import SuperFrustum
 from partwright.shapes import canonical_unit
-from partwright.writing import write_bytes
 
 _SOLIDS = {
     "box": "bd.Box(*{size})",

@@ -20,12 +20,12 @@ from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.files import instance_dict
 from partwright.assembly.palette import palette
 from partwright.assembly.similarity import NO_ROTATION
+from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
 from partwright.export.identifiers import free_name
 from partwright.export.wholes import is_whole, whole_mesh
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
-from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     import trimesh

@@ -16,10 +16,10 @@ import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.rows import as_superfrustum
+from partwright.atomic_io import write_bytes
 from partwright.export.identifiers import comment, identifiers
 from partwright.fields import Quadric
 from partwright.shapes import canonical_unit
-from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

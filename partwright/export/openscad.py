@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from partwright.assembly import Assembly, Node, Part, Similarity
+from partwright.atomic_io import write_bytes
 from partwright.errors import ParameterError
 from partwright.export.approximation import Change, write_report
 from partwright.export.closed_quadrics import Ball
@@ -34,7 +35,6 @@ from partwright.export.solid_tree import solid_tree
 from partwright.fields import Quadric
 from partwright.meshing.quadric_solids import quadric_solid
 from partwright.shapes import canonical_unit
-from partwright.writing import write_bytes
 
 _SOLIDS = {
     "box": "cube({size}, center = true);",

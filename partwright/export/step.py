@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from partwright import __version__
 from partwright.assembly import Assembly
+from partwright.atomic_io import replacing
 from partwright.errors import OutputError
 from partwright.export.approximation import Change, write_report
 from partwright.export.brep import built, require_cad
@@ -20,7 +21,6 @@ from partwright.export.brep_tree import Compromises, combined
 from partwright.export.closed_quadrics import Ball
 from partwright.export.solid_tree import solid_tree
 from partwright.shapes import METRES, canonical_unit
-from partwright.writing import replacing
 
 if TYPE_CHECKING:
     from OCP.TDocStd import TDocStd_Document

@@ -16,11 +16,11 @@ import numpy as np
 
 from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import rotation_matrix
+from partwright.atomic_io import write_bytes
 from partwright.export.bodies import DENSITY, Body, numbers
 from partwright.export.primitives import TOLERANCE, Geometry
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.mass import MassProperties
-from partwright.writing import write_bytes
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly

@@ -17,11 +17,11 @@ import numpy as np
 from partwright import __version__
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.palette import palette
+from partwright.atomic_io import write_bytes
 from partwright.errors import MissingDependencyError, NoSurfaceError
 from partwright.export.axes import to_metres_z_up
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
-from partwright.writing import write_bytes
 
 _AXES = {"y": "Y", "z": "Z"}
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from partwright.atomic_io import write_bytes
 from partwright.errors import ModelError, SettingError
 from partwright.partsdf.config import Config
 from partwright.partsdf.model import about_file
-from partwright.writing import write_bytes
 
 FORMAT = "partwright-checkpoint"
 _MOMENTS = ("exp_avg", "exp_avg_sq")

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from partwright.writing import write_bytes
+from partwright.atomic_io import write_bytes
 
 FILE = "log.csv"
 COLUMNS = ("epoch", "whole", "part", "inter", "latent_norm", "rate", "seconds",

@@ -14,13 +14,13 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from partwright.atomic_io import write_bytes
 from partwright.errors import ModelError, NewerVersionError, SettingError, UnreadableFileError
 from partwright.partsdf.config import Config, DecoderSettings, config_from
 from partwright.partsdf.decoder import Conditioned, Decoder
 from partwright.partsdf.losses import aggregate
 from partwright.partsdf.poses import PoseTensors, local_points
 from partwright.partsdf.transformer import TransformerDecoder
-from partwright.writing import write_bytes
 
 FORMAT, VERSION = "partwright-partsdf", 1
 SUFFIX = ".safetensors"

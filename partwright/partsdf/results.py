@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from partwright import __version__
 from partwright.assembly import Assembly
+from partwright.atomic_io import finishing, replacing_files, write_bytes
 from partwright.metrics.report import evaluate
 from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.meshing import mesh_shape
@@ -17,7 +18,6 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.reconstruction import Progress, ReconstructionSettings, reconstruct
 from partwright.shapes import Shape
-from partwright.writing import finishing, replacing_files, write_bytes
 
 if TYPE_CHECKING:
     import trimesh

@@ -18,6 +18,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from partwright.atomic_io import check_folder
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import MissingDependencyError, SettingError
 from partwright.partsdf.autodecoder import AutoDecoder
@@ -30,7 +31,6 @@ from partwright.partsdf.poses import PoseTensors, identity
 from partwright.partsdf.slope import measured_slope
 from partwright.partsdf.stepping import backward
 from partwright.partsdf.validation import Validation
-from partwright.writing import check_folder
 
 MODEL, CHECKPOINT = "model.safetensors", "checkpoint.safetensors"
 _DROPS = (0.8, 0.9)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from partwright.writing import replacing
+from partwright.atomic_io import replacing
 
 
 def write(path: str | Path, save: Callable[[Path], None]) -> None:

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly import Assembly, Node
+from partwright.atomic_io import check_folder, write_bytes
 from partwright.datasets.cad_parts import prismatic, rotational
 from partwright.datasets.making import to_mesh, write_ply
 from partwright.errors import NoSurfaceError, SettingError
 from partwright.meshing.csg import solid_of
 from partwright.render.raycast import Scene
 from partwright.shapes.sampling import sample_triangles
-from partwright.writing import check_folder, write_bytes
 
 if TYPE_CHECKING:
     import trimesh

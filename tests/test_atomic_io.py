@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from partwright.writing import finishing
+from partwright.atomic_io import finishing
 
 
 def test_an_interruption_does_not_undo_what_is_being_finished() -> None:
