@@ -14,7 +14,6 @@ import trimesh
 
 import partwright as pw
 from partwright.assembly import Similarity
-from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import AssemblyFileError, ModelError, NoSurfaceError
 from partwright.meshing import mesh_assembly, mesh_part
 from partwright.partsdf import model as models
@@ -23,6 +22,7 @@ from partwright.partsdf.field import NeuralField
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.shapes import UnitFrame
+from tests.partsdf.lamps import distances
 
 FRAME = UnitFrame((10.0, 20.0, 30.0), 0.5)
 POINTS = np.random.default_rng(1).uniform(-0.9, 0.9, (300, 3)).astype(np.float32)
@@ -183,16 +183,30 @@ def test_a_field_alone_is_as_its_model_knows_it(model: Model, assembly: pw.Assem
     np.testing.assert_allclose(twice(2 * local), 2 * alone(local), atol=1e-5)
 
 
-def test_walls_are_as_thin_as_the_parts_are(
-    lamp: NeuralShape, assembly: pw.Assembly, lamps: PreparedFamily, monkeypatch: pytest.MonkeyPatch
+def analytic(shape: NeuralShape, points: np.ndarray) -> np.ndarray:
+    """What a decoder without error would answer: (Q, N) of a lamp's parts, whose poses are not turned."""
+    poses = shape.poses.numpy()
+    half, ball, knob = poses.scale
+    each = distances(points, poses.translation, half, ball[0], knob[0])
+    return each.T[shape.present.numpy()]
+
+
+def test_walls_are_as_thin_as_the_parts_are(lamp: NeuralShape, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of exact distances: the sampled depth that one in twenty places inside exceeds is known."""
+    monkeypatch.setattr(NeuralShape, "part_distances", analytic)
+    half, ball, knob = lamp.poses.scale.numpy()
+    plate, *balls = lamp.walls()
+    assert plate == pytest.approx(2 * half.min(), rel=0.1)
+    assert balls == pytest.approx([2 * (1 - 0.05 ** (1 / 3)) * r for r in (ball[0], knob[0])], rel=0.06)
+    fields = [part.field for part in to_assembly(lamp, FRAME).parts]
+    assert [field.wall for field in fields] == pytest.approx([2 * plate, *(2 * b for b in balls)], rel=0.02)
+
+
+def test_a_part_that_is_nowhere_has_no_wall_and_no_surface(
+    lamp: NeuralShape, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plate = lamps.load(lamp.model.shapes.index("lamp1")).poses.scale[0]
-    walls = lamp.walls()
-    clamp = lamp.model.config.losses.clamp  # deeper than this nothing was learned
-    assert walls[0] == pytest.approx(2 * min(plate.min(), clamp), rel=0.1)
-    assert (walls[1:] > clamp).all()
-    assert assembly.parts[0].field.wall == pytest.approx(2 * walls[0], rel=0.1)  # in own units
+    part = to_assembly(lamp, FRAME).parts[0]
     monkeypatch.setattr(NeuralShape, "part_distances", lambda shape, points: np.ones((3, len(points))))
-    assert np.isinf(lamp.walls()).all()  # nothing is inside
+    assert np.isinf(lamp.walls()).all()
     with pytest.raises(NoSurfaceError, match=r"part plate of .* has no surface"):
-        mesh_part(dataclasses.replace(assembly.parts[0]))
+        mesh_part(part)
