@@ -12,11 +12,11 @@ from partwright import __version__
 from partwright.assembly import Assembly
 from partwright.assembly.checks import MAX_NAME
 from partwright.atomic_io import finishing
-from partwright.bounding import Bounds, bounds_report, bounds_warnings, check_alone, promise
 from partwright.errors import SettingError
 from partwright.reporting import about_input, check_density_of, masses, warnings
 from partwright.results import Result
 from partwright.shapes import Shape
+from partwright.tolerances import DistanceBounds, bounds_report, bounds_warnings, check_alone, enforce
 
 if TYPE_CHECKING:
     import trimesh
@@ -102,7 +102,7 @@ def fit(
         check_alone(tolerance, min_iou=min_iou, curve=curve, per_node=per_node)
         if method == "capri":
             raise SettingError("capri keeps no tolerance and no bound; use method superfrusta or solids")
-        bounds = Bounds.of(shape, tolerance, contain, inside)
+        bounds = DistanceBounds.of(shape, tolerance, contain, inside)
     _check_cleaning(method, shape, clean, clean_tolerance, locked, bounds is not None)
     module = import_module(METHODS[method])
     settings = module.Settings.for_quality(
@@ -134,7 +134,7 @@ def fit(
             return _assembled(shape, pieces, again, per_node, source)
 
         fitted_at = time.perf_counter()
-        bounded, outcome = promise(assembly, shape, bounds, outcome, refit, locked, seed)
+        bounded, outcome = enforce(assembly, shape, bounds, outcome, refit, locked, seed)
         assembly, seconds["bounds"] = bounded.assembly, time.perf_counter() - fitted_at
     cleaned = None
     if clean and outcome != "interrupted":

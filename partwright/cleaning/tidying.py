@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from partwright.bounding.noise import roughness
 from partwright.cleaning.evidence import Evidence, State
 from partwright.cleaning.grid import Grid
 from partwright.cleaning.judging import Judge
@@ -26,6 +25,7 @@ from partwright.cleaning.snapping import snapped
 from partwright.errors import SettingError
 from partwright.metrics.iou import RESOLUTION, iou
 from partwright.shapes import Shape
+from partwright.tolerances.noise import roughness
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import partwright as pw
-from partwright.bounding import Bounds, bound, fewest
 from partwright.meshing import mesh_assembly
 from partwright.metrics.deviation import projected
-from tests.bounding.shapes import ALL, boss, tube
+from partwright.tolerances import DistanceBounds, minimise_parts, satisfy
+from tests.tolerances.shapes import ALL, boss, tube
 
 
 def on_shape(shape: pw.Shape) -> np.ndarray:
@@ -28,8 +28,8 @@ def test_the_assembly_contains_the_shape_and_stays_tight(name: str) -> None:
     mesh, rough = ALL[name]()
     shape = pw.load_shape(mesh)
     assert rough.distance(on_shape(shape)).max() > 5e-3  # it does not, to begin with
-    kept = bound(rough, shape, Bounds.of(shape, contain=True))
-    assert kept.kept
+    kept = satisfy(rough, shape, DistanceBounds.of(shape, contain=True))
+    assert kept.satisfied
     assert kept.assembly.distance(on_shape(shape)).max() <= 5e-4
     assert mesh_assembly(kept.assembly).volume < 1.05 * shape.volume
 
@@ -38,8 +38,8 @@ def test_the_assembly_contains_the_shape_and_stays_tight(name: str) -> None:
 def test_the_assembly_stays_inside_the_shape_and_fills_it(name: str) -> None:
     mesh, rough = ALL[name]()
     shape = pw.load_shape(mesh)
-    kept = bound(rough, shape, Bounds.of(shape, inside=True))
-    assert kept.kept
+    kept = satisfy(rough, shape, DistanceBounds.of(shape, inside=True))
+    assert kept.satisfied
     assert shape.signed_distance(on_assembly(kept.assembly)).max() <= 5e-4
     assert mesh_assembly(kept.assembly).volume > 0.95 * shape.volume
 
@@ -47,8 +47,8 @@ def test_the_assembly_stays_inside_the_shape_and_fills_it(name: str) -> None:
 def test_a_slack_is_used_up_to_its_length_and_no_further() -> None:
     mesh, rough = boss()
     shape = pw.load_shape(mesh, unit="m")
-    kept = bound(rough, shape, Bounds.of(shape, contain="5mm"))
-    assert kept.kept
+    kept = satisfy(rough, shape, DistanceBounds.of(shape, contain="5mm"))
+    assert kept.satisfied
     assert kept.assembly.distance(on_shape(shape)).max() <= 5.5e-3
 
 
@@ -57,35 +57,35 @@ def test_a_tolerance_holds_both_ways(name: str) -> None:
     mesh, rough = ALL[name]()
     shape = pw.load_shape(mesh)
     assert pw.evaluate(rough, shape, emd=False).max_deviation > 0.01
-    kept = bound(rough, shape, Bounds.of(shape, tolerance=0.01))
-    assert kept.kept
+    kept = satisfy(rough, shape, DistanceBounds.of(shape, tolerance=0.01))
+    assert kept.satisfied
     assert pw.evaluate(kept.assembly, shape, seed=5, emd=False).max_deviation <= 0.0105
 
 
 def test_what_keeps_its_bounds_comes_back_untouched() -> None:
     mesh, _ = tube()
     loose = pw.Assembly([pw.Part(pw.fields.Tube(1.01, 0.32, 2.02))])
-    assert bound(loose, pw.load_shape(mesh), Bounds(contain=0.0)).assembly is loose
+    assert satisfy(loose, pw.load_shape(mesh), DistanceBounds(contain=0.0)).assembly is loose
 
 
-def test_held_parts_stay_and_the_bound_is_reported_as_missed() -> None:
+def test_locked_parts_stay_and_the_bound_is_reported_as_missed() -> None:
     mesh, rough = boss()
     shape = pw.load_shape(mesh)
     names = [part.name for part in rough.parts]
-    missed = bound(rough, shape, Bounds(contain=0.0), held=names)
-    assert not missed.kept
+    missed = satisfy(rough, shape, DistanceBounds(contain=0.0), locked=names)
+    assert not missed.satisfied
     assert missed.checked.excess["contain"] > 1e-3
     assert missed.assembly == rough
 
 
 def test_parts_that_a_tolerance_does_not_need_go() -> None:
     mesh, rough = boss()
-    shape, bounds = pw.load_shape(mesh), Bounds(tolerance=0.02)
+    shape, bounds = pw.load_shape(mesh), DistanceBounds(tolerance=0.02)
     chip = pw.Part(pw.fields.Box((0.3, 0.3, 0.3)), (-0.7, 0.2, 0), name="chip")
-    kept = bound(pw.Assembly([*rough.parts, chip]), shape, bounds)
-    assert kept.kept
-    thinned = fewest(kept, shape, bounds, held=[part.name for part in rough.parts])
-    assert thinned.kept
+    kept = satisfy(pw.Assembly([*rough.parts, chip]), shape, bounds)
+    assert kept.satisfied
+    thinned = minimise_parts(kept, shape, bounds, locked=[part.name for part in rough.parts])
+    assert thinned.satisfied
     assert len(thinned.assembly) == 2
     assert "chip" not in [part.name for part in thinned.assembly.parts]
 
@@ -97,7 +97,7 @@ def test_ctrl_c_keeps_the_best_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("partwright.bounding.keeping.press", interrupted)
-    stopped = bound(rough, shape, Bounds(contain=0.0))
+    monkeypatch.setattr("partwright.tolerances.satisfying.augmented_lagrangian", interrupted)
+    stopped = satisfy(rough, shape, DistanceBounds(contain=0.0))
     assert not stopped.complete
-    assert stopped.kept  # the start, closed
+    assert stopped.satisfied  # the start, closed

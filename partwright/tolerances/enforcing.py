@@ -7,13 +7,13 @@ from typing import Any
 
 from partwright.assembly import Assembly
 from partwright.atomic_io import finishing
-from partwright.bounding.check import check, place_of
-from partwright.bounding.keeping import Bounded, bound
-from partwright.bounding.limits import Bounds, Length, said
-from partwright.bounding.thinning import fewest
 from partwright.errors import BoundsError
 from partwright.metrics.frames import in_unit_frame
 from partwright.shapes import Shape
+from partwright.tolerances.check import check, place_of
+from partwright.tolerances.distance_bounds import DistanceBounds, Length, format_length
+from partwright.tolerances.minimising import minimise_parts
+from partwright.tolerances.satisfying import Bounded, satisfy
 
 # A tolerance that the fit does not reach is tried again with parts that cost this share of their price.
 CHEAPER = (1 / 3, 1 / 10)
@@ -32,30 +32,30 @@ def check_alone(tolerance: Length | None, *, min_iou: float | None, curve: bool,
         raise BoundsError(f"tolerance and {other} both decide how many parts there are: give one of the two")
 
 
-def promise(
+def enforce(
     assembly: Assembly,
     shape: Shape,
-    bounds: Bounds,
+    bounds: DistanceBounds,
     outcome: str,
     refit: Callable[[float], Assembly | None],
-    held: Sequence[str] = (),
+    locked: Sequence[str] = (),
     seed: int = 0,
 ) -> tuple[Bounded, str]:
     """An assembly that keeps the bounds, or comes nearest to it, and how the fit ended with that in mind.
 
     outcome: of the fit; one that was interrupted is measured only. refit: makes an assembly of more parts, at
-    a share of their price (None where there may be no more). Parts in `held` stay.
+    a share of their price (None where there may be no more). Parts in `locked` stay.
     """
     if outcome == "interrupted":
         with finishing():
             local = in_unit_frame(assembly, shape.frame)
             return Bounded(assembly, check(local, shape, bounds, seed), complete=False), outcome
-    bounded = bound(assembly, shape, bounds, held, seed)
+    bounded = satisfy(assembly, shape, bounds, locked, seed)
     if bounds.tolerance is not None:
-        bounded = _by_parts(bounded, shape, bounds, refit, held, seed)
+        bounded = _by_parts(bounded, shape, bounds, refit, locked, seed)
     if not bounded.complete:
         return bounded, "interrupted"
-    if not bounded.kept:
+    if not bounded.satisfied:
         return bounded, "budget_reached"
     return bounded, "target_reached" if bounds.tolerance is not None else outcome
 
@@ -63,22 +63,22 @@ def promise(
 def _by_parts(
     best: Bounded,
     shape: Shape,
-    bounds: Bounds,
+    bounds: DistanceBounds,
     refit: Callable[[float], Assembly | None],
-    held: Sequence[str],
+    locked: Sequence[str],
     seed: int,
 ) -> Bounded:
     """More parts until a tolerance is kept, and then the fewest that keep it."""
     for share in CHEAPER:
-        if best.kept or not best.complete:
+        if best.satisfied or not best.complete:
             break
         more = refit(share)
         if more is None:
             break
-        tried = bound(more, shape, bounds, held, seed)
+        tried = satisfy(more, shape, bounds, locked, seed)
         if sum(tried.checked.excess.values()) < sum(best.checked.excess.values()):
             best = tried
-    return fewest(best, shape, bounds, held, seed) if best.kept and best.complete else best
+    return minimise_parts(best, shape, bounds, locked, seed) if best.satisfied and best.complete else best
 
 
 def bounds_report(bounded: Bounded, shape: Shape, volume: float) -> dict[str, Any]:
@@ -109,8 +109,8 @@ def bounds_warnings(bounded: Bounded, shape: Shape) -> list[str]:
     result = []
     for name in checked.excess:
         side = checked.found[name]
-        missed = _MISSED[name].format(reached=said(side.worst, shape))
-        asked = said(getattr(checked.bounds, name), shape)
+        missed = _MISSED[name].format(reached=format_length(side.worst, shape))
+        asked = format_length(getattr(checked.bounds, name), shape)
         place = place_of(side.point, shape)
         parts = len(bounded.assembly)
         result.append(

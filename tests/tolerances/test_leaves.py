@@ -10,8 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import partwright as pw
-from partwright.bounding.closing import grown
-from partwright.bounding.leaves import free_numbers, moved, numbers, slope, weigh, with_numbers
 from partwright.fields import (
     Box,
     Capsule,
@@ -24,7 +22,9 @@ from partwright.fields import (
     Torus,
     Tube,
 )
-from tests.bounding.shapes import ALL
+from partwright.tolerances.feasible_offset import grown
+from partwright.tolerances.leaves import free_numbers, moved, numbers, slope, weigh, with_numbers
+from tests.tolerances.shapes import ALL
 
 SOLIDS = (
     Box((0.8, 0.5, 0.3)),

@@ -1,11 +1,11 @@
 """What bounds cost: how tight a containing, an inner and a tolerant assembly are, and whether they hold.
 
-    python benchmarks/bounds.py --shapes FOLDER [--names robot_arm_ur5,ttt_angle_bracket] [--quality draft]
+    python benchmarks/tolerances.py --shapes FOLDER [--names robot_arm_ur5] [--quality draft]
 
 Each shape is fitted as it is, with --contain --max-parts 8, with --inside, and with two tolerances. `judged`
 is measured anew, on other samples than the fit's own check: by how much the shape sticks out, the parts stick
 out, or the surfaces are apart, in percent of the longest side. FOLDER is as for fit.py; without it the shape
-that ships with the project is taken. The table goes to benchmarks/results/bounds.md, and a picture of the
+that ships with the project is taken. The table goes to benchmarks/results/tolerances.md, and a picture of the
 first shape with --picture FILE.
 """
 
@@ -21,7 +21,7 @@ from fit import OWN_SHAPES, find_shapes, machine
 
 from partwright.atomic_io import write_bytes
 
-RESULT = Path(__file__).parent / "results" / "bounds.md"
+RESULT = Path(__file__).parent / "results" / "tolerances.md"
 CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     ("plain", {}),
     ("--max-parts 8", {"max_parts": 8}),
@@ -35,11 +35,11 @@ FRESH = 4242  # seed of the samples that judge
 
 def judged(result: Any, options: dict[str, Any]) -> str:
     """In percent of the longest side."""
-    from partwright.bounding import Bounds, check
     from partwright.metrics.frames import in_unit_frame
+    from partwright.tolerances import DistanceBounds, check
 
     asked = {name: options[name] for name in ("contain", "inside", "tolerance") if name in options}
-    bounds = Bounds.of(result.shape, **asked)
+    bounds = DistanceBounds.of(result.shape, **asked)
     found = check(in_unit_frame(result.assembly, result.shape.frame), result.shape, bounds, FRESH).found
     return ", ".join(f"{100 * max(side.worst, 0.0) / 1.8:.2f}" for side in found.values())
 
@@ -97,7 +97,7 @@ def document(lines: list[str], options: argparse.Namespace) -> str:
         [
             "# Bounds",
             "",
-            f"`python benchmarks/bounds.py{folder}{names} --quality {options.quality}` on {machine()}.",
+            f"`python benchmarks/tolerances.py{folder}{names} --quality {options.quality}` on {machine()}.",
             "",
             "Volume is that of the parts over the shape's. Largest deviation and judged (on other samples",
             "than the fit's own check) are percent of the longest side. Seconds are CPU time of one thread.",

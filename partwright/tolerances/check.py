@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.bounding.limits import Bounds
 from partwright.meshing import mesh_assembly
 from partwright.metrics.deviation import COUNT, place_name, projected
 from partwright.metrics.report import surface_deviation
 from partwright.shapes import Shape
 from partwright.shapes.sampling import sample_triangles
+from partwright.tolerances.distance_bounds import DistanceBounds
 
 if TYPE_CHECKING:
     import trimesh
@@ -40,7 +40,7 @@ class Side:
 class Checked:
     """What was found, by the bounds' names; those that were not asked for are left out."""
 
-    bounds: Bounds
+    bounds: DistanceBounds
     found: dict[str, Side]
 
     @property
@@ -56,11 +56,11 @@ class Checked:
         return self.found["tolerance"].worst / asked if asked else 0.0
 
     @property
-    def kept(self) -> bool:
+    def satisfied(self) -> bool:
         return not self.excess
 
 
-def check(assembly: Assembly, shape: Shape, bounds: Bounds, seed: int = 0) -> Checked:
+def check(assembly: Assembly, shape: Shape, bounds: DistanceBounds, seed: int = 0) -> Checked:
     """Measures an assembly (unit frame) against a shape, on 100,000 fresh points of each surface, the shape's
     corners, and the middles of its edges.
 

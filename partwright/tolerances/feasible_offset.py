@@ -1,4 +1,4 @@
-"""What pressing leaves over is removed exactly: parts grow or shrink by just as much as is missing.
+"""What the augmented Lagrangian leaves over is removed exactly: parts grow or shrink by what is missing.
 
 Every fold of a tree passes a shift on: where all leaves grow by e (those that are subtracted shrink), F falls
 by e. So growing the leaf that decides F at a point lowers F there, and no other point rises.
@@ -13,8 +13,6 @@ import numpy as np
 
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.rows import as_superfrustum
-from partwright.bounding.leaves import tightest, weigh
-from partwright.bounding.pressing import Constraints
 from partwright.errors import ParameterError
 from partwright.fields import Field, SuperFrustum
 from partwright.fields.solids import (
@@ -29,6 +27,8 @@ from partwright.fields.solids import (
     Torus,
     Tube,
 )
+from partwright.tolerances.augmented_lagrangian import Constraints
+from partwright.tolerances.leaves import tightest, weigh
 
 _PASSES = 20
 _LEAST_WEIGHT = 0.25
@@ -36,8 +36,10 @@ _THINNEST = 1e-3  # unit lengths: a thinner part is as good as none
 _ROOM = 2e-6  # unit lengths, for rounding to float32
 
 
-def close(assembly: Assembly, wanted: Constraints, held: frozenset[str] = frozenset()) -> Assembly:
-    """The assembly with the constraints met by changes of size, as far as that goes; leaves in `held` stay,
+def offset_to_feasible(
+    assembly: Assembly, wanted: Constraints, locked: frozenset[str] = frozenset()
+) -> Assembly:
+    """The assembly with the constraints met by changes of size, as far as that goes; leaves in `locked` stay,
     and those that would shrink to nothing go.
 
     Points that ask for more come first; where some ask a leaf to grow and others to shrink it stays between.
@@ -54,7 +56,7 @@ def close(assembly: Assembly, wanted: Constraints, held: frozenset[str] = frozen
         new = assembly
         for i, part in enumerate(assembly.parts):
             mine = growth[leaf == i]
-            if part.name in held or len(mine) == 0:
+            if part.name in locked or len(mine) == 0:
                 continue
             most, least = max(mine.max(), 0.0), min(mine.min(), 0.0)
             step = most + least + math.copysign(_ROOM, most + least)

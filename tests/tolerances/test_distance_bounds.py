@@ -7,10 +7,10 @@ import pytest
 import trimesh
 
 import partwright as pw
-from partwright.bounding import Bounds
-from partwright.bounding.noise import roughness
 from partwright.errors import BoundsError
-from tests.bounding.shapes import boss
+from partwright.tolerances import DistanceBounds
+from partwright.tolerances.noise import roughness
+from tests.tolerances.shapes import boss
 
 
 @pytest.fixture(scope="module")
@@ -23,14 +23,14 @@ def shape() -> pw.Shape:
     [("0.5mm", 0.5), (0.5, 0.5), ("0.5", 0.5), ("1%", 1.0), ("0.02 in", 0.508), ("1e-3m", 1.0)],
 )
 def test_lengths_are_read_in_any_unit(shape: pw.Shape, given: str | float, own: float) -> None:
-    assert Bounds.of(shape, tolerance=given).tolerance == pytest.approx(own * 1.8 / 100)
-    assert Bounds.of(shape, contain=True, inside=given) == Bounds(
+    assert DistanceBounds.of(shape, tolerance=given).tolerance == pytest.approx(own * 1.8 / 100)
+    assert DistanceBounds.of(shape, contain=True, inside=given) == DistanceBounds(
         contain=0.0, inside=pytest.approx(0.018 * own)
     )
 
 
 @pytest.mark.parametrize(
-    ("asked", "said"),
+    ("asked", "message"),
     [
         ({"tolerance": "link.stl"}, "expected a length"),
         ({"tolerance": "5 parsecs"}, "unknown length unit"),
@@ -42,15 +42,15 @@ def test_lengths_are_read_in_any_unit(shape: pw.Shape, given: str | float, own: 
         ({"contain": True, "inside": True}, "give one of them at least 0.1 mm"),
     ],
 )
-def test_what_cannot_be_kept_is_one_line(shape: pw.Shape, asked: dict, said: str) -> None:
-    with pytest.raises(BoundsError, match=said) as error:
-        Bounds.of(shape, **asked)
+def test_what_cannot_be_kept_is_one_line(shape: pw.Shape, asked: dict, message: str) -> None:
+    with pytest.raises(BoundsError, match=message) as error:
+        DistanceBounds.of(shape, **asked)
     assert "\n" not in str(error.value)
 
 
 def test_a_unit_needs_a_shape_that_has_one() -> None:
     with pytest.raises(BoundsError, match="--unit"):
-        Bounds.of(pw.load_shape(boss()[0]), tolerance="1mm")
+        DistanceBounds.of(pw.load_shape(boss()[0]), tolerance="1mm")
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.002, 0.005])
@@ -67,8 +67,8 @@ def test_a_tolerance_below_the_noise_is_refused() -> None:
     noise = np.random.default_rng(0).normal(0, 0.005, len(ball.vertices))
     rough = pw.load_shape(trimesh.Trimesh(ball.vertices * (1 + noise[:, None]), ball.faces, process=False))
     with pytest.raises(BoundsError, match="noise"):
-        Bounds.of(rough, tolerance="0.2%")
-    assert Bounds.of(rough, tolerance="3%").tolerance
+        DistanceBounds.of(rough, tolerance="0.2%")
+    assert DistanceBounds.of(rough, tolerance="3%").tolerance
 
 
 @pytest.mark.parametrize("other", [{"curve": True}, {"min_iou": 0.9}, {"per_node": True}])

@@ -6,19 +6,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from partwright.assembly import Assembly
-from partwright.bounding.keeping import Bounded, bound
-from partwright.bounding.limits import Bounds
 from partwright.errors import ParameterError
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import occupancy_iou
 from partwright.shapes import Shape
+from partwright.tolerances.distance_bounds import DistanceBounds
+from partwright.tolerances.satisfying import Bounded, satisfy
 
 _SAMPLES = 6_000
 _AT_ONCE = 0.25  # of the parts are tried to be removed in the first step
 _TRIALS = 2  # single parts whose removal is tried before it ends
 
 
-def fewest(kept: Bounded, shape: Shape, bounds: Bounds, held: Sequence[str] = (), seed: int = 0) -> Bounded:
+def minimise_parts(
+    kept: Bounded, shape: Shape, bounds: DistanceBounds, locked: Sequence[str] = (), seed: int = 0
+) -> Bounded:
     """An assembly that keeps the bounds with as few parts as removals find; `kept` keeps them to begin with.
 
     A quarter of the parts is tried first, those that the IoU misses least; what fails is tried with half as
@@ -28,14 +30,14 @@ def fewest(kept: Bounded, shape: Shape, bounds: Bounds, held: Sequence[str] = ()
     failed = 0
     try:
         while failed < _TRIALS and len(kept.assembly) > 1:
-            names = _cheapest(kept.assembly, shape, held, at_once, failed if at_once == 1 else 0, seed)
+            names = _cheapest(kept.assembly, shape, locked, at_once, failed if at_once == 1 else 0, seed)
             thinned = _without(kept.assembly, names)
             if thinned is None:
                 return kept
-            tried = bound(thinned, shape, bounds, held, seed)
+            tried = satisfy(thinned, shape, bounds, locked, seed)
             if not tried.complete:
                 return replace(kept, complete=False)
-            if tried.kept:
+            if tried.satisfied:
                 kept, failed = tried, 0
                 at_once = min(at_once, max(1, round(_AT_ONCE * len(kept.assembly))))
             elif at_once > 1:
@@ -48,7 +50,7 @@ def fewest(kept: Bounded, shape: Shape, bounds: Bounds, held: Sequence[str] = ()
 
 
 def _cheapest(
-    assembly: Assembly, shape: Shape, held: Sequence[str], count: int, skipped: int, seed: int
+    assembly: Assembly, shape: Shape, locked: Sequence[str], count: int, skipped: int, seed: int
 ) -> list[str]:
     """Names of the parts that go one after another, each the one that the IoU misses least then."""
     samples = shape.samples(_SAMPLES, _SAMPLES, seed + 300)
@@ -58,7 +60,7 @@ def _cheapest(
     for _ in range(count):
         scores = {}
         for part in local.parts:
-            rest = None if part.name in held else _without(local, [part.name])
+            rest = None if part.name in locked else _without(local, [part.name])
             if rest is not None:
                 occupied = rest.distance(samples.points) < 0
                 scores[part.name] = occupancy_iou(occupied, inside)

@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
-from partwright.bounding.check import assembly_points, shape_points
-from partwright.bounding.leaves import free_numbers, moved, slope, weigh
-from partwright.bounding.limits import Bounds
 from partwright.errors import NoSurfaceError
 from partwright.meshing import mesh_assembly
 from partwright.shapes import Samples, Shape
+from partwright.tolerances.check import assembly_points, shape_points
+from partwright.tolerances.distance_bounds import DistanceBounds
+from partwright.tolerances.leaves import free_numbers, moved, slope, weigh
 
 _NEAR, _UNIFORM = 4_000, 2_000
 _SURFACE, _DENSE = 6_000, 40_000
@@ -46,11 +46,13 @@ class Constraints:
     lower: Floats
     upper: Floats
 
-    def violation(self, field: Floats, lasting: Floats | float = 0.0) -> Floats:
-        """(N,) how far F is outside its bounds: positive above, negative below, 0 within. lasting (N,) is of
-        the same sign and makes a bound that much narrower."""
-        above = np.maximum(field - self.upper + np.maximum(lasting, 0.0), 0.0)
-        below = np.maximum(self.lower - field - np.minimum(lasting, 0.0), 0.0)
+    def violation(self, field: Floats, multipliers: Floats | float = 0.0) -> Floats:
+        """(N,) how far F is outside its bounds: positive above, negative below, 0 within.
+
+        multipliers (N,) are of the same sign and make a bound that much narrower.
+        """
+        above = np.maximum(field - self.upper + np.maximum(multipliers, 0.0), 0.0)
+        below = np.maximum(self.lower - field - np.minimum(multipliers, 0.0), 0.0)
         return above - below
 
     def worst(self, assembly: Assembly, most: int) -> Constraints:
@@ -68,7 +70,7 @@ class Constraints:
         )
 
 
-def on_shape(shape: Shape, bounds: Bounds, count: int, seed: int) -> Constraints:
+def on_shape(shape: Shape, bounds: DistanceBounds, count: int, seed: int) -> Constraints:
     """What points of the shape's surface ask of F."""
     points = shape_points(shape, count, seed)
     full = np.ones(len(points))
@@ -76,7 +78,7 @@ def on_shape(shape: Shape, bounds: Bounds, count: int, seed: int) -> Constraints
 
 
 def on_assembly(
-    assembly: Assembly, shape: Shape, bounds: Bounds, count: int, seed: int, cells: int
+    assembly: Assembly, shape: Shape, bounds: DistanceBounds, count: int, seed: int, cells: int
 ) -> Constraints:
     """What points of a unit-frame assembly's surface ask of F: where they lie too far outside the shape the
     surface has to fall back by that much, where too far inside it has to rise."""
@@ -85,33 +87,37 @@ def on_assembly(
     return Constraints(points, depth - bounds.beyond, depth + bounds.within)
 
 
-def press(
-    assembly: Assembly, shape: Shape, bounds: Bounds, held: frozenset[str] = frozenset(), seed: int = 0
+def augmented_lagrangian(
+    assembly: Assembly,
+    shape: Shape,
+    bounds: DistanceBounds,
+    locked: frozenset[str] = frozenset(),
+    seed: int = 0,
 ) -> Iterator[Assembly]:
-    """Assemblies (unit frame) that break the bounds less and less, one a round; leaves in `held` stay."""
+    """Assemblies (unit frame) that break the bounds less and less, one a round; leaves in `locked` stay."""
     samples = shape.samples(_NEAR, _UNIFORM, seed + 11)
-    free = [free_numbers(part) & (part.name not in held) for part in assembly.parts]
+    free = [free_numbers(part) & (part.name not in locked) for part in assembly.parts]
     if not any(may.any() for may in free):
         return
     # a little more than is asked for, so that what lies between the samples holds too
     aim = bounds.narrowed(_MARGIN)
     wanted = on_shape(shape, aim, _SURFACE, seed + 12)
-    lasting = np.zeros(len(wanted.points))
+    multipliers = np.zeros(len(wanted.points))
     weight, damping = _FIRST, 1e-2
     for round_ in range(_ROUNDS):
         try:
             cuts = _cuts(assembly, shape, aim, seed + 13 + round_)
         except NoSurfaceError:
             return
-        wanted, lasting = wanted + cuts, np.append(lasting, np.zeros(len(cuts.points)))
-        problem = _Problem(samples, wanted, lasting, weight * _SHARPNESS**2 / 16 / _SURFACE)
+        wanted, multipliers = wanted + cuts, np.append(multipliers, np.zeros(len(cuts.points)))
+        problem = _Problem(samples, wanted, multipliers, weight * _SHARPNESS**2 / 16 / _SURFACE)
         assembly, damping = _descend(assembly, problem, free, damping)
         yield assembly
-        lasting = problem.shortfall(weigh(assembly, wanted.points)[0]) / _RISE
+        multipliers = problem.shortfall(weigh(assembly, wanted.points)[0]) / _RISE
         weight *= _RISE
 
 
-def _cuts(assembly: Assembly, shape: Shape, aim: Bounds, seed: int) -> Constraints:
+def _cuts(assembly: Assembly, shape: Shape, aim: DistanceBounds, seed: int) -> Constraints:
     """The worst violations at fresh, dense samples: few samples would miss what is amiss in a small place."""
     cuts = on_shape(shape, aim, _DENSE, seed).worst(assembly, _KEPT)
     if math.isfinite(aim.beyond):
@@ -121,16 +127,16 @@ def _cuts(assembly: Assembly, shape: Shape, aim: Bounds, seed: int) -> Constrain
 
 @dataclass(frozen=True)
 class _Problem:
-    """lasting (N,): the constraints' multipliers over `weight`, in unit lengths, signed as violations."""
+    """multipliers (N,): the constraints' multipliers over `weight`, in unit lengths, signed as violations."""
 
     samples: Samples
     constraints: Constraints
-    lasting: Floats
+    multipliers: Floats
     weight: float
 
     def shortfall(self, field: Floats) -> Floats:
         """(N,) violations with what lasts of earlier ones."""
-        return self.constraints.violation(field, self.lasting)
+        return self.constraints.violation(field, self.multipliers)
 
     def loss(self, assembly: Assembly) -> float:
         residual, _ = self._reconstruction(weigh(assembly, self.samples.points)[0])

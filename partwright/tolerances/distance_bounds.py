@@ -6,9 +6,9 @@ import math
 import re
 from dataclasses import dataclass
 
-from partwright.bounding.noise import roughness
 from partwright.errors import BoundsError, SettingError
 from partwright.shapes import LONGEST_SIDE, METRES, Shape, canonical_unit
+from partwright.tolerances.noise import roughness
 
 # Of the longest side. Samples 0.7 % apart on each surface tell no finer difference reliably.
 RESOLUTION = 1e-3
@@ -18,8 +18,8 @@ Length = float | str
 
 
 @dataclass(frozen=True)
-class Bounds:
-    """What is promised, in unit lengths; None where nothing is.
+class DistanceBounds:
+    """How far surfaces may be apart, in unit lengths; None where nothing is asked.
 
     tolerance: the surfaces are nowhere further apart, both ways. contain: the shape nowhere sticks out of the
     assembly by more. inside: the assembly nowhere sticks out of the shape by more.
@@ -36,7 +36,7 @@ class Bounds:
         tolerance: Length | None = None,
         contain: Length | bool | None = None,
         inside: Length | bool | None = None,
-    ) -> Bounds:
+    ) -> DistanceBounds:
         """Bounds from lengths in the shape's own units, or text: "0.5", "0.5mm", "1%" of the longest side.
 
         `contain` and `inside` may be True: no slack at all.
@@ -67,9 +67,9 @@ class Bounds:
     def within(self) -> float:
         return math.inf if self.tolerance is None else self.tolerance
 
-    def narrowed(self, margin: float, share: float = 1.0) -> Bounds:
+    def narrowed(self, margin: float, share: float = 1.0) -> DistanceBounds:
         """Bounds that ask for `margin` (unit lengths) more, of a tolerance for this share."""
-        return Bounds(
+        return DistanceBounds(
             None if self.tolerance is None else max(share * self.tolerance - margin, self.tolerance / 2),
             None if self.contain is None else self.contain - margin,
             None if self.inside is None else self.inside - margin,
@@ -78,25 +78,26 @@ class Bounds:
     def _check(self, shape: Shape) -> None:
         least = RESOLUTION * LONGEST_SIDE
         if self.tolerance is not None:
-            noise = _NOISE * roughness(shape)
+            asked, noise = format_length(self.tolerance, shape), _NOISE * roughness(shape)
             if self.tolerance < least:
                 raise BoundsError(
-                    f"tolerance {said(self.tolerance, shape)} is finer than a surface's samples can tell; "
-                    f"the least for this shape is {said(least, shape)}"
+                    f"tolerance {asked} is finer than a surface's samples can tell; "
+                    f"the least for this shape is {format_length(least, shape)}"
                 )
             if self.tolerance < noise:
                 raise BoundsError(
-                    f"tolerance {said(self.tolerance, shape)} is less than the noise of the shape's own "
-                    f"surface; give at least {said(noise, shape)}, or smooth the shape"
+                    f"tolerance {asked} is less than the noise of the shape's own surface; "
+                    f"give at least {format_length(noise, shape)}, or smooth the shape"
                 )
         if self.contain is not None and self.inside is not None and self.contain + self.inside < least:
             raise BoundsError(
-                f"contain {said(self.contain, shape)} and inside {said(self.inside, shape)} leave no room "
-                f"between the two surfaces; give one of them at least {said(least, shape)}"
+                f"contain {format_length(self.contain, shape)} and inside "
+                f"{format_length(self.inside, shape)} leave no room between the two surfaces; "
+                f"give one of them at least {format_length(least, shape)}"
             )
 
 
-def said(length: float, shape: Shape) -> str:
+def format_length(length: float, shape: Shape) -> str:
     """A unit length in the shape's own units, for people; never rounded down to less than it is."""
     own = float(shape.frame.length_from_unit(length))
     if own > 0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import partwright as pw
-from tests.bounding.shapes import boss
+from tests.tolerances.shapes import boss
 
 
 @pytest.fixture(scope="module")
