@@ -22,11 +22,12 @@ import numpy as np
 from PIL import Image
 
 import partwright as pw
+from partwright.assembly.euler_angles import fixed_axes_angles
 from partwright.assembly.palette import palette
 from partwright.atomic_io import write_bytes
 from partwright.cleaning import Cleaned
 from partwright.cleaning.dimensions import dimensions, values
-from partwright.export.solid_source import fixed_axes_angles, number
+from partwright.export.solid_source import number
 from partwright.fields import SuperFrustum
 from partwright.metrics import Scores
 from partwright.render import Camera, sheet

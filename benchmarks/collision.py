@@ -23,12 +23,12 @@ import numpy as np
 import trimesh
 
 import partwright as pw
+from partwright.approximation.collision import TOLERANCE, geometries
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.atomic_io import write_bytes
 from partwright.export.axes import to_metres_z_up
-from partwright.export.bodies import DENSITY
 from partwright.export.mjcf import GEOMS
-from partwright.export.primitives import TOLERANCE, geometries
+from partwright.export.rigid_body import DENSITY
 from partwright.fields import Box
 from partwright.meshing.mass import MassProperties, mass_properties
 from partwright.shapes import Shape

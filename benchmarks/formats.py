@@ -31,8 +31,8 @@ import trimesh
 
 import partwright as pw
 from partwright.assembly import Assembly, Node
+from partwright.atomic_io import report_path
 from partwright.errors import PartwrightError
-from partwright.export.approximation import report_path
 from partwright.meshing import mesh_assembly
 from partwright.shapes import METRES
 

@@ -47,6 +47,11 @@ def write_bytes(path: str | Path, data: bytes) -> None:
         temporary.write_bytes(data)
 
 
+def report_path(path: str | Path) -> Path:
+    """FILE.report.json, in which what is to be known of FILE lies."""
+    return Path(path).with_name(Path(path).name + ".report.json")
+
+
 @contextmanager
 def finishing() -> Iterator[None]:
     """Ctrl-C in the block is left unheard: what scoring and writing finish took longer than they do.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.export.solid_source import fixed_axes_angles
+from partwright.assembly.euler_angles import fixed_axes_angles
 
 _FINEST = 1e-4  # of the longest side: lengths are typed to this
 _RATIO = 1e-3

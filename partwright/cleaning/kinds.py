@@ -5,14 +5,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator
 
+from partwright.approximation.nearest import nearest_solid
+from partwright.approximation.recognise import exact_solid
 from partwright.assembly import Part
 from partwright.cleaning.dimensions import dimensions, values
 from partwright.cleaning.evidence import State
 from partwright.cleaning.grid import Grid
 from partwright.cleaning.judging import Judge
 from partwright.errors import NoSurfaceError
-from partwright.export.nearest import nearest_solid
-from partwright.export.recognise import exact_solid
 from partwright.fields import Cone, Cylinder, Field, Frustum, SuperFrustum
 
 _NEAR = 0.2  # ratios this near to a plain value are tried there

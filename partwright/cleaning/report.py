@@ -6,10 +6,9 @@ import json
 from pathlib import Path
 
 from partwright import __version__
-from partwright.atomic_io import write_bytes
+from partwright.atomic_io import report_path, write_bytes
 from partwright.cleaning.tidying import Cleaned
 from partwright.errors import NothingToCleanError, UnsupportedFormatError
-from partwright.export.approximation import report_path
 
 
 def check_suffix(path: str | Path) -> None:

@@ -33,9 +33,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
+    from partwright.atomic_io import report_path
     from partwright.cli.tables import warn
     from partwright.export import export
-    from partwright.export.approximation import report_path
 
     given = {name: getattr(arguments, name) for name in OPTIONS}
     options = {name: value for name, value in given.items() if value is not None}

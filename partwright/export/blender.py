@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.palette import palette
 from partwright.assembly.rows import as_superfrustum
 from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
 from partwright.export.identifiers import comment, free_name
-from partwright.export.wholes import is_whole, whole_mesh
 from partwright.fields import Quadric, Solid, SuperFrustum
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit
@@ -101,9 +101,9 @@ def _longest(assembly: Assembly) -> float:
 
 def _tree(node: Node, assembly: Assembly, resolution: int, solids: dict[str, _Solid]) -> Any:
     """The node by the names of its solids, which are put into `solids`; None where it has no volume."""
-    if is_whole(node) or isinstance(node, Part):
+    if is_atomic(node) or isinstance(node, Part):
         try:
-            solid = _whole(node, assembly) if is_whole(node) else _part(cast(Part, node), resolution)
+            solid = _atomic(node, assembly) if is_atomic(node) else _part(cast(Part, node), resolution)
         except NoSurfaceError:
             return None  # it only blends, or nothing of it lies within the assembly
         name = free_name(node.name or "convex", set(solids))
@@ -130,12 +130,12 @@ def _part(part: Part, resolution: int) -> _Solid:
     return _Solid(entry, mesh_part(Part(part.field), resolution))
 
 
-def _whole(node: Node, assembly: Assembly) -> _Solid:
+def _atomic(node: Node, assembly: Assembly) -> _Solid:
     """Quadrics that bound one convex, in the assembly's frame; their coefficients by name."""
     parts = (node,) if isinstance(node, Part) else node.parts
     quadrics = {part.name: list(part.field.coefficients) for part in parts if isinstance(part.field, Quadric)}
     entry = {"location": [0.0] * 3, "rotation": [1.0, 0.0, 0.0, 0.0], "kind": "convex", "blend": 0.0}
-    return _Solid(entry | quadrics, whole_mesh(node, assembly))
+    return _Solid(entry | quadrics, atomic_mesh(node, assembly))
 
 
 def _literal(value: Any) -> str:

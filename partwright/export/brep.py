@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.nearest import Approximation
+from partwright.approximation.recognise import SAME
 from partwright.assembly import Part
 from partwright.assembly.rows import as_superfrustum
 from partwright.errors import MissingDependencyError, NoSurfaceError
@@ -22,8 +24,6 @@ from partwright.export.brep_bent import bent_solid
 from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
-from partwright.export.nearest import Approximation
-from partwright.export.recognise import SAME
 from partwright.fields import Field, Quadric, Solid, SuperFrustum
 from partwright.meshing import mesh_part
 

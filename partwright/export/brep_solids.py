@@ -6,8 +6,8 @@ import math
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from partwright.approximation.recognise import SAME
 from partwright.errors import NoSurfaceError
-from partwright.export.recognise import SAME
 from partwright.fields import SuperFrustum
 
 if TYPE_CHECKING:

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.closed_quadrics import Ball
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import NoSurfaceError
 from partwright.export.brep import solid_of, volume_and_area
 from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
-from partwright.export.closed_quadrics import Ball
 from partwright.fields import Quadric
 from partwright.meshing import has_exact_mesh, mesh_csg
 

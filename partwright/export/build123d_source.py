@@ -12,21 +12,21 @@ import keyword
 from collections.abc import Iterator
 from pathlib import Path
 
+from partwright.approximation.nearest import Approximation, compared
+from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node, Part
+from partwright.assembly.euler_angles import own_axes_angles
 from partwright.atomic_io import write_bytes
-from partwright.export.approximation import write_report
-from partwright.export.copies import Poses, Row
+from partwright.export.export_report import write_report
 from partwright.export.identifiers import comment
-from partwright.export.nearest import Approximation, compared
+from partwright.export.instance_patterns import Poses, Row
 from partwright.export.solid_source import (
     SourcePart,
     drawn,
-    own_axes_angles,
     plain_unions,
     source_parts,
     superfrustum_source,
 )
-from partwright.export.solid_tree import solid_tree
 from partwright.fields import SuperFrustum
 from partwright.shapes import canonical_unit
 

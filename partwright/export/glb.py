@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from partwright import __version__
+from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.files import instance_dict
 from partwright.assembly.palette import palette
@@ -23,7 +24,6 @@ from partwright.assembly.similarity import NO_ROTATION
 from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
 from partwright.export.identifiers import free_name
-from partwright.export.wholes import is_whole, whole_mesh
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
 
@@ -95,13 +95,13 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
                 frame_to=copy, frame_from=part.name, matrix=within, geometry=part.name, metadata=extras
             )
 
-    def add_whole(node: Node, parent: str, pose: np.ndarray, about: dict[str, Any]) -> None:
+    def add_atomic(node: Node, parent: str, pose: np.ndarray, about: dict[str, Any]) -> None:
         """A leaf or an intersection, its mesh in the assembly's own frame."""
         parts = (node,) if isinstance(node, Part) else node.parts
         name = free_name(node.name or "convex", taken) if isinstance(node, Assembly) else node.name
         about = about | {"operation": "intersection", "parts": [{"name": p.name} | _extras(p) for p in parts]}
         try:
-            mesh = coloured(whole_mesh(node, assembly), colours[parts[0].name])
+            mesh = coloured(atomic_mesh(node, assembly), colours[parts[0].name])
         except NoSurfaceError:
             scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=about)
         else:
@@ -109,8 +109,8 @@ def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
 
     def add(node: Node, parent: str, pose: np.ndarray, role: str) -> None:
         extras: dict[str, Any] = {"role": role} if role else {}
-        if is_whole(node):
-            add_whole(node, parent, pose, extras)
+        if is_atomic(node):
+            add_atomic(node, parent, pose, extras)
             return
         if isinstance(node, Part):
             placed = pose @ Similarity(1.0, node.rotation, node.translation).matrix()

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.collision import TOLERANCE, Geometry
+from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.errors import UnitError
-from partwright.export.bodies import DENSITY, Body, numbers
-from partwright.export.ellipsoid import Ellipsoid
-from partwright.export.primitives import TOLERANCE, Geometry
+from partwright.export.rigid_body import DENSITY, Body, numbers
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.mass import MassProperties
 

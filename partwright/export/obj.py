@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.pieces import surfaces
 from partwright.atomic_io import write_bytes
-from partwright.export.pieces import surfaces
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly

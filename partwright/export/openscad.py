@@ -14,24 +14,25 @@ from pathlib import Path
 
 import numpy as np
 
+from partwright.approximation.change import Change
+from partwright.approximation.closed_quadrics import Ball
+from partwright.approximation.nearest import Approximation
+from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node, Part, Similarity
+from partwright.assembly.euler_angles import fixed_axes_angles
 from partwright.atomic_io import write_bytes
 from partwright.errors import ParameterError
-from partwright.export.approximation import Change, write_report
-from partwright.export.closed_quadrics import Ball
-from partwright.export.copies import Poses, Ring, Row
+from partwright.export.export_report import write_report
 from partwright.export.identifiers import comment
-from partwright.export.nearest import Approximation
+from partwright.export.instance_patterns import Poses, Ring, Row
 from partwright.export.solid_source import (
     SourcePart,
     drawn,
-    fixed_axes_angles,
     number,
     plain_unions,
     source_parts,
     superfrustum_source,
 )
-from partwright.export.solid_tree import solid_tree
 from partwright.fields import Quadric
 from partwright.meshing.quadric_solids import quadric_solid
 from partwright.shapes import canonical_unit

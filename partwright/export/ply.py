@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.pieces import one_surface
 from partwright.atomic_io import write_bytes
-from partwright.export.pieces import one_surface
 
 if TYPE_CHECKING:
     import trimesh

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from partwright.approximation.nearest import Approximation
+from partwright.approximation.recognise import SAME, exact_solid
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.similarity import rotation_matrix
-from partwright.export.copies import Poses, Ring, Row, pattern
 from partwright.export.identifiers import comment, identifiers
-from partwright.export.nearest import Approximation
-from partwright.export.recognise import SAME, exact_solid
+from partwright.export.instance_patterns import Poses, Ring, Row, pattern
 from partwright.fields import Field, HollowBox, HollowFrustum, Quadric, SuperFrustum
 
 MEANING = {
@@ -172,24 +172,6 @@ def number(value: float) -> str:
     return f"{value + 0.0:.12g}"
 
 
-def fixed_axes_angles(rotation: np.ndarray) -> tuple[float, float, float]:
-    """Degrees about the fixed axes x, then y, then z, of a (3, 3) rotation."""
-    r = rotation
-    pitch = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
-    if abs(r[2, 0]) > 1 - 1e-12:  # x and z then turn about the same line: all of it goes to z
-        roll, yaw = 0.0, math.atan2(-r[0, 1], r[1, 1])
-    else:
-        roll, yaw = math.atan2(r[2, 1], r[2, 2]), math.atan2(r[1, 0], r[0, 0])
-    x, y, z = (math.degrees(angle) for angle in (roll, pitch, yaw))
-    return _clean(x), _clean(y), _clean(z)
-
-
-def own_axes_angles(rotation: np.ndarray) -> tuple[float, float, float]:
-    """Degrees about the part's own x, then its y, then its z, of a (3, 3) rotation."""
-    x, y, z = fixed_axes_angles(rotation.T)
-    return _clean(-x), _clean(-y), _clean(-z)
-
-
 def plain_unions(node: Node) -> Node:
     """Nested unions flattened, and assemblies of one child replaced by it: the same, shorter to read."""
     if isinstance(node, Part):
@@ -199,7 +181,3 @@ def plain_unions(node: Node) -> Node:
         is_union = isinstance(child, Assembly) and child.operation == node.operation == "union"
         children += child.children if is_union and isinstance(child, Assembly) else (child,)
     return children[0] if len(children) == 1 else dataclasses.replace(node, children=tuple(children))
-
-
-def _clean(degrees: float) -> float:
-    return round(degrees, 9) + 0.0

@@ -12,14 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from partwright import __version__
+from partwright.approximation.change import Change
+from partwright.approximation.closed_quadrics import Ball
+from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly
 from partwright.atomic_io import replacing
 from partwright.errors import OutputError
-from partwright.export.approximation import Change, write_report
 from partwright.export.brep import built, require_cad
 from partwright.export.brep_tree import Compromises, combined
-from partwright.export.closed_quadrics import Ball
-from partwright.export.solid_tree import solid_tree
+from partwright.export.export_report import write_report
 from partwright.shapes import METRES, canonical_unit
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from partwright.approximation.pieces import one_surface
 from partwright.atomic_io import write_bytes
-from partwright.export.pieces import one_surface
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly

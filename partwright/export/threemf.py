@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright import __version__
+from partwright.approximation.pieces import piece_meshes, whole_surface
 from partwright.assembly import Assembly
 from partwright.atomic_io import write_bytes
 from partwright.errors import UnitError
 from partwright.export.axes import to_metres_z_up
-from partwright.export.pieces import piece_meshes, whole_surface
 from partwright.shapes import canonical_unit
 
 if TYPE_CHECKING:

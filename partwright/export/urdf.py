@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.collision import TOLERANCE, Geometry
 from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import rotation_matrix
 from partwright.atomic_io import write_bytes
-from partwright.export.bodies import DENSITY, Body, numbers
-from partwright.export.primitives import TOLERANCE, Geometry
+from partwright.export.rigid_body import DENSITY, Body, numbers
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.mass import MassProperties
 

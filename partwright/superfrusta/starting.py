@@ -48,6 +48,6 @@ def starting_rows(
 
 def nearest_part(part: Part) -> Part:
     """The part as the nearest named solid."""
-    from partwright.export.nearest import nearest_solid
+    from partwright.approximation.nearest import nearest_solid
 
     return nearest_solid(part).part_with_solid

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from partwright.assembly import Assembly, Part, Similarity
+from partwright.atomic_io import report_path
 from partwright.errors import NothingToExportError, ParameterError, SettingError, UnitError
 from partwright.export import export
-from partwright.export.approximation import report_path
 from partwright.export.axes import to_metres_z_up
 from partwright.fields import Box, Cylinder, Sphere, SuperFrustum, Tube
 from partwright.meshing.mass import mass_properties

@@ -14,10 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from partwright.assembly import Assembly, Part
+from partwright.assembly.euler_angles import fixed_axes_angles, own_axes_angles
 from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.errors import NoSurfaceError, OutputError, SettingError
 from partwright.export import export
-from partwright.export.solid_source import fixed_axes_angles, own_axes_angles
 from partwright.fields import Field, Sphere, SuperFrustum
 from partwright.meshing import mesh_assembly, mesh_part
 from tests.export.trees import SOLIDS, SUPERFRUSTA, UNDRAWN, flange, lone

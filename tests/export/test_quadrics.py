@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from partwright.approximation.closed_quadrics import with_closed_quadrics
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export import brep_tree, export
-from partwright.export.closed_quadrics import with_closed_quadrics
 from partwright.fields import Box, Cone, Cylinder, Quadric, Sphere
 from partwright.meshing import mesh_csg
 from tests.export.test_openscad import rendered

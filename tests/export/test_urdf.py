@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from partwright.assembly import Assembly, Part
 from partwright.assembly.similarity import rotation_matrix
+from partwright.atomic_io import report_path
 from partwright.errors import NothingToExportError, ParameterError
 from partwright.export import export
-from partwright.export.approximation import report_path
 from partwright.export.urdf import roll_pitch_yaw
 from partwright.fields import SuperFrustum
 from partwright.meshing.mass import mass_properties

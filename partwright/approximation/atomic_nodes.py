@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import trimesh
 
 
-def is_whole(node: Node) -> bool:
+def is_atomic(node: Node) -> bool:
     """A quadric, or an intersection of leaves with quadrics among them that has an exact mesh."""
     if isinstance(node, Part):
         return isinstance(node.field, Quadric)
@@ -22,7 +22,7 @@ def is_whole(node: Node) -> bool:
     return quadrics and node.operation == "intersection" and has_exact_mesh(node)
 
 
-def whole_mesh(node: Node, assembly: Assembly) -> trimesh.Trimesh:
+def atomic_mesh(node: Node, assembly: Assembly) -> trimesh.Trimesh:
     """The closed mesh of such a node in the assembly's frame; cut off at its bounds where it does not end.
 
     Raises:

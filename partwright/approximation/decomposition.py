@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.atomic_nodes import box_between
+from partwright.approximation.convex import segments, wedges
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.tree import operands
 from partwright.errors import NoSurfaceError
-from partwright.export.convex import segments, wedges
-from partwright.export.wholes import box_between
 from partwright.fields import Quadric
 from partwright.fields.quadric_forms import SAME
 from partwright.meshing import mesh_assembly, mesh_part

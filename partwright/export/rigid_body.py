@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from partwright import __version__
+from partwright.approximation.change import Change
+from partwright.approximation.collision import Geometry, geometries
 from partwright.atomic_io import write_bytes
-from partwright.export.approximation import Change, write_report
 from partwright.export.axes import to_metres_z_up, unknowns
-from partwright.export.primitives import Geometry, geometries
+from partwright.export.export_report import write_report
 from partwright.fields import Field
 from partwright.meshing.mass import MassProperties, check_density, mass_properties
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.export import export
-from partwright.export.copies import Poses, Ring, Row, pattern
+from partwright.export.instance_patterns import Poses, Ring, Row, pattern
 from partwright.fields import Box, Cylinder, HollowBox, HollowFrustum
 from tests.export.test_openscad import rendered
 

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from partwright.approximation.decomposition import convex_pieces, separated
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.errors import NoSurfaceError
 from partwright.export import export
-from partwright.export.decomposition import convex_pieces, separated
 from partwright.fields import Box, Cylinder, Quadric, Sphere, SuperFrustum, Tube
 from tests.export.robotics import FLOOR, with_others
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
+from partwright.approximation.decomposition import separated
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.names import unique_names
 from partwright.assembly.palette import palette
 from partwright.assembly.tree import operands
 from partwright.errors import NoSurfaceError, NothingToExportError
-from partwright.export.decomposition import separated
 from partwright.meshing import mesh_assembly, mesh_part
 
 if TYPE_CHECKING:

@@ -11,12 +11,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from partwright.approximation.change import Change, of_part
+from partwright.approximation.closed_quadrics import closes_alike, with_closed_quadrics
+from partwright.approximation.nearest import SOLIDS, Approximation, nearest_solid
 from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.export.approximation import Change, of_part
-from partwright.export.closed_quadrics import closes_alike, with_closed_quadrics
-from partwright.export.copies import expanded_but
-from partwright.export.nearest import SOLIDS, Approximation, nearest_solid
 from partwright.fields import Cone, Cylinder, Field, Frustum, HollowBox, HollowFrustum, SuperFrustum, Tube
 
 _LOOPED: tuple[type[Field], ...] = (*SOLIDS, HollowBox, HollowFrustum, SuperFrustum)
@@ -47,7 +46,7 @@ def solid_tree(
     """
     changes: list[Change] = []
     if source:
-        whole: Node = with_closed_quadrics(expanded_but(assembly, _looped))
+        whole: Node = with_closed_quadrics(_expanded_but(assembly, _looped))
     else:
         whole = _with_holes(with_closed_quadrics(assembly.expanded()))
     tree = _solid(whole, True, keep, length, changes)
@@ -111,3 +110,18 @@ def _plain(solid: Field) -> Field:
     if isinstance(solid, HollowFrustum) and solid.top_radius == solid.bottom_radius:
         return Tube(solid.bottom_radius, solid.thickness, solid.height)
     return solid
+
+
+def _expanded_but(assembly: Assembly, stays: Callable[[Part], bool]) -> Assembly:
+    """The assembly with repeated parts as parts of their own, but for those that may stay repeated."""
+
+    def expand(node: Node) -> Node:
+        if isinstance(node, Assembly):
+            return dataclasses.replace(node, children=tuple(expand(child) for child in node.children))
+        if not node.instances or stays(node):
+            return node
+        return Assembly(node.copies, blend=node.blend)
+
+    result = expand(assembly)
+    assert isinstance(result, Assembly)
+    return result

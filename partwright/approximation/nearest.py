@@ -16,12 +16,12 @@ from itertools import product
 
 import numpy as np
 
+from partwright.approximation.ellipsoid import Ellipsoid
+from partwright.approximation.recognise import SAME, exact_solid
 from partwright.assembly import Part, Similarity
 from partwright.assembly.rows import as_superfrustum, is_superfrustum
 from partwright.assembly.similarity import NO_ROTATION, quaternion_product, rotation_matrix
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.export.ellipsoid import Ellipsoid
-from partwright.export.recognise import SAME, exact_solid
 from partwright.fields import Box, Capsule, Cone, Cylinder, Field, Frustum, Sphere, Torus, Tube
 
 SOLIDS: tuple[type[Field], ...] = (Box, Cylinder, Cone, Frustum, Sphere, Capsule, Tube, Torus)

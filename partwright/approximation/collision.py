@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.change import Change
+from partwright.approximation.convex import segments, wedges
+from partwright.approximation.decomposition import convex_pieces
+from partwright.approximation.nearest import Approximation, nearest_solid
+from partwright.approximation.pieces import Piece, piece_mesh, pieces, require_some
 from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.export.approximation import Change
-from partwright.export.convex import segments, wedges
-from partwright.export.decomposition import convex_pieces
-from partwright.export.nearest import Approximation, nearest_solid
-from partwright.export.pieces import Piece, piece_mesh, pieces, require_some
 from partwright.fields import Field, Solid, SuperFrustum
 from partwright.meshing import mesh_part
 from partwright.shapes import MeshDistance

@@ -3,13 +3,11 @@ places, or each placed and turned for itself."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from partwright.assembly import Assembly, Node, Part
+from partwright.assembly import Part
 from partwright.assembly.similarity import rotation_matrix
 
 _SAME = 1e-9  # of the lengths that occur, and of entries of rotations
@@ -73,18 +71,3 @@ def _ring(part: Part) -> Ring | None:
         x, y, z = (0.0 if abs(c) < 1e-9 * size else float(f"{c:.12g}") for c in centre)
         return Ring(count, "xyz"[axis], (x, y, z))
     return None
-
-
-def expanded_but(assembly: Assembly, stays: Callable[[Part], bool]) -> Assembly:
-    """The assembly with repeated parts as parts of their own, but for those that may stay repeated."""
-
-    def expand(node: Node) -> Node:
-        if isinstance(node, Assembly):
-            return dataclasses.replace(node, children=tuple(expand(child) for child in node.children))
-        if not node.instances or stays(node):
-            return node
-        return Assembly(node.copies, blend=node.blend)
-
-    result = expand(assembly)
-    assert isinstance(result, Assembly)
-    return result

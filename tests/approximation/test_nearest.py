@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from partwright.assembly import Assembly, Part
+from partwright.approximation.ellipsoid import Ellipsoid
+from partwright.approximation.nearest import nearest_solid
+from partwright.assembly import Part
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.export.approximation import Change, report_path, write_report
-from partwright.export.ellipsoid import Ellipsoid
-from partwright.export.nearest import nearest_solid
 from partwright.fields import (
     Box,
     Capsule,
@@ -129,17 +125,3 @@ def test_bad_input() -> None:
         nearest_solid(Part(SuperFrustum((0, 0, 0)), name="point"))
     with pytest.raises(ParameterError, match="torus"):
         nearest_solid(Part(Box((1, 1, 1))), (Torus,))
-
-
-def test_the_report_lists_changes_and_goes_when_there_are_none(tmp_path: Path) -> None:
-    assembly = Assembly((Part(Box((1, 1, 1)), name="a"),), unit="mm")
-    path = tmp_path / "a.mjcf"
-    write_report(assembly, path, [Change(("a",), "box", 0.1, 0.2, 0.3)], ["said"], format="MJCF")
-    report = json.loads(report_path(path).read_text())
-    assert report_path(path).name == "a.mjcf.report.json"
-    assert report["approximated"] == [
-        {"parts": ["a"], "to": "box", "volume_error_ratio": 0.1, "max_deviation": 0.2, "blend_dropped": 0.3}
-    ]
-    assert (report["notes"], report["unit"], report["format"]) == (["said"], "mm", "MJCF")
-    write_report(assembly, path, [])
-    assert not list(tmp_path.iterdir())

@@ -1,0 +1,1 @@
+"""An assembly in other solids: the nearest named solid, convex pieces, bodies to collide."""

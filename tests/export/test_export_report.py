@@ -1,0 +1,26 @@
+"""FILE.report.json lies beside an export that changed something, and beside no other."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from partwright.approximation.change import Change
+from partwright.assembly import Assembly, Part
+from partwright.atomic_io import report_path
+from partwright.export.export_report import write_report
+from partwright.fields import Box
+
+
+def test_the_report_lists_changes_and_goes_when_there_are_none(tmp_path: Path) -> None:
+    assembly = Assembly((Part(Box((1, 1, 1)), name="a"),), unit="mm")
+    path = tmp_path / "a.mjcf"
+    write_report(assembly, path, [Change(("a",), "box", 0.1, 0.2, 0.3)], ["said"], format="MJCF")
+    report = json.loads(report_path(path).read_text())
+    assert report_path(path).name == "a.mjcf.report.json"
+    assert report["approximated"] == [
+        {"parts": ["a"], "to": "box", "volume_error_ratio": 0.1, "max_deviation": 0.2, "blend_dropped": 0.3}
+    ]
+    assert (report["notes"], report["unit"], report["format"]) == (["said"], "mm", "MJCF")
+    write_report(assembly, path, [])
+    assert not list(tmp_path.iterdir())
