@@ -16,8 +16,8 @@ from scipy.spatial import ConvexHull
 from partwright.errors import MissingDependencyError, NoSurfaceError
 from partwright.meshing import mesh_field
 from partwright.shapes.grid import DistanceGrid
-from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.growing import Region
+from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 
 CONCAVITY = 0.05  # CoACD's own default
@@ -32,23 +32,23 @@ _SEARCH = {
 }
 
 
-def regions(evidence: Evidence, rows: Rows, settings: Settings) -> list[Region]:
+def regions(samples: FitSamples, rows: Rows, settings: Settings) -> list[Region]:
     """The convex pieces of the volume that no part explains yet; a stand-in for `growing.regions`.
 
     At most `settings.regions`, the largest; each tight and wide, as there.
     """
-    grid = evidence.grid
-    residual = np.maximum(grid.values, -evidence.grid_field(rows))
+    grid = samples.grid
+    residual = np.maximum(grid.values, -samples.grid_field(rows))
     unexplained = residual.ravel() < -LEAST_DEPTH * grid.spacing
     candidates = np.flatnonzero(unexplained)
-    places = evidence.grid_points[candidates]
+    places = samples.grid_points[candidates]
     found = []
     for piece in convex_pieces(DistanceGrid(grid.origin, grid.spacing, residual), settings):
         planes = ConvexHull(piece).equations
         inside = (places @ planes[:, :3].T + planes[:, 3] <= 0.5 * grid.spacing).all(axis=1)
         voxels = np.zeros(residual.size, bool)
         voxels[candidates[inside]] = True
-        if np.count_nonzero(inside) > LEAST_VOLUME * evidence.inside_voxels:
+        if np.count_nonzero(inside) > LEAST_VOLUME * samples.inside_voxels:
             found.append((voxels, float(-residual.ravel()[voxels].min())))
     found.sort(key=lambda region: -np.count_nonzero(region[0]))
     wanted = found[: settings.regions]

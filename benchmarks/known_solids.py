@@ -33,7 +33,7 @@ from partwright.fields import (
     Tube,
 )
 from partwright.meshing import mesh_assembly, mesh_part
-from partwright.superfrusta.tree import flattened
+from partwright.superfrusta.flat_tree import flattened
 
 Rng = np.random.Generator
 Floats = NDArray[np.float64]

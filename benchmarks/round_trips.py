@@ -35,7 +35,7 @@ from partwright.cleaning import Relation
 from partwright.cleaning.dimensions import dimensions, values
 from partwright.fields import Box, Field, HollowBox
 from partwright.meshing import mesh_assembly
-from partwright.superfrusta.tree import flattened
+from partwright.superfrusta.flat_tree import flattened
 
 HERE = Path(__file__).parent
 _SAME = 0.5  # of volume shared over volume of either: the same part

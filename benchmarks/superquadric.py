@@ -36,8 +36,8 @@ from partwright.fields import reference
 from partwright.fields.base import LARGEST, Array, Field, normalise, number, scale_lengths, vector
 from partwright.meshing import mesh_field
 from partwright.shapes import Shape
-from partwright.superfrusta import growing, seeding
-from partwright.superfrusta.evidence import Evidence, Rows
+from partwright.superfrusta import growing, initialisation
+from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.torch_kernel import TorchKernel
 
@@ -114,9 +114,11 @@ class Superquadric(Field):
         return scale_lengths(self, factor, ("size",))
 
 
-def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float32] = seeding._NONE) -> Rows:
+def starts(
+    points: NDArray[np.float32], spacing: float, frames: NDArray[np.float32] = initialisation._NONE
+) -> Rows:
     """In every straight frame of the SuperFrustum's starts: a box, a cylinder and an ellipsoid."""
-    rows = seeding.starts(points, spacing, frames)
+    rows = initialisation.starts(points, spacing, frames)
     rows = rows[(rows[:, ONION] == 0) & (rows[:, BULGE] == 0)]
     rows[:, [DILATION, TAPER]] = 0.0, 1.0
     made = []
@@ -135,13 +137,13 @@ def fitted_with_superquadrics() -> Iterator[None]:
 
     The kernel in PyTorch takes a part's distance from the reference, which is another one meanwhile.
     """
-    original = Evidence.of
+    original = FitSamples.of
 
-    def of(shape: Shape, settings: Settings) -> Evidence:
+    def of(shape: Shape, settings: Settings) -> FitSamples:
         return replace(original(shape, settings), kernel=TorchKernel("cpu"))
 
     with (
-        mock.patch.object(Evidence, "of", of),
+        mock.patch.object(FitSamples, "of", of),
         mock.patch.object(reference, "superfrustum", superquadric),
         mock.patch.object(growing, "starts", starts),
     ):

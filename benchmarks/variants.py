@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from partwright.fields.kernel import Rows, Target
 from partwright.shapes import Shape
-from partwright.superfrusta import growing, seeding
+from partwright.superfrusta import growing, initialisation
 from partwright.superfrusta.backend import Kernel
-from partwright.superfrusta.evidence import Evidence
+from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 
 # Smaller than the default, so that all of it runs in minutes; no round or cycle less.
@@ -67,14 +67,14 @@ class Variant:
 
 
 @contextmanager
-def with_evidence(change: Callable[[Evidence], Evidence]) -> Iterator[None]:
-    """Fits see changed evidence."""
-    original = Evidence.of
+def with_samples(change: Callable[[FitSamples], FitSamples]) -> Iterator[None]:
+    """Fits see changed samples."""
+    original = FitSamples.of
 
-    def of(shape: Shape, settings: Settings) -> Evidence:
+    def of(shape: Shape, settings: Settings) -> FitSamples:
         return change(original(shape, settings))
 
-    with mock.patch.object(Evidence, "of", of):
+    with mock.patch.object(FitSamples, "of", of):
         yield
 
 
@@ -102,28 +102,28 @@ class HardTargets:
 
 
 def hard_targets() -> AbstractContextManager[object]:
-    return with_evidence(lambda evidence: replace(evidence, kernel=HardTargets(evidence.kernel)))
+    return with_samples(lambda samples: replace(samples, kernel=HardTargets(samples.kernel)))
 
 
 def without_curvature() -> AbstractContextManager[object]:
     """Every sample near the surface weighs the same, on average as before."""
 
-    def change(evidence: Evidence) -> Evidence:
-        weight = evidence.weight.copy()
-        weight[: evidence.near] = weight[: evidence.near].mean()
-        return replace(evidence, weight=weight)
+    def change(samples: FitSamples) -> FitSamples:
+        weight = samples.weight.copy()
+        weight[: samples.near] = weight[: samples.near].mean()
+        return replace(samples, weight=weight)
 
-    return with_evidence(change)
+    return with_samples(change)
 
 
 def one_start(
-    points: NDArray[np.float32], spacing: float, frames: NDArray[np.float32] = seeding._NONE
+    points: NDArray[np.float32], spacing: float, frames: NDArray[np.float32] = initialisation._NONE
 ) -> Rows:
     """The one start of section 3.3: along the principal axis around which the region is the most cylindrical.
 
     As the measure of that, which the paper leaves to its supplement: how alike the other two extents are.
     """
-    straight = seeding.starts(points, spacing, frames)[:6:2]  # along each of the three principal axes
+    straight = initialisation.starts(points, spacing, frames)[:6:2]  # along each of the three principal axes
     width, depth = straight[:, 7], straight[:, 8]
     alike = np.minimum(width, depth) / np.maximum(width, depth)
     chosen = straight[[int(alike.argmax())]]

@@ -16,7 +16,7 @@ FAMILIES: dict[Family, dict[str, float]] = {
     "superfrustum": {},
     "superprimitive": {"taper": 1.0, "bulge": 0.0},
     "cuboid": {"roundness": 0.0, "dilation": 0.0, "taper": 1.0, "bulge": 0.0, "onion": 0.0},
-    "solid": {"bulge": 0.0},  # what else each part holds is its kind's: see kinds.py
+    "solid": {"bulge": 0.0},  # what else each part holds is its kind's: see solid_kinds.py
 }
 
 

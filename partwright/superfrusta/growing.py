@@ -10,13 +10,13 @@ from scipy import ndimage
 
 from partwright.fields import kernel
 from partwright.superfrusta import solid_starts
-from partwright.superfrusta.evidence import NOTHING, Evidence, Rows
 from partwright.superfrusta.families import held, held_down
-from partwright.superfrusta.kinds import SIGN, plainness
+from partwright.superfrusta.initialisation import starts
 from partwright.superfrusta.objective import occupancy_score
 from partwright.superfrusta.refining import LIMITS, freedom, sharpened, ties
-from partwright.superfrusta.seeding import starts
+from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.solid_kinds import SIGN, plainness
 
 _LEAST_DEPTH = 0.15  # voxels: thinner regions are noise (half a voxel would lose thin walls)
 _LEAST_VOLUME = 2e-4  # of the shape
@@ -76,22 +76,22 @@ class View:
     background: NDArray[np.float32]
 
 
-def regions(evidence: Evidence, rows: Rows, settings: Settings) -> list[Region]:
+def regions(samples: FitSamples, rows: Rows, settings: Settings) -> list[Region]:
     """Pieces of the residual max(S, -F), to add, and, where settings allow, of max(F, -S), to subtract."""
-    values, field = evidence.grid.values, evidence.grid_field(rows)
-    found = _pieces(evidence, np.maximum(values, -field), rows, settings, 1.0)
+    values, field = samples.grid.values, samples.grid_field(rows)
+    found = _pieces(samples, np.maximum(values, -field), rows, settings, 1.0)
     if settings.subtract and len(rows):
-        found += _pieces(evidence, np.maximum(field, -values), rows, settings, -1.0)
+        found += _pieces(samples, np.maximum(field, -values), rows, settings, -1.0)
     return found
 
 
 def _pieces(
-    evidence: Evidence, residual: NDArray[np.float32], rows: Rows, settings: Settings, sign: float
+    samples: FitSamples, residual: NDArray[np.float32], rows: Rows, settings: Settings, sign: float
 ) -> list[Region]:
     """Morphological decomposition of the residual, and its largest connected pieces whole."""
-    grid = evidence.grid
+    grid = samples.grid
     carved = sign > 0 and bool((rows[:, SIGN] < 0).any())
-    least_depth, least = _LEAST_DEPTH * grid.spacing, _LEAST_VOLUME * evidence.inside_voxels
+    least_depth, least = _LEAST_DEPTH * grid.spacing, _LEAST_VOLUME * samples.inside_voxels
     labels, depths = kernel.decompose(
         residual, grid.spacing, settings.regions, settings.kappa, least_depth, least
     )
@@ -111,59 +111,59 @@ def _pieces(
     return found
 
 
-def grow(evidence: Evidence, rows: Rows, settings: Settings, most: int) -> Grown:
+def grow(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Grown:
     """New rows, at most `most`, that raise the objective by more than their price; none when nothing does."""
-    wanted = regions(evidence, rows, settings)
+    wanted = regions(samples, rows, settings)
     if not wanted or most <= 0:
         return Grown(NOTHING, NOTHING)
-    candidates = fit_regions(evidence, wanted, settings)
-    return _select(evidence, candidates, rows, settings.price / _EAGER, most)
+    candidates = fit_regions(samples, wanted, settings)
+    return _select(samples, candidates, rows, settings.price / _EAGER, most)
 
 
-def _view(evidence: Evidence, region: Region) -> View:
-    voxels = evidence.grid_points[region.voxels]
+def _view(samples: FitSamples, region: Region) -> View:
+    voxels = samples.grid_points[region.voxels]
     low, high = voxels.min(axis=0), voxels.max(axis=0)
     margin = max(0.06, region.margin * float((high - low).max()))
-    index = np.flatnonzero(((evidence.points > low - margin) & (evidence.points < high + margin)).all(axis=1))
+    index = np.flatnonzero(((samples.points > low - margin) & (samples.points < high + margin)).all(axis=1))
     if len(index) > _PLENTY:
         index = index[np.linspace(0, len(index) - 1, _PLENTY).astype(np.int64)]
-    index = np.concatenate([index, evidence.outskirts])
-    background = evidence.distance_of(region.others, evidence.points[index])
-    weight = evidence.weight[index].copy()
-    wrong = (background < 0) != evidence.inside[index]
-    missed = evidence.inside[index] if region.sign > 0 else ~evidence.inside[index]
-    weight[wrong & missed & ~region.voxels[evidence.voxel[index]]] *= region.elsewhere
+    index = np.concatenate([index, samples.far_indices])
+    background = samples.distance_of(region.others, samples.points[index])
+    weight = samples.weight[index].copy()
+    wrong = (background < 0) != samples.inside[index]
+    missed = samples.inside[index] if region.sign > 0 else ~samples.inside[index]
+    weight[wrong & missed & ~region.voxels[samples.voxel[index]]] *= region.elsewhere
     if region.under:
         cuts = region.others[region.others[:, SIGN] < 0]
-        weight[(evidence.parts_of(cuts, evidence.points[index]) < 0).any(axis=0)] = 0
+        weight[(samples.parts_of(cuts, samples.points[index]) < 0).any(axis=0)] = 0
     if region.hull is not None:
-        within = (evidence.points[index] @ region.hull[:, :3].T + region.hull[:, 3] < 0).all(axis=1)
-        weight[within & ~evidence.inside[index]] *= _GENEROUS
+        within = (samples.points[index] @ region.hull[:, :3].T + region.hull[:, 3] < 0).all(axis=1)
+        weight[within & ~samples.inside[index]] *= _GENEROUS
     return View(index, weight / max(float(weight.sum()), 1e-9), background)
 
 
-def fit_regions(evidence: Evidence, wanted: list[Region], settings: Settings, overlap: float = 0.0) -> Rows:
+def fit_regions(samples: FitSamples, wanted: list[Region], settings: Settings, overlap: float = 0.0) -> Rows:
     """The best part for each region."""
-    fitted, owner, losses = finalists(evidence, wanted, settings, overlap)
+    fitted, owner, losses = finalists(samples, wanted, settings, overlap)
     if settings.family == "solid":
         losses = losses * plainness(fitted)
     return fitted[np.concatenate([_best(losses, owner, i, 1) for i in range(len(wanted))])]
 
 
 def finalists(
-    evidence: Evidence, wanted: list[Region], settings: Settings, overlap: float = 0.0
+    samples: FitSamples, wanted: list[Region], settings: Settings, overlap: float = 0.0
 ) -> tuple[Rows, NDArray[np.int64], NDArray[np.float64]]:
     """Some parts fitted to each region, the regions that they are for, and their losses.
 
     All starts are screened briefly on few samples, and the best go on. `overlap` is the price of running into
     the other parts. Growth asks none: a new part that may not cross what is there gets stuck in its region.
     """
-    views = [_view(evidence, region) for region in wanted]
-    guesses = [_guesses(evidence, region, settings) for region in wanted]
+    views = [_view(samples, region) for region in wanted]
+    guesses = [_guesses(samples, region, settings) for region in wanted]
     owner = np.repeat(np.arange(len(wanted)), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))
     screened, losses = _run(
-        evidence,
+        samples,
         np.concatenate(guesses),
         owner,
         views,
@@ -174,16 +174,16 @@ def finalists(
     )
     kept = np.concatenate([_best(losses, owner, i, _KEPT) for i in range(len(wanted))])
     fitted, losses = _run(
-        evidence, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings
+        samples, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings
     )
     # A thin part that shoots out of the shape passes between the few samples out there.
-    astray = evidence.astray(fitted) * (fitted[:, SIGN] > 0)
+    astray = samples.stray_weight(fitted) * (fitted[:, SIGN] > 0)
     losses += astray / np.array([len(view.index) for view in views])[owner[kept]]
     return fitted, owner[kept], losses
 
 
-def _guesses(evidence: Evidence, region: Region, settings: Settings) -> Rows:
-    points, spacing = evidence.grid_points[region.voxels], evidence.grid.spacing
+def _guesses(samples: FitSamples, region: Region, settings: Settings) -> Rows:
+    points, spacing = samples.grid_points[region.voxels], samples.grid.spacing
     if settings.family == "solid":
         return solid_starts.starts(points, spacing, region.sign, region.frames)
     rows = held_down(starts(points, spacing, region.frames), held(settings.family, settings.smooth))
@@ -199,7 +199,7 @@ def _best(
 
 
 def _run(
-    evidence: Evidence,
+    samples: FitSamples,
     rows: Rows,
     owner: NDArray[np.int64],
     views: list[View],
@@ -213,12 +213,12 @@ def _run(
     counts = np.array([len(view.index[::every]) for view in views])
     ends = np.cumsum(counts)
     target = kernel.Target(
-        evidence.points[index],
-        evidence.distance[index],
+        samples.points[index],
+        samples.distance[index],
         np.concatenate([view.weight[::every] for view in views]),
         np.concatenate([view.background[::every] for view in views]),
     )
-    return evidence.kernel.fit_starts(
+    return samples.kernel.fit_starts(
         rows,
         np.stack([ends - counts, ends], axis=1)[owner],
         target,
@@ -231,22 +231,22 @@ def _run(
     )
 
 
-def _select(evidence: Evidence, candidates: Rows, rows: Rows, price: float, most: int) -> Grown:
+def _select(samples: FitSamples, candidates: Rows, rows: Rows, price: float, most: int) -> Grown:
     """Greedy choice: whichever candidate raises R most joins, until none pays its price.
 
     What is added may join before the parts that are subtracted, or after them.
     """
-    occupied = evidence.parts_of(candidates, evidence.points) < 0
+    occupied = samples.parts_of(candidates, samples.points) < 0
     added, cuts = candidates[:, SIGN] > 0, rows[rows[:, SIGN] < 0]
-    carved = (evidence.parts_of(cuts, evidence.points) < 0).any(axis=0) if len(cuts) else None
-    covered = evidence.field(rows) < 0
+    carved = (samples.parts_of(cuts, samples.points) < 0).any(axis=0) if len(cuts) else None
+    covered = samples.field(rows) < 0
     chosen: list[tuple[bool, int]] = []
-    current = float(occupancy_score(evidence, covered))
+    current = float(occupancy_score(samples, covered))
     while len(chosen) < most:
         ways = {False: np.where(added[:, None], covered | occupied, covered & ~occupied)}
         if carved is not None:
             ways[True] = np.where(added[:, None], covered | (occupied & ~carved), covered)
-        scores = {under: occupancy_score(evidence, way) for under, way in ways.items()}
+        scores = {under: occupancy_score(samples, way) for under, way in ways.items()}
         under = max(scores, key=lambda u: (float(scores[u].max()), u))
         best = int(scores[under].argmax())
         if scores[under][best] < current + price:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.growing import Region, fit_regions
-from partwright.superfrusta.kinds import SIGN
 from partwright.superfrusta.objective import coverage, occupancy_score, removal_scores, score
 from partwright.superfrusta.pruning import neighbours
 from partwright.superfrusta.refining import TOUCH_UP, refine
+from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.solid_kinds import SIGN
 
 _TOUCHING = 0.03  # unit lengths
 _LOSS = 0.02  # of R: a merger that costs more before its refit is not tried
@@ -32,20 +32,20 @@ class Merger:
     gain: float
 
 
-def merge(evidence: Evidence, rows: Rows, settings: Settings, locked: int = 0) -> Rows:
+def merge(samples: FitSamples, rows: Rows, settings: Settings, locked: int = 0) -> Rows:
     """Replaces pairs by single parts while the objective does not fall.
 
     The most promising mergers are tried one after another with a refit of their neighbours.
     """
-    whole = score(evidence, rows)
+    whole = score(samples, rows)
     gone: set[int] = set()
     alive = np.arange(len(rows))
-    for merger in mergers(evidence, rows, settings, locked)[:_TRIED]:
+    for merger in mergers(samples, rows, settings, locked)[:_TRIED]:
         if merger.gain < -_LOSS or gone & set(merger.pair):
             continue
         first, second = (int(np.flatnonzero(alive == part)[0]) for part in merger.pair)
-        trial = _carried_out(evidence, rows, first, second, merger.part, settings, locked)
-        reached = score(evidence, trial)
+        trial = _carried_out(samples, rows, first, second, merger.part, settings, locked)
+        reached = score(samples, trial)
         if reached + settings.alpha >= whole:
             rows, whole = trial, reached
             gone |= set(merger.pair)
@@ -54,31 +54,31 @@ def merge(evidence: Evidence, rows: Rows, settings: Settings, locked: int = 0) -
 
 
 def cheapest_merger(
-    evidence: Evidence, rows: Rows, settings: Settings, locked: int = 0
+    samples: FitSamples, rows: Rows, settings: Settings, locked: int = 0
 ) -> tuple[Rows, float] | None:
     """The assembly with one pair merged that keeps the most of `coverage`, and that; None for a single part.
 
     Any two parts may merge, near or far: a pair of legs into one block.
     """
     best: tuple[Rows, float] | None = None
-    for merger in mergers(evidence, rows, settings, locked, apart=True)[: 2 * settings.trials]:
-        trial = _carried_out(evidence, rows, *merger.pair, merger.part, settings, locked)
-        reached = coverage(evidence, trial)
+    for merger in mergers(samples, rows, settings, locked, apart=True)[: 2 * settings.trials]:
+        trial = _carried_out(samples, rows, *merger.pair, merger.part, settings, locked)
+        reached = coverage(samples, trial)
         if best is None or reached > best[1]:
             best = trial, reached
     return best
 
 
 def mergers(
-    evidence: Evidence, rows: Rows, settings: Settings, locked: int, apart: bool = False
+    samples: FitSamples, rows: Rows, settings: Settings, locked: int, apart: bool = False
 ) -> list[Merger]:
     """Best first. Of the pairs that touch, or of all where they may lie apart, those with the least valuable
     member are fitted, in one batch."""
-    without, _ = removal_scores(evidence, rows)
-    found = list(combinations(range(len(rows)), 2)) if apart else _touching_pairs(evidence, rows)
+    without, _ = removal_scores(samples, rows)
+    found = list(combinations(range(len(rows)), 2)) if apart else _touching_pairs(samples, rows)
     found = [(i, j) for i, j in found if rows[i, SIGN] == rows[j, SIGN]]
     value = {pair: float(-max(without[list(pair)])) for pair in found if pair[0] >= locked}
-    owner = owners(evidence, rows)
+    owner = owners(samples, rows)
     pairs = [p for p in sorted(value, key=lambda p: (value[p], p)) if np.isin(owner, p).any()][:_FITTED]
     if not pairs:
         return []
@@ -86,7 +86,7 @@ def mergers(
         Region(
             np.isin(owner, pair),
             np.delete(rows, pair, axis=0),
-            _depth(evidence, owner, pair),
+            _depth(samples, owner, pair),
             margin=0.2,
             elsewhere=0.15,
             frames=rows[list(pair), 3:7],
@@ -95,50 +95,50 @@ def mergers(
         )
         for pair in pairs
     ]
-    merged = fit_regions(evidence, regions, settings, settings.overlap)
-    occupied = evidence.parts_of(rows, evidence.points) < 0
-    single = evidence.parts_of(merged, evidence.points) < 0
+    merged = fit_regions(samples, regions, settings, settings.overlap)
+    occupied = samples.parts_of(rows, samples.points) < 0
+    single = samples.parts_of(merged, samples.points) < 0
     added = rows[:, SIGN] > 0
     trials = [
         _folded(_replaced(occupied, *pair, one), np.delete(added, pair[1]))
         for pair, one in zip(pairs, single, strict=True)
     ]
     together = _folded(occupied, added)
-    gains = np.subtract(occupancy_score(evidence, np.array(trials)), occupancy_score(evidence, together))
+    gains = np.subtract(occupancy_score(samples, np.array(trials)), occupancy_score(samples, together))
     return [Merger(pairs[i], merged[i], float(gains[i])) for i in np.argsort(-gains, kind="stable")]
 
 
-def _touching_pairs(evidence: Evidence, rows: Rows) -> list[tuple[int, int]]:
-    near = evidence.parts_of(rows, evidence.points[::4]) < _TOUCHING
-    inside = evidence.inside[::4]
+def _touching_pairs(samples: FitSamples, rows: Rows) -> list[tuple[int, int]]:
+    near = samples.parts_of(rows, samples.points[::4]) < _TOUCHING
+    inside = samples.inside[::4]
     near &= np.where(rows[:, SIGN, None] > 0, inside, ~inside)
     shared = near.astype(np.float32) @ near.T.astype(np.float32) > 2
     return [(int(i), int(j)) for i, j in zip(*np.nonzero(np.triu(shared, 1)), strict=True)]
 
 
-def owners(evidence: Evidence, rows: Rows) -> NDArray[np.int64]:
+def owners(samples: FitSamples, rows: Rows) -> NDArray[np.int64]:
     """The part (X * Y * Z,) that each voxel inside the shape lies deepest in or nearest to; -1 outside.
 
     Voxels outside that parts would cover belong to those that are subtracted there.
     """
-    inside = evidence.grid.values.ravel() < 0
+    inside = samples.grid.values.ravel() < 0
     owner = np.full(len(inside), -1, dtype=np.int64)
     added = rows[:, SIGN] > 0
     voxels = np.flatnonzero(inside)
-    distance = evidence.parts_of(rows, evidence.grid_points[voxels])
+    distance = samples.parts_of(rows, samples.grid_points[voxels])
     owner[voxels] = np.where(added[:, None], distance, np.inf).argmin(axis=0)
     if not added.all():
         voxels = np.flatnonzero(~inside)
-        distance = evidence.parts_of(rows, evidence.grid_points[voxels])
+        distance = samples.parts_of(rows, samples.grid_points[voxels])
         covered = (distance[added] < 0).any(axis=0)
         cut = np.where(added[:, None], np.inf, distance)
         owner[voxels[covered]] = cut.argmin(axis=0)[covered]
     return owner
 
 
-def _depth(evidence: Evidence, owner: NDArray[np.int64], pair: tuple[int, int]) -> float:
-    depths = np.abs(evidence.grid.values.ravel()[np.isin(owner, pair)])
-    return float(depths.max()) if len(depths) else evidence.grid.spacing
+def _depth(samples: FitSamples, owner: NDArray[np.int64], pair: tuple[int, int]) -> float:
+    depths = np.abs(samples.grid.values.ravel()[np.isin(owner, pair)])
+    return float(depths.max()) if len(depths) else samples.grid.spacing
 
 
 def _replaced(rows: Any, first: int, second: int, part: Any) -> Any:
@@ -159,7 +159,7 @@ def _folded(occupied: NDArray[np.bool_], added: NDArray[np.bool_]) -> NDArray[np
 
 
 def _carried_out(
-    evidence: Evidence,
+    samples: FitSamples,
     rows: Rows,
     first: int,
     second: int,
@@ -168,8 +168,8 @@ def _carried_out(
     locked: int,
 ) -> Rows:
     """The rows with `part` in place of both, it and its neighbours refitted."""
-    moving = neighbours(evidence, rows, first) | neighbours(evidence, rows, second)
+    moving = neighbours(samples, rows, first) | neighbours(samples, rows, second)
     moving[first] = True
     moving[:locked] = False
     merged = _replaced(rows, first, second, part)
-    return refine(evidence, merged, TOUCH_UP, settings, np.delete(moving, second))
+    return refine(samples, merged, TOUCH_UP, settings, np.delete(moving, second))

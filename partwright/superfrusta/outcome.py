@@ -10,10 +10,10 @@ from partwright.assembly.rows import parts_from_rows
 from partwright.methods import Outcome
 from partwright.shapes import Shape
 from partwright.superfrusta.curve import with_parents
-from partwright.superfrusta.evidence import Rows
-from partwright.superfrusta.kinds import SIGN, is_solid, solid
+from partwright.superfrusta.flat_tree import nested
+from partwright.superfrusta.samples import Rows
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.tree import nested
+from partwright.superfrusta.solid_kinds import SIGN, is_solid, solid
 
 _STEM = {True: "part", False: "cut"}  # of the names of parts that are added, and subtracted
 

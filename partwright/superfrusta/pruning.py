@@ -7,18 +7,18 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.objective import removal_scores, score
 from partwright.superfrusta.refining import TOUCH_UP, refine
+from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 
 _TOUCHING = 0.06  # unit lengths within which parts count as neighbours
 
 
-def prune(evidence: Evidence, rows: Rows, alpha: float, locked: int = 0) -> Rows:
+def prune(samples: FitSamples, rows: Rows, alpha: float, locked: int = 0) -> Rows:
     """Removes parts one by one while the objective R - alpha * parts does not fall (section 3.4, Pruning)."""
     while len(rows) > max(1, locked):
-        without, whole = removal_scores(evidence, rows)
+        without, whole = removal_scores(samples, rows)
         without[:locked] = -np.inf
         worst = int(without.argmax())
         if without[worst] + alpha < whole:
@@ -27,36 +27,36 @@ def prune(evidence: Evidence, rows: Rows, alpha: float, locked: int = 0) -> Rows
     return rows
 
 
-def drop_least(evidence: Evidence, rows: Rows, locked: int = 0) -> Rows:
+def drop_least(samples: FitSamples, rows: Rows, locked: int = 0) -> Rows:
     """The assembly without the part that R misses least."""
-    without, _ = removal_scores(evidence, rows)
+    without, _ = removal_scores(samples, rows)
     without[:locked] = -np.inf
     return np.delete(rows, int(without.argmax()), axis=0)
 
 
 def cheapest_removal(
-    evidence: Evidence,
+    samples: FitSamples,
     rows: Rows,
     settings: Settings,
     locked: int = 0,
-    measure: Callable[[Evidence, Rows], float] = score,
+    measure: Callable[[FitSamples, Rows], float] = score,
 ) -> tuple[Rows, float, float]:
     """The assembly with one part less that keeps the most of `measure` after its neighbours are refitted.
 
     Returns it with its measure, and the R of the assembly as given. `settings.trials` parts are tried.
     """
-    without, whole = removal_scores(evidence, rows)
+    without, whole = removal_scores(samples, rows)
     without[:locked] = -np.inf
     best: tuple[Rows, float] | None = None
     for index in np.argsort(-without, kind="stable")[: settings.trials]:
         if not np.isfinite(without[index]):
             continue
-        moving = neighbours(evidence, rows, int(index))
+        moving = neighbours(samples, rows, int(index))
         moving[:locked] = False
         thinned = refine(
-            evidence, np.delete(rows, index, axis=0), TOUCH_UP, settings, np.delete(moving, index)
+            samples, np.delete(rows, index, axis=0), TOUCH_UP, settings, np.delete(moving, index)
         )
-        kept = measure(evidence, thinned)
+        kept = measure(samples, thinned)
         if best is None or kept > best[1]:
             best = thinned, kept
     if best is None:
@@ -64,9 +64,9 @@ def cheapest_removal(
     return best[0], best[1], whole
 
 
-def neighbours(evidence: Evidence, rows: Rows, index: int) -> NDArray[np.bool_]:
+def neighbours(samples: FitSamples, rows: Rows, index: int) -> NDArray[np.bool_]:
     """Parts (M,) that come near the given one, itself not counted."""
-    distance = evidence.parts_of(rows, evidence.points[::8])
+    distance = samples.parts_of(rows, samples.points[::8])
     around = np.abs(distance[index]) < _TOUCHING
     near: NDArray[np.bool_] = np.asarray((distance[:, around] < _TOUCHING).any(axis=1))
     near[index] = False

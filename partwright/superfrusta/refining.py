@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.fields import kernel
-from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.families import held
-from partwright.superfrusta.kinds import kind_freedom, round_parts
+from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.solid_kinds import kind_freedom, round_parts
 
 # A side shorter than this is thinner than any wall that the samples can see.
 _SHORTEST = 0.004
@@ -54,7 +54,7 @@ def ties(rows: Rows, settings: Settings) -> NDArray[np.bool_]:
     return round_parts(rows) if settings.family == "solid" else np.zeros(len(rows), bool)
 
 
-def optimise(evidence: Evidence, rows: Rows, stages: Stages, settings: Settings, locked: int = 0) -> Rows:
+def optimise(samples: FitSamples, rows: Rows, stages: Stages, settings: Settings, locked: int = 0) -> Rows:
     """Optimises the whole assembly but the first `locked` parts, by the optimiser that the settings name.
 
     The paper's own may return fewer parts: those whose existence it gave up.
@@ -62,22 +62,22 @@ def optimise(evidence: Evidence, rows: Rows, stages: Stages, settings: Settings,
     if settings.optimiser == "adam":
         from partwright.superfrusta import paper
 
-        index = evidence.training
+        index = samples.optimised_indices
         config = paper.PaperConfig()
         return paper.optimise(
             rows,
-            evidence.points[index],
-            evidence.distance[index],
-            evidence.weight[index],
+            samples.points[index],
+            samples.distance[index],
+            samples.weight[index],
             config=config,
             seed=settings.seed,
             locked=locked,
         ).rows
-    return refine(evidence, rows, stages, settings, np.arange(len(rows)) >= locked)
+    return refine(samples, rows, stages, settings, np.arange(len(rows)) >= locked)
 
 
 def refine(
-    evidence: Evidence,
+    samples: FitSamples,
     rows: Rows,
     stages: Stages,
     settings: Settings,
@@ -87,10 +87,10 @@ def refine(
     moving = np.ones(len(rows), bool) if moving is None else moving
     if not moving.any():
         return rows
-    refined, _, _ = evidence.kernel.levenberg_marquardt(
+    refined, _, _ = samples.kernel.levenberg_marquardt(
         rows,
-        evidence.target(evidence.training),
-        sharpened(stages, evidence.thickness),
+        samples.target(samples.optimised_indices),
+        sharpened(stages, samples.thickness),
         LIMITS,
         free=freedom(rows, moving, settings),
         tied=ties(rows, settings),

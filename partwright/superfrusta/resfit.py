@@ -16,19 +16,19 @@ from partwright.assembly import Assembly
 from partwright.errors import EmptyShapeError
 from partwright.methods import Outcome, Progress, timed
 from partwright.shapes import Shape
-from partwright.superfrusta.carving import body
-from partwright.superfrusta.constrained import Leaf, expanded
-from partwright.superfrusta.evidence import NOTHING, Evidence, Rows
 from partwright.superfrusta.growing import grow
+from partwright.superfrusta.hull_start import convex_hull_start
 from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
 from partwright.superfrusta.outcome import CurvePoint, Fitted, Step, assembly_of
 from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
 from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimise
-from partwright.superfrusta.repeats import repeat
+from partwright.superfrusta.repeated_parts import repeat
+from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.settling import cut_through, plainer_kinds
+from partwright.superfrusta.simplification import extend_cuts, simplify_kinds
 from partwright.superfrusta.starting import starting_rows
+from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded
 from partwright.superfrusta.symmetry import symmetries
 
 # In growth, parts need only pay this; the settings' alpha decides when the assembly is thinned out.
@@ -56,25 +56,26 @@ def fit(
     """
     settings = settings or Settings()
     rows, fixed = starting_rows(shape, start, locked, settings)
-    run = Run(settings, progress, len(fixed))
+    seconds: dict[str, float] = {}
+    with timed(seconds, "prepare"):
+        samples = FitSamples.of(shape, settings)
+    run = Run(samples, settings, progress, len(fixed), seconds=seconds)
     try:
-        with run.timed("prepare"):
-            evidence = Evidence.of(shape, settings)
-        outcome = run.through(evidence, rows)
+        outcome = run.through(rows)
         if settings.symmetry and run.best is not None:
-            run.find_repeats(shape, evidence)
+            run.find_repeats(shape)
     except KeyboardInterrupt:
         if run.best is None and run.earlier is None:
             raise
         outcome = "interrupted"
-        run.choose(evidence)
-    run.enforce_budget(evidence)
+        run.choose()
+    run.enforce_budget()
     if run.best is None:
         raise EmptyShapeError(
             f"{shape.name}: no part could be placed; the shape has no volume that {settings.near} samples "
             "can see. Check its thickness, or use --quality high"
         )
-    leaves = run.leaves or [Leaf(row) for row in run.best]
+    leaves = run.leaves or [RepeatedPart(row) for row in run.best]
     moves = [leaf.moves for leaf in leaves]
     assembly = assembly_of(shape, np.stack([leaf.row for leaf in leaves]), settings, fixed, moves=moves)
     curve: list[CurvePoint] = []
@@ -87,8 +88,10 @@ def fit(
 
 @dataclass
 class Run:
-    """State of one fit: the best rows so far, of which the first `locked` never change."""
+    """State of one fit: the samples that all its scores are of, and the best rows so far, of which the first
+    `locked` never change."""
 
+    samples: FitSamples
     settings: Settings
     report: Callable[[Progress], None] | None = None
     locked: int = 0
@@ -99,120 +102,121 @@ class Run:
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
     curve: list[Step] = field(default_factory=list)
-    leaves: list[Leaf] = field(default_factory=list)
+    leaves: list[RepeatedPart] = field(default_factory=list)
 
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage)
 
-    def through(self, evidence: Evidence, start: Rows = NOTHING) -> Outcome:
+    def through(self, start: Rows = NOTHING) -> Outcome:
         settings = self.settings
         converged = True
         for self.attempt in range(settings.attempts):
-            converged = self.once(evidence, start) and converged
-            self.choose(evidence)
+            converged = self.once(start) and converged
+            self.choose()
         if self.best is None:
             return "converged"
         if settings.family == "solid":
             with self.timed("settle"):
-                plain = plainer_kinds(evidence, self.best, settings, self.locked)
-                self.best = cut_through(evidence, plain, self.locked)
+                plain = simplify_kinds(self.samples, self.best, settings, self.locked)
+                self.best = extend_cuts(self.samples, plain, self.locked)
         if settings.curve:
-            self.descend(evidence, self.best)
-        if settings.min_iou is not None and volume_iou(evidence, self.best) >= settings.min_iou:
+            self.descend(self.best)
+        if settings.min_iou is not None and volume_iou(self.samples, self.best) >= settings.min_iou:
             return "target_reached"
         if settings.max_parts is not None and len(self.best) >= settings.max_parts:
             return "budget_reached"
         return "converged" if converged else "budget_reached"
 
-    def once(self, evidence: Evidence, start: Rows) -> bool:
+    def once(self, start: Rows) -> bool:
         """Grown and thinned out from the start, beside earlier attempts; says whether growth converged."""
         if self.best is not None:
             self.earlier = self.best
             self.best, self.best_objective = None, -np.inf
         if self.settings.subtract and not len(start):
-            start = self.opening(evidence)
-        rows, converged = self.growth(evidence, start)
+            start = self.opening()
+        rows, converged = self.growth(start)
         for cycle in range(self.settings.cycles if self.best is not None else 0):
-            rows = self.thinning(evidence, rows)
-            if not self.keep(evidence, rows, "thin", cycle + 1) and cycle:
+            rows = self.thinning(rows)
+            if not self.keep(rows, "thin", cycle + 1) and cycle:
                 break
             if cycle + 1 < self.settings.cycles:
-                rows = self.regrowth(evidence, rows)
+                rows = self.regrowth(rows)
         return converged
 
-    def opening(self, evidence: Evidence) -> Rows:
+    def opening(self) -> Rows:
         """A few rounds from nothing and from a body to carve from; whichever gets further."""
         brief = replace(self.settings, rounds=min(_OPENING, self.settings.rounds))
         tried = []
-        for start in (NOTHING, body(evidence, self.settings)):
-            run = Run(brief, None, self.locked, attempt=self.attempt, seconds=self.seconds)
-            run.growth(evidence, start)
+        for start in (NOTHING, convex_hull_start(self.samples, self.settings)):
+            run = Run(self.samples, brief, None, self.locked, attempt=self.attempt, seconds=self.seconds)
+            run.growth(start)
+            self.samples = run.samples
             if run.best is not None:
-                tried.append((run.best_objective, run.best))
-        return max(tried, key=lambda one: one[0])[1] if tried else NOTHING
+                tried.append(run.best)
+        return max(tried, key=self.objective) if tried else NOTHING
 
-    def choose(self, evidence: Evidence) -> None:
+    def choose(self) -> None:
         """Goes back to the earlier attempts' best where this one's is no better."""
         if self.earlier is None:
             return
         latest, self.best, self.earlier = self.best, self.earlier, None
-        self.best_objective = self.objective(evidence, self.best)
-        if latest is not None and self.better(evidence, latest):
-            self.best, self.best_objective = latest, self.objective(evidence, latest)
+        self.best_objective = self.objective(self.best)
+        if latest is not None and self.better(latest):
+            self.best, self.best_objective = latest, self.objective(latest)
 
-    def growth(self, evidence: Evidence, rows: Rows) -> tuple[Rows, bool]:
+    def growth(self, rows: Rows) -> tuple[Rows, bool]:
         """Rounds of growing until the objective saturates; returns the last rows and whether it did."""
         settings = self.settings
         if len(rows):
             with self.timed("optimise"):
-                rows = optimise(evidence, rows, FINE, settings, self.locked)
-            self.keep(evidence, rows, "start", 0)
+                rows = optimise(self.samples, rows, FINE, settings, self.locked)
+            self.keep(rows, "start", 0)
         stale = 0
         for round_ in range(settings.rounds):
             with self.timed("grow"):
                 most = settings.at_once(round_, self.regions)
-                new = grow(evidence, rows, replace(settings, regions=self.regions), most)
+                new = grow(self.samples, rows, replace(settings, regions=self.regions), most)
             if len(new) == 0:
                 return rows, True
             with self.timed("optimise"):
                 stages = FINE if len(rows) else COARSE_TO_FINE
-                rows = optimise(evidence, new.joined(rows, self.locked), stages, settings, self.locked)
+                rows = optimise(self.samples, new.joined(rows, self.locked), stages, settings, self.locked)
             with self.timed("prune"):
-                rows = prune(evidence, rows, min(GROWTH_ALPHA, settings.price), self.locked)
-            stale = 0 if self.keep(evidence, rows, "grow", round_ + 1) else stale + 1
+                rows = prune(self.samples, rows, min(GROWTH_ALPHA, settings.price), self.locked)
+            stale = 0 if self.keep(rows, "grow", round_ + 1) else stale + 1
             if stale >= settings.patience:
                 return rows, True
-            if settings.min_iou is not None and volume_iou(evidence, rows) > settings.min_iou + _SPARE:
+            if settings.min_iou is not None and volume_iou(self.samples, rows) > settings.min_iou + _SPARE:
                 return rows, True
         return rows, False
 
-    def thinning(self, evidence: Evidence, rows: Rows) -> Rows:
+    def thinning(self, rows: Rows) -> Rows:
         """Merges and removes parts while the objective, the part budget or the target asks for it."""
         settings = self.settings
         most = settings.max_parts if settings.max_parts is not None else len(rows)
         if settings.merging:
             with self.timed("merge"):
-                rows = merge(evidence, rows, settings, self.locked)
+                rows = merge(self.samples, rows, settings, self.locked)
         with self.timed("thin"):
             while len(rows) > max(1, self.locked):
                 if len(rows) > most:
-                    rows = self.one_less(evidence, rows)
+                    rows = self.one_less(rows)
                     continue
-                thinned, kept, whole = cheapest_removal(evidence, rows, settings, self.locked)
-                if not self.worthwhile(evidence, thinned, kept, whole):
+                thinned, kept, whole = cheapest_removal(self.samples, rows, settings, self.locked)
+                if not self.worthwhile(thinned, kept, whole):
                     break
                 rows = thinned
         with self.timed("optimise"):
-            rows = optimise(evidence, rows, POLISH, settings, self.locked)
-            if evidence.learn(rows):
-                rows = optimise(evidence, rows, POLISH, settings, self.locked)
+            rows = optimise(self.samples, rows, POLISH, settings, self.locked)
+            if self.sampled_strays(rows):
+                rows = optimise(self.samples, rows, POLISH, settings, self.locked)
             if settings.family == "solid":
-                rows = plainer_kinds(evidence, rows, settings, self.locked)
+                rows = simplify_kinds(self.samples, rows, settings, self.locked)
         return rows
 
-    def worthwhile(self, evidence: Evidence, thinned: Rows, kept: float, whole: float) -> bool:
+    def worthwhile(self, thinned: Rows, kept: float, whole: float) -> bool:
         if self.settings.min_iou is not None:
-            return volume_iou(evidence, thinned) >= self.settings.min_iou
+            return volume_iou(self.samples, thinned) >= self.settings.min_iou
         return kept + self.settings.alpha >= whole
 
     @property
@@ -221,73 +225,82 @@ class Run:
         aside = (self.attempt + 1) // 2 * (2 if self.attempt % 2 == 0 else -2)
         return max(1, self.settings.regions + aside)
 
-    def regrowth(self, evidence: Evidence, rows: Rows) -> Rows:
+    def regrowth(self, rows: Rows) -> Rows:
         with self.timed("grow"):
-            new = grow(evidence, rows, self.settings, self.settings.regions)
+            new = grow(self.samples, rows, self.settings, self.settings.regions)
         if len(new) == 0:
             return rows
         with self.timed("optimise"):
-            return optimise(evidence, new.joined(rows, self.locked), FINE, self.settings, self.locked)
+            return optimise(self.samples, new.joined(rows, self.locked), FINE, self.settings, self.locked)
 
-    def one_less(self, evidence: Evidence, rows: Rows) -> Rows:
+    def one_less(self, rows: Rows) -> Rows:
         """The cheapest way to do with one part less: a removal or a merger."""
-        thinned, kept, _ = cheapest_removal(evidence, rows, self.settings, self.locked, coverage)
+        thinned, kept, _ = cheapest_removal(self.samples, rows, self.settings, self.locked, coverage)
         merged = (
-            cheapest_merger(evidence, rows, self.settings, self.locked) if self.settings.merging else None
+            cheapest_merger(self.samples, rows, self.settings, self.locked) if self.settings.merging else None
         )
         return merged[0] if merged is not None and merged[1] > kept else thinned
 
-    def descend(self, evidence: Evidence, rows: Rows) -> None:
+    def descend(self, rows: Rows) -> None:
         """The curve: one part less at a time, each size polished; from few parts to many."""
         with self.timed("curve"):
-            steps = [Step(rows, score(evidence, rows), volume_iou(evidence, rows))]
+            steps = [Step(rows, score(self.samples, rows), volume_iou(self.samples, rows))]
             while len(rows) > max(1, self.locked):
-                rows = self.one_less(evidence, rows)
-                rows = optimise(evidence, rows, FINE, self.settings, self.locked)
-                steps.append(Step(rows, score(evidence, rows), volume_iou(evidence, rows)))
+                rows = self.one_less(rows)
+                rows = optimise(self.samples, rows, FINE, self.settings, self.locked)
+                steps.append(Step(rows, score(self.samples, rows), volume_iou(self.samples, rows)))
         self.curve = steps[::-1]
 
-    def find_repeats(self, shape: Shape, evidence: Evidence) -> None:
-        self.enforce_budget(evidence)
+    def find_repeats(self, shape: Shape) -> None:
+        self.enforce_budget()
         assert self.best is not None
         with self.timed("symmetry"):
             found = symmetries(shape, self.settings)
-            self.leaves = repeat(evidence, self.best, found, self.settings, self.locked)
+            self.leaves = repeat(self.samples, self.best, found, self.settings, self.locked)
             rows = expanded(self.leaves)
-        reached, iou = score(evidence, rows), volume_iou(evidence, rows)
+        reached, iou = score(self.samples, rows), volume_iou(self.samples, rows)
         self.tell("symmetry", self.settings.rounds, len(self.leaves), reached, iou, 1.0)
 
-    def enforce_budget(self, evidence: Evidence) -> None:
+    def enforce_budget(self) -> None:
         """What an interruption or a fit without thinning left over the part budget goes, without refits."""
         most = self.settings.max_parts
         if self.best is None or most is None:
             return
         while len(self.best) > max(most, self.locked, 1):
-            self.best = drop_least(evidence, self.best, self.locked)
+            self.best = drop_least(self.samples, self.best, self.locked)
 
-    def keep(self, evidence: Evidence, rows: Rows, stage: str, round_: int) -> bool:
+    def keep(self, rows: Rows, stage: str, round_: int) -> bool:
         """Records the state and keeps it if it is the best so far; says whether it made progress."""
         settings = self.settings
-        if evidence.learn(rows) and self.best is not None:
-            self.best_objective = self.objective(evidence, self.best)
-        objective = self.objective(evidence, rows)
+        self.sampled_strays(rows)
+        objective = self.objective(rows)
         progressed = objective > self.best_objective + PROGRESS
-        if self.better(evidence, rows):
+        if self.better(rows):
             self.best, self.best_objective = rows, objective
         total = settings.rounds + settings.cycles
         done = min(1.0, (settings.rounds + round_ if stage == "thin" else round_) / total)
-        reached, iou = score(evidence, rows), volume_iou(evidence, rows)
+        reached, iou = score(self.samples, rows), volume_iou(self.samples, rows)
         self.tell(stage, round_, len(rows), reached, iou, (self.attempt + done) / settings.attempts)
         return progressed
 
-    def objective(self, evidence: Evidence, rows: Rows) -> float:
-        return score(evidence, rows) - self.settings.price * len(rows)
+    def sampled_strays(self, rows: Rows) -> bool:
+        """Whether these rows go astray where no samples were; now some are, and the best is scored anew."""
+        samples = self.samples.with_stray_samples(rows)
+        if samples is self.samples:
+            return False
+        self.samples = samples
+        if self.best is not None:
+            self.best_objective = self.objective(self.best)
+        return True
 
-    def better(self, evidence: Evidence, rows: Rows) -> bool:
+    def objective(self, rows: Rows) -> float:
+        return score(self.samples, rows) - self.settings.price * len(rows)
+
+    def better(self, rows: Rows) -> bool:
         """Whether these rows take the place of the best so far."""
-        if self.best is None or self.objective(evidence, rows) > self.best_objective:
+        if self.best is None or self.objective(rows) > self.best_objective:
             return True
-        return self.due(evidence, rows, volume_iou(evidence, rows))
+        return self.due(rows, volume_iou(self.samples, rows))
 
     def tell(self, stage: str, round_: int, parts: int, reached: float, iou: float, fraction: float) -> None:
         entry: dict[str, float | str] = {"stage": stage, "round": round_, "parts": parts}
@@ -295,7 +308,7 @@ class Run:
         if self.report is not None:
             self.report(Progress(stage, round_, self.settings.rounds, parts, iou, fraction))
 
-    def due(self, evidence: Evidence, rows: Rows, iou: float) -> bool:
+    def due(self, rows: Rows, iou: float) -> bool:
         """Whether the best so far misses the part budget or the target, or is larger than it need be."""
         assert self.best is not None
         most, target = self.settings.max_parts, self.settings.min_iou
@@ -303,5 +316,5 @@ class Run:
             return len(rows) < len(self.best)
         if target is None:
             return False
-        reached = volume_iou(evidence, self.best)
+        reached = volume_iou(self.samples, self.best)
         return iou > reached if reached < target else iou >= target and len(rows) < len(self.best)

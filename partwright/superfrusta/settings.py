@@ -31,7 +31,7 @@ class Settings:
         subtract: parts may also be taken away from what came before them, where too much is covered.
         smooth: parts blend into each other (eq. 4); otherwise unions are plain.
         family: "superfrustum", or less of it: "superprimitive" (no taper, no bulge), "cuboid" (Table 2), or
-            "solid": each part one of the named kinds (kinds.py). Parts of an assembly to start from keep what
+            "solid": each part one of the named kinds (solid_kinds.py). Parts of a start keep what
             they have of the rest.
 
     Ours:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from partwright.fields import kernel
-from partwright.superfrusta.evidence import Rows
-from partwright.superfrusta.kinds import SIGN, SX
-from partwright.superfrusta.seeding import ENOUGH, TRIM, along, extents, thinned
+from partwright.superfrusta.initialisation import ENOUGH, TRIM, along, extents, thinned
+from partwright.superfrusta.samples import Rows
+from partwright.superfrusta.solid_kinds import SIGN, SX
 
 _LEAN, _HOLE = 0.8, 0.7  # taper and onion that frusta and hollow solids start with
 _NONE = np.empty((0, 4), np.float32)

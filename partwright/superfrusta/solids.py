@@ -1,7 +1,7 @@
 """Method "solids": assemblies of boxes, cylinders and other named solids, added and subtracted.
 
 SuperFrusta, section 5, infers programs of canonical solids by the same residual fit. Here unions are plain,
-each part is of one kind (`kinds`), and parts may also be subtracted, which the paper leaves to hollow
+each part is of one kind (`solid_kinds`), and parts may also be subtracted, which the paper leaves to hollow
 primitives.
 """
 

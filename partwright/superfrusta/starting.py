@@ -11,9 +11,9 @@ from partwright.assembly.rows import rows as rows_of
 from partwright.errors import SettingError
 from partwright.fields import kernel
 from partwright.shapes import Shape
-from partwright.superfrusta.evidence import NOTHING, Rows
+from partwright.superfrusta.flat_tree import flattened
+from partwright.superfrusta.samples import NOTHING, Rows
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.tree import flattened
 
 
 def starting_rows(

@@ -10,11 +10,11 @@ import pytest
 from partwright.fields import kernel
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
-from partwright.superfrusta.evidence import Evidence
 from partwright.superfrusta.growing import grow
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.pruning import cheapest_removal, neighbours, prune
 from partwright.superfrusta.refining import POLISH, refine
+from partwright.superfrusta.samples import FitSamples
 from tests.superfrusta.meshes import box, union
 from tests.superfrusta.rows import box as box_row
 
@@ -27,8 +27,8 @@ RIGHT = ((0.6, 0.4, 0.5), (0.6, 0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
-def pair() -> Evidence:
-    return Evidence.of(load_shape(union(box(*LEFT), box(*RIGHT))), SETTINGS)
+def pair() -> FitSamples:
+    return FitSamples.of(load_shape(union(box(*LEFT), box(*RIGHT))), SETTINGS)
 
 
 @pytest.fixture(scope="module")
@@ -36,19 +36,19 @@ def exact() -> np.ndarray:
     return np.array([box_row(*LEFT), box_row(*RIGHT)])
 
 
-def test_two_blocks_grow_two_parts(pair: Evidence, exact: np.ndarray) -> None:
+def test_two_blocks_grow_two_parts(pair: FitSamples, exact: np.ndarray) -> None:
     grown = grow(pair, NONE, SETTINGS, most=5).last
     assert len(grown) == 2
     assert score(pair, grown) > 0.95
     assert np.sort(grown[:, 0]) == pytest.approx([-0.6, 0.6], abs=0.02)
 
 
-def test_what_is_explained_already_grows_nothing(pair: Evidence, exact: np.ndarray) -> None:
+def test_what_is_explained_already_grows_nothing(pair: FitSamples, exact: np.ndarray) -> None:
     assert score(pair, exact) > 0.998
     assert len(grow(pair, exact, SETTINGS, most=5)) == 0
 
 
-def test_the_other_block_grows_where_one_is_missing(pair: Evidence, exact: np.ndarray) -> None:
+def test_the_other_block_grows_where_one_is_missing(pair: FitSamples, exact: np.ndarray) -> None:
     for there, missing in ((0, 1), (1, 0)):
         grown = grow(pair, exact[[there]], SETTINGS, most=5).last
         assert len(grown) == 1
@@ -57,14 +57,14 @@ def test_the_other_block_grows_where_one_is_missing(pair: Evidence, exact: np.nd
         assert np.count_nonzero(occupied & wanted) > 0.95 * np.count_nonzero(occupied | wanted)
 
 
-def test_no_more_than_wanted_grow_and_the_best_comes_first(pair: Evidence) -> None:
+def test_no_more_than_wanted_grow_and_the_best_comes_first(pair: FitSamples) -> None:
     assert len(grow(pair, NONE, SETTINGS, most=0)) == 0
     one = grow(pair, NONE, SETTINGS, most=1).last
     assert len(one) == 1
     assert one[0, 0] < 0  # the larger block
 
 
-def test_growing_repeats_at_any_number_of_threads(pair: Evidence) -> None:
+def test_growing_repeats_at_any_number_of_threads(pair: FitSamples) -> None:
     first = grow(pair, NONE, SETTINGS, most=5).last
     for threads in (1, 2):
         again = dataclasses.replace(pair, threads=threads)
@@ -72,7 +72,7 @@ def test_growing_repeats_at_any_number_of_threads(pair: Evidence) -> None:
         np.testing.assert_array_equal(grow(again, NONE, changed, most=5).last, first)
 
 
-def test_pruning_drops_copies_crumbs_and_strays_only(pair: Evidence, exact: np.ndarray) -> None:
+def test_pruning_drops_copies_crumbs_and_strays_only(pair: FitSamples, exact: np.ndarray) -> None:
     copy = box_row((0.5, 0.6, 0.4), LEFT[1])  # inside the left block
     crumb = box_row((0.02, 0.02, 0.02), (0.6, 0.21, 0.0))
     stray = box_row((0.2, 0.2, 0.2), (0.0, 0.3, 0.0))  # outside the shape
@@ -83,14 +83,14 @@ def test_pruning_drops_copies_crumbs_and_strays_only(pair: Evidence, exact: np.n
     np.testing.assert_array_equal(prune(pair, exact, alpha=10.0), exact[:1])
 
 
-def test_locked_parts_are_never_pruned(pair: Evidence, exact: np.ndarray) -> None:
+def test_locked_parts_are_never_pruned(pair: FitSamples, exact: np.ndarray) -> None:
     stray = box_row((0.2, 0.2, 0.2), (0.0, 0.3, 0.0))
     rows = np.array([stray, exact[0], exact[1]])
     np.testing.assert_array_equal(prune(pair, rows, alpha=1e-3, locked=1), rows)
     np.testing.assert_array_equal(prune(pair, rows, alpha=10.0, locked=1), rows[:1])
 
 
-def test_the_cheapest_removal_is_the_part_that_explains_least(pair: Evidence, exact: np.ndarray) -> None:
+def test_the_cheapest_removal_is_the_part_that_explains_least(pair: FitSamples, exact: np.ndarray) -> None:
     halves = np.array(
         [
             exact[0],
@@ -107,14 +107,14 @@ def test_the_cheapest_removal_is_the_part_that_explains_least(pair: Evidence, ex
     np.testing.assert_array_equal(thinned[0], exact[0])
 
 
-def test_neighbours_touch(pair: Evidence, exact: np.ndarray) -> None:
+def test_neighbours_touch(pair: FitSamples, exact: np.ndarray) -> None:
     touching = box_row((0.3, 0.4, 0.5), (0.15, 0.0, 0.0))
     rows = np.array([*exact, touching])
     assert neighbours(pair, rows, 1).tolist() == [False, False, True]
     assert neighbours(pair, rows, 0).tolist() == [False, False, False]
 
 
-def test_refining_moves_the_marked_parts_only(pair: Evidence, exact: np.ndarray) -> None:
+def test_refining_moves_the_marked_parts_only(pair: FitSamples, exact: np.ndarray) -> None:
     moved = exact.copy()
     moved[:, 0] += 0.03
     refined = refine(pair, moved, POLISH, SETTINGS, np.array([False, True]))

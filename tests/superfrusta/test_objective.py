@@ -1,4 +1,4 @@
-"""The objective on evidence small enough to count by hand."""
+"""The objective on samples small enough to count by hand."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 from partwright.fields import kernel
 from partwright.shapes.grid import DistanceGrid
 from partwright.superfrusta.backend import backend
-from partwright.superfrusta.evidence import Evidence
 from partwright.superfrusta.objective import occupancy_score, removal_scores, score, volume_iou
+from partwright.superfrusta.samples import FitSamples
 from tests.superfrusta.rows import ball, points_in_box, random_rows
 
 GRID = DistanceGrid(np.zeros(3), 0.1, np.ones((2, 2, 2), np.float32))
 
 
-def evidence(points: np.ndarray, inside: np.ndarray, weight: np.ndarray, near: int) -> Evidence:
+def samples(points: np.ndarray, inside: np.ndarray, weight: np.ndarray, near: int) -> FitSamples:
     distance = np.where(inside, -0.1, 0.1)
-    return Evidence(
+    return FitSamples(
         points.astype(np.float32),
         distance.astype(np.float32),
         weight.astype(np.float32),
@@ -28,15 +28,17 @@ def evidence(points: np.ndarray, inside: np.ndarray, weight: np.ndarray, near: i
         threads=1,
         kernel=backend("cpu"),
         measure=lambda points: np.ones(len(points), np.float32),
+        density=1.0,
+        probes=np.empty((0, 3), np.float32),
     )
 
 
-def by_hand() -> Evidence:
+def by_hand() -> FitSamples:
     """On a line: near samples at x = 0, 1, 2, 3 of weight 1, 2, 1, 1.5, volume samples at x = 0 ... 4."""
     x = np.array([0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 4.0])
     inside = np.array([1, 1, 0, 0, 1, 1, 1, 0, 0], bool)
     weight = np.array([1, 2, 1, 1.5, 1, 1, 1, 1, 1])
-    return evidence(np.stack([x, 0 * x, 0 * x], axis=1), inside, weight, near=4)
+    return samples(np.stack([x, 0 * x, 0 * x], axis=1), inside, weight, near=4)
 
 
 def test_the_score_of_occupancies_by_hand() -> None:
@@ -78,7 +80,7 @@ def test_removal_scores_equal_the_scores_of_what_is_left(seed: int, parts: int) 
     inside = kernel.evaluate(random_rows(3, seed + 1), points) < 0
     weight = np.random.default_rng(seed).uniform(0.5, 2, 1200)
     weight[500:] = 1
-    made = evidence(points, inside, weight, near=500)
+    made = samples(points, inside, weight, near=500)
     without, whole = removal_scores(made, rows)
     assert whole == pytest.approx(score(made, rows), abs=1e-5)
     left = [score(made, np.delete(rows, i, axis=0)) for i in range(parts)]
@@ -91,7 +93,7 @@ def test_the_score_is_an_iou(seed: int) -> None:
     """Between 0 and 1, 1 only for equality, and it rises with every sample put right."""
     generator = np.random.default_rng(seed)
     inside, occupied = generator.random((2, 300)) < 0.5
-    made = evidence(points_in_box(300), inside, generator.uniform(1, 2, 300), near=150)
+    made = samples(points_in_box(300), inside, generator.uniform(1, 2, 300), near=150)
     before = float(occupancy_score(made, occupied))
     assert 0 <= before < 1
     wrong = int(np.flatnonzero(occupied != inside)[0])

@@ -14,8 +14,8 @@ from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import iou
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Fitted, Progress, Settings, fit
-from partwright.superfrusta.evidence import Evidence
 from partwright.superfrusta.resfit import Run
+from partwright.superfrusta.samples import FitSamples
 from tests.superfrusta.meshes import box, bracket, corner_tie, half_torus, pipe, table, union
 
 OUTCOMES = {"converged", "budget_reached", "target_reached", "interrupted"}
@@ -122,7 +122,7 @@ def test_an_interruption_before_there_is_anything_goes_through(table_shape: Shap
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("partwright.superfrusta.resfit.Evidence.of", interrupt)
+    monkeypatch.setattr("partwright.superfrusta.resfit.FitSamples.of", interrupt)
     with pytest.raises(KeyboardInterrupt):
         draft(table_shape)
 
@@ -164,19 +164,19 @@ def test_settings_that_cannot_be_used_are_named() -> None:
 
 def test_of_several_attempts_the_best_is_kept(table_shape: Shape) -> None:
     settings = Settings.for_quality("draft", threads=1)
-    evidence = Evidence.of(table_shape, settings)
-    single, several = Run(settings), Run(replace(settings, attempts=3))
-    single.through(evidence)
+    samples = FitSamples.of(table_shape, settings)
+    single, several = Run(samples, settings), Run(samples, replace(settings, attempts=3))
+    single.through()
     seen: list[float] = []
     several.report = lambda step: seen.append(step.fraction)
-    several.through(evidence)
+    several.through()
     assert single.best is not None
     assert several.best is not None
-    assert several.objective(evidence, several.best) >= single.objective(evidence, single.best)
-    assert several.best_objective == several.objective(evidence, several.best)
+    assert several.objective(several.best) >= replace(single, samples=several.samples).objective(single.best)
+    assert several.best_objective == several.objective(several.best)
     assert seen == sorted(seen)
     assert len([entry for entry in several.history if entry["stage"] == "thin"]) == 3
-    assert [Run(Settings(), attempt=i).regions for i in range(5)] == [7, 5, 9, 3, 11]
+    assert [Run(samples, Settings(), attempt=i).regions for i in range(5)] == [7, 5, 9, 3, 11]
 
 
 def test_an_interruption_in_a_later_attempt_keeps_the_earlier_ones_result(table_shape: Shape) -> None:

@@ -28,12 +28,12 @@ from partwright.fields import (
     kernel,
 )
 from partwright.shapes import load_shape
-from partwright.superfrusta.evidence import NOTHING, Evidence
+from partwright.superfrusta.flat_tree import flattened, nested
 from partwright.superfrusta.growing import Region, fit_regions
-from partwright.superfrusta.kinds import is_solid, kind_freedom, round_parts, solid
-from partwright.superfrusta.settling import cut_through
+from partwright.superfrusta.samples import NOTHING, FitSamples
+from partwright.superfrusta.simplification import extend_cuts
+from partwright.superfrusta.solid_kinds import is_solid, kind_freedom, round_parts, solid
 from partwright.superfrusta.solids import Settings, fit
-from partwright.superfrusta.tree import flattened, nested
 from tests.superfrusta.rows import row, subtracting
 
 DRAFT = Settings.for_quality("draft", threads=1)
@@ -200,7 +200,7 @@ def test_repeated_holes_are_subtracted_with_all_their_copies() -> None:
 
 def test_cuts_end_a_little_beyond_the_solid_in_the_open_and_nowhere_else() -> None:
     mesh = plate()
-    evidence = Evidence.of(load_shape(mesh), DRAFT)
+    samples = FitSamples.of(load_shape(mesh), DRAFT)
     block = row(size=(1.8, 1.2, 0.2), blend=0)
     cuts = [
         row((x, y, 0.1 * y), size=(0.2, 0.2, 0.3), roundness=1, blend=0)
@@ -209,19 +209,19 @@ def test_cuts_end_a_little_beyond_the_solid_in_the_open_and_nowhere_else() -> No
     ]
     blind = row((0, 0, 0.1), size=(0.1, 0.1, 0.1), roundness=1, blend=0)
     rows = subtracting(np.stack([block, *cuts, blind]), 1, 2, 3, 4, 5)
-    longer = cut_through(evidence, rows)
+    longer = extend_cuts(samples, rows)
     np.testing.assert_allclose(longer[1:5, 9], 0.26, atol=1e-4)  # 0.03 on both sides, though they lay askew
     np.testing.assert_allclose(longer[1:5, 2], 0, atol=1e-4)
     np.testing.assert_allclose(longer[5, [2, 9]], (0.09, 0.08), atol=1e-4)  # from 0.05, upwards only
 
 
 def test_a_cut_is_fitted_to_what_is_covered_too_much() -> None:
-    evidence = Evidence.of(load_shape(plate()), DRAFT)
+    samples = FitSamples.of(load_shape(plate()), DRAFT)
     rows = row(size=(1.8, 1.2, 0.2), blend=0)[None]
-    over = np.maximum(evidence.grid_field(rows), -evidence.grid.values) < 0
-    corner = (evidence.grid_points[:, 0] > 0) & (evidence.grid_points[:, 1] > 0)
+    over = np.maximum(samples.grid_field(rows), -samples.grid.values) < 0
+    corner = (samples.grid_points[:, 0] > 0) & (samples.grid_points[:, 1] > 0)
     region = Region(over.ravel() & corner, rows, 0.1, 0.2, 0.15, sign=-1.0)
-    (cut,) = fit_regions(evidence, [region], DRAFT)
+    (cut,) = fit_regions(samples, [region], DRAFT)
     assert cut[16] == -1
     np.testing.assert_allclose(cut[:2], (0.6, 0.3), atol=0.01)
     assert NOTHING.shape == (0, 17)

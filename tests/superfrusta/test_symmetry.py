@@ -14,12 +14,12 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.rows import parts_from_rows, rows
 from partwright.fields import SuperFrustum, kernel
 from partwright.shapes import load_shape
-from partwright.superfrusta.constrained import Leaf, expanded, image, refit, rigid
-from partwright.superfrusta.evidence import Evidence
 from partwright.superfrusta.objective import score
-from partwright.superfrusta.repeats import repeat
+from partwright.superfrusta.repeated_parts import repeat
 from partwright.superfrusta.resfit import fit
+from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, image, refit, rigid
 from partwright.superfrusta.symmetry import Isometry, Symmetry, groups, mirror, rotation, symmetries
 from tests.assembly.strategies import ROTATION, SUPERFRUSTA, VECTOR
 from tests.superfrusta.meshes import box, table, union
@@ -100,37 +100,37 @@ def test_groups_too_large_are_left_out() -> None:
     assert [len(group) for group in groups(odd)] == [1, 1]
 
 
-def known_table() -> tuple[Evidence, np.ndarray, tuple[Symmetry, ...]]:
-    """Evidence of the table, exact rows of its five parts, and its symmetries, in the unit frame."""
+def known_table() -> tuple[FitSamples, np.ndarray, tuple[Symmetry, ...]]:
+    """FitSamples of the table, exact rows of its five parts, and its symmetries, in the unit frame."""
     shape = load_shape(table())
     boxes = [((2, 1.2, 0.15), (0, 0, 1.0))]
     boxes += [((0.15, 0.15, 1.05), (x, y, 0.5)) for x in (-0.85, 0.85) for y in (-0.5, 0.5)]
     parts = Assembly(tuple(Part(SuperFrustum(size), place, blend=0.001) for size, place in boxes))
     unit = parts.translated([-c for c in shape.frame.centre]).scaled(shape.frame.scale)
-    return Evidence.of(shape, DRAFT), subtracting(rows(unit.parts)), symmetries(shape, DRAFT)
+    return FitSamples.of(shape, DRAFT), subtracting(rows(unit.parts)), symmetries(shape, DRAFT)
 
 
 def test_legs_of_a_table_become_one_leaf() -> None:
-    evidence, exact, found = known_table()
-    leaves = repeat(evidence, exact, found, DRAFT)
+    samples, exact, found = known_table()
+    leaves = repeat(samples, exact, found, DRAFT)
     assert [len(leaf.rows) for leaf in leaves] == [1, 4]
-    assert score(evidence, expanded(leaves)) == pytest.approx(score(evidence, exact), abs=1e-6)
+    assert score(samples, expanded(leaves)) == pytest.approx(score(samples, exact), abs=1e-6)
 
 
 def test_locked_parts_and_missing_symmetries_change_nothing() -> None:
-    evidence, exact, found = known_table()
-    assert [len(leaf.rows) for leaf in repeat(evidence, exact, (), DRAFT)] == [1] * 5
-    locked = repeat(evidence, exact, found, DRAFT, locked=5)
+    samples, exact, found = known_table()
+    assert [len(leaf.rows) for leaf in repeat(samples, exact, (), DRAFT)] == [1] * 5
+    locked = repeat(samples, exact, found, DRAFT, locked=5)
     assert np.array_equal(expanded(locked), exact)
 
 
 def test_repeats_that_would_hurt_are_refused() -> None:
-    evidence, exact, found = known_table()
+    samples, exact, found = known_table()
     shifted = [
         Symmetry(s.kind, s.order, Isometry(s.isometry.linear, s.isometry.shift + 0.06), 0) for s in found
     ]
-    leaves = repeat(evidence, exact, shifted, DRAFT)
-    assert score(evidence, expanded(leaves)) >= score(evidence, exact) - 2e-3 - 1e-9
+    leaves = repeat(samples, exact, shifted, DRAFT)
+    assert score(samples, expanded(leaves)) >= score(samples, exact) - 2e-3 - 1e-9
 
 
 X, Z, ORIGIN = np.eye(3)[0], np.eye(3)[2], np.zeros(3)
@@ -140,17 +140,17 @@ X, Z, ORIGIN = np.eye(3)[0], np.eye(3)[2], np.zeros(3)
     ("isometry", "others"), [(mirror(X, ORIGIN), [0, 2, 4]), (rotation(Z, np.pi, ORIGIN), [0, 2, 3])]
 )
 def test_copies_are_refitted_as_one(isometry: Isometry, others: list[int]) -> None:
-    evidence, exact, _ = known_table()
+    samples, exact, _ = known_table()
     leg = exact[1].copy()
     leg[:3] += (0.02, -0.015, 0.01)
     leg[3:7] = Similarity(1.0, (1.0, 0.02, 0.02, 0.05)).rotation
     leg[7:9] *= 1.15
-    fixed = [Leaf(row) for row in exact[others]]
-    before = [*fixed, Leaf(leg, (isometry,))]
-    after = refit(evidence, before, ((100.0, 15),), DRAFT, locked=len(fixed))
+    fixed = [RepeatedPart(row) for row in exact[others]]
+    before = [*fixed, RepeatedPart(leg, (isometry,))]
+    after = refit(samples, before, ((100.0, 15),), DRAFT, locked=len(fixed))
     assert np.array_equal(expanded(after)[:3], exact[others])
-    assert score(evidence, expanded(before)) < 0.97
-    assert score(evidence, expanded(after)) > 0.995
+    assert score(samples, expanded(before)) < 0.97
+    assert score(samples, expanded(after)) > 0.995
 
 
 def test_a_fit_repeats_parts_only_if_asked() -> None:

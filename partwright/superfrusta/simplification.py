@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import kernel
-from partwright.superfrusta.evidence import Evidence, Rows
-from partwright.superfrusta.kinds import SIGN, SX, SY, SZ
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.pruning import neighbours
 from partwright.superfrusta.refining import TOUCH_UP, refine
+from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.solid_kinds import SIGN, SX, SY, SZ
 
 Row = NDArray[np.float32]
 
@@ -26,23 +26,23 @@ _ACROSS, _ALONG, _WITHIN = 7, 60, 0.35  # points across and along a cut, and how
 _HARMLESS = 2e-5  # of R
 
 
-def plainer_kinds(evidence: Evidence, rows: Rows, settings: Settings, locked: int = 0) -> Rows:
+def simplify_kinds(samples: FitSamples, rows: Rows, settings: Settings, locked: int = 0) -> Rows:
     """Each part as the plainest kind that explains as much.
 
     A frustum that hardly tapers becomes a cylinder, and so does a tube with hardly a hole, or a capsule whose
     ends are flat. The part and its neighbours are refitted before the two are compared.
     """
-    whole = score(evidence, rows)
+    whole = score(samples, rows)
     for index in range(locked, len(rows)):
         for plainer in _plainer(rows[index]):
             trial = rows.copy()
             trial[index] = plainer
-            if score(evidence, trial) < whole - _PROMISING:
+            if score(samples, trial) < whole - _PROMISING:
                 continue
-            moving = neighbours(evidence, rows, index)
+            moving = neighbours(samples, rows, index)
             moving[index], moving[:locked] = True, False
-            trial = refine(evidence, trial, TOUCH_UP, settings, moving)
-            reached = score(evidence, trial)
+            trial = refine(samples, trial, TOUCH_UP, settings, moving)
+            reached = score(samples, trial)
             if reached >= whole - _LOSS:
                 rows, whole = trial, reached
                 break
@@ -87,21 +87,21 @@ def _changed(row: Row, **values: float) -> Row:
     return result
 
 
-def cut_through(evidence: Evidence, rows: Rows, locked: int = 0) -> Rows:
+def extend_cuts(samples: FitSamples, rows: Rows, locked: int = 0) -> Rows:
     """Subtracted parts that end in the open end a little beyond what they cut, so that no skin is left.
 
     A fit does not care how far a cut goes where nothing is; a CAD program does when two faces coincide, and a
     reader when every hole through one plate has another length.
     """
-    least = score(evidence, rows) - _HARMLESS
+    least = score(samples, rows) - _HARMLESS
     added = rows[rows[:, SIGN] > 0]
     for index in range(locked, len(rows)):
         if rows[index, SIGN] > 0:
             continue
         for axis, side in _ends(rows[index]):
             trial = rows.copy()
-            trial[index] = _ending_beyond(evidence, added, rows[index], axis, side)
-            if score(evidence, trial) >= least:
+            trial[index] = _ending_beyond(samples, added, rows[index], axis, side)
+            if score(samples, trial) >= least:
                 rows = trial
     return rows
 
@@ -114,7 +114,7 @@ def _ends(row: Row) -> list[tuple[int, float]]:
     return [(axis, side) for axis in axes for side in (-1.0, 1.0)]
 
 
-def _ending_beyond(evidence: Evidence, added: Rows, row: Row, axis: int, side: float) -> Row:
+def _ending_beyond(samples: FitSamples, added: Rows, row: Row, axis: int, side: float) -> Row:
     """The cut (17,) with one end `_BEYOND` further than it meets any added part; longer by as much where
     these go on, which the caller will find costs too much."""
     w, x, y, z = (float(v) for v in row[3:7])
@@ -123,7 +123,7 @@ def _ending_beyond(evidence: Evidence, added: Rows, row: Row, axis: int, side: f
     across = [np.linspace(-_WITHIN, _WITHIN, _ACROSS) * size[k] for k in range(3)]
     across[axis] = side * np.linspace(-end, end + _BEYOND, _ALONG)
     local = np.stack(np.meshgrid(*across, indexing="ij"), axis=-1).reshape(-1, 3)
-    distance = evidence.parts_of(added, (row[:3] + local @ turn.T).astype(np.float32)).min(axis=0)
+    distance = samples.parts_of(added, (row[:3] + local @ turn.T).astype(np.float32)).min(axis=0)
     inside = distance < 0
     if not inside.any():
         return row

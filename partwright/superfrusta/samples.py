@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,86 +19,83 @@ from partwright.superfrusta.settings import Settings
 Rows = NDArray[np.float32]
 NOTHING: Rows = np.empty((0, len(COLUMNS)), np.float32)
 
-_REACH = 1.2  # half the side of the cube that guards and probes fill
-_LOUDEST = 3.0
+_HALF_SIDE = 1.2  # unit lengths: half the side of the cube that padding and probes fill
+_MOST_PADDING_WEIGHT = 3.0  # of one point, where the weight of a sample in the box is 1
 _PROBES = 48  # along a side of that cube
-_STRAY = 0.05  # an assembly that reaches further than this from the shape is astray
-_FAR, _FEW = 0.1, 400
+_STRAY = 0.05  # unit lengths: what an assembly covers further than this from the shape is astray
+_FAR = 0.1  # unit lengths from the shape
+_FAR_COUNT = 400  # about so many samples stand for all that are far
 
 
-@dataclass
-class Evidence:
+@dataclass(frozen=True)
+class FitSamples:
     """Samples (the first `near` lie near the surface, the rest fills the box and more) and the grid.
 
-    points (N, 3), distance (N,), weight (N,) = 1 + sigmoid(curvature) near the surface (eq. 7), 1 in the box.
-    measure: signed distance (n,) of the shape at points (n, 3). `learn` adds samples.
+    They never change: `with_stray_samples` gives others, so that a score always says of which samples it is.
     """
 
     points: NDArray[np.float32]
+    """(N, 3), unit frame."""
     distance: NDArray[np.float32]
+    """(N,) signed distance of the shape."""
     weight: NDArray[np.float32]
+    """(N,) 1 + sigmoid(curvature) near the surface (eq. 7), 1 in the box."""
     near: int
     grid: DistanceGrid
     threads: int
     kernel: Kernel
     measure: Callable[[NDArray[np.float32]], NDArray[np.float32]]
-    density: float = 0.0  # of the samples in the box, per unit volume
+    """Signed distance (n,) of the shape at points (n, 3)."""
+    density: float
+    """Of the samples in the box, per unit volume."""
+    probes: NDArray[np.float32]
+    """(n, 3) points that are no samples yet, where a part that goes astray is looked for."""
 
     @classmethod
-    def of(cls, shape: Shape, settings: Settings) -> Evidence:
+    def of(cls, shape: Shape, settings: Settings) -> FitSamples:
         grid = shape.unit_grid(settings.resolution)
-        samples = shape.samples(settings.near, settings.uniform, settings.seed)
-        guards, density = _guards(grid, settings)
+        drawn = shape.samples(settings.near, settings.uniform, settings.seed)
+        around, padding_weight = padding(grid, settings)
         return cls(
-            np.concatenate([samples.points, guards]),
-            np.concatenate([samples.distance, shape.unit_distance(guards)]),
-            np.concatenate([samples.weight, np.full(len(guards), density, np.float32)]),
-            samples.near,
+            np.concatenate([drawn.points, around]),
+            np.concatenate([drawn.distance, shape.unit_distance(around)]),
+            np.concatenate([drawn.weight, np.full(len(around), padding_weight, np.float32)]),
+            drawn.near,
             grid,
             settings.threads,
             backend(settings.device),
             shape.unit_distance,
             settings.uniform / float(np.prod(grid.spacing * np.array(grid.values.shape))),
+            _probes(grid),
         )
 
-    def learn(self, rows: Rows) -> bool:
-        """Adds samples where an assembly is astray, well outside the shape; says whether there were any.
+    def with_stray_samples(self, rows: Rows) -> FitSamples:
+        """These and samples where an assembly is astray, well outside the shape; itself where it nowhere is.
 
         A thin part that shoots out of the shape passes between random samples. The probes are a lattice fine
         enough to meet it; those that do become samples, with the weight of the volume that they stand for.
         """
-        hit = np.flatnonzero(self.distance_of(rows, self._probes) < 0)
-        distance = self.measure(self._probes[hit])
+        hit = np.flatnonzero(self.distance_of(rows, self.probes) < 0)
+        distance = self.measure(self.probes[hit])
         hit, distance = hit[distance > _STRAY], distance[distance > _STRAY]
         if len(hit) == 0:
-            return False
-        self.points = np.concatenate([self.points, self._probes[hit]])
-        self.distance = np.concatenate([self.distance, distance.astype(np.float32)])
-        self.weight = np.concatenate([self.weight, np.full(len(hit), self._probe_weight, np.float32)])
-        self._probes = np.delete(self._probes, hit, axis=0)
-        for name in ("inside", "voxel", "training", "outskirts"):
-            self.__dict__.pop(name, None)
-        return True
+            return self
+        return replace(
+            self,
+            points=np.concatenate([self.points, self.probes[hit]]),
+            distance=np.concatenate([self.distance, distance.astype(np.float32)]),
+            weight=np.concatenate([self.weight, np.full(len(hit), self._probe_weight, np.float32)]),
+            probes=np.delete(self.probes, hit, axis=0),
+        )
 
-    def astray(self, rows: Rows) -> NDArray[np.float64]:
-        """Weight (M,) of the probes that each part alone covers, as `learn` would give it to them."""
-        hits = (self.parts_of(rows, self._probes) < 0).sum(axis=1)
+    def stray_weight(self, rows: Rows) -> NDArray[np.float64]:
+        """Weight (M,) of the probes that each part alone covers, as they would have it as samples."""
+        hits = (self.parts_of(rows, self.probes) < 0).sum(axis=1)
         return np.asarray(hits * self._probe_weight, dtype=np.float64)
 
     @property
     def _probe_weight(self) -> float:
-        return self.density * (2 * _REACH / _PROBES) ** 3
-
-    @cached_property
-    def _probes(self) -> NDArray[np.float32]:
-        """Lattice points (n, 3), each moved within its cell, that may lie well outside the shape."""
-        cell = 2 * _REACH / _PROBES
-        corner = np.stack(np.meshgrid(*[np.arange(_PROBES)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-        within = np.random.default_rng(0).uniform(0.1, 0.9, corner.shape)
-        points = (cell * (corner + within) - _REACH).astype(np.float32)
-        values = self.grid.values.ravel()[self._voxel_of(points)]
-        nearest = self.grid_points[self._voxel_of(points)]
-        return points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]
+        return self.density * (2 * _HALF_SIDE / _PROBES) ** 3
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
@@ -112,12 +109,7 @@ class Evidence:
     @cached_property
     def voxel(self) -> NDArray[np.int64]:
         """Index into grid.values.ravel() of the voxel that each sample lies in (or is nearest to)."""
-        return self._voxel_of(self.points)
-
-    def _voxel_of(self, points: NDArray[np.float32]) -> NDArray[np.int64]:
-        shape = np.array(self.grid.values.shape)
-        cell = np.rint((points - self.grid.origin) / self.grid.spacing).astype(np.int64)
-        return np.ravel_multi_index(tuple(np.clip(cell, 0, shape - 1).T), tuple(shape))
+        return _voxel_of(self.grid, self.points)
 
     @cached_property
     def inside_voxels(self) -> int:
@@ -130,15 +122,15 @@ class Evidence:
         return float(-np.quantile(inside, 0.1)) if len(inside) else self.grid.spacing
 
     @cached_property
-    def training(self) -> NDArray[np.int64]:
+    def optimised_indices(self) -> NDArray[np.int64]:
         """The samples that optimisation runs on: every second one near the surface, every third elsewhere."""
         return np.concatenate([np.arange(0, self.near, 2), np.arange(self.near, len(self.points), 3)])
 
     @cached_property
-    def outskirts(self) -> NDArray[np.int64]:
+    def far_indices(self) -> NDArray[np.int64]:
         """A few hundred samples far outside: they keep a part fitted to one region from running away."""
         outside = self.near + np.flatnonzero(self.distance[self.near :] > _FAR)
-        return outside[:: max(1, len(outside) // _FEW)]
+        return outside[:: max(1, len(outside) // _FAR_COUNT)]
 
     def target(self, index: NDArray[np.int64], weight: NDArray[np.float32] | None = None) -> Target:
         """Samples by index as the kernel takes them; weights are scaled to sum to 1."""
@@ -164,18 +156,36 @@ class Evidence:
         return self.kernel.evaluate_parts(rows, points, self.threads)
 
 
-def _guards(grid: DistanceGrid, settings: Settings) -> tuple[NDArray[np.float32], float]:
-    """Points (G, 3) around the box that the uniform samples fill, and their weight.
+def padding(grid: DistanceGrid, settings: Settings) -> tuple[NDArray[np.float32], float]:
+    """Points (G, 3) around the box that the uniform samples fill, and the weight of each.
 
     Without them nothing would stop a part from growing out of the box. The weight makes up for their lower
-    density, up to a limit beyond which few points would speak too loudly.
+    density, up to a limit: a few points of more weight would outvote all that lies near them.
     """
     low = grid.origin
     high = low + grid.spacing * (np.array(grid.values.shape) - 1)
     rng = np.random.default_rng(settings.seed + 1)
-    points = rng.uniform(-_REACH, _REACH, (settings.uniform // 3, 3)).astype(np.float32)
+    points = rng.uniform(-_HALF_SIDE, _HALF_SIDE, (settings.uniform // 3, 3)).astype(np.float32)
     points = points[((points < low) | (points > high)).any(axis=1)]
     points = points[morton_order(points)]
-    around = (2 * _REACH) ** 3 - float(np.prod(high - low))
+    around = (2 * _HALF_SIDE) ** 3 - float(np.prod(high - low))
     density = around / max(len(points), 1) * settings.uniform / float(np.prod(high - low))
-    return points, min(density, _LOUDEST)
+    return points, min(density, _MOST_PADDING_WEIGHT)
+
+
+def _probes(grid: DistanceGrid) -> NDArray[np.float32]:
+    """Lattice points (n, 3), each moved within its cell, that may lie well outside the shape."""
+    cell = 2 * _HALF_SIDE / _PROBES
+    corner = np.stack(np.meshgrid(*[np.arange(_PROBES)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    within = np.random.default_rng(0).uniform(0.1, 0.9, corner.shape)
+    points = (cell * (corner + within) - _HALF_SIDE).astype(np.float32)
+    voxel = _voxel_of(grid, points)
+    values, nearest = grid.values.ravel()[voxel], grid.points()[voxel].astype(np.float32)
+    return points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]
+
+
+def _voxel_of(grid: DistanceGrid, points: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Index (N,) into grid.values.ravel() of the voxel nearest to each point (N, 3)."""
+    shape = np.array(grid.values.shape)
+    cell = np.rint((points - grid.origin) / grid.spacing).astype(np.int64)
+    return np.ravel_multi_index(tuple(np.clip(cell, 0, shape - 1).T), tuple(shape))

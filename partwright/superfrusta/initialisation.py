@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from partwright.superfrusta.evidence import Rows
 from partwright.superfrusta.refining import START_BLEND
+from partwright.superfrusta.samples import Rows
 
 ENOUGH = 600  # points that describe a region well enough for its extents
 _NONE = np.empty((0, 4), np.float32)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.superfrusta.constrained import Leaf, expanded, image, refit
-from partwright.superfrusta.evidence import Evidence, Rows
-from partwright.superfrusta.kinds import SIGN
 from partwright.superfrusta.objective import score
+from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.solid_kinds import SIGN
+from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, image, refit
 from partwright.superfrusta.symmetry import Isometry, Symmetry, groups
 
 _EVERY = 6  # samples that matching looks at
@@ -35,8 +35,8 @@ class Repeat:
 
 
 def repeat(
-    evidence: Evidence, rows: Rows, found: Sequence[Symmetry], settings: Settings, locked: int = 0
-) -> list[Leaf]:
+    samples: FitSamples, rows: Rows, found: Sequence[Symmetry], settings: Settings, locked: int = 0
+) -> list[RepeatedPart]:
     """The assembly as leaves, of which those that repeat under the symmetries are one each.
 
     Repeats that replace the most parts come first. Together they cost at most 2e-3 of R and 1e-3 of IoU:
@@ -44,20 +44,20 @@ def repeat(
     repeats are given up. An IoU that the settings ask for is kept. The first `locked` rows stay leaves of
     their own.
     """
-    reached = _measures(evidence, rows)
+    reached = _measures(samples, rows)
     least = reached - _TOLERANCE
     if settings.min_iou is not None:
         least[1] = max(least[1], min(reached[1], settings.min_iou))
 
-    def good(leaves: list[Leaf]) -> bool:
-        return bool((_measures(evidence, expanded(leaves)) >= least).all())
+    def good(leaves: list[RepeatedPart]) -> bool:
+        return bool((_measures(samples, expanded(leaves)) >= least).all())
 
-    wanted = candidates(evidence, rows, groups(found), locked)
-    chosen = _chosen(evidence, rows, wanted)
+    wanted = candidates(samples, rows, groups(found), locked)
+    chosen = _chosen(samples, rows, wanted)
     leaves = _leaves(rows, chosen)
     if good(leaves):
         return leaves
-    leaves = refit(evidence, leaves, _REFIT, settings, locked)
+    leaves = refit(samples, leaves, _REFIT, settings, locked)
     if good(leaves):
         return leaves
     kept: list[Repeat] = []
@@ -67,25 +67,25 @@ def repeat(
     return _leaves(rows, kept)
 
 
-def _measures(evidence: Evidence, rows: Rows) -> NDArray[np.float64]:
+def _measures(samples: FitSamples, rows: Rows) -> NDArray[np.float64]:
     """R, and IoU on the grid: a refit leans towards the samples that it saw."""
-    occupied = evidence.distance_of(rows, evidence.grid_points[::_GRID_EVERY]) < 0
-    inside = evidence.grid.values.ravel()[::_GRID_EVERY] < 0
+    occupied = samples.distance_of(rows, samples.grid_points[::_GRID_EVERY]) < 0
+    inside = samples.grid.values.ravel()[::_GRID_EVERY] < 0
     both, either = np.count_nonzero(occupied & inside), np.count_nonzero(occupied | inside)
-    return np.array([score(evidence, rows), both / np.maximum(either, 1)])
+    return np.array([score(samples, rows), both / np.maximum(either, 1)])
 
 
 def candidates(
-    evidence: Evidence, rows: Rows, found: Sequence[tuple[Isometry, ...]], locked: int
+    samples: FitSamples, rows: Rows, found: Sequence[tuple[Isometry, ...]], locked: int
 ) -> list[Repeat]:
     """Repeats that would replace parts, those that replace the most first."""
-    points = evidence.points[::_EVERY]
-    parts = evidence.parts_of(rows, points) < 0
+    points = samples.points[::_EVERY]
+    parts = samples.parts_of(rows, points) < 0
     sizes = np.maximum(parts.sum(axis=1), 1)
     result = []
     for group in found:
         for base in range(locked, len(rows)):
-            images = evidence.parts_of(np.stack([image(rows[base], g) for g in group]), points) < 0
+            images = samples.parts_of(np.stack([image(rows[base], g) for g in group]), points) < 0
             distinct = _distinct(parts[base], images)
             covered = images[distinct].any(axis=0) if distinct else np.zeros(len(points), bool)
             share = (parts & covered).sum(axis=1) / sizes
@@ -108,10 +108,10 @@ def _distinct(base: NDArray[np.bool_], images: NDArray[np.bool_]) -> list[int]:
     return kept
 
 
-def _chosen(evidence: Evidence, rows: Rows, wanted: list[Repeat]) -> list[Repeat]:
+def _chosen(samples: FitSamples, rows: Rows, wanted: list[Repeat]) -> list[Repeat]:
     """Repeats that get along, those first that cost least of R before a refit."""
-    whole = score(evidence, rows)
-    priced = [(whole - score(evidence, expanded(_leaves(rows, [one]))), one) for one in wanted[:_TRIED]]
+    whole = score(samples, rows)
+    priced = [(whole - score(samples, expanded(_leaves(rows, [one]))), one) for one in wanted[:_TRIED]]
     chosen: list[tuple[float, Repeat]] = []
     taken: set[int] = set()
     for cost, one in sorted(priced, key=lambda entry: (-len(entry[1].replaced), entry[0])):
@@ -122,7 +122,7 @@ def _chosen(evidence: Evidence, rows: Rows, wanted: list[Repeat]) -> list[Repeat
     return [one for _, one in sorted(chosen, key=lambda entry: entry[0])]
 
 
-def _leaves(rows: Rows, repeats: Sequence[Repeat]) -> list[Leaf]:
+def _leaves(rows: Rows, repeats: Sequence[Repeat]) -> list[RepeatedPart]:
     gone = frozenset[int]().union(*(r.replaced for r in repeats))
     isometries = {r.base: r.isometries for r in repeats}
-    return [Leaf(row, isometries.get(i, ())) for i, row in enumerate(rows) if i not in gone]
+    return [RepeatedPart(row, isometries.get(i, ())) for i, row in enumerate(rows) if i not in gone]

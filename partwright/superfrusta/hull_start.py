@@ -9,22 +9,22 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from partwright.superfrusta.evidence import NOTHING, Evidence, Rows
 from partwright.superfrusta.growing import Region, fit_regions
+from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 
 _MOST = 4000  # voxels that the hull is made of
 _MARGIN = 0.2
 
 
-def body(evidence: Evidence, settings: Settings) -> Rows:
+def convex_hull_start(samples: FitSamples, settings: Settings) -> Rows:
     """The part (1, 17) that fits the shape's convex hull best; none where the shape is flat."""
-    inside = evidence.grid.values.ravel() < 0
-    points = evidence.grid_points[inside]
+    inside = samples.grid.values.ravel() < 0
+    points = samples.grid_points[inside]
     try:
         hull = ConvexHull(points[:: max(1, len(points) // _MOST)])
     except QhullError:
         return NOTHING
-    depth = float(-evidence.grid.values.min())
+    depth = float(-samples.grid.values.min())
     region = Region(inside, NOTHING, depth, _MARGIN, 1.0, hull=np.asarray(hull.equations, np.float32))
-    return fit_regions(evidence, [region], settings)
+    return fit_regions(samples, [region], settings)

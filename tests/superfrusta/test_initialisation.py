@@ -8,8 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from partwright.superfrusta.initialisation import starts, thinned
 from partwright.superfrusta.refining import LIMITS
-from partwright.superfrusta.seeding import starts, thinned
 
 SPACING = 0.03
 SHAPE = slice(7, 16)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from partwright.assembly import Similarity
 from partwright.fields import kernel
-from partwright.superfrusta.evidence import Evidence, Rows
 from partwright.superfrusta.refining import LIMITS, Stages, freedom, penalties, sharpened, ties
+from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetry import Isometry
 
@@ -28,7 +28,7 @@ _DAMPING, _CALM, _HARSH = 1e-2, 0.3, 5.0
 
 
 @dataclass(frozen=True)
-class Leaf:
+class RepeatedPart:
     """A parameter row (17,) and the isometries that make its further copies."""
 
     row: NDArray[np.float32]
@@ -65,28 +65,28 @@ def image(row: NDArray[np.float32], isometry: Isometry) -> NDArray[np.float32]:
     return np.array([*placed.translation, *placed.rotation, *row[7:]], dtype=np.float32)
 
 
-def expanded(leaves: Sequence[Leaf]) -> Rows:
+def expanded(leaves: Sequence[RepeatedPart]) -> Rows:
     """Rows of all copies, leaf by leaf."""
     return np.concatenate([leaf.rows for leaf in leaves])
 
 
 def refit(
-    evidence: Evidence, leaves: Sequence[Leaf], stages: Stages, settings: Settings, locked: int = 0
-) -> list[Leaf]:
+    samples: FitSamples, leaves: Sequence[RepeatedPart], stages: Stages, settings: Settings, locked: int = 0
+) -> list[RepeatedPart]:
     """Minimises the losses of `refine` over the leaves, all copies of each moving as one.
 
     The kernel's normal equations of all copies are projected onto the leaves' parameters; the damped steps
     are those of Levenberg and Marquardt. The first `locked` leaves stay.
     """
     leaves = list(leaves)
-    target = evidence.target(evidence.training)
+    target = samples.target(samples.optimised_indices)
     moving = np.arange(len(leaves)) >= locked
     firsts = np.stack([leaf.row for leaf in leaves])
     tied = ties(firsts, settings)
     free = freedom(firsts, moving, settings)
     free[tied, _D_SY] = False
     damping, quality, threads = _DAMPING, penalties(settings), settings.threads
-    for beta, iterations in sharpened(stages, evidence.thickness):
+    for beta, iterations in sharpened(stages, samples.thickness):
         for _ in range(int(iterations)):
             rows = expanded(leaves)
             loss, gradient, matrix = kernel.normal_equations(rows, target, float(beta), quality, threads)
@@ -107,7 +107,7 @@ def refit(
 
 
 def _projected(
-    leaves: Sequence[Leaf], tied: NDArray[np.bool_], gradient: Floats, matrix: Floats
+    leaves: Sequence[RepeatedPart], tied: NDArray[np.bool_], gradient: Floats, matrix: Floats
 ) -> tuple[Floats, Floats]:
     """P^T g and P^T H P, where P takes steps of the leaves to steps of their copies."""
     count = sum(1 + len(leaf.isometries) for leaf in leaves)
@@ -142,7 +142,7 @@ def _damped(gradient: Floats, matrix: Floats, free: NDArray[np.bool_], damping: 
     return step.reshape(-1, _WIDTH)
 
 
-def _moved(leaf: Leaf, step: Floats, free: NDArray[np.bool_], tied: bool) -> Leaf:
+def _moved(leaf: RepeatedPart, step: Floats, free: NDArray[np.bool_], tied: bool) -> RepeatedPart:
     """The leaf after a step (15,), clipped, within bounds; what is not `free` (15,) keeps its bits."""
     lower, upper, longest = LIMITS.array().astype(np.float64)
     step = np.clip(step, -longest, longest)
@@ -161,7 +161,7 @@ def _moved(leaf: Leaf, step: Floats, free: NDArray[np.bool_], tied: bool) -> Lea
     if free[_D_BULGE]:
         tightest = math.asin(min(1.0, row[_SZ] / max(row[_SX], 1e-6))) / (math.pi / 2)
         row[_BULGE] = min(row[_BULGE], tightest)
-    return Leaf(row.astype(np.float32), leaf.isometries)
+    return RepeatedPart(row.astype(np.float32), leaf.isometries)
 
 
 def _pose(row: NDArray[np.float32]) -> Similarity:
