@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from partwright.cleaning.pipeline import Cleaned, checked_tolerance, clean
 from partwright.cleaning.relations import Relation
 from partwright.cleaning.segmentation import segment
-from partwright.cleaning.tidying import Cleaned, checked_tolerance, clean
 
 __all__ = ["Cleaned", "Relation", "checked_tolerance", "clean", "segment"]

@@ -47,9 +47,9 @@ class Equations:
         left = scaled - self.basis.T @ (self.basis @ scaled)
         return float(np.linalg.norm(left)) <= _DEPENDENT * float(np.linalg.norm(scaled))
 
-    def freedom(self, held: NDArray[np.bool_]) -> Floats:
-        """(n, d): steps of the vector that keep all equations and the entries `held` (n,), as columns."""
-        fixed = np.eye(len(self.vector))[held]
+    def freedom(self, locked: NDArray[np.bool_]) -> Floats:
+        """(n, d): steps of the vector that keep all equations and the entries `locked` (n,), as columns."""
+        fixed = np.eye(len(self.vector))[locked]
         rows = np.vstack([self.basis, fixed])
         _, sizes, directions = np.linalg.svd(rows, full_matrices=True)
         rank = int((sizes > 1e-8).sum())

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from partwright.assembly import Part
 from partwright.assembly.similarity import rotation_matrix
+from partwright.cleaning.acceptance import AcceptanceTest
+from partwright.cleaning.deviation_samples import State
 from partwright.cleaning.dimensions import turned_freely
-from partwright.cleaning.evidence import State
 from partwright.cleaning.grid import plain_rotation, rotation_of, rounded_rotations
-from partwright.cleaning.judging import Judge
 from partwright.cleaning.model import Model, quaternion_of
 from partwright.fields import Box, Field
 
@@ -106,35 +106,35 @@ def aligned(frame: Floats, rotation: Floats, freely: str) -> NDArray[np.int64] |
     return np.asarray(cosines.argmax(axis=1))
 
 
-def turned(state: State, judge: Judge) -> tuple[State, Frames]:
+def turned(state: State, acceptance: AcceptanceTest) -> tuple[State, Frames]:
     """Every leaf and its copies in their places' plainest orientation that costs little enough; parts that
-    meet the evidence most come first. The frames are those along which parts lie then."""
+    own the most samples come first. The frames are those along which parts lie then."""
     frames = _known(state.model)
-    size = np.bincount(state.evidence.owner, minlength=len(state.model.leaves))
+    size = np.bincount(state.samples.owner, minlength=len(state.model.leaves))
     for leaf in np.argsort(-size, kind="stable").tolist():
         part = state.model.leaves[leaf]
         freely = turned_freely(part.field)
         if not _plain_already(state.model, leaf, freely, frames):
-            for candidate in _candidates(state, leaf, frames, judge):
+            for candidate in _candidates(state, leaf, frames, acceptance):
                 copies = _turned_copies(part, candidate, freely, frames)
-                found = judge.leaf(state, leaf, state.model.with_leaf(leaf, copies), ("turn",))
+                found = acceptance.leaf(state, leaf, state.model.with_leaf(leaf, copies), ("turn",))
                 if found is not None:
                     state = found
                     break
             else:
-                state = _rounded(state, judge, leaf, freely, frames)
+                state = _rounded(state, acceptance, leaf, freely, frames)
         frames = frames.with_rotation(state.model.rotations[int(state.model.firsts[leaf])], freely)
     return state, frames
 
 
-def _rounded(state: State, judge: Judge, leaf: int, freely: str, frames: Frames) -> State:
+def _rounded(state: State, acceptance: AcceptanceTest, leaf: int, freely: str, frames: Frames) -> State:
     """At hundredths of a degree, whatever they cost: all angles are plain in the end."""
     rotation = state.model.rotations[int(state.model.firsts[leaf])]
     rotation = along(rotation[:, 2], freely) if freely in ("axis", "arrow") else rotation
     nearest = next(rounded_rotations(rotation, _FINEST))
     copies = _turned_copies(state.model.leaves[leaf], nearest, freely, frames)
     model = state.model.with_leaf(leaf, copies)
-    return judge.without_limit().leaf(state, leaf, model, ("turn", "number")) or state
+    return acceptance.without_limit().leaf(state, leaf, model, ("turn", "number")) or state
 
 
 def _known(model: Model) -> Frames:
@@ -169,7 +169,7 @@ def _plain_itself(rotation: Floats, field: Field, frames: Frames) -> bool:
     return lying or plain_rotation(rotation)
 
 
-def _candidates(state: State, leaf: int, frames: Frames, judge: Judge) -> Iterator[Floats]:
+def _candidates(state: State, leaf: int, frames: Frames, acceptance: AcceptanceTest) -> Iterator[Floats]:
     """Rotations of the leaf's first copy, plainest first."""
     model = state.model
     rotation = model.rotations[int(model.firsts[leaf])]
@@ -177,7 +177,7 @@ def _candidates(state: State, leaf: int, frames: Frames, judge: Judge) -> Iterat
     if freely == "all":
         yield np.eye(3)
         return
-    fine = np.degrees(2 * judge.tolerance / state.evidence.scale / _size(model.leaves[leaf]))
+    fine = np.degrees(2 * acceptance.tolerance / state.samples.scale / _size(model.leaves[leaf]))
     if freely in ("axis", "arrow"):
         direction = rotation[:, 2]
         for axis in [*_near(direction, frames.axes(), _NEAR), *_sensible(direction)]:

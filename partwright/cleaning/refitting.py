@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from partwright.cleaning.evidence import BAND, State
+from partwright.cleaning.deviation_samples import BAND, State
 from partwright.cleaning.model import Model
 from partwright.errors import ParameterError
 from partwright.fields import kernel
@@ -36,7 +36,7 @@ def refit(state: State, freedom: Floats, iterations: int) -> State:
         matrix[np.diag_indices_from(matrix)] += 1e-6 * max(float(matrix.diagonal().max()), 1e-12)
         step = freedom @ np.linalg.solve(matrix, -gradient)
         step *= min(
-            1.0, _LONGEST / max(float(np.abs(step * state.model.weights).max() * state.evidence.scale), 1e-12)
+            1.0, _LONGEST / max(float(np.abs(step * state.model.weights).max() * state.samples.scale), 1e-12)
         )
         try:
             trial = state.changed(state.model, state.vector + step, leaves)
@@ -59,7 +59,7 @@ def _moving(model: Model, freedom: Floats) -> list[int]:
 
 
 def _residual(state: State) -> Floats:
-    return np.tanh(state.field / _SOFT) - np.tanh(state.evidence.target / _SOFT)
+    return np.tanh(state.field / _SOFT) - np.tanh(state.samples.target / _SOFT)
 
 
 def _loss(state: State) -> float:
@@ -68,7 +68,7 @@ def _loss(state: State) -> float:
 
 def _jacobian(state: State, freedom: Floats, leaves: list[int]) -> sparse.csr_matrix:
     """(N, n) of the residuals: how the whole follows each copy, times the copy's difference quotients."""
-    model, evidence = state.model, state.evidence
+    model, samples = state.model, state.samples
     slope = (1 - np.tanh(state.field / _SOFT) ** 2) / _SOFT
     used = np.abs(freedom).max(axis=1) > 0
     data, rows, columns = [], [], []
@@ -82,11 +82,11 @@ def _jacobian(state: State, freedom: Floats, leaves: list[int]) -> sparse.csr_ma
             own_at = [
                 at for at in own if model.variables[at].kind != "place" or model.variables[at].copy == c
             ]
-            quotients = _quotients(state, int(c), own_at, evidence.points[index])
+            quotients = _quotients(state, int(c), own_at, samples.points[index])
             data.append((share * quotients).ravel())
             rows.append(np.tile(index, len(own_at)))
             columns.append(np.repeat(own_at, len(index)))
-    shape = (len(evidence.points), len(state.vector))
+    shape = (len(samples.points), len(state.vector))
     if not data:
         return sparse.csr_matrix(shape)
     triple = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
@@ -97,24 +97,24 @@ def _share(state: State, copy: int, index: NDArray[np.int64]) -> Floats:
     """How much the whole's distance moves with the copy's, at some points."""
     values = state.distances[:, index].copy()
     values[copy] += _NUDGE
-    moved = state.model.fold(values, state.model.blends * state.evidence.scale)
+    moved = state.model.fold(values, state.model.blends * state.samples.scale)
     return np.clip((moved - state.field[index]) / _NUDGE, -1.0, 1.0).astype(np.float64)
 
 
 def _quotients(state: State, copy: int, entries: list[int], points: NDArray[np.float32]) -> Floats:
     """(K, N) slopes of a copy's distance by entries of the vector; one-sided at the end of a range."""
-    model, evidence = state.model, state.evidence
+    model, samples = state.model, state.samples
     rows, spans = [], []
     for at in entries:
         ends = []
         for sign in (1.0, -1.0):
             vector = state.vector.copy()
-            vector[at] += sign * _NUDGE / evidence.scale / model.weights[at]
+            vector[at] += sign * _NUDGE / samples.scale / model.weights[at]
             try:
-                rows.append(model.rows([vector], copy, evidence.centre, evidence.scale))
+                rows.append(model.rows([vector], copy, samples.centre, samples.scale))
             except ParameterError:
                 vector = state.vector
-                rows.append(model.rows([vector], copy, evidence.centre, evidence.scale))
+                rows.append(model.rows([vector], copy, samples.centre, samples.scale))
             ends.append(vector[at])
         spans.append(max(ends[0] - ends[1], 1e-300))
     values = kernel.evaluate_parts(np.concatenate(rows), points).astype(np.float64)

@@ -10,10 +10,10 @@ from itertools import chain, islice
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.cleaning.evidence import State
+from partwright.cleaning.acceptance import AcceptanceTest
+from partwright.cleaning.deviation_samples import State
 from partwright.cleaning.features import Family, clusters, families, halves, meaningful
 from partwright.cleaning.grid import Grid
-from partwright.cleaning.judging import Judge
 from partwright.cleaning.linear import Equations
 from partwright.cleaning.orientations import Frames
 from partwright.cleaning.patterns import Circle, circles, equal_leaves, mirror_pairs
@@ -38,43 +38,45 @@ class Snapped:
     state: State
     equations: Equations
 
-    def tried(self, judge: Judge, rows: Sequence[tuple[Floats, float]], same: float) -> Snapped | None:
+    def tried(
+        self, acceptance: AcceptanceTest, rows: Sequence[tuple[Floats, float]], same: float
+    ) -> Snapped | None:
         """With further equations row @ vector = value, if they agree with the others and cost little."""
         equations: Equations | None = self.equations
         for row, value in rows:
             equations = equations.with_row(row, value, same) if equations is not None else None
         if equations is None:
             return None
-        state = judge.equations(self.state, equations)
+        state = acceptance.equations(self.state, equations)
         return None if state is None else Snapped(state, equations)
 
 
-def snapped(state: State, judge: Judge, frames: Frames, grid: Grid) -> State:
+def snapped(state: State, acceptance: AcceptanceTest, frames: Frames, grid: Grid) -> State:
     """All relations, one refit of what they leave free, and at last plain numbers."""
-    reach = _REACH * judge.tolerance / state.evidence.scale
+    reach = _REACH * acceptance.tolerance / state.samples.scale
     now = Snapped(state, _typed(state, grid))
     found = list(circles(state.model, state.vector, frames, reach))
     kept = []
     for circle in found:
         leaves = sorted({int(state.model.leaf_of[c]) for c in circle.copies})
         trial = now.tried(
-            judge, [*_equal(now.state, leaves), *((row, 0.0) for row in circle.rows)], grid.same
+            acceptance, [*_equal(now.state, leaves), *((row, 0.0) for row in circle.rows)], grid.same
         )
         if trial is not None:
             now = trial
             kept.append(circle)
     for group in equal_leaves(state.model, now.state.vector, reach):
-        now = now.tried(judge, _equal(now.state, group), grid.same) or now
+        now = now.tried(acceptance, _equal(now.state, group), grid.same) or now
     for family in families(state.model, frames):
-        now = _coinciding(now, judge, family, reach, grid.same)
+        now = _coinciding(now, acceptance, family, reach, grid.same)
         if family.kind == "centre":
-            now = _mirrored(now, judge, frames, family, reach, grid.same)
+            now = _mirrored(now, acceptance, frames, family, reach, grid.same)
     phases = []
     for circle in kept:
-        now, phase = _sensible_phase(now, judge, circle, frames, grid.same)
+        now, phase = _sensible_phase(now, acceptance, circle, frames, grid.same)
         phases.append((circle, phase))
-    now = _refitted(now, judge)
-    return _rounded(now, judge, grid, [c.radius(state.model, frames, p) for c, p in phases]).state
+    now = _refitted(now, acceptance)
+    return _rounded(now, acceptance, grid, [c.radius(state.model, frames, p) for c, p in phases]).state
 
 
 def _typed(state: State, grid: Grid) -> Equations:
@@ -106,7 +108,9 @@ def _equal(state: State, leaves: Sequence[int]) -> list[tuple[Floats, float]]:
     return rows
 
 
-def _coinciding(now: Snapped, judge: Judge, family: Family, reach: float, same: float) -> Snapped:
+def _coinciding(
+    now: Snapped, acceptance: AcceptanceTest, family: Family, reach: float, same: float
+) -> Snapped:
     """The largest clusters first; one that costs too much is parted at its widest gap."""
     relative = _ALIKE if family.kind == "number" else 0.0
     pending = clusters(family.members, now.state.vector, reach, relative)
@@ -116,7 +120,7 @@ def _coinciding(now: Snapped, judge: Judge, family: Family, reach: float, same: 
             continue
         anchor = next((one for one in group if one.owner is None), group[0])
         rows = [(one.row - anchor.row, 0.0) for one in group if one is not anchor]
-        trial = now.tried(judge, rows, same)
+        trial = now.tried(acceptance, rows, same)
         if trial is not None:
             now = trial
         elif len(group) > 2:
@@ -126,7 +130,7 @@ def _coinciding(now: Snapped, judge: Judge, family: Family, reach: float, same: 
 
 
 def _mirrored(
-    now: Snapped, judge: Judge, frames: Frames, family: Family, reach: float, same: float
+    now: Snapped, acceptance: AcceptanceTest, frames: Frames, family: Family, reach: float, same: float
 ) -> Snapped:
     """Pairs of equal parts on both sides of a plane through centres."""
     assert family.axis is not None
@@ -134,12 +138,12 @@ def _mirrored(
     planes = [group[0] for group in clusters(family.members, now.state.vector, same)]
     planes = [*(one for one in family.members if one.owner is None), *planes]
     for _, _, row in mirror_pairs(now.state.model, now.state.vector, frames, planes, axis, frame, reach):
-        now = now.tried(judge, [(row, 0.0)], same) or now
+        now = now.tried(acceptance, [(row, 0.0)], same) or now
     return now
 
 
 def _sensible_phase(
-    now: Snapped, judge: Judge, circle: Circle, frames: Frames, same: float
+    now: Snapped, acceptance: AcceptanceTest, circle: Circle, frames: Frames, same: float
 ) -> tuple[Snapped, float]:
     """A circle's first copy at a multiple of 15 degrees, if near; and its angle then."""
     model = now.state.model
@@ -148,35 +152,37 @@ def _sensible_phase(
     rounded = round(phase / _PHASE) * _PHASE
     if abs(rounded - phase) <= _PHASE_NEAR:
         _, off = circle.radius(model, frames, rounded)
-        trial = now.tried(judge, [(off, 0.0)], same)
+        trial = now.tried(acceptance, [(off, 0.0)], same)
         if trial is not None:
             return trial, rounded
     return now, phase
 
 
-def _refitted(now: Snapped, judge: Judge) -> Snapped:
+def _refitted(now: Snapped, acceptance: AcceptanceTest) -> Snapped:
     """As far towards the least squares as no part gets worse than it may."""
-    held = np.array([v.kind == "turn" for v in now.state.model.variables])
-    step = refit(now.state, now.equations.freedom(held), _ITERATIONS).vector - now.state.vector
+    locked = np.array([v.kind == "turn" for v in now.state.model.variables])
+    step = refit(now.state, now.equations.freedom(locked), _ITERATIONS).vector - now.state.vector
     for share in _SHARES:
         equations = dataclasses.replace(now.equations, vector=now.state.vector + share * step)
-        better = judge.equations(now.state, equations)
+        better = acceptance.equations(now.state, equations)
         if better is not None:
             return Snapped(better, equations)
     return now
 
 
-def _rounded(now: Snapped, judge: Judge, grid: Grid, radii: Sequence[tuple[Floats, Floats]]) -> Snapped:
+def _rounded(
+    now: Snapped, acceptance: AcceptanceTest, grid: Grid, radii: Sequence[tuple[Floats, Floats]]
+) -> Snapped:
     """Dimensions, radii of circles and places at the plainest numbers that cost little enough; at the finest
     whatever they cost, so that all are plain in the end."""
-    tolerance = _ROUNDED * judge.tolerance / now.state.evidence.scale
-    free = judge.without_limit()
+    tolerance = _ROUNDED * acceptance.tolerance / now.state.samples.scale
+    free = acceptance.without_limit()
     for row, limit, ratio in _entries(now, radii, tolerance):
         if now.equations.determined(row):
             continue
         value = float(row @ now.state.vector)
         near = islice(grid.nearest(value, limit, ratio), _ROUNDINGS)
-        tries = ((judge, rounded) for rounded in near)
+        tries = ((acceptance, rounded) for rounded in near)
         rest = ((free, rounded) for rounded in grid.finest(value, ratio))
         trials = (now.tried(who, [(row, rounded)], grid.same) for who, rounded in chain(tries, rest))
         now = next((trial for trial in trials if trial is not None), now)

@@ -31,7 +31,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
     from partwright.cleaning import clean
-    from partwright.cleaning.report import check_suffix, write_cleaned
+    from partwright.cleaning.cleaned_file import check_suffix, write_cleaned
     from partwright.cli.tables import print_cleaned
     from partwright.shapes import load_shape
 

@@ -1,4 +1,4 @@
-"""What cleaning is judged by: points of surfaces, each owned by a part, and how far off the solid is there.
+"""What changes are tested on: points of surfaces, each owned by a part, and how far off the solid is there.
 
 With a shape, the points lie on the shape's surface and on the given assembly's, and the target is the shape's
 signed distance. Without one, they lie on the assembly's own surface, and the target is its own distance.
@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.assembly import Assembly, Similarity
 from partwright.assembly.distance import unit_similarity
 from partwright.cleaning.model import Model
 from partwright.fields import kernel
@@ -28,17 +29,22 @@ _NEWTON, _NUDGE = 5, 1e-3
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """points (N, 3), target (N,): unit frame; owner (N,): leaves. centre, scale: of the unit frame."""
+class DeviationSamples:
+    """Points of both surfaces, the same from the given assembly to the cleaned one."""
 
     points: NDArray[np.float32]
+    """(N, 3) in the unit frame."""
     target: NDArray[np.float32]
+    """(N,) signed distances that the assembly should have there, unit lengths."""
     owner: NDArray[np.int64]
+    """(N,) the leaf whose surface each is a point of, or lies nearest to."""
     centre: Floats
+    """(3,) of the unit frame, own units."""
     scale: float
+    """Unit lengths in one of own units: u = (p - centre) * scale."""
 
     @classmethod
-    def of(cls, model: Model, shape: Shape | None) -> Evidence:
+    def of(cls, model: Model, shape: Shape | None) -> DeviationSamples:
         if shape is None:
             frame = unit_similarity(model.assembly)
             scale, centre = frame.scale, -np.array(frame.translation) / frame.scale
@@ -61,6 +67,16 @@ class Evidence:
         rows = _rows(model, vector, copies, self.centre, self.scale)
         return kernel.evaluate_parts(rows, self.points)
 
+    @property
+    def frame(self) -> Similarity:
+        """From own units to the unit frame."""
+        x, y, z = (-self.scale * self.centre).tolist()
+        return Similarity(self.scale, translation=(x, y, z))
+
+    def mean_deviation(self, local: Assembly) -> float:
+        """Mean difference between a unit-frame assembly's distance and the target, own units."""
+        return float(np.abs(local.distance(self.points) - self.target).mean()) / self.scale
+
     @cached_property
     def clipped(self) -> NDArray[np.float32]:
         return np.clip(self.target, -BAND, BAND)
@@ -68,45 +84,48 @@ class Evidence:
 
 @dataclass(frozen=True)
 class State:
-    """A model with its copies' distances (C, N) at the evidence's points, and the whole's (N,)."""
+    """A model with its distances at the samples: what a step of cleaning starts from, and what it makes."""
 
-    evidence: Evidence
+    samples: DeviationSamples
     model: Model
     vector: Floats
+    """(n,) the numbers that are tried, own units; `model.vector` until something moves."""
     distances: NDArray[np.float32]
+    """(C, N) of each copy alone, unit lengths."""
     field: NDArray[np.float32]
+    """(N,) of the whole, unit lengths."""
 
     @classmethod
-    def of(cls, evidence: Evidence, model: Model, vector: Floats | None = None) -> State:
+    def of(cls, samples: DeviationSamples, model: Model, vector: Floats | None = None) -> State:
         """Raises ParameterError where a field does not allow its numbers."""
         vector = model.vector if vector is None else vector
-        distances = evidence.distances(model, vector, range(len(model.leaf_of)))
-        field = model.fold(distances, model.blends * evidence.scale)
-        return cls(evidence, model, vector, distances, field)
+        distances = samples.distances(model, vector, range(len(model.leaf_of)))
+        field = model.fold(distances, model.blends * samples.scale)
+        return cls(samples, model, vector, distances, field)
 
     def changed(self, model: Model, vector: Floats, leaves: Sequence[int]) -> State:
         """The state after a change of some leaves alone. Raises ParameterError as `of`."""
         copies = np.flatnonzero(np.isin(model.leaf_of, leaves))
         distances = self.distances.copy()
-        distances[copies] = self.evidence.distances(model, vector, copies.tolist())
+        distances[copies] = self.samples.distances(model, vector, copies.tolist())
         field = self.field.copy()
         near = (np.minimum(np.abs(distances[copies]), np.abs(self.distances[copies])) < 2 * BAND).any(axis=0)
         index = np.flatnonzero(near)
-        field[index] = model.fold(distances[:, index], model.blends * self.evidence.scale)
-        return State(self.evidence, model, vector, distances, field)
+        field[index] = model.fold(distances[:, index], model.blends * self.samples.scale)
+        return State(self.samples, model, vector, distances, field)
 
     def settled(self) -> State:
         """The same, its model being what the vector says."""
         model = self.model.moved(self.vector)
-        return State(self.evidence, model, model.vector, self.distances, self.field)
+        return State(self.samples, model, model.vector, self.distances, self.field)
 
     @cached_property
     def deviations(self) -> Floats:
         """(L,) mean distance to the target over each leaf's own points, unit lengths; 0 without points."""
-        apart = np.abs(np.clip(self.field, -BAND, BAND) - self.evidence.clipped)
+        apart = np.abs(np.clip(self.field, -BAND, BAND) - self.samples.clipped)
         count = len(self.model.leaves)
-        sums = np.bincount(self.evidence.owner, apart, minlength=count)
-        points = np.bincount(self.evidence.owner, minlength=count)
+        sums = np.bincount(self.samples.owner, apart, minlength=count)
+        points = np.bincount(self.samples.owner, minlength=count)
         return np.asarray(sums / np.maximum(points, 1))
 
 

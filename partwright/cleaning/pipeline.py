@@ -9,26 +9,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from partwright.cleaning.evidence import Evidence, State
+from partwright.assembly import Assembly
+from partwright.cleaning.acceptance import AcceptanceTest
+from partwright.cleaning.deviation_samples import DeviationSamples, State
 from partwright.cleaning.grid import Grid
-from partwright.cleaning.judging import Judge
-from partwright.cleaning.kinds import plainer
 from partwright.cleaning.model import Model
 from partwright.cleaning.orientations import turned
 from partwright.cleaning.relations import Relation, relations
-from partwright.cleaning.repeats import collapsed, tidy, unchanged
+from partwright.cleaning.repeated_parts import collapsed, tidy, unchanged
 from partwright.cleaning.snapping import snapped
+from partwright.cleaning.solid_kinds import plainer
 from partwright.errors import SettingError
+from partwright.meshing import occupancy_grid
 from partwright.metrics.iou import RESOLUTION, iou
 from partwright.shapes import Shape
 from partwright.tolerances.noise import roughness
-
-if TYPE_CHECKING:
-    from partwright.assembly import Assembly
 
 TOLERANCE = 5e-4  # of the longest side
 _COARSEST = 0.05  # of the longest side
@@ -37,12 +37,14 @@ _FINEST = 1e-5
 
 @dataclass(frozen=True)
 class Agreement:
-    """iou: with the shape, or with the given assembly where there is no shape. mean_deviation: over points of
-    both surfaces, own units. parts: leaves."""
+    """How well an assembly agrees with what it stands for."""
 
     iou: float
+    """With the shape, or with the given assembly where there is no shape."""
     mean_deviation: float
+    """Over points of both surfaces, own units."""
     parts: int
+    """Leaves."""
 
     def to_dict(self) -> dict[str, float]:
         return {"iou": self.iou, "mean_deviation": self.mean_deviation, "parts": self.parts}
@@ -50,15 +52,20 @@ class Agreement:
 
 @dataclass(frozen=True)
 class Cleaned:
-    """assembly: the very one that was given where nothing was to be done. relations: all that hold in it.
-    tolerance: own units."""
+    """What `clean` made."""
 
     assembly: Assembly
+    """The very one that was given where nothing was to be done."""
     relations: tuple[Relation, ...]
+    """All that hold in it."""
     tolerance: float
+    """How much further from the shape each part could come to lie, on average; own units."""
     before: Agreement
+    """Of the given assembly."""
     after: Agreement
+    """Of the cleaned one, at the very samples and cells of `before`."""
     changed: bool
+    """Whether anything but rounding differs."""
 
     def to_dict(self) -> dict[str, Any]:
         """For report.json."""
@@ -90,17 +97,21 @@ def clean(assembly: Assembly, shape: Shape | None = None, tolerance: float | Non
     target = assembly if shape is None else shape
     tolerance = checked_tolerance(tolerance, target)
     grid = Grid.of(_longest(target))
-    evidence = Evidence.of(model, shape)
-    given = State.of(evidence, model)
-    judge = Judge.of(given, tolerance * evidence.scale)
-    state, frames = turned(plainer(given, judge, grid), judge)
-    state = snapped(state, judge, frames, grid)
+    samples = DeviationSamples.of(model, shape)
+    given = State.of(samples, model)
+    acceptance = AcceptanceTest.of(given, tolerance * samples.scale)
+    state, frames = turned(plainer(given, acceptance, grid), acceptance)
+    state = snapped(state, acceptance, frames, grid)
     tidied = np.array([tidy(value, grid) for value in state.vector.tolist()])
     made = collapsed(state.model.moved(tidied), frames, grid)
     changed = not unchanged(model, made, grid)
     result = made if changed else assembly
-    before = _agreement(assembly, assembly, given, shape)
-    after = _agreement(result, assembly, state, shape) if changed else before
+    if shape is None:
+        occupied = occupancy_grid(assembly.transformed(samples.frame).distance, RESOLUTION)
+    else:
+        occupied = shape.unit_occupancy(RESOLUTION)
+    before = _agreement(assembly, samples, occupied)
+    after = _agreement(result, samples, occupied) if changed else before
     return Cleaned(result, relations(result, frames, grid), tolerance, before, after, changed)
 
 
@@ -144,16 +155,7 @@ def checked_tolerance(tolerance: float | None, of: Assembly | Shape) -> float:
     return tolerance
 
 
-def _agreement(assembly: Assembly, given: Assembly, state: State, shape: Shape | None) -> Agreement:
-    from partwright.assembly import Similarity
-    from partwright.meshing import occupancy_grid
-
-    centre, scale = state.evidence.centre, state.evidence.scale
-    x, y, z = (-scale * centre).tolist()
-    frame = Similarity(scale, translation=(x, y, z))
-    if shape is not None:
-        target = shape.unit_occupancy(RESOLUTION)
-    else:
-        target = occupancy_grid(given.transformed(frame).distance, RESOLUTION)
-    mean = float(np.abs(state.field - state.evidence.target).mean()) / scale
-    return Agreement(iou(assembly.transformed(frame).distance, target), mean, len(assembly))
+def _agreement(assembly: Assembly, samples: DeviationSamples, occupied: NDArray[np.bool_]) -> Agreement:
+    """occupied: (R, R, R) cells of the unit frame that should be inside."""
+    local = assembly.transformed(samples.frame)
+    return Agreement(iou(local.distance, occupied), samples.mean_deviation(local), len(assembly))

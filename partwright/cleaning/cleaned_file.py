@@ -7,7 +7,7 @@ from pathlib import Path
 
 from partwright import __version__
 from partwright.atomic_io import report_path, write_bytes
-from partwright.cleaning.tidying import Cleaned
+from partwright.cleaning.pipeline import Cleaned
 from partwright.errors import NothingToCleanError, UnsupportedFormatError
 
 

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 from partwright.approximation.nearest import nearest_solid
 from partwright.approximation.recognise import exact_solid
 from partwright.assembly import Part
+from partwright.cleaning.acceptance import AcceptanceTest
+from partwright.cleaning.deviation_samples import State
 from partwright.cleaning.dimensions import dimensions, values
-from partwright.cleaning.evidence import State
 from partwright.cleaning.grid import Grid
-from partwright.cleaning.judging import Judge
 from partwright.errors import NoSurfaceError
 from partwright.fields import Cone, Cylinder, Field, Frustum, SuperFrustum
 
@@ -20,26 +20,28 @@ _SQUARE = 0.1  # relative difference of sides that are tried as one
 _DILATED = 0.1  # of the longest side: a dilation under this is tried as none
 
 
-def plainer(state: State, judge: Judge, grid: Grid) -> State:
+def plainer(state: State, acceptance: AcceptanceTest, grid: Grid) -> State:
     """Each leaf with the plainest blend and as the plainest field that cost little enough."""
     for leaf in range(len(state.model.leaves)):
         part = state.model.leaves[leaf]
         if not is_plain(part.field, grid):
-            state = _simplified(_blended(state, judge, grid, leaf, (0.0,)), judge, leaf)
+            state = _simplified(_blended(state, acceptance, grid, leaf, (0.0,)), acceptance, leaf)
         blend = state.model.leaves[leaf].blend
-        near = grid.nearest(blend, judge.tolerance / state.evidence.scale)
-        state = _blended(state, judge, grid, leaf, (0.0, *near))
+        near = grid.nearest(blend, acceptance.tolerance / state.samples.scale)
+        state = _blended(state, acceptance, grid, leaf, (0.0, *near))
         if not grid.plain(state.model.leaves[leaf].blend):
-            state = _blended(state, judge.without_limit(), grid, leaf, grid.finest(blend))
+            state = _blended(state, acceptance.without_limit(), grid, leaf, grid.finest(blend))
     return state
 
 
-def _blended(state: State, judge: Judge, grid: Grid, leaf: int, blends: Iterable[float]) -> State:
+def _blended(
+    state: State, acceptance: AcceptanceTest, grid: Grid, leaf: int, blends: Iterable[float]
+) -> State:
     """With the first of these blends that costs little enough; one that is plain stays."""
     part = state.model.leaves[leaf]
     if grid.plain(part.blend):
         return state
-    trials = (_tried(state, judge, leaf, dataclasses.replace(part, blend=blend)) for blend in blends)
+    trials = (_tried(state, acceptance, leaf, dataclasses.replace(part, blend=blend)) for blend in blends)
     return next((trial for trial in trials if trial is not None), state)
 
 
@@ -51,46 +53,46 @@ def is_plain(field: Field, grid: Grid) -> bool:
     )
 
 
-def _simplified(state: State, judge: Judge, leaf: int) -> State:
+def _simplified(state: State, acceptance: AcceptanceTest, leaf: int) -> State:
     part = state.model.leaves[leaf]
     if isinstance(part.field, SuperFrustum):
-        named = _named(state, judge, leaf)
+        named = _named(state, acceptance, leaf)
         if named is None:
-            state = _plain_ratios(state, judge, leaf)
+            state = _plain_ratios(state, acceptance, leaf)
             part = state.model.leaves[leaf]
             exact = exact_solid(part.field)
             if exact is not None:
-                state = _tried(state, judge, leaf, dataclasses.replace(part, field=exact)) or state
+                state = _tried(state, acceptance, leaf, dataclasses.replace(part, field=exact)) or state
         else:
             state = named
     for other in _special_cases(state.model.leaves[leaf]):
-        found = _tried(state, judge, leaf, other)
+        found = _tried(state, acceptance, leaf, other)
         if found is not None:
             return found
     return state
 
 
-def _named(state: State, judge: Judge, leaf: int) -> State | None:
+def _named(state: State, acceptance: AcceptanceTest, leaf: int) -> State | None:
     """As the nearest named solid."""
     try:
         near = nearest_solid(state.model.leaves[leaf])
     except NoSurfaceError:
         return None
-    return _tried(state, judge, leaf, near.part_with_solid)
+    return _tried(state, acceptance, leaf, near.part_with_solid)
 
 
-def _plain_ratios(state: State, judge: Judge, leaf: int) -> State:
+def _plain_ratios(state: State, acceptance: AcceptanceTest, leaf: int) -> State:
     """One ratio after the other to 0 or 1, each for good."""
-    held: list[str] = []
+    locked: list[str] = []
     for name in ("bulge", "onion", "taper", "square", "roundness", "dilation"):
         field = state.model.leaves[leaf].field
         assert isinstance(field, SuperFrustum)
         for other in _plain_values(field, name):
             part = dataclasses.replace(state.model.leaves[leaf], field=other)
-            found = _tried(state, judge, leaf, part, (*held, name))
+            found = _tried(state, acceptance, leaf, part, (*locked, name))
             if found is not None:
                 state = found
-                held.append(name)
+                locked.append(name)
                 break
     return state
 
@@ -125,6 +127,8 @@ def _special_cases(part: Part) -> Iterator[Part]:
             yield dataclasses.replace(part, field=Cone(low, field.height))
 
 
-def _tried(state: State, judge: Judge, leaf: int, part: Part, held: tuple[str, ...] = ()) -> State | None:
+def _tried(
+    state: State, acceptance: AcceptanceTest, leaf: int, part: Part, locked: tuple[str, ...] = ()
+) -> State | None:
     model = state.model.with_leaf(leaf, part.copies)
-    return judge.leaf(state, leaf, model, held)
+    return acceptance.leaf(state, leaf, model, locked)

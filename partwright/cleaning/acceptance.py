@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.cleaning.evidence import State
+from partwright.cleaning.deviation_samples import State
 from partwright.cleaning.linear import Equations
 from partwright.cleaning.model import Model
 from partwright.cleaning.refitting import refit
@@ -24,28 +24,29 @@ _LOCAL = 6  # iterations of a refit of one part
 
 
 @dataclass(frozen=True)
-class Judge:
-    """limit: (L,) mean deviation that each part's own surface may have; tolerance: unit lengths. Of a part's
-    thickness, a sixtieth at most may be lost: that is about 3 % of its volume."""
+class AcceptanceTest:
+    """What a change may cost. Of a part's thickness, a sixtieth at most may be lost: 3 % of its volume."""
 
     limit: Floats
+    """(L,) mean deviation that each part's own surface may have, unit lengths."""
     tolerance: float
+    """How much of that the cleaning may add, unit lengths."""
 
     @classmethod
-    def of(cls, state: State, tolerance: float) -> Judge:
+    def of(cls, state: State, tolerance: float) -> AcceptanceTest:
         fields = (part.field.superfrustum() for part in state.model.leaves)  # type: ignore[attr-defined]
-        thickness = np.array([field.thinnest for field in fields]) * state.evidence.scale
+        thickness = np.array([field.thinnest for field in fields]) * state.samples.scale
         return cls(state.deviations + np.minimum(tolerance, thickness / _THIN), tolerance)
 
-    def without_limit(self) -> Judge:
-        """One who accepts whatever the fields allow."""
-        return Judge(np.full(len(self.limit), np.inf), self.tolerance)
+    def without_limit(self) -> AcceptanceTest:
+        """One that accepts whatever the fields allow."""
+        return AcceptanceTest(np.full(len(self.limit), np.inf), self.tolerance)
 
     def accepts(self, state: State) -> bool:
         return bool((state.deviations <= self.limit + 1e-9).all())
 
-    def leaf(self, state: State, leaf: int, model: Model, held: Sequence[str] = ()) -> State | None:
-        """The state with one leaf otherwise, its own numbers but those `held` (variable kinds or names of
+    def leaf(self, state: State, leaf: int, model: Model, locked: Sequence[str] = ()) -> State | None:
+        """The state with one leaf otherwise, its own numbers but those `locked` (variable kinds or names of
         dimensions) fitted anew; None where that costs too much."""
         try:
             trial = state.changed(model, model.vector, [leaf])
@@ -54,7 +55,7 @@ class Judge:
         free = [
             at
             for at, v in enumerate(model.variables)
-            if v.leaf == leaf and v.kind not in held and not (v.dimension and v.dimension.name in held)
+            if v.leaf == leaf and v.kind not in locked and not (v.dimension and v.dimension.name in locked)
         ]
         refitted = refit(trial, _together(model, leaf, free), _LOCAL)
         best = min((trial, refitted), key=lambda s: float((s.deviations - self.limit).max()))
