@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from partwright.assembly import Similarity
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 POOR_IOU = 0.85
 POOR_DEVIATION = 0.1  # of the longest side
 UNSURE = 0.5
+MUCH_MISSING = 0.02  # of the surface
 SAME_VOLUME = 0.01  # of the input's triangles and of its inside: then no surface runs through it twice
 
 
@@ -27,6 +29,7 @@ def about_input(shape: Shape, source: str | None) -> dict[str, Any]:
         "up": shape.up,
         "triangles": len(shape.input_faces),
         "repairs": list(shape.repairs),
+        "openings": asdict(shape.openings),
         "confidence": shape.confidence,
     }
 
@@ -72,9 +75,28 @@ def warnings(shape: Shape, scores: Scores) -> list[str]:
             f"the fit is poor in places: IoU {scores.iou:.3f}; it is furthest off, by "
             f"{scores.max_deviation:.3g}{unit}, at the {scores.worst_place}; try --quality high or more parts"
         )
+    if shape.openings.share > MUCH_MISSING:
+        result.append(_about_openings(shape))
     if shape.confidence < UNSURE:
         repairs = "; ".join(shape.repairs)
         result.append(
             f"it is unsure what lies inside this surface (confidence {shape.confidence:.2f}): {repairs}"
         )
     return result
+
+
+def _about_openings(shape: Shape) -> str:
+    """How much of the surface is made up, and where: scores are against the repaired shape, so hide it."""
+    from partwright.metrics.deviation import place_name
+
+    openings = shape.openings
+    assert openings.largest is not None  # what has a share has a place
+    middle = shape.frame.to_unit(openings.largest)
+    size = shape.frame.length_to_unit(shape.vertices.max(axis=0) - shape.vertices.min(axis=0))
+    place = f"at the {place_name(middle, size, shape.up)}"
+    if openings.count > 1:
+        place = f"in {openings.count} places, the largest {place}"
+    return (
+        f"about {openings.share:.0%} of the surface was missing, {place}, and is made up; the scores are "
+        "against the repaired shape. Mend the input where that matters"
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from partwright.shapes.distance import DistanceSource, MeshDistance
 from partwright.shapes.frame import LONGEST_SIDE, UnitFrame
 from partwright.shapes.grid import DistanceGrid
+from partwright.shapes.holes import Openings
 from partwright.shapes.loading import MESH_SUFFIXES
 from partwright.shapes.reading import SUFFIXES
 from partwright.shapes.sampling import Samples, SurfaceSamples
@@ -22,6 +23,7 @@ __all__ = [
     "MeshDistance",
     "Node",
     "NodeLeftOutWarning",
+    "Openings",
     "Samples",
     "Shape",
     "SurfaceSamples",

@@ -1,21 +1,38 @@
-"""Holes in a surface: a fan of triangles over each opening that is one."""
+"""Openings of a surface: a fan of triangles over each that is one, and how much of the surface was missing."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from partwright.shapes.cleaning import counted
 from partwright.shapes.distance import MeshDistance
-from partwright.shapes.topology import EdgeTable, boundary_loops
+from partwright.shapes.sampling import uniform_box
+from partwright.shapes.topology import EdgeTable, boundary_loops, components
 
 _HALF = 0.3  # a lid over a true opening sees a winding number within 0.5 +- this on both of its sides
 _STEP = 1e-4
+_PROBES = 4000  # points from which what stays open is looked at
+
+
+@dataclass(frozen=True)
+class Openings:
+    """What the input's surface left open and repair made up, or left to the winding number.
+
+    count: openings. share: of the whole surface's area that they take, 0 to 1. largest: middle (3,) of the
+    largest, None where there is none.
+    """
+
+    count: int = 0
+    share: float = 0.0
+    largest: tuple[float, float, float] | None = None
 
 
 def fill_holes(
     vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
-) -> tuple[NDArray[np.float64], EdgeTable]:
+) -> tuple[NDArray[np.float64], EdgeTable, Openings]:
     """Close every opening that a fan from the middle of its rim closes.
 
     The rim of a loose patch that other patches already cover is no opening: there the winding number is near
@@ -23,8 +40,6 @@ def fill_holes(
     """
     faces = edges.faces
     loops = boundary_loops(edges.open_half_edges)
-    if not loops:
-        return vertices, edges
     source = MeshDistance(vertices, faces, faces, closed=False)
     lids: list[NDArray[np.int64]] = []
     middles: list[NDArray[np.float64]] = []
@@ -37,12 +52,35 @@ def fill_holes(
             lids.append(np.stack([np.roll(loop, -1), loop, number], axis=1))
             middles.append(middle)
     if not lids:
-        return vertices, edges
+        return vertices, edges, Openings()
     lid = np.concatenate(lids)
-    filled = np.concatenate([vertices, middles]), np.concatenate([faces, lid])
-    share = _area(filled[0], lid) / _area(*filled)
+    closed, faces = np.concatenate([vertices, middles]), np.concatenate([faces, lid])
+    area = np.array([_area(closed, one) for one in lids])
+    share = float(area.sum()) / _area(closed, faces)
     notes.append(f"filled {counted(len(lids), 'hole')} ({share:.1%} of the surface)")
-    return filled[0], EdgeTable(filled[1])
+    x, y, z = middles[int(area.argmax())].tolist()
+    return closed, EdgeTable(faces), Openings(len(lids), share, (x, y, z))
+
+
+def with_what_stays_open(filled: Openings, vertices: NDArray[np.float64], edges: EdgeTable) -> Openings:
+    """`filled` and what no fan closes: there the share is that of directions, from points within, in which
+    no surface is met, which is what their winding number lacks to 1."""
+    faces = edges.faces
+    points = uniform_box(vertices.min(axis=0), vertices.max(axis=0), _PROBES, 0)
+    winding = MeshDistance(vertices, faces, faces, closed=False).winding(points)
+    inside = winding > 0.5
+    share = float(np.clip(1 - winding[inside], 0, None).mean()) if inside.any() else 0.0
+    rim = edges.unbalanced_half_edges
+    used, numbered = np.unique(rim, return_inverse=True)
+    numbered = numbered.reshape(-1, 2)
+    label = components(len(used), numbered[:, 0], numbered[:, 1])[numbered[:, 0]]
+    length = np.linalg.norm(np.diff(vertices[rim], axis=1)[:, 0], axis=1)
+    longest = label == np.bincount(label, length).argmax()
+    largest = filled.largest
+    if share > filled.share:
+        x, y, z = np.average(vertices[rim[longest]].mean(axis=1), axis=0, weights=length[longest]).tolist()
+        largest = (x, y, z)
+    return Openings(filled.count + int(label.max()) + 1, min(1.0, filled.share + share), largest)
 
 
 def _is_opening(source: MeshDistance, rim: NDArray[np.float64], middle: NDArray[np.float64]) -> bool:

@@ -6,7 +6,7 @@ Geometry is moved only where it is open: closed thin walls come out as they went
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from partwright.errors import EmptyShapeError, FlatShapeError, OpenShellError
 from partwright.shapes.boolean import unite
 from partwright.shapes.cleaning import drop_doubles, merge_vertices, weld_boundary
 from partwright.shapes.distance import MeshDistance
-from partwright.shapes.holes import fill_holes
+from partwright.shapes.holes import Openings, fill_holes, with_what_stays_open
 from partwright.shapes.orientation import orient
 from partwright.shapes.sampling import sample_triangles
 from partwright.shapes.topology import EdgeTable, components, signed_volumes
@@ -36,7 +36,7 @@ class Surface:
 
     `faces` is the outer surface. `winding_faces` decide the inside and may hold sheets within the shape as
     well; with `closed` they have no open edge. `simple`: no point is enclosed twice, so volume is a sum over
-    `faces`.
+    `faces`. `openings`: what of the surface was missing.
     """
 
     vertices: NDArray[np.float64]
@@ -46,6 +46,7 @@ class Surface:
     simple: bool
     repairs: tuple[str, ...]
     confidence: float
+    openings: Openings = Openings()
 
     def distance(self) -> MeshDistance:
         """The distance source of this surface."""
@@ -66,16 +67,18 @@ def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Surface:
         raise EmptyShapeError("no triangle has any area; export the shape again with its surface")
     vertices, edges = weld_boundary(vertices, EdgeTable(faces), notes)
     edges = orient(vertices, edges, notes)
-    confidence = 1.0
-    if edges.balance.any():
-        confidence = _confidence_of_open(vertices, edges.faces)
-        vertices, edges = fill_holes(vertices, edges, notes)
-    if edges.balance.any():
-        notes.append(
-            "the surface stays open; inside and outside are told apart by the generalised winding number"
-        )
-        return _surface_of_sheets(vertices, edges.faces, notes, confidence, closed=False)
-    return _surface_of_closed(vertices, edges, notes, confidence)
+    if not edges.balance.any():
+        return _surface_of_closed(vertices, edges, notes, 1.0)
+    confidence = _confidence_of_open(vertices, edges.faces)
+    vertices, edges, openings = fill_holes(vertices, edges, notes)
+    if not edges.balance.any():
+        return replace(_surface_of_closed(vertices, edges, notes, confidence), openings=openings)
+    notes.append(
+        "the surface stays open; inside and outside are told apart by the generalised winding number"
+    )
+    openings = with_what_stays_open(openings, vertices, edges)
+    surface = _surface_of_sheets(vertices, edges.faces, notes, confidence, closed=False)
+    return replace(surface, openings=openings)
 
 
 def _refuse_plane(vertices: NDArray[np.float64]) -> None:

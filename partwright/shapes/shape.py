@@ -15,6 +15,7 @@ from partwright.errors import NotFiniteError, PartwrightError, SettingError
 from partwright.shapes.curvature import CurvatureField
 from partwright.shapes.frame import UnitFrame
 from partwright.shapes.grid import DistanceGrid, distance_grid, occupancy_grid
+from partwright.shapes.holes import Openings
 from partwright.shapes.reading import read_source, source_of
 from partwright.shapes.repair import repair
 from partwright.shapes.sampling import (
@@ -57,8 +58,9 @@ class Shape:
     name: of the file, without its suffix, or of the node. vertices (V, 3) float64 and faces (F, 3) int64: the
     repaired outer surface in own units. input_vertices, input_faces: as read, before any repair; `nodes` are
     ranges of input_faces. frame: to the unit frame and back. unit: "mm", "m" ... or None; up: "x", "y", "z",
-    "-z" ... or None. repairs: what was done to the surface, a sentence each. confidence: 0 to 1, how sure
-    inside and outside are. Results are cached by their arguments; returned arrays are read-only.
+    "-z" ... or None. repairs: what was done to the surface, a sentence each. openings: how much of the
+    surface the input left out, and where the most of it, own units. confidence: 0 to 1, how sure inside and
+    outside are. Results are cached by their arguments; returned arrays are read-only.
     """
 
     def __init__(self, source: Source) -> None:
@@ -83,6 +85,7 @@ class Shape:
         self.faces = self._surface.faces
         self.repairs = source.repairs + self._surface.repairs
         self.confidence = min(source.confidence, self._surface.confidence)
+        self.openings = self._own(self._surface.openings)
         self._source = self._surface.distance()
         self._cache: dict[tuple[Any, ...], Any] = {}
 
@@ -188,6 +191,12 @@ class Shape:
         return self._cached(
             ("samples", near, uniform, seed, widths), lambda: self._sample(near, uniform, seed, widths)
         )
+
+    def _own(self, openings: Openings) -> Openings:
+        if openings.largest is None:
+            return openings
+        x, y, z = self.frame.from_unit(openings.largest).tolist()
+        return replace(openings, largest=(x, y, z))
 
     def _unit_bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return self._surface.vertices.min(axis=0), self._surface.vertices.max(axis=0)

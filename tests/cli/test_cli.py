@@ -125,6 +125,18 @@ def test_a_poor_fit_is_told(method: BoxMethod, block: Path, tmp_path: Path, caps
     assert report["scores"]["worst_place"] in error
 
 
+def test_a_large_repair_is_told(method: BoxMethod, block: Path, tmp_path: Path, capsys: Any) -> None:
+    whole = trimesh.load_mesh(block)
+    right = whole.triangles_center[:, 0] > 11.9
+    trimesh.Trimesh(whole.vertices, whole.faces[~right]).export(tmp_path / "open.stl")
+    assert main(["fit", str(tmp_path / "open.stl"), "-o", str(tmp_path / "out"), "--up", "z"]) == 0
+    error = capsys.readouterr().err
+    assert "warning: about 7% of the surface was missing, at the right, and is made up" in error
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report["input"]["openings"]["share"] == pytest.approx(2 / 28)
+    assert report["input"]["openings"]["largest"] == pytest.approx([12, 20, 30])
+
+
 def test_an_interrupted_fit_writes_what_it_has(
     method: BoxMethod, block: Path, tmp_path: Path, capsys: Any
 ) -> None:

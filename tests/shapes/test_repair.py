@@ -8,7 +8,7 @@ import trimesh
 from solids import box, inverted, sphere, together, without
 
 from partwright.errors import EmptyShapeError, FlatShapeError, OpenShellError
-from partwright.shapes import load_shape, repair
+from partwright.shapes import Openings, load_shape, repair
 
 
 def test_a_sound_mesh_is_used_as_it_is():
@@ -94,6 +94,31 @@ def test_a_hole_is_filled_and_costs_confidence():
     assert shape.volume == pytest.approx(mesh.volume, rel=0.02)
     assert any("filled 1 hole" in note for note in shape.repairs)
     assert 0.9 < shape.confidence < 1.0
+
+
+@pytest.mark.parametrize(
+    ("lost", "count"), [("cap", 1), ("crumbs", None)], ids=["one hole", "crumbs all over"]
+)
+def test_how_much_of_the_surface_was_missing_is_known(lost, count):
+    mesh = sphere()
+    mesh.apply_translation((10, 0, 0))
+    if lost == "cap":
+        dropped = mesh.triangles_center[:, 2] > 0.68
+    else:
+        dropped = np.random.default_rng(0).random(len(mesh.faces)) < 0.16
+    openings = load_shape(without(mesh, dropped)).openings
+    assert openings.share == pytest.approx(mesh.area_faces[dropped].sum() / mesh.area, abs=0.015)
+    if count is not None:
+        assert openings.count == count
+        assert openings.largest == pytest.approx((10, 0, 0.68), abs=0.02)
+    assert load_shape(mesh).openings == Openings()
+
+
+def test_gaps_between_patches_are_no_missing_surface():
+    loose = box().triangles.reshape(-1, 3) + np.repeat(
+        np.random.default_rng(0).normal(0, 1e-3, (12, 3)), 3, axis=0
+    )
+    assert load_shape((loose, np.arange(36).reshape(-1, 3))).openings.share < 0.01
 
 
 def test_cracks_are_welded():
