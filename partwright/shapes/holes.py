@@ -1,4 +1,4 @@
-"""Openings of a surface: a fan of triangles over each that is one, and how much of the surface was missing."""
+"""Openings of a surface: a fan of triangles over each that is one, and how much of it was missing."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ Geometry is moved only where it is open: closed thin walls come out as they went
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,7 @@ class Surface:
     simple: bool
     repairs: tuple[str, ...]
     confidence: float
-    openings: Openings = Openings()
+    openings: Openings = field(default_factory=Openings)
 
     def distance(self) -> MeshDistance:
         """The distance source of this surface."""
