@@ -47,11 +47,10 @@ def with_closed_quadrics(assembly: Assembly) -> Assembly:
 def closes_alike(part: Part) -> bool:
     """Whether the solid that a repeated quadric is closed to does for its copies, too: spheres, and cylinders
     that are moved across their axis alone."""
-    if not isinstance(part.field, Quadric):
+    quadric = placed_quadric(part)
+    if quadric is None or any(np.abs(move.rotation[1:]).max() > _TURNED for move in part.instances):
         return False
-    if any(np.abs(move.rotation[1:]).max() > _TURNED for move in part.instances):
-        return False
-    form = normal_form(placed_quadric(part))
+    form = normal_form(quadric)
     if form.complement or form.name not in ("sphere", "cylinder"):
         return False
     moves = np.array([move.translation for move in part.instances])

@@ -16,7 +16,6 @@ import numpy as np
 from partwright.approximation.atomic_nodes import box_between
 from partwright.approximation.convex import segments, wedges
 from partwright.assembly import Assembly, Node, Part
-from partwright.assembly.tree import operands
 from partwright.errors import NoSurfaceError
 from partwright.fields import Quadric
 from partwright.fields.quadric_forms import SAME
@@ -61,10 +60,10 @@ def separated(node: Node) -> Iterator[Node]:
     if not isinstance(node, Assembly) or node.operation == "intersection":
         yield node
     elif node.operation == "union":
-        for child in operands(node):
+        for child in node.operands:
             yield from separated(child)
     else:
-        first, *cutters = operands(node)
+        first, *cutters = node.operands
         for child in separated(first):
             cutting = [cutter for cutter in cutters if _common(child, cutter, None) is not None]
             yield Assembly((child, *cutting), "difference", child.name) if cutting else child
@@ -85,12 +84,12 @@ def _convex_solids(node: Node, allowed: float, room: Part | None = None) -> list
     if isinstance(node, Part) and not node.instances:
         return [_manifold(mesh) for one in segments(node, allowed) for mesh in wedges(one, allowed, _CELLS)]
     if isinstance(node, Part) or node.operation == "union":
-        return [one for child in operands(node) for one in _convex_solids(child, allowed, room)]
+        return [one for child in node.operands for one in _convex_solids(child, allowed, room)]
     if node.operation == "intersection":
         node = _without_concave(node)
         if node.operation == "intersection":
             return [one.hull() for one in solid.decompose()]
-    first, *cutters = operands(node)
+    first, *cutters = node.operands
     box = box_between(*np.reshape(solid.bounding_box(), (2, 3)))
     pieces = _convex_solids(first, allowed, box)
     for cutter in cutters:

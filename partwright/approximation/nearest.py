@@ -19,7 +19,6 @@ import numpy as np
 from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.approximation.recognise import SAME, exact_solid
 from partwright.assembly import Part, Similarity
-from partwright.assembly.rows import as_superfrustum, is_superfrustum
 from partwright.assembly.similarity import NO_ROTATION, quaternion_product, rotation_matrix
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.fields import Box, Capsule, Cone, Cylinder, Field, Frustum, Sphere, Torus, Tube
@@ -67,9 +66,8 @@ def nearest_solid(part: Part, kinds: Sequence[type[Field]] = SOLIDS) -> Approxim
         return Approximation(exact, dataclasses.replace(part, field=exact), 0.0, 0.0)
     lower, upper = part.field.bounds()
     longest = float((upper - lower).max())
-    if longest <= 0 or (
-        is_superfrustum(part.field) and as_superfrustum(part.field).thinnest < SAME * longest
-    ):
+    own = part.field.superfrustum()
+    if longest <= 0 or (own is not None and own.thinnest < SAME * longest):
         raise NoSurfaceError(f"part {part.name!r} has no volume, so no solid is near it")
     found = _nearest(part.field.scaled(1 / longest), tuple(kinds))
     if found is None:

@@ -13,7 +13,6 @@ from partwright.approximation.decomposition import separated
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.names import unique_names
 from partwright.assembly.palette import palette
-from partwright.assembly.tree import operands
 from partwright.errors import NoSurfaceError, NothingToExportError
 from partwright.meshing import mesh_assembly, mesh_part
 
@@ -60,7 +59,7 @@ def pieces(assembly: Assembly, *, separate: bool = False) -> list[Piece]:
 def _opened(node: Node, blend: float) -> Iterator[tuple[Node, float]]:
     """The first child of a union melts in as the union itself does."""
     if isinstance(node, Assembly) and node.operation == "union":
-        for i, child in enumerate(operands(node)):
+        for i, child in enumerate(node.operands):
             yield from _opened(child, child.blend if i else blend)
     else:
         yield node, blend

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from partwright.assembly.placed import placed_quadric
-from partwright.assembly.tree import Node, Part
-from partwright.fields import NormalForm, Quadric, normal_form
+from partwright.fields import NormalForm, normal_form
+
+if TYPE_CHECKING:
+    from partwright.assembly.tree import Node, Part
 
 
 def describe(node: Node, digits: int = 4) -> str:
@@ -18,7 +21,7 @@ def describe(node: Node, digits: int = 4) -> str:
 
 
 def _lines(node: Node, digits: int, first: str, rest: str) -> Iterator[str]:
-    if isinstance(node, Part):
+    if node.is_part:
         yield first + _leaf(node, digits)
         return
     blend = f", blend {_number(node.blend, digits)}" if node.blend else ""
@@ -32,8 +35,9 @@ def _lines(node: Node, digits: int, first: str, rest: str) -> Iterator[str]:
 
 
 def _leaf(part: Part, digits: int) -> str:
-    if isinstance(part.field, Quadric):
-        own = _quadric(normal_form(placed_quadric(part)), digits)
+    quadric = placed_quadric(part)
+    if quadric is not None:
+        own = _quadric(normal_form(quadric), digits)
     else:
         values = ((f.name, getattr(part.field, f.name)) for f in dataclasses.fields(part.field))  # type: ignore[arg-type]
         numbers = [f"{name} {_numbers(value, digits)}" for name, value in values]

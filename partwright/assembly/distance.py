@@ -8,18 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import chain, groupby, takewhile
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from partwright.assembly.bounds import bounds
-from partwright.assembly.rows import is_superfrustum, rows
+from partwright.assembly.joint import is_joint
+from partwright.assembly.rows import rows
 from partwright.assembly.similarity import Similarity, rotation_matrix
-from partwright.assembly.tree import Assembly, Node, Operation, Part, operands
 from partwright.errors import ParameterError
 from partwright.fields import kernel, smooth_difference, smooth_intersection, smooth_union
-from partwright.fields.joint import JointField
 from partwright.fields.operations import is_tensor
+
+if TYPE_CHECKING:
+    from partwright.assembly.joint import JointPart
+    from partwright.assembly.tree import Assembly, Node, Operation, Part
 
 _UNIT_SIDE = 1.8
 _KERNEL = "kernel"
@@ -32,11 +34,10 @@ def unit_similarity(node: Node) -> Similarity:
 
     Leaves without end do not count; where all are, the node's own box does, if it ends.
     """
-    parts = (node,) if isinstance(node, Part) else node.parts
-    boxes = np.array([bounds(part) for part in parts])
+    boxes = np.array([part.bounds() for part in node.parts])
     boxes = boxes[np.isfinite(boxes).all(axis=(1, 2))]
-    if len(boxes) < len(parts):
-        whole = bounds(node)
+    if len(boxes) < len(node.parts):
+        whole = node.bounds()
         boxes = np.array([*boxes, whole]) if np.isfinite(whole).all() else boxes
     if not len(boxes):
         return Similarity()
@@ -93,23 +94,19 @@ def _back(values: np.ndarray, frame: Similarity, points: np.ndarray) -> np.ndarr
 
 def _evaluate(node: Node, points: np.ndarray) -> np.ndarray:
     """(N,) float32 by the kernel; the leaves that begin a union are folded in a single call."""
-    operation, children = _operation(node), operands(node)
-    lead = _leading_leaves(children) if operation == "union" else []
+    children = node.operands
+    lead = _leading_leaves(children) if node.operation == "union" else []
     values = _children(children[len(lead) :], points)
     if lead:
         values = chain([(kernel.evaluate(rows(lead), points), 0.0)], values)
-    return _folded(operation, values)
+    return _folded(node.operation, values)
 
 
 def _reference(node: Node, points: Any) -> Any:
     """(N,) by the fields themselves, differentiable where the points are torch tensors."""
-    if isinstance(node, Part) and not node.instances:
+    if node.is_part and not node.instances:
         return _posed(node, points)
-    return _folded(_operation(node), ((_reference(c, points), c.blend) for c in operands(node)))
-
-
-def _operation(node: Node) -> Operation:
-    return "union" if isinstance(node, Part) else node.operation
+    return _folded(node.operation, ((_reference(c, points), c.blend) for c in node.operands))
 
 
 def _folded(operation: Operation, values: Iterator[tuple[Any, float]]) -> Any:
@@ -130,26 +127,26 @@ def _posed(part: Part, points: Any) -> Any:
 
 
 def _leading_leaves(children: tuple[Node, ...]) -> list[Part]:
-    return list(cast(Iterator[Part], takewhile(_in_one_row, children)))
+    return list(cast("Iterator[Part]", takewhile(_in_one_row, children)))
 
 
 def _in_one_row(node: Node) -> bool:
     """Whether one row of the kernel stands for the node."""
-    return isinstance(node, Part) and is_superfrustum(node.field) and not node.instances
+    return node.is_part and not node.instances and node.field.superfrustum() is not None
 
 
 def _batch(node: Node) -> object:
     """What neighbouring nodes have in common that are evaluated by one call; None for one by itself."""
     if _in_one_row(node):
         return _KERNEL
-    if isinstance(node, Part) and isinstance(node.field, JointField) and not node.instances:
+    if is_joint(node) and not node.instances:
         return node.field.shape_key
     return None
 
 
-def _joint(parts: list[Part], points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
+def _joint(parts: list[JointPart], points: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
     """Parts of one learned shape in one pass; the next shape begins with the first that is none of them."""
-    fields = [cast(JointField, part.field) for part in parts]
+    fields = [part.field for part in parts]
     known = [member.field for member in fields[0].members]
     last = next((i for i, field in enumerate(fields) if i and field not in known), len(parts))
     local = (points - np.array(parts[0].translation, np.float32)) @ rotation_matrix(parts[0].rotation)
@@ -163,14 +160,14 @@ def _children(children: tuple[Node, ...], points: np.ndarray) -> Iterator[tuple[
     """Each child's distance alone and its blend; neighbouring leaves share a call."""
     for batched, group in groupby(children, _batch):
         if batched == _KERNEL:
-            leaves = cast(list[Part], list(group))
+            leaves = cast("list[Part]", list(group))
             values = kernel.evaluate_parts(rows(leaves), points)
             yield from zip(values, (leaf.blend for leaf in leaves), strict=True)
         elif batched is not None:
-            yield from _joint(cast(list[Part], list(group)), points)
+            yield from _joint(cast("list[JointPart]", list(group)), points)
         else:
             for node in group:
-                if isinstance(node, Part) and not node.instances:
+                if node.is_part and not node.instances:
                     yield _posed(node, points), node.blend
                 else:
                     yield _evaluate(node, points), node.blend

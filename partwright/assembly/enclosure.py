@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly.placed import placed_quadric
-from partwright.assembly.tree import Node, Part, operands
 from partwright.fields import Quadric
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
+
+    from partwright.assembly.tree import Node, Part
 
 _HUGE = 1e4  # half the first box, in units of how far the leaves are from its middle
 _ROUNDS = 4
@@ -31,7 +32,7 @@ def enclosing_box(node: Node, level: float = 0.0) -> np.ndarray:
     """
     from manifold3d import Manifold
 
-    parts = node.copies if isinstance(node, Part) else tuple(c for p in node.parts for c in p.copies)
+    parts = tuple(copy for part in node.parts for copy in part.copies)
     middle, reach = _about(parts)
     half = _HUGE * (reach + level)
     start = Manifold.cube((2 * half,) * 3, True).translate(tuple(middle))
@@ -48,7 +49,7 @@ def _about(parts: tuple[Part, ...]) -> tuple[np.ndarray, float]:
     finite = [box for box in finite if np.isfinite(box).all()]
     places = [np.mean(box, axis=0) for box in finite] + [np.array(part.translation) for part in parts]
     middle = np.mean(places, axis=0)
-    distances = [_reach(placed_quadric(part), middle) for part in parts if isinstance(part.field, Quadric)]
+    distances = [_reach(placed, middle) for part in parts if (placed := placed_quadric(part)) is not None]
     corners = [float(np.abs(box - middle).max()) for box in finite]
     spread = [float(np.abs(place - middle).max()) for place in places]
     return middle, max([*distances, *corners, *spread]) or 1.0
@@ -67,13 +68,12 @@ def _cut_by(node: Node, region: Manifold, level: float) -> Manifold:
     """What of a convex region may be inside the node, as a convex region."""
     from manifold3d import Manifold
 
-    if isinstance(node, Part) and not node.instances:
+    if node.is_part and not node.instances:
         return _cut_by_part(node, region, level)
-    operation = "union" if isinstance(node, Part) else node.operation
-    children = operands(node)
-    if operation == "difference":
+    children = node.operands
+    if node.operation == "difference":
         return _cut_by(children[0], region, level)
-    if operation == "union":
+    if node.operation == "union":
         grown = [level + child.blend / 2 for child in children]
         return Manifold.batch_hull(
             [_cut_by(child, region, more) for child, more in zip(children, grown, strict=True)]
@@ -88,10 +88,10 @@ def _cut_by(node: Node, region: Manifold, level: float) -> Manifold:
 
 
 def _cut_by_part(part: Part, region: Manifold, level: float) -> Manifold:
-    if not isinstance(part.field, Quadric):
+    quadric, corners = placed_quadric(part), _corners(region)
+    if quadric is None:
         box = part.bounds() + level * np.array([[-1.0], [1.0]])
         return _trimmed(region, _AXES, np.concatenate([-box[0], box[1]]))
-    quadric, corners = placed_quadric(part), _corners(region)
     if not len(corners):
         return region
     square, linear, constant = quadric.matrices()

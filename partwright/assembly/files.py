@@ -1,41 +1,26 @@
-"""The assembly file: versioned JSON, strict on the way in, reproducible to the byte on the way out.
+"""Reading the assembly file: versioned JSON, strict. `file_text` writes it.
 
-docs/assembly-file.md describes it, docs/assembly.schema.json is its JSON Schema. Numbers are written in the
-shortest form that reads back to the same bits, so that `load_assembly(save(a)) == a`.
+docs/assembly-file.md describes it, docs/assembly.schema.json is its JSON Schema.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
+from partwright.assembly.file_text import FORMAT, VERSION
 from partwright.assembly.similarity import Similarity
 from partwright.assembly.tree import MAX_DEPTH, Assembly, Node, Part
-from partwright.atomic_io import write_bytes
 from partwright.errors import AssemblyFileError, NewerVersionError, ParameterError, UnreadableFileError
 from partwright.fields import from_dict
 
-FORMAT = "partwright-assembly"
-VERSION = 1
 MAX_BYTES = 64 * 1024 * 1024
 MAX_PARTS = 100_000
 
 _PART_KEYS = {"name", "field", "translation", "rotation", "blend", "metadata", "instances"}
 _INSTANCE_KEYS = {"translation", "rotation"}
 _ASSEMBLY_KEYS = {"name", "operation", "blend", "unit", "up", "metadata", "children"}
-
-
-def save(assembly: Assembly, path: str | Path) -> None:
-    """Write the assembly file; see `Assembly.save`."""
-    write_bytes(path, to_text(assembly).encode("utf-8"))
-
-
-def to_text(assembly: Assembly) -> str:
-    """The text of the assembly file, one part a line."""
-    head = f'"format": "{FORMAT}",\n "version": {VERSION},\n '
-    return "{" + head + _assembly_text(assembly, 1)[1:] + "\n"
 
 
 def load_assembly(path: str | Path) -> Assembly:
@@ -165,57 +150,6 @@ def _check_lists(data: dict[str, Any], place: str) -> None:
     for key in ("translation", "rotation"):
         if not isinstance(data.get(key, []), list):
             _fail(f"{place}.{key}", f"expected a list of numbers, got {_shown(data[key])}")
-
-
-def _assembly_text(node: Assembly, depth: int) -> str:
-    pad = " " * depth
-    lines = []
-    if depth == 1 or node.unit is not None:
-        lines.append(f'"unit": {_json(node.unit)}')
-    if depth == 1 or node.up is not None:
-        lines.append(f'"up": {_json(node.up)}')
-    lines += [
-        f'"name": {_json(node.name)}',
-        f'"operation": "{node.operation}"',
-        f'"blend": {_json(node.blend)}',
-    ]
-    if node.metadata:
-        lines.append(f'"metadata": {_json(_sorted(node.metadata))}')
-    children = (
-        _part_text(child) if isinstance(child, Part) else _assembly_text(child, depth + 2)
-        for child in node.children
-    )
-    inner = f",\n{pad} ".join(children)
-    lines.append(f'"children": [\n{pad} {inner}\n{pad}]')
-    return "{" + f",\n{pad}".join(lines) + "}"
-
-
-def _part_text(part: Part) -> str:
-    data: dict[str, Any] = {
-        "name": part.name,
-        "field": part.field.to_dict(),
-        "translation": part.translation,
-        "rotation": part.rotation,
-        "blend": part.blend,
-    }
-    if part.instances:
-        data["instances"] = [instance_dict(move) for move in part.instances]
-    if part.metadata:
-        data["metadata"] = _sorted(part.metadata)
-    return _json(data)
-
-
-def instance_dict(move: Similarity) -> dict[str, list[float]]:
-    """A rigid move as assembly files have it."""
-    return {"translation": list(move.translation), "rotation": list(move.rotation)}
-
-
-def _sorted(metadata: Mapping[str, str | float]) -> dict[str, str | float]:
-    return dict(sorted(metadata.items()))
-
-
-def _json(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def _refuse_constant(name: str) -> NoReturn:

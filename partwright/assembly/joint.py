@@ -20,7 +20,7 @@ def joined(children: tuple[Node, ...]) -> tuple[Node, ...]:
     latest: dict[object, dict[str, int]] = {}  # the last shape of each key: its roles, and whose they are
     shapes: list[dict[str, int]] = []
     for i, child in enumerate(children):
-        if _is_joint(child):
+        if is_joint(child):
             shape = latest.get(child.field.shape_key)
             if shape is None or child.field.role in shape:
                 shape = latest[child.field.shape_key] = {}
@@ -28,17 +28,18 @@ def joined(children: tuple[Node, ...]) -> tuple[Node, ...]:
             shape[child.field.role] = i
     result = list(children)
     for shape in shapes:
-        parts = [part for i in shape.values() if _is_joint(part := children[i])]
+        parts = [part for i in shape.values() if is_joint(part := children[i])]
         for i, part in zip(shape.values(), parts, strict=True):
             result[i] = _among(part, parts)
     return tuple(result)
 
 
-def _is_joint(node: Node) -> TypeGuard[_JointPart]:
-    return isinstance(getattr(node, "field", None), JointField)
+def is_joint(node: Node) -> TypeGuard[JointPart]:
+    """Whether the node is a part whose field is decoded together with others."""
+    return node.is_part and isinstance(node.field, JointField)
 
 
-def _among(part: _JointPart, parts: list[_JointPart]) -> Part:
+def _among(part: JointPart, parts: list[JointPart]) -> Part:
     back = _pose(part).inverse()
     seen = [(other.field, back @ _pose(other)) for other in parts]
     members = [Member(field, pose.translation, pose.rotation) for field, pose in seen]
@@ -51,5 +52,5 @@ def _pose(part: Part) -> Similarity:
 
 if TYPE_CHECKING:
 
-    class _JointPart(Part):
+    class JointPart(Part):
         field: JointField

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from partwright.assembly.similarity import rotation_matrix
-from partwright.assembly.tree import Part
-from partwright.fields import Quadric
+
+if TYPE_CHECKING:
+    from partwright.assembly.tree import Part
+    from partwright.fields import Quadric
 
 
-def placed_quadric(part: Part) -> Quadric:
-    """The quadric of a part, which has to be one, in the assembly's frame; copies aside."""
-    assert isinstance(part.field, Quadric)
-    return part.field.moved(rotation_matrix(part.rotation), np.array(part.translation))
+def placed_quadric(part: Part) -> Quadric | None:
+    """The part's field as a quadric of the assembly's frame, copies aside; None where it is none."""
+    own = part.field.quadric()
+    return None if own is None else own.moved(rotation_matrix(part.rotation), np.array(part.translation))

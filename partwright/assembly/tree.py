@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
 
+from partwright.assembly.bounding_box import bounding_box
 from partwright.assembly.checks import (
     Quaternion,
     Vector,
@@ -20,6 +21,9 @@ from partwright.assembly.checks import (
     unit_quaternion,
     vector,
 )
+from partwright.assembly.description import describe
+from partwright.assembly.distance import distance, nearest_parts, part_distances, unit_similarity
+from partwright.assembly.file_text import save
 from partwright.assembly.joint import joined
 from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import (
@@ -30,7 +34,7 @@ from partwright.assembly.similarity import (
     rigid_moves,
 )
 from partwright.errors import ParameterError
-from partwright.fields import Field, SuperFrustum
+from partwright.fields import Field
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -68,21 +72,15 @@ class _Common(ABC):
 
     def bounds(self) -> np.ndarray:
         """(2, 3) lowest and highest corner, float64."""
-        from partwright.assembly.bounds import bounds
-
-        return bounds(self)  # type: ignore[arg-type]
+        return bounding_box(self)  # type: ignore[arg-type]
 
     @cached_property
     def _normalised(self) -> tuple[Similarity, Self]:
-        from partwright.assembly.distance import unit_similarity
-
         frame = unit_similarity(self)  # type: ignore[arg-type]
         return frame, self.transformed(frame)
 
     def describe(self, digits: int = 4) -> str:
         """The tree in words and numbers, a line a node."""
-        from partwright.assembly.description import describe
-
         return describe(self, digits)  # type: ignore[arg-type]
 
     def distance(self, points: Array) -> Array:
@@ -90,8 +88,6 @@ class _Common(ABC):
 
         A torch tensor is answered by the differentiable reference, anything else by the kernel.
         """
-        from partwright.assembly.distance import distance
-
         return distance(self, points)  # type: ignore[arg-type]
 
 
@@ -116,6 +112,8 @@ class Part(_Common):
             instance is no rigid move.
     """
 
+    is_part: ClassVar[Literal[True]] = True
+
     field: Field
     translation: Vector = ORIGIN
     rotation: Quaternion = NO_ROTATION
@@ -131,6 +129,21 @@ class Part(_Common):
         object.__setattr__(self, "rotation", unit_quaternion(self.rotation, "rotation"))
         object.__setattr__(self, "instances", rigid_moves(self.instances, "instances"))
         _check_common(self)
+
+    @property
+    def operation(self) -> Operation:
+        """A part is the union of its copies."""
+        return "union"
+
+    @property
+    def operands(self) -> tuple[Part, ...]:
+        """What the operation folds: its copies."""
+        return self.copies
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The part itself."""
+        return (self,)
 
     @cached_property
     def copies(self) -> tuple[Part, ...]:
@@ -171,6 +184,8 @@ class Assembly(_Common):
         ParameterError: no children, an unknown operation, nested more than 64 deep, or a bad number.
     """
 
+    is_part: ClassVar[Literal[False]] = False
+
     children: tuple[Node, ...]
     operation: Operation = "union"
     name: str = ""
@@ -201,12 +216,19 @@ class Assembly(_Common):
     @cached_property
     def parts(self) -> tuple[Part, ...]:
         """The leaves, depth first."""
-        return tuple(_leaves(self.children))
+        return tuple(part for child in self.children for part in child.parts)
+
+    @cached_property
+    def operands(self) -> tuple[Node, ...]:
+        """What the operation folds, in order: the children; in a union, repeated parts as their copies."""
+        if self.operation != "union":
+            return self.children
+        return tuple(c for child in self.children for c in (child.copies if child.is_part else (child,)))
 
     @cached_property
     def depth(self) -> int:
         """1 for an assembly of parts alone."""
-        return 1 + max((child.depth for child in self.children if isinstance(child, Assembly)), default=0)
+        return 1 + max((child.depth for child in self.children if not child.is_part), default=0)
 
     def __len__(self) -> int:
         return len(self.parts)
@@ -218,14 +240,10 @@ class Assembly(_Common):
 
     def part_distances(self, points: np.ndarray) -> np.ndarray:
         """(M, N) signed distance of each leaf alone, unblended, to its nearest copy, at points (N, 3)."""
-        from partwright.assembly.distance import part_distances
-
         return part_distances(self, points)
 
     def nearest_parts(self, points: np.ndarray) -> np.ndarray:
         """(N,) index into `parts` of the leaf that each point (N, 3) lies deepest in or nearest to."""
-        from partwright.assembly.distance import nearest_parts
-
         return nearest_parts(self, points)
 
     def transformed(self, similarity: Similarity) -> Assembly:
@@ -235,7 +253,7 @@ class Assembly(_Common):
 
     def expanded(self) -> Assembly:
         """The same solid with every copy of a repeated part as a part of its own (named leg, leg_02 ...)."""
-        nodes = (node.expanded() if isinstance(node, Assembly) else node for node in operands(self))
+        nodes = (node if node.is_part else node.expanded() for node in self.operands)
         return dataclasses.replace(self, children=tuple(map(_without_instances, nodes)))
 
     def renamed(self, old: str, new: str) -> Assembly:
@@ -269,8 +287,6 @@ class Assembly(_Common):
         Raises:
             OutputError: the file cannot be written.
         """
-        from partwright.assembly.files import save
-
         save(self, path)
 
     def _require(self, name: str) -> None:
@@ -280,7 +296,7 @@ class Assembly(_Common):
             raise ParameterError(f"no part is named {name!r}; the names are: {shown}")
 
     def _edited(self, edit: Callable[[Part], Part | None]) -> Assembly | None:
-        edited = [edit(c) if isinstance(c, Part) else c._edited(edit) for c in self.children]
+        edited = [edit(c) if c.is_part else c._edited(edit) for c in self.children]
         if all(new is old for new, old in zip(edited, self.children, strict=True)):
             return self
         if self.operation == "difference" and edited[0] is None:
@@ -292,19 +308,8 @@ class Assembly(_Common):
 Node: TypeAlias = Part | Assembly
 
 
-def operands(node: Node) -> tuple[Node, ...]:
-    """What the node's operation folds, in order: its children; in a union, repeated parts as their copies."""
-    if isinstance(node, Part):
-        return node.copies
-    if node.operation != "union":
-        return node.children
-    return tuple(
-        one for child in node.children for one in (child.copies if isinstance(child, Part) else (child,))
-    )
-
-
 def _without_instances(node: Node) -> Node:
-    if isinstance(node, Part) and node.instances:
+    if node.is_part and node.instances:
         return Assembly(node.copies, blend=node.blend)
     return node
 
@@ -332,32 +337,20 @@ def _check_common(node: Node) -> None:
     object.__setattr__(node, "metadata", flat_metadata(node.metadata))
 
 
-def _leaves(children: Sequence[Node]) -> Iterator[Part]:
-    for child in children:
-        if isinstance(child, Part):
-            yield child
-        else:
-            yield from child.parts
-
-
 def _with_unique_names(children: tuple[Node, ...]) -> tuple[Node, ...]:
-    leaves = list(_leaves(children))
+    leaves = [part for child in children for part in child.parts]
     wanted = [leaf.name for leaf in leaves]
     if all(wanted) and len(set(wanted)) == len(wanted):
         return children
-    names = iter(unique_names(wanted, [_stem(leaf) for leaf in leaves]))
+    names = iter(unique_names(wanted, [leaf.field.stem for leaf in leaves]))
 
     def rename(node: Node) -> Node:
-        if isinstance(node, Assembly):
+        if not node.is_part:
             return dataclasses.replace(node, children=tuple(rename(child) for child in node.children))
         name = next(names)
         return node if name == node.name else dataclasses.replace(node, name=name)
 
     return tuple(rename(child) for child in children)
-
-
-def _stem(part: Part) -> str:
-    return "part" if isinstance(part.field, SuperFrustum) else part.field.kind
 
 
 def _require_some(assembly: Assembly | None) -> Assembly:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.assembly.rows import as_superfrustum
 from partwright.cleaning.deviation_samples import State
 from partwright.cleaning.linear import Equations
 from partwright.cleaning.model import Model
@@ -34,7 +35,7 @@ class AcceptanceTest:
 
     @classmethod
     def of(cls, state: State, tolerance: float) -> AcceptanceTest:
-        fields = (part.field.superfrustum() for part in state.model.leaves)  # type: ignore[attr-defined]
+        fields = (as_superfrustum(part.field) for part in state.model.leaves)
         thickness = np.array([field.thinnest for field in fields]) * state.samples.scale
         return cls(state.deviations + np.minimum(tolerance, thickness / _THIN), tolerance)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.checks import Quaternion
-from partwright.assembly.rows import is_superfrustum
+from partwright.assembly.rows import as_superfrustum
 from partwright.assembly.similarity import quaternion_product, rotation_matrix
 from partwright.cleaning.dimensions import Dimension, dimensions, values, with_values
 from partwright.cleaning.fold import Fold
@@ -51,7 +51,7 @@ class Model:
     def of(cls, assembly: Assembly) -> Model:
         """Raises UncleanableError where a leaf is neither a SuperFrustum nor a named solid."""
         for part in assembly.parts:
-            if not is_superfrustum(part.field):
+            if part.field.superfrustum() is None:
                 raise UncleanableError(
                     f"part {part.name!r} is a {part.field.kind}, whose numbers no relation can bind; only "
                     "SuperFrusta and named solids can be cleaned"
@@ -162,7 +162,7 @@ class Model:
             if turn.any():
                 rotation = quaternion_product(rotation, _turned(turn))
             place = (vector[places] - centre) * scale
-            result.append([*place, *rotation, *field.superfrustum().parameters(), 0.0])  # type: ignore[attr-defined]
+            result.append([*place, *rotation, *as_superfrustum(field).parameters(), 0.0])
         return np.array(result, dtype=np.float32)
 
     def copies(self, vector: Floats, which: Iterable[int]) -> list[Part]:

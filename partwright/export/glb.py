@@ -18,7 +18,7 @@ import numpy as np
 from partwright import __version__
 from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic
 from partwright.assembly import Assembly, Node, Part, Similarity
-from partwright.assembly.files import instance_dict
+from partwright.assembly.file_text import instance_dict
 from partwright.assembly.palette import palette
 from partwright.assembly.similarity import NO_ROTATION
 from partwright.atomic_io import write_bytes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass, replace
@@ -14,6 +15,10 @@ from partwright.errors import ParameterError
 
 if TYPE_CHECKING:
     import torch
+    import trimesh
+
+    from partwright.fields.quadric import Quadric
+    from partwright.fields.superfrustum import SuperFrustum
 
     Array = TypeVar("Array", np.ndarray, torch.Tensor)
 else:
@@ -22,6 +27,10 @@ else:
 # Longest length a field accepts: its square still fits into float32, in which distances are computed.
 LARGEST = 1e12
 
+# How much faster than distance a field may change. Unions, poses and tapers keep 1; a SuperFrustum's bend
+# stretches the inside of its arc (up to pi/2 at a third of the radius), and callers' fields are rarely exact.
+LIPSCHITZ = 1.6
+
 NUMBERS = (int, float, np.integer, np.floating)
 
 
@@ -29,6 +38,7 @@ class Field(ABC):
     """A signed distance: negative inside, positive outside, in the length unit of its own parameters.
 
     Fields are frozen dataclasses of numbers and triples in a local frame; a `Part` gives them their place.
+    What others need to know of a field it says itself: a new kind overrides what it knows better.
     """
 
     kind: ClassVar[str]  # its name in an assembly file
@@ -44,6 +54,45 @@ class Field(ABC):
     @abstractmethod
     def scaled(self, factor: float) -> Self:
         """The same solid `factor` times as large; raises ParameterError unless factor is positive."""
+
+    @property
+    def stem(self) -> str:
+        """What the names of its parts begin with where they have none: "cylinder_01"."""
+        return self.kind
+
+    @property
+    def lipschitz(self) -> float:
+        """How much its value changes per length at most."""
+        return LIPSCHITZ
+
+    @property
+    def wall(self) -> float:
+        """How thin it is where it is thinnest, tips aside; infinite where that is not known."""
+        return math.inf
+
+    def support(self, directions: np.ndarray, level: float = 0.0) -> np.ndarray:
+        """(K,) how far the inside of the level set at `level` (>= 0) reaches along unit directions (K, 3).
+
+        Infinite where that has no end or is not known, minus infinity where nothing is inside.
+        """
+        lower, upper = self.bounds()
+        return np.asarray(np.maximum(directions * lower, directions * upper).sum(axis=1) + level)
+
+    def superfrustum(self) -> SuperFrustum | None:
+        """The SuperFrustum with exactly this surface, None where there is none."""
+        return None
+
+    def quadric(self) -> Quadric | None:
+        """The quadric that it is, None where it is none."""
+        return None
+
+    def surface(self, resolution: int) -> trimesh.Trimesh | None:
+        """Closed mesh of its own making, in its own frame; None where it leaves that to `meshing`.
+
+        resolution: about so many cells along the longest side of its bounds, or more. Raises NoSurfaceError
+        where it has none.
+        """
+        return None
 
     def to_dict(self) -> dict[str, Any]:
         """Its kind and parameters as JSON types; `fields.from_dict` is the inverse."""

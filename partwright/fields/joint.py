@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from partwright.fields.base import Field
-
-if TYPE_CHECKING:
-    import trimesh
 
 
 class Member(NamedTuple):
@@ -40,23 +37,6 @@ class JointField(Field):
     @abstractmethod
     def role(self) -> str:
         """Which part it is; a shape has each role at most once."""
-
-    @property
-    @abstractmethod
-    def slope(self) -> float:
-        """About how much the distance changes per length at most."""
-
-    @property
-    @abstractmethod
-    def wall(self) -> float:
-        """About how thin it is."""
-
-    @abstractmethod
-    def surface(self, resolution: int) -> trimesh.Trimesh:
-        """Closed mesh in its own frame, of about so many cells along the longest side of its bounds, or more.
-
-        Raises NoSurfaceError where it has none.
-        """
 
     @abstractmethod
     def among(self, members: Sequence[Member]) -> Self:

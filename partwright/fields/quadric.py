@@ -118,6 +118,11 @@ class Quadric(Field):
         square = np.array([[a, xy / 2, zx / 2], [xy / 2, b, yz / 2], [zx / 2, yz / 2, c]])
         return square, np.array([d, e, f]), g
 
+    @property
+    def is_plane(self) -> bool:
+        """Whether it is a half-space."""
+        return not any(self.coefficients[:3] + self.coefficients[7:])
+
     def polynomial(self, points: np.ndarray) -> np.ndarray:
         """f itself (N,), float64, at points (N, 3)."""
         square, linear, constant = self.matrices()
@@ -164,12 +169,14 @@ class Quadric(Field):
         used = curvature[~idle] if not idle.all() else curvature
         return Terms(square, linear, float(constant), float(-used.min()), float(used.max()))
 
-    def support(self, directions: np.ndarray) -> np.ndarray:
-        """(K,) how far the solid reaches along directions (K, 3); infinite where it does not end.
+    def quadric(self) -> Quadric:
+        return self
 
-        Minus infinity where nothing is inside.
-        """
+    def support(self, directions: np.ndarray, level: float = 0.0) -> np.ndarray:
+        """As `Field.support`; not known above level 0, where the level sets are no quadrics."""
         directions = np.asarray(directions, dtype=np.float64)
+        if level:
+            return np.full(len(directions), np.inf)
         square, linear, constant = self.scaled_terms[:3]
         curvature, axes = np.linalg.eigh(square)
         slope, along = axes.T @ linear, directions @ axes

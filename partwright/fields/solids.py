@@ -31,6 +31,13 @@ class Solid(Field):
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         return self.superfrustum().bounds()
 
+    @property
+    def wall(self) -> float:
+        return self.superfrustum().wall
+
+    def support(self, directions: np.ndarray, level: float = 0.0) -> np.ndarray:
+        return self.superfrustum().support(directions, level)
+
     def scaled(self, factor: float) -> Self:
         names = tuple(entry.name for entry in fields(self))  # type: ignore[arg-type]
         return cast(Self, scale_lengths(self, factor, names))

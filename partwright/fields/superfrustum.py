@@ -12,6 +12,9 @@ import numpy as np
 from partwright.fields import kernel
 from partwright.fields.base import LARGEST, Array, Field, normalise, number, scale_lengths, vector
 from partwright.fields.operations import is_tensor
+from partwright.fields.superfrustum_support import support
+
+_TIP = 0.25  # of a wall that tapers to nothing, the part that is looked at
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,10 @@ class SuperFrustum(Field):
             return cast(Array, self._reference(points))
         return cast(Array, kernel.evaluate(self.row()[None], cast(np.ndarray, points)))
 
+    @property
+    def stem(self) -> str:
+        return "part"
+
     def superfrustum(self) -> SuperFrustum:
         return self
 
@@ -88,6 +95,24 @@ class SuperFrustum(Field):
         wall = (1 + self.taper) / 2 * self._half_width
         wall = wall * (1 - self.onion) if self.hollow else 2 * wall
         return min(wall, self.size[2]) + 2 * self.dilation
+
+    @property
+    def wall(self) -> float:
+        return float(self.walls().min())
+
+    def walls(self) -> np.ndarray:
+        """(3,) how thin the solid is along each local axis, tips aside (no resolution would do for them)."""
+        result = np.array(self.size) + 2 * self.dilation
+        if self.hollow:
+            taper = min(max(self.taper, _TIP), 1.0)
+            wall = taper * self._half_width * (1.0 - self.onion)
+            result[:2] = np.minimum(result[:2], wall + 2 * self.dilation)
+        if self.bulge > 0:
+            result[[0, 2]] = min(result[0], result[2])
+        return result
+
+    def support(self, directions: np.ndarray, level: float = 0.0) -> np.ndarray:
+        return support(self, directions, level)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Box around the dilated rectangle of the larger end, swept along the arc and its straight ends."""

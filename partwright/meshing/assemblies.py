@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.assembly.rows import as_superfrustum, is_superfrustum
+from partwright.assembly.rows import as_superfrustum
 from partwright.errors import NoSurfaceError
-from partwright.fields import Field, Quadric, SuperFrustum
-from partwright.fields.joint import JointField
-from partwright.meshing.blocks import LIPSCHITZ
+from partwright.fields.base import LIPSCHITZ
 from partwright.meshing.csg import has_exact_mesh, mesh_csg
 from partwright.meshing.dust import without_dust
 from partwright.meshing.marching import mesh_field
@@ -27,7 +24,6 @@ _FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin 
 _PART_CELLS = 120_000  # a part's surface is given at most this many cells
 _MOST = 1024.0  # cells along one axis of a part
 _CHORDS = 32  # a chord of an exact mesh is this part of a cell from its surface at most
-_TIP = 0.25  # of a wall that tapers to nothing, the part that is looked at
 _ROOM = 1e-3  # of the longest side, around the bounds
 
 
@@ -52,14 +48,12 @@ def mesh_assembly(
         return _exact(assembly, resolution)
     lower, upper = assembly.bounds()
     frame, longest = _frame(lower, upper), float((upper - lower).max())
-    parts = assembly.parts if isinstance(assembly, Assembly) else (assembly,)
-    thin = [_wall(part.field) for part in parts]
-    thinnest = np.array(thin) / longest
+    thinnest = np.array([part.field.wall for part in assembly.parts]) / longest
     wanted = ACROSS / np.maximum(thinnest, 1e-9)
     counts = int(np.ceil(wanted[wanted <= _FINEST * resolution].max(initial=resolution)))
     local = assembly.transformed(frame)
     room = _ROOM + (upper - lower) * frame.scale / 2
-    mesh = mesh_field(local.distance, -room, room, counts, lipschitz=_slope(parts), sharp=sharp)
+    mesh = mesh_field(local.distance, -room, room, counts, lipschitz=_lipschitz(assembly), sharp=sharp)
     vertices, faces = without_dust(mesh.vertices, mesh.faces, np.full(3, 2 * room.max() / counts))
     return trimesh.Trimesh(frame.inverse()(vertices), faces, process=False)
 
@@ -73,10 +67,10 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
 
     Raises NoSurfaceError for a part without volume, or without end, as most quadrics are.
     """
-    if isinstance(part.field, Quadric):
+    if part.field.quadric() is not None:
         return _repeated(_exact(replace(part, instances=()), resolution), part.instances)
-    if isinstance(part.field, JointField):
-        mesh = part.field.surface(resolution)
+    mesh = part.field.surface(resolution)
+    if mesh is not None:
         mesh.vertices = Similarity(1.0, part.rotation, part.translation)(mesh.vertices)
         return _repeated(mesh, part.instances)
     field = as_superfrustum(part.field)
@@ -85,7 +79,7 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     local = field.scaled(frame.scale)
     centre = np.asarray(frame.translation)
     extent = (upper - lower) * frame.scale + 2 * _ROOM
-    thin = np.maximum(walls(local), 1e-9)
+    thin = np.maximum(local.walls(), 1e-9)
     counts = np.maximum(resolution * extent / extent.max(), _ACROSS_PART * extent / thin)
     surface = 4 * (counts * np.roll(counts, 1)).sum()
     counts = np.clip(counts * min(1.0, float(np.sqrt(_PART_CELLS / surface))), 4.0, _MOST)
@@ -93,15 +87,15 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     def distance(points: np.ndarray) -> np.ndarray:
         return local(points - centre.astype(np.float32))
 
-    mesh = mesh_field(distance, -extent / 2, extent / 2, counts, lipschitz=LIPSCHITZ, sharp=sharp)
+    mesh = mesh_field(distance, -extent / 2, extent / 2, counts, lipschitz=local.lipschitz, sharp=sharp)
     pose = Similarity(1.0, part.rotation, part.translation) @ frame.inverse()
     mesh.vertices = pose(mesh.vertices)
     return _repeated(mesh, part.instances)
 
 
-def _slope(parts: Sequence[Part]) -> float:
+def _lipschitz(node: Assembly | Part) -> float:
     """How fast the distance may change: learned parts know how steep they are."""
-    return max([LIPSCHITZ, *(part.field.slope for part in parts if isinstance(part.field, JointField))])
+    return max(LIPSCHITZ, *(part.field.lipschitz for part in node.parts))
 
 
 def _exact(node: Assembly | Part, resolution: int) -> trimesh.Trimesh:
@@ -118,25 +112,6 @@ def _repeated(mesh: trimesh.Trimesh, moves: tuple[Similarity, ...]) -> trimesh.T
     vertices = [mesh.vertices, *(move(mesh.vertices) for move in moves)]
     faces = [mesh.faces + i * len(mesh.vertices) for i in range(len(vertices))]
     return trimesh.Trimesh(np.concatenate(vertices), np.concatenate(faces), process=False)
-
-
-def _wall(field: Field) -> float:
-    """How thin a field is, so far as it is known; else infinite."""
-    if isinstance(field, JointField):
-        return field.wall
-    return float(walls(as_superfrustum(field)).min()) if is_superfrustum(field) else np.inf
-
-
-def walls(field: SuperFrustum) -> np.ndarray:
-    """(3,) how thin the solid is along each local axis, tips aside (no resolution would do for them)."""
-    result = np.array(field.size) + 2 * field.dilation
-    middle = min(field.size[0], field.size[1]) / 2
-    if max(1.0, field.taper) * middle * field.onion > field.dilation:
-        taper = min(max(field.taper, _TIP), 1.0)
-        result[:2] = np.minimum(result[:2], taper * middle * (1.0 - field.onion) + 2 * field.dilation)
-    if field.bulge > 0:
-        result[[0, 2]] = min(result[0], result[2])
-    return result
 
 
 def _frame(lower: np.ndarray, upper: np.ndarray) -> Similarity:

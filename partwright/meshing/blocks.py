@@ -8,15 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from partwright.errors import NoSurfaceError, NotFiniteError
+from partwright.fields.base import LIPSCHITZ
 
 Distance = Callable[[np.ndarray], np.ndarray]
 
 BLOCK = 4  # cells along a block
 COARSEST = 16  # cells along a block of the first level
-
-# How much faster than distance a field may change. Unions, poses and tapers keep 1; a SuperFrustum's bend
-# stretches the inside of its arc (up to pi/2 at a third of the radius), and callers' fields are rarely exact.
-LIPSCHITZ = 1.6
 
 _CORNERS = np.stack(np.meshgrid(*[np.arange(BLOCK + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _CHILDREN = np.stack(np.meshgrid(*[np.arange(2)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)

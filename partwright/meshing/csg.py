@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Part
 from partwright.assembly.placed import placed_quadric
 from partwright.assembly.similarity import rotation_matrix
-from partwright.assembly.tree import Node, operands
+from partwright.assembly.tree import Node
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.fields import Quadric, Solid, normal_form
+from partwright.fields import Field, Solid, normal_form
 from partwright.meshing.named_solids import named_solid
 from partwright.meshing.quadric_solids import half_space, quadric_solid
 
@@ -31,10 +31,14 @@ _ROOM = 0.02  # of the longest side, around the bounds
 
 def has_exact_mesh(node: Node) -> bool:
     """Whether all leaves are quadrics or named solids, and none of them is blended."""
-    if isinstance(node, Part):
-        return isinstance(node.field, Quadric | Solid) and not (node.instances and node.blend)
+    if node.is_part:
+        return _is_exact(node.field) and not (node.instances and node.blend)
     blended = any(child.blend for child in node.children[1:])
     return not blended and all(has_exact_mesh(child) for child in node.children)
+
+
+def _is_exact(field: Field) -> bool:
+    return isinstance(field, Solid) or field.quadric() is not None
 
 
 def mesh_csg(node: Node, tolerance: float | None = None) -> trimesh.Trimesh:
@@ -83,13 +87,11 @@ class _Builder:
         self.box, self.tolerance = box, tolerance
 
     def solid(self, node: Node) -> Manifold:
-        if isinstance(node, Part) and not node.instances:
+        if node.is_part and not node.instances:
             return self.leaf(node)
-        operation = "union" if isinstance(node, Part) else node.operation
-        children = operands(node)
-        if operation == "intersection":
-            return self.intersection(children)
-        return self.joined(children, operation == "difference", _NUDGE * _STEP ** _height(node))
+        if node.operation == "intersection":
+            return self.intersection(node.operands)
+        return self.joined(node.operands, node.operation == "difference", _NUDGE * _STEP ** _height(node))
 
     def joined(self, children: tuple[Node, ...], subtract: bool, nudge: float) -> Manifold:
         """The union of solids, or the first minus the others.
@@ -112,7 +114,7 @@ class _Builder:
 
     def larger(self, node: Node, solid: Manifold, nudge: float) -> Manifold:
         """The solid of a node with every side further out by `nudge`: along a leaf's own axes."""
-        if not isinstance(node, Part) or node.instances or not isinstance(node.field, Solid):
+        if not node.is_part or node.instances or not isinstance(node.field, Solid):
             return _larger(solid, nudge)
         return _placed(_larger(named_solid(node.field, self.tolerance), nudge), node)
 
@@ -130,16 +132,17 @@ class _Builder:
         return Manifold.batch_boolean([region, *others], OpType.Intersect) if others else region
 
     def leaf(self, part: Part) -> Manifold:
-        if isinstance(part.field, Quadric):
-            return quadric_solid(placed_quadric(part), self.box, self.tolerance)
+        quadric = placed_quadric(part)
+        if quadric is not None:
+            return quadric_solid(quadric, self.box, self.tolerance)
         assert isinstance(part.field, Solid)
         return _placed(named_solid(part.field, self.tolerance), part)
 
 
 def _height(node: Node) -> int:
     """Operations below the node's own, on the way to the deepest leaf."""
-    below = node.children if isinstance(node, Assembly) else ()
-    return max((1 + _height(child) for child in below if isinstance(child, Assembly)), default=0)
+    below = () if node.is_part else node.children
+    return max((1 + _height(child) for child in below if not child.is_part), default=0)
 
 
 def _topology(solid: Manifold) -> tuple[int, int]:
@@ -161,11 +164,10 @@ def _placed(solid: Manifold, part: Part) -> Manifold:
 
 def _plane(node: Node) -> tuple[np.ndarray, np.ndarray] | None:
     """Normal and a point, both (3,), of a leaf that is a half-space."""
-    if not isinstance(node, Part) or node.instances or not isinstance(node.field, Quadric):
+    quadric = placed_quadric(node) if node.is_part and not node.instances else None
+    if quadric is None or not quadric.is_plane:
         return None
-    if any(node.field.coefficients[:3]) or any(node.field.coefficients[7:]):
-        return None
-    form = normal_form(placed_quadric(node))
+    form = normal_form(quadric)
     return form.axes[:, 2] * (-1.0 if form.complement else 1.0), form.centre
 
 

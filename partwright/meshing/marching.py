@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from partwright.errors import SettingError
-from partwright.meshing.blocks import BLOCK, LIPSCHITZ, Distance, Grid, evaluate, surface_blocks
+from partwright.fields.base import LIPSCHITZ
+from partwright.meshing.blocks import BLOCK, Distance, Grid, evaluate, surface_blocks
 from partwright.meshing.features import sharpen
 from partwright.meshing.polygons import Polygons
 from partwright.meshing.tables import CORNERS, EDGE_AXIS, EDGES, loop_table

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from partwright.meshing.blocks import BLOCK, LIPSCHITZ, Distance, Grid, evaluate, subdivided
+from partwright.fields.base import LIPSCHITZ
+from partwright.meshing.blocks import BLOCK, Distance, Grid, evaluate, subdivided
 
 _CELLS = np.stack(np.meshgrid(*[np.arange(BLOCK)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _LEVELS = (16, 8, BLOCK)

@@ -6,7 +6,6 @@ import numpy as np
 
 from partwright.assembly import Assembly, Part
 from partwright.assembly.placed import placed_quadric
-from partwright.fields import Quadric
 
 _DIGITS = 9
 
@@ -16,7 +15,7 @@ def primitives(node: Assembly | Part) -> int:
 
     What repeats counts once; of `assembly.expanded()` every copy counts, as in those tables.
     """
-    return 1 if isinstance(node, Part) else len(node)
+    return len(node.parts)
 
 
 def convexes(node: Assembly | Part) -> int:
@@ -25,7 +24,7 @@ def convexes(node: Assembly | Part) -> int:
     What repeats counts once, as in `primitives`.
     An intersection counts once for each convex that its children hold beyond the one that they share.
     """
-    if isinstance(node, Part):
+    if node.is_part:
         return 1
     counts = [convexes(child) for child in node.children]
     return sum(counts) - (len(counts) - 1 if node.operation == "intersection" else 0)
@@ -37,14 +36,14 @@ def distinct_primitives(node: Assembly | Part) -> int:
     A quadric that several convexes share counts once, as a row of CAPRI-Net's P that several columns of its
     selection matrix choose (section 3.1).
     """
-    parts = (node,) if isinstance(node, Part) else node.parts
     found: set[tuple[float, ...]] = set()
     others = 0
-    for part in parts:
-        if not isinstance(part.field, Quadric):
+    for part in node.parts:
+        quadric = placed_quadric(part)
+        if quadric is None:
             others += 1
             continue
-        row = np.array(placed_quadric(part).coefficients)
+        row = np.array(quadric.coefficients)
         row = row / row[np.abs(row).argmax()]  # of the same sign, whichever side is inside
         found.add(tuple((row.round(_DIGITS) + 0.0).tolist()))
     return len(found) + others

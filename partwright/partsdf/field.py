@@ -89,7 +89,7 @@ class NeuralField(JointField):
         return self.part
 
     @property
-    def slope(self) -> float:
+    def lipschitz(self) -> float:
         return self.network.slope
 
     @cached_property
@@ -104,7 +104,7 @@ class NeuralField(JointField):
             return self((centre + points / scale).astype(np.float32))[None] * np.float32(scale)
 
         cells = fitting(self.wall * scale, round(resolution * 2 / _SIDE))
-        lattice = SparseLattice(distances, 1.0, cells, self.slope)
+        lattice = SparseLattice(distances, 1.0, cells, self.lipschitz)
         mesh = lattice.meshes()[0]
         if mesh is None:
             raise NoSurfaceError(
@@ -178,7 +178,7 @@ class NeuralField(JointField):
                 -1, 3
             )
             centres = box[0] + steps * cell
-            near = self(centres.astype(np.float32)) <= self.slope * np.linalg.norm(cell) / 2
+            near = self(centres.astype(np.float32)) <= self.lipschitz * np.linalg.norm(cell) / 2
             if not near.any():
                 return np.zeros((2, 3))
             box = np.array([centres[near].min(axis=0) - cell / 2, centres[near].max(axis=0) + cell / 2])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from partwright.assembly import Assembly, Similarity
-from partwright.assembly.rows import parts_from_rows
+from partwright.assembly.parts_from_rows import parts_from_rows
 from partwright.methods import Outcome
 from partwright.shapes import Shape
 from partwright.superfrusta.curve import with_parents

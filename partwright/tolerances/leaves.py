@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.rows import rows
 from partwright.assembly.similarity import rotation_matrix
-from partwright.assembly.tree import Node, operands
+from partwright.assembly.tree import Node
 from partwright.errors import ParameterError
 from partwright.fields import Field, SuperFrustum, kernel
 from partwright.fields.operations import SHARP
@@ -124,17 +124,17 @@ class Share:
 
 def fold(node: Node, values: Iterator[Floats]) -> tuple[Floats, list[Share]]:
     """Distance (N,) of a node by those of its leaves' copies, depth first, and each copy's share in it."""
-    if isinstance(node, Part) and not node.instances:
+    if node.is_part and not node.instances:
         value = next(values)
         return value, [Share(np.ones_like(value), np.zeros_like(value))]
-    operation = "union" if isinstance(node, Part) else node.operation
     result, shares = np.empty(0), []
-    for i, child in enumerate(operands(node)):
+    for i, child in enumerate(node.operands):
         value, inner = fold(child, values)
         if i == 0:
             result, shares = value, inner
             continue
         # all three are a smooth minimum of plus or minus their arguments
+        operation = node.operation
         a, b = (1.0, 1.0) if operation == "union" else (-1.0, -1.0 if operation == "intersection" else 1.0)
         result, share, fillet = _smooth_minimum(a * result, b * value, child.blend)
         result = a * result

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from partwright.assembly import Assembly, Part, load_assembly
-from partwright.assembly.files import MAX_BYTES, from_text, to_text
+from partwright.assembly.file_text import to_text
+from partwright.assembly.files import MAX_BYTES, from_text
 from partwright.errors import AssemblyFileError, NewerVersionError, OutputError, UnreadableFileError
 from partwright.fields import KINDS, Sphere
 from partwright.fields.registry import LEARNED

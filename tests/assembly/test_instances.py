@@ -10,7 +10,8 @@ import torch
 from hypothesis import given, settings
 
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.assembly.files import from_text, to_text
+from partwright.assembly.file_text import to_text
+from partwright.assembly.files import from_text
 from partwright.assembly.rows import rows
 from partwright.errors import AssemblyFileError, ParameterError
 from partwright.fields import Box, Sphere

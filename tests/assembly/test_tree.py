@@ -10,7 +10,8 @@ from hypothesis import given, settings
 
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.names import unique_names
-from partwright.assembly.rows import parts_from_rows, rows
+from partwright.assembly.parts_from_rows import parts_from_rows
+from partwright.assembly.rows import rows
 from partwright.errors import ParameterError
 from partwright.fields import Box, Cylinder, Sphere, SuperFrustum
 from tests.assembly.strategies import ASSEMBLIES, PARTS, SIMILARITIES

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.assembly.rows import parts_from_rows, rows
+from partwright.assembly.parts_from_rows import parts_from_rows
+from partwright.assembly.rows import rows
 from partwright.fields import SuperFrustum, kernel
 from partwright.shapes import load_shape
 from partwright.superfrusta.objective import score
