@@ -14,7 +14,7 @@ def main() -> int:
     import torch
 
     from partwright.capri.network import SMALL
-    from partwright.capri.training import NETWORK, Report, Training, train
+    from partwright.capri.pretraining import NETWORK, PretrainingReport, PretrainingSettings, train
 
     parser = argparse.ArgumentParser(
         prog="python -m partwright.capri",
@@ -22,7 +22,7 @@ def main() -> int:
         "from where it was stopped.",
     )
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="where to write")
-    for entry in fields(Training):
+    for entry in fields(PretrainingSettings):
         kind = float if isinstance(entry.default, float) else int
         parser.add_argument(f"--{entry.name}", metavar="X", type=kind, default=entry.default)
     parser.add_argument("--threads", metavar="N", type=int, default=0, help="default: one per core")
@@ -31,12 +31,12 @@ def main() -> int:
     if threads:
         torch.set_num_threads(threads)
 
-    def tell(report: Report) -> None:
+    def report_step(report: PretrainingReport) -> None:
         line = f"step {report.step}/{report.steps}  loss {report.loss:.5f}  {report.seconds:.0f} s"
         print(f"partwright: {line}", file=sys.stderr, flush=True)
 
     try:
-        outcome = train(folder, Training(**given), SMALL, tell)
+        outcome = train(folder, PretrainingSettings(**given), SMALL, report_step)
     except PartwrightError as error:
         print(f"partwright: error: {error}", file=sys.stderr)
         return error.exit_code

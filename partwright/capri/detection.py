@@ -13,34 +13,34 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from partwright.capri import rows
-from partwright.capri.kinds import FITTERS, MAKERS, Draw
-from partwright.capri.rows import Row
-from partwright.capri.surface import Surface
+from partwright.capri import quadric_rows as rows
+from partwright.capri.oriented_points import OrientedPoints
+from partwright.capri.quadric_kinds import HYPOTHESES, LEAST_SQUARES_FITS, MinimalSets
+from partwright.capri.quadric_rows import Row
 
-_SEEDS = 48  # hypotheses of each kind in one draw
-_PROBE = 1500  # points that sift hypotheses
-_FINALISTS = 6
-TOLERANCE = 0.006  # unit frame: how far from its quadric a point may lie
-_CLOSER = 0.125  # share of the tolerance at which the kinds are told apart
-_AGREE = np.cos(np.radians(18.0))  # and by how much its normal may differ
-_NEAR, _FAR = 6, 60  # neighbours among which partners are drawn
-_SIMPLER = {
+_HYPOTHESES_PER_KIND = 48  # hypotheses of each kind in one draw
+_PROBE_POINTS = 1500  # points that sift hypotheses
+_MAX_REFITTED = 6
+INLIER_DISTANCE = 0.006  # unit frame: how far from its quadric a point may lie
+_CLOSE_INLIER_SHARE = 0.125  # share of the tolerance at which the kinds are told apart
+_MIN_NORMAL_COSINE = np.cos(np.radians(18.0))  # and by how much its normal may differ
+_NEAR_NEIGHBOURS, _ALL_NEIGHBOURS = 6, 60  # neighbours among which partners are drawn
+_SIMPLICITY_PRIOR = {
     "plane": 1.0,
     "cylinder": 0.95,
     "sphere": 0.92,
     "cone": 0.9,
     "quadric": 0.75,
 }  # rather the simpler
-_PATCH = 40  # points of a patch that a general quadric is fitted to
-_REFITS = 3
-_STALE = 6  # draws without a find that end the search
-_MOST = 250
-_FEWEST = 8  # points of a fit
+_PATCH_POINTS = 40  # points of a patch that a general quadric is fitted to
+_MAX_REFITS = 3
+_MAX_FRUITLESS_DRAWS = 6  # draws without a find that end the search
+_MAX_QUADRICS = 250
+_MIN_INLIERS = 8  # points of a fit
 
 
 @dataclass(frozen=True)
-class Surfel:
+class DetectedQuadric:
     """A quadric found on a surface: its row (10,), kind, and the points (K,) (indices) that bear it out.
 
     outward: whether the points' normals point out of f <= 0, as on a boss; on a hole's wall they do not.
@@ -50,33 +50,33 @@ class Surfel:
 
     row: Row
     kind: str
-    members: NDArray[np.int64]
+    inliers: NDArray[np.int64]
     outward: bool
     support: float
 
 
 def detect(
-    surface: Surface, kinds: tuple[str, ...], least: int, seed: int, tolerance: float = TOLERANCE
-) -> list[Surfel]:
+    surface: OrientedPoints, kinds: tuple[str, ...], least: int, seed: int, tolerance: float = INLIER_DISTANCE
+) -> list[DetectedQuadric]:
     """Quadrics of these kinds (of `KINDS`) that `least` points bear out."""
     rng = np.random.default_rng(seed)
     points, normals = surface.points, surface.normals
-    neighbours = cKDTree(points).query(points, min(_FAR + 1, len(points)))[1][:, 1:]
+    neighbours = cKDTree(points).query(points, min(_ALL_NEIGHBOURS + 1, len(points)))[1][:, 1:]
     left = np.ones(len(points), dtype=bool)
-    found: list[Surfel] = []
+    found: list[DetectedQuadric] = []
     stale = 0
-    while stale < _STALE and left.sum() >= least and len(found) < _MOST:
-        best = _draw(points, normals, neighbours, left, kinds, rng, tolerance)
-        if best is None or len(best.members) < least:
+    while stale < _MAX_FRUITLESS_DRAWS and left.sum() >= least and len(found) < _MAX_QUADRICS:
+        best = _best_of_draw(points, normals, neighbours, left, kinds, rng, tolerance)
+        if best is None or len(best.inliers) < least:
             stale += 1
             continue
         stale = 0
-        left[best.members] = False
+        left[best.inliers] = False
         found.append(best)
     return found
 
 
-def _draw(
+def _best_of_draw(
     points: NDArray[np.float64],
     normals: NDArray[np.float64],
     neighbours: NDArray[np.int64],
@@ -84,26 +84,28 @@ def _draw(
     kinds: tuple[str, ...],
     rng: np.random.Generator,
     tolerance: float,
-) -> Surfel | None:
+) -> DetectedQuadric | None:
     """The best of one draw of hypotheses, refitted."""
     free = np.flatnonzero(left)
-    seeds = rng.choice(free, _SEEDS)
-    mates = np.stack([_mate(seeds, neighbours, left, rng) for _ in range(2)])
-    draw = Draw(points, normals, seeds, mates, neighbours[seeds, :_PATCH])
-    probe = rng.choice(free, min(_PROBE, len(free)), replace=False)
+    seeds = rng.choice(free, _HYPOTHESES_PER_KIND)
+    mates = np.stack([_partners(seeds, neighbours, left, rng) for _ in range(2)])
+    draw = MinimalSets(points, normals, seeds, mates, neighbours[seeds, :_PATCH_POINTS])
+    probe = rng.choice(free, min(_PROBE_POINTS, len(free)), replace=False)
     scored: list[tuple[float, Row, str]] = []
     for kind in kinds:
-        made = MAKERS[kind](draw)
+        made = HYPOTHESES[kind](draw)
         if len(made) == 0:
             continue
-        support = _SIMPLER[kind] * _support(made, points[probe], normals[probe], tolerance).sum(axis=1)
+        support = _SIMPLICITY_PRIOR[kind] * _support(made, points[probe], normals[probe], tolerance).sum(
+            axis=1
+        )
         scored += [(float(score), row, kind) for score, row in zip(support, made, strict=True)]
     scored.sort(key=lambda entry: -entry[0])
-    best = _best([(row, kind) for _, row, kind in scored[:_FINALISTS]], points, normals, free, tolerance)
-    if best is None or len(best.members) < _FEWEST:  # of a plane, those that face its way may be few
+    best = _best([(row, kind) for _, row, kind in scored[:_MAX_REFITTED]], points, normals, free, tolerance)
+    if best is None or len(best.inliers) < _MIN_INLIERS:  # of a plane, those that face its way may be few
         return best
-    at, across = points[best.members], normals[best.members]
-    others = [(kind, FITTERS[kind](best.row, at, across)) for kind in kinds if kind != best.kind]
+    at, across = points[best.inliers], normals[best.inliers]
+    others = [(kind, LEAST_SQUARES_FITS[kind](best.row, at, across)) for kind in kinds if kind != best.kind]
     other = _best([(r, k) for k, r in others if r is not None], points, normals, free, tolerance)
     return other if other is not None and _score(other) > _score(best) else best
 
@@ -114,17 +116,17 @@ def _best(
     normals: NDArray[np.float64],
     free: NDArray[np.int64],
     tolerance: float,
-) -> Surfel | None:
+) -> DetectedQuadric | None:
     """The best of rows of these kinds after they are refitted."""
     fits = [_refitted(row, kind, points, normals, free, tolerance) for row, kind in given]
     return max((one for one in fits if one is not None), key=_score, default=None)
 
 
-def _score(one: Surfel) -> float:
-    return one.support * _SIMPLER[one.kind]
+def _score(one: DetectedQuadric) -> float:
+    return one.support * _SIMPLICITY_PRIOR[one.kind]
 
 
-def _mate(
+def _partners(
     seeds: NDArray[np.int64],
     neighbours: NDArray[np.int64],
     left: NDArray[np.bool_],
@@ -132,7 +134,9 @@ def _mate(
 ) -> NDArray[np.int64]:
     """A partner for each seed among its neighbours, which is free itself where one of four tries is."""
     width = neighbours.shape[1]
-    tries = rng.integers(0, np.where(rng.random(len(seeds)) < 0.4, min(_NEAR, width), width), (4, len(seeds)))
+    tries = rng.integers(
+        0, np.where(rng.random(len(seeds)) < 0.4, min(_NEAR_NEIGHBOURS, width), width), (4, len(seeds))
+    )
     chosen = neighbours[seeds[None], tries]
     first = np.argmax(left[chosen], axis=0)
     return np.asarray(chosen[first, np.arange(len(seeds))])
@@ -148,7 +152,7 @@ def _support(
     length = np.maximum(np.linalg.norm(slope, axis=2), 1e-9)
     along = np.abs((slope * normals).sum(axis=2))
     near = 1 - (value / (tolerance * length)) ** 2
-    return np.where(along > _AGREE * length, np.maximum(near, 0.0), 0.0)
+    return np.where(along > _MIN_NORMAL_COSINE * length, np.maximum(near, 0.0), 0.0)
 
 
 def _refitted(
@@ -158,29 +162,33 @@ def _refitted(
     normals: NDArray[np.float64],
     free: NDArray[np.int64],
     tolerance: float,
-) -> Surfel | None:
+) -> DetectedQuadric | None:
     """The row fitted to the free points that agree with it, and those again."""
     found = _support([row], points[free], normals[free], tolerance)[0]
-    for _ in range(_REFITS):
-        members = free[found > 0]
-        if len(members) < _FEWEST:
+    for _ in range(_MAX_REFITS):
+        inliers = free[found > 0]
+        if len(inliers) < _MIN_INLIERS:
             return None
-        better = FITTERS[kind](row, points[members], normals[members])
+        better = LEAST_SQUARES_FITS[kind](row, points[inliers], normals[inliers])
         if better is None:
             break
         again = _support([better], points[free], normals[free], tolerance)[0]
         if again.sum() < found.sum():
             break
         row, found = better, again
-    members = free[found > 0]
-    signs = (rows.gradients(row, points[members]) * normals[members]).sum(axis=1)
+    inliers = free[found > 0]
+    signs = (rows.gradients(row, points[inliers]) * normals[inliers]).sum(axis=1)
     outward = bool(np.sum(np.sign(signs)) >= 0)
-    same = members[(signs > 0) == outward] if kind == "plane" else members
-    return Surfel(row, kind, same, outward, support(row, points[members], normals[members], tolerance))
+    same = inliers[(signs > 0) == outward] if kind == "plane" else inliers
+    return DetectedQuadric(
+        row, kind, same, outward, support(row, points[inliers], normals[inliers], tolerance)
+    )
 
 
 def support(
-    row: Row, points: NDArray[np.float64], normals: NDArray[np.float64], tolerance: float = TOLERANCE
+    row: Row, points: NDArray[np.float64], normals: NDArray[np.float64], tolerance: float = INLIER_DISTANCE
 ) -> float:
     """How well oriented points (N, 3), (N, 3) bear out a quadric, at the tolerance and more closely."""
-    return float(sum(_support([row], points, normals, t).sum() for t in (tolerance, _CLOSER * tolerance)))
+    return float(
+        sum(_support([row], points, normals, t).sum() for t in (tolerance, _CLOSE_INLIER_SHARE * tolerance))
+    )

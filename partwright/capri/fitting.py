@@ -12,19 +12,19 @@ from typing import Any
 import numpy as np
 
 from partwright.assembly import Assembly
-from partwright.capri import rows, selection
+from partwright.capri import oriented_points, selection
+from partwright.capri import quadric_rows as rows
 from partwright.capri import samples as sampling
-from partwright.capri import surface as surfaces
 from partwright.capri.alignment import aligned
-from partwright.capri.candidates import Pool, candidates
+from partwright.capri.candidates import CandidatePool, candidates
+from partwright.capri.csg_tree import CsgTree
 from partwright.capri.detection import detect
-from partwright.capri.given import surface_of
+from partwright.capri.initialisation import start_surface
 from partwright.capri.overlap import overlapped
-from partwright.capri.repeats import with_repeats
-from partwright.capri.samples import Samples
+from partwright.capri.repeated_quadrics import with_repeats
+from partwright.capri.samples import OccupancySamples
 from partwright.capri.selection import Problem
 from partwright.capri.settings import Settings
-from partwright.capri.tree import Tree
 from partwright.errors import EmptyShapeError, MissingDependencyError, SettingError
 from partwright.methods import Outcome, Progress, timed
 from partwright.metrics.complexity import convexes, distinct_primitives, primitives
@@ -32,9 +32,9 @@ from partwright.shapes import Shape
 
 ORIGINS = {"seeds": "detected surfaces", "weights": "pre-trained network"}
 
-_MOST = 64  # convexes: the paper's c (section 4.1)
-_STEP = 1.5  # factor between the prices that are tried for a budget or a target
-_LADDER = 16
+_MAX_CONVEXES = 64  # convexes: the paper's c (section 4.1)
+_PRICE_FACTOR = 1.5  # factor between the prices that are tried for a budget or a target
+_PRICE_STEPS = 16  # prices that are tried at most
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Fitted:
     outcome: Outcome
     seconds: dict[str, float]
     history: list[dict[str, float | str]]
-    tree: Tree
+    tree: CsgTree
     details: dict[str, Any] = field(default_factory=dict)
     curve: tuple[Any, ...] = ()
 
@@ -131,12 +131,12 @@ class Run:
     origin: str = "seeds"
     turn: tuple[int, int] = (0, 1)
     best: selection.Layers | None = None
-    tuned: Tree | None = None
+    tuned: CsgTree | None = None
     outcome: Outcome = "converged"
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
-    pool: Pool = field(init=False)
-    samples: Samples = field(init=False)
+    pool: CandidatePool = field(init=False)
+    samples: OccupancySamples = field(init=False)
 
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage)
@@ -145,20 +145,20 @@ class Run:
         """Samples, and the pool of quadrics."""
         s = self.settings
         with self.timed("prepare"):
-            self.samples = sampling.sample(shape, s.near, s.uniform, s.seed)
-            surface = surfaces.sample(shape, s.surface, s.seed)
+            self.samples = sampling.draw_samples(shape, s.near, s.uniform, s.seed)
+            surface = oriented_points.sample_surface(shape, s.surface, s.seed)
         with self.timed("detect" if self.origin == "seeds" else "predict"):
             found = detect(surface, s.kinds, s.least, s.seed) if self.origin == "seeds" else []
             found = aligned(found, surface)
             if start is not None:
-                seen = surface_of(start, shape, s.surface, s.seed)
+                seen = start_surface(start, shape, s.surface, s.seed)
                 found = [*found, *aligned(detect(seen, s.kinds, s.least, s.seed), seen)]
             given = candidates(found, surface)
             if self.origin == "weights":
                 given += list(_paper().predicted(shape, s))
-            pool = Pool.of(given, nested=s.nested, oriented=s.oriented)
+            pool = CandidatePool.of(given, nested=s.nested, oriented=s.oriented)
             held = rows.expressible(pool.rows) | (s.schedule == "search")
-            self.pool = Pool(pool.rows[held], pool.complement[held])
+            self.pool = CandidatePool(pool.rows[held], pool.complement[held])
             self.outside = (rows.values(self.pool.rows, self.samples.points) > 0).astype(np.float32)
 
     def make(self, shape: Shape) -> None:
@@ -170,19 +170,21 @@ class Run:
             with self.timed("fine-tune"):
                 seeds = self.tree() if self.placed else None
                 if seeds is not None or self.origin == "weights":
-                    _paper().fine_tuned(shape, seeds, s, self.samples.points, self.take, self.tell)
+                    _paper().fine_tuned(
+                        shape, seeds, s, self.samples.points, self.accept_tuned, self.report_finetuning
+                    )
 
     @property
     def placed(self) -> bool:
         """Whether there is a tree."""
         return bool(self.tuned.layers[0]) if self.tuned else bool(self.best and any(self.best))
 
-    def take(self, tree: Tree) -> None:
+    def accept_tuned(self, tree: CsgTree) -> None:
         """The result of fine-tuning, where it is no empty tree."""
         if tree.layers[0]:
             self.tuned = tree
 
-    def tell(self, stage: str, done: float) -> None:
+    def report_finetuning(self, stage: str, done: float) -> None:
         """Progress of fine-tuning."""
         if self.report is not None:
             self.report(Progress(stage, 1, 1, 0, 0.0, self.fraction(0.3 + 0.7 * done)))
@@ -212,20 +214,22 @@ class Run:
         )
 
     def search(self) -> Outcome:
-        """Starts of several severities, the best of them ruined and recreated; then budget and target."""
+        """Starts that forgive false positives more or less, the best ruined and recreated; then demands."""
         s = self.settings
         problem = self.problem()
         empty: selection.Layers = [[] for _ in range(2 if s.subtract else 1)]
         with self.timed("select"):
-            for i, strict in enumerate(selection.SEVERITIES):
-                layers = selection.polish(problem, selection.fill(problem, empty, strict, _MOST), _MOST)
-                self.keep(problem, layers, "select", i + 1, len(selection.SEVERITIES))
+            weights = selection.FALSE_POSITIVE_WEIGHTS
+            for i, weight in enumerate(weights):
+                layers = selection.fill(problem, empty, weight, _MAX_CONVEXES)
+                layers = selection.polish(problem, layers, _MAX_CONVEXES)
+                self.keep_cheaper(problem, layers, "select", i + 1, len(weights))
         if self.best is None:
             return "converged"
         with self.timed("recreate"):
             for i in range(s.tries):
-                layers = selection.ruin_and_recreate(problem, self.best, _MOST)
-                self.keep(problem, layers, "recreate", i + 1, s.tries)
+                layers = selection.ruin_and_recreate(problem, self.best, _MAX_CONVEXES)
+                self.keep_cheaper(problem, layers, "recreate", i + 1, s.tries)
         return self.meet_demands()
 
     def meet_demands(self) -> Outcome:
@@ -237,8 +241,8 @@ class Run:
                 return self.meet_target(s.min_iou)
             if s.max_parts is None or self.tree().primitives <= s.max_parts:
                 return "converged"
-            for i in range(1, _LADDER):
-                self.best = selection.polish(self.problem(_STEP**i), self.best, _MOST)
+            for i in range(1, _PRICE_STEPS):
+                self.best = selection.polish(self.problem(_PRICE_FACTOR**i), self.best, _MAX_CONVEXES)
                 if self.tree().primitives <= s.max_parts:
                     return "budget_reached"
             raise SettingError(f"max_parts: no tree of {s.max_parts} primitives encloses anything; give more")
@@ -246,16 +250,18 @@ class Run:
     def meet_target(self, target: float) -> Outcome:
         """The dearest prices at which the IoU of the samples reaches the target."""
         best = self.best
-        for i in range(_LADDER // 2, -_LADDER // 2, -1):
-            problem = self.problem(_STEP**i)
-            layers = selection.polish(problem, best or [], _MOST)
+        for i in range(_PRICE_STEPS // 2, -_PRICE_STEPS // 2, -1):
+            problem = self.problem(_PRICE_FACTOR**i)
+            layers = selection.polish(problem, best or [], _MAX_CONVEXES)
             if self.iou(layers) >= target:
                 self.best = layers
                 return "target_reached"
         return "converged"
 
-    def keep(self, problem: Problem, layers: selection.Layers, stage: str, round_: int, rounds: int) -> None:
-        """Keeps layers that are cheaper than the best so far, and tells."""
+    def keep_cheaper(
+        self, problem: Problem, layers: selection.Layers, stage: str, round_: int, rounds: int
+    ) -> None:
+        """Keeps layers that are cheaper than the best so far, and reports progress."""
         if any(layers) and (self.best is None or problem.cost(layers) < problem.cost(self.best)):
             self.best = layers
         tree = self.tree() if self.best else None
@@ -272,12 +278,12 @@ class Run:
         occupied, inside = self.problem().occupancy(layers)[rest], self.samples.inside[rest]
         return float((occupied & inside).sum() / max((occupied | inside).sum(), 1))
 
-    def tree(self) -> Tree:
+    def tree(self) -> CsgTree:
         if self.tuned is not None:
             return self.tuned
         assert self.best is not None
         layers = tuple(tuple(layer) for layer in self.best)
-        return Tree(self.pool.rows, self.pool.complement, layers)
+        return CsgTree(self.pool.rows, self.pool.complement, layers)
 
 
 def _paper() -> ModuleType:

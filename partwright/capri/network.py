@@ -12,17 +12,18 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from partwright.capri.quadric_rows import CROSS
 from partwright.errors import SettingError, UnreadableFileError
 
 VOXELS = 64
-HALF = 0.5  # the paper's coordinates, in which a shape is at most 1 long, from the unit frame's
-_SLOPE = 0.01
-_SPREAD = 0.02  # of T and W at the start
-_WEIGHT = 1e-5  # W at the start: small, so that eq. 4 does not saturate
+UNIT_TO_PAPER = 0.5  # the paper's coordinates, in which a shape is at most 1 long, from the unit frame's
+_LEAKY_SLOPE = 0.01
+_INITIAL_SPREAD = 0.02  # of T and W at the start
+_INITIAL_WEIGHT = 1e-5  # W at the start: small, so that eq. 4 does not saturate
 
 
 @dataclass(frozen=True)
-class Sizes:
+class NetworkSizes:
     """primitives p, convexes c (half of them subtracted), code: section 4.1; hidden: the MLP's middle layer;
     channels: the encoder's first (IM-Net: 32, doubled twice)."""
 
@@ -33,13 +34,13 @@ class Sizes:
     channels: int = 32
 
 
-SMALL = Sizes(primitives=256, convexes=32, code=128, hidden=256, channels=4)  # a few megabytes
+SMALL = NetworkSizes(primitives=256, convexes=32, code=128, hidden=256, channels=4)  # a few megabytes
 
 
 class Encoder(nn.Module):
     """64^3 voxels (B, 1, 64, 64, 64) to a code (B, code), as in IM-Net: four halvings, then to a point."""
 
-    def __init__(self, sizes: Sizes) -> None:
+    def __init__(self, sizes: NetworkSizes) -> None:
         super().__init__()
         c = sizes.channels
         widths = (1, c, 2 * c, 4 * c, 8 * c)
@@ -60,16 +61,16 @@ class Encoder(nn.Module):
 class CapriNet(nn.Module):
     """Code to primitives P (B, p, 7), beside T (p, c) and W (c,), which all shapes share in pre-training."""
 
-    def __init__(self, sizes: Sizes | None = None) -> None:
+    def __init__(self, sizes: NetworkSizes | None = None) -> None:
         super().__init__()
-        self.sizes = sizes or Sizes()
+        self.sizes = sizes or NetworkSizes()
         s = self.sizes
         self.encoder = Encoder(s)
         self.primitives = nn.Sequential(
-            nn.Linear(s.code, s.hidden), nn.LeakyReLU(_SLOPE), nn.Linear(s.hidden, 7 * s.primitives)
+            nn.Linear(s.code, s.hidden), nn.LeakyReLU(_LEAKY_SLOPE), nn.Linear(s.hidden, 7 * s.primitives)
         )
-        self.selection = nn.Parameter(_SPREAD * torch.randn(s.primitives, s.convexes))
-        self.weights = nn.Parameter(_WEIGHT + _SPREAD * torch.randn(s.convexes))
+        self.selection = nn.Parameter(_INITIAL_SPREAD * torch.randn(s.primitives, s.convexes))
+        self.weights = nn.Parameter(_INITIAL_WEIGHT + _INITIAL_SPREAD * torch.randn(s.convexes))
 
     def coefficients(self, code: Tensor) -> Tensor:
         """P (B, p, 7) of codes (B, code): eq. 1, with a, b, c >= 0."""
@@ -98,12 +99,12 @@ def rows_of(coefficients: Tensor) -> NDArray[np.float64]:
 
 def coefficients_of(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rows (K, 10) of the unit frame, without cross terms, as P (K, 7)."""
-    return np.asarray(rows[:, :7] / _scale())
+    return np.asarray(rows[:, : CROSS.start] / _scale())
 
 
 def _scale() -> NDArray[np.float64]:
-    """f(HALF * p) by coefficients of p."""
-    return np.array([HALF**2] * 3 + [HALF] * 3 + [1.0])
+    """f(UNIT_TO_PAPER * p) by coefficients of p."""
+    return np.array([UNIT_TO_PAPER**2] * 3 + [UNIT_TO_PAPER] * 3 + [1.0])
 
 
 def save_network(network: CapriNet, path: Path, half: bool = True) -> None:
@@ -130,7 +131,7 @@ def load_network(path: Path) -> CapriNet:
 
     try:
         with safe_open(path, "pt") as file:
-            sizes = Sizes(**json.loads((file.metadata() or {})["sizes"]))
+            sizes = NetworkSizes(**json.loads((file.metadata() or {})["sizes"]))
             state = {name: file.get_tensor(name).float() for name in file.keys()}  # noqa: SIM118
         network = CapriNet(sizes)
         network.load_state_dict(state)

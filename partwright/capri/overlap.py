@@ -9,16 +9,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.capri import rows
-from partwright.capri.samples import Samples
-from partwright.capri.tree import Tree
+from partwright.capri import quadric_rows as rows
+from partwright.capri.csg_tree import CsgTree
+from partwright.capri.samples import OccupancySamples
 
-_STEP = 0.002  # unit frame: by how much an internal face moves out
-_BEYOND = 0.01  # how far beyond a face samples tell whether it is internal
-_EXPOSED = 0.3  # share of them that may be of the other side: corners, details that the tree leaves out
+_OVERLAP_DEPTH = 0.002  # unit frame: by how much an internal face moves out
+_PROBE_DEPTH = 0.01  # how far beyond a face samples tell whether it is internal
+_MAX_EXPOSED_SHARE = 0.3  # of them that may be of the other side: corners, details that the tree leaves out
 
 
-def overlapped(tree: Tree, samples: Samples) -> Tree:
+def overlapped(tree: CsgTree, samples: OccupancySamples) -> CsgTree:
     """The tree with the internal faces of its convexes moved out."""
     values = rows.values(tree.rows, samples.points)
     covered = [[(values[:, list(c)] <= 0).all(axis=1) for c in layer] for layer in tree.layers]
@@ -33,17 +33,17 @@ def overlapped(tree: Tree, samples: Samples) -> Tree:
             moved = list(convex)
             for i in np.flatnonzero(_internal(values[:, convex], harmed)):
                 moved[i] = len(table)
-                table.append(tree.rows[convex[i]] - _STEP * np.eye(10)[6])
+                table.append(tree.rows[convex[i]] - _OVERLAP_DEPTH * np.eye(10)[rows.CONSTANT])
                 complement.append(tree.complement[convex[i]])
             convexes.append(tuple(moved))
         layers.append(tuple(convexes))
-    return Tree(np.stack(table), np.array(complement), tuple(layers))
+    return CsgTree(np.stack(table), np.array(complement), tuple(layers))
 
 
 def _internal(values: NDArray[np.float64], harmed: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(k,) whether the samples just beyond a face of a convex with these values (N, k) are on its side."""
     left_out = values > 0
     single = left_out.sum(axis=1) == 1
-    beyond = left_out & single[:, None] & (values < _BEYOND)
+    beyond = left_out & single[:, None] & (values < _PROBE_DEPTH)
     count = beyond.sum(axis=0)
-    return np.asarray((count > 0) & ((beyond & harmed[:, None]).sum(axis=0) <= _EXPOSED * count))
+    return np.asarray((count > 0) & ((beyond & harmed[:, None]).sum(axis=0) <= _MAX_EXPOSED_SHARE * count))

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.capri import stages
+from partwright.capri.csg_tree import CsgTree
+from partwright.capri.finetuning import Finetuning, encoded, seeded, straightened
+from partwright.capri.finetuning_samples import draw_finetuning_samples
 from partwright.capri.network import CapriNet, device_of, load_network, rows_of
 from partwright.capri.pruning import pruned
 from partwright.capri.settings import Settings
-from partwright.capri.supervision import supervision
-from partwright.capri.tree import Tree
-from partwright.capri.tuning import Tuning, encoded, seeded, straightened
 from partwright.shapes import Shape
 
 SHIPPED = Path(__file__).parent / "models" / "cad_parts.safetensors"
@@ -34,11 +34,11 @@ def predicted(shape: Shape, settings: Settings) -> NDArray[np.float64]:
 
 def fine_tuned(
     shape: Shape,
-    seeds: Tree | None,
+    seeds: CsgTree | None,
     settings: Settings,
     points: NDArray[np.floating],
-    keep: Callable[[Tree], None],
-    tell: Callable[[str, float], None],
+    accept: Callable[[CsgTree], None],
+    report: Callable[[str, float], None],
 ) -> None:
     """Runs the three stages, from a tree or (None) from the pre-trained network, and keeps the pruned tree.
 
@@ -54,15 +54,15 @@ def fine_tuned(
         code = encoded(network, shape)
     else:
         network, code = seeded(seeds, settings.seed)
-    given = supervision(settings.supervision, shape, settings.seed)
-    tuning = Tuning(network.to(device), code.to(device), given, settings.seed)
+    samples = draw_finetuning_samples(settings.supervision, shape, settings.seed)
+    tuning = Finetuning(network.to(device), code.to(device), samples, settings.seed)
     try:
         for i, stage in enumerate(stages.STAGES):
-            told = partial(_tell, tell, stage.replace("_", " "), i)
-            tuning.run(stage, settings.iterations, told)
+            stage_report = partial(_report_stage, report, stage.replace("_", " "), i)
+            tuning.run(stage, settings.iterations, stage_report)
     finally:
-        keep(pruned(tuning.tree(), points))
+        accept(pruned(tuning.tree(), points))
 
 
-def _tell(tell: Callable[[str, float], None], stage: str, before: int, done: float) -> None:
-    tell(stage, (before + done) / len(stages.STAGES))
+def _report_stage(report: Callable[[str, float], None], stage: str, before: int, done: float) -> None:
+    report(stage, (before + done) / len(stages.STAGES))

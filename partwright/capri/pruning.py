@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.capri import rows
-from partwright.capri.tree import Convex, Tree
+from partwright.capri import quadric_rows as rows
+from partwright.capri.csg_tree import Convex, CsgTree
 
-SHARE = 1 / 50_000  # of the points may change side for each removal, as in the authors' program
+MAX_CHANGED_SHARE = 1 / 50_000  # of the points may change side for each removal, as in the authors' program
 
 
-def pruned(tree: Tree, points: NDArray[np.floating]) -> Tree:
+def pruned(tree: CsgTree, points: NDArray[np.floating]) -> CsgTree:
     """The tree after greedy removals, convexes first; points (N, 3) of the unit frame, best near the surface.
 
     Only for trees of at most two layers (eq. 5).
     """
     outside = rows.values(tree.rows, points) > 0
     layers = [list(layer) for layer in tree.layers] + [[] for _ in range(2 - len(tree.layers))]
-    most = int(SHARE * len(points))
+    most = int(MAX_CHANGED_SHARE * len(points))
     before = None
     while layers != before:
         before = [list(layer) for layer in layers]
@@ -27,7 +27,7 @@ def pruned(tree: Tree, points: NDArray[np.floating]) -> Tree:
             for i in range(len(layers[side])):
                 layers[side][i] = _drop_primitives(layers, side, i, outside, most)
     kept = tuple(tuple(layer) for layer in layers)
-    return Tree(tree.rows, tree.complement, kept[: 2 if kept[1] else 1])
+    return CsgTree(tree.rows, tree.complement, kept[: 2 if kept[1] else 1])
 
 
 def _covers(layer: list[Convex], outside: NDArray[np.bool_]) -> NDArray[np.int64]:

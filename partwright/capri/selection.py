@@ -19,13 +19,13 @@ Layers = list[list[Convex]]
 Matrix = NDArray[np.float32]
 Move = tuple[int | None, int | None]  # which of the chosen to drop, which quadric to add
 
-_SEEDS = 24
-_COARSE = 6000  # samples on which seeds compete
-_KEPT = 3
-_CACHED = 1000
-SEVERITIES = (0.3, 1.0, 3.0, 10.0)
-_PROGRESS = 1e-3  # of the cost, below which polishing ends
-_EPSILON = 1e-3  # of a sample's least weight
+_SEED_SAMPLES = 24
+_COARSE_SAMPLES = 6000  # samples on which seeds compete
+_MAX_IMPROVED = 3
+_MAX_CACHED_CONVEXES = 1000
+FALSE_POSITIVE_WEIGHTS = (0.3, 1.0, 3.0, 10.0)
+_MIN_RELATIVE_PROGRESS = 1e-3  # of the cost, below which polishing ends
+_MIN_GAIN = 1e-3  # of a sample's least weight
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Problem:
     def covered(self, convex: Convex) -> NDArray[np.bool_]:
         """(N,) samples within a convex."""
         if convex not in self.known:
-            if len(self.known) >= _CACHED:
+            if len(self.known) >= _MAX_CACHED_CONVEXES:
                 self.known.clear()
             self.known[convex] = np.asarray(~self.outside[:, list(convex)].any(axis=1))
         return self.known[convex]
@@ -72,11 +72,13 @@ class Problem:
         """What a convex costs."""
         return float(self.price[list(convex)].sum()) + self.convex_price
 
-    def worth(self, layers: Layers, at: int, without: int | None = None, strict: float = 1.0) -> Matrix:
+    def error_reduction(
+        self, layers: Layers, at: int, without: int | None = None, false_positive_weight: float = 1.0
+    ) -> Matrix:
         """(N,) by how much the error falls where a convex in layer `at` covers a sample.
 
-        without: index in that layer of a convex to leave out. strict: how many times a sample counts that the
-        convex would put on the wrong side.
+        without: index in that layer of a convex to leave out. false_positive_weight: how many times a sample
+        counts that the convex would put on the wrong side.
         """
         before = np.zeros(len(self.inside), dtype=bool)
         for k in range(at + 1):
@@ -90,20 +92,20 @@ class Problem:
         painted = at % 2 == 0
         change = free & (before != painted)
         right = self.inside == painted
-        value = np.where(right, self.weight, -np.rint(strict * self.weight))
+        value = np.where(right, self.weight, -np.rint(false_positive_weight * self.weight))
         return np.where(change, value, 0).astype(np.float32)
 
 
-def improve(problem: Problem, outside: Matrix, worth: Matrix, convex: Convex) -> tuple[Convex, float]:
+def improve(problem: Problem, outside: Matrix, reduction: Matrix, convex: Convex) -> tuple[Convex, float]:
     """Local search over one convex: adds, drops, exchanges while its value rises; the convex, its value.
 
-    outside (N, K) and worth (N,): the samples at which it matters whether the convex covers them. What each
-    quadric would take from the convex is kept up to date by the samples that a move changes: weights are
-    whole numbers, so the sums stay exact.
+    outside (N, K) and reduction (N,) of the error: the samples at which it matters whether the convex covers
+    them. What each quadric would take from the convex is kept up to date by the samples that a move changes:
+    weights are whole numbers, so the sums stay exact.
     """
     chosen = list(convex)
     count = outside[:, chosen].sum(axis=1)
-    taken = _sums(outside, worth, count == 0)
+    taken = _sums(outside, reduction, count == 0)
     while True:
         gain = -taken - problem.price
         gain[chosen] = -np.inf
@@ -112,49 +114,49 @@ def improve(problem: Problem, outside: Matrix, worth: Matrix, convex: Convex) ->
         single = np.flatnonzero(count == 1)
         alone = outside[np.ix_(single, np.array(chosen, dtype=np.int64))] > 0
         if chosen:
-            back = worth[single] @ alone + problem.price[chosen]
+            back = reduction[single] @ alone + problem.price[chosen]
             if back.max() > best:
                 best, move = float(back.max()), (int(np.argmax(back)), None)
-        if best <= _EPSILON:
+        if best <= _MIN_GAIN:
             opened = [single[alone[:, i]] for i in range(len(chosen))]
-            best, move = _exchange(problem, outside, worth, chosen, taken, opened)
-            if best <= _EPSILON:
+            best, move = _exchange(problem, outside, reduction, chosen, taken, opened)
+            if best <= _MIN_GAIN:
                 break
         drop, add = move
         if drop is not None:
-            taken += _sums(outside, worth, single[alone[:, drop]])
+            taken += _sums(outside, reduction, single[alone[:, drop]])
             count -= outside[:, chosen.pop(drop)]
         if add is not None:
-            taken -= _sums(outside, worth, (count == 0) & (outside[:, add] > 0))
+            taken -= _sums(outside, reduction, (count == 0) & (outside[:, add] > 0))
             chosen.append(add)
             count += outside[:, add]
     convex = tuple(sorted(chosen))
-    return convex, float(worth[count == 0].sum()) - problem.length(convex)
+    return convex, float(reduction[count == 0].sum()) - problem.length(convex)
 
 
-def _sums(outside: Matrix, worth: Matrix, which: NDArray[Any]) -> Matrix:
-    """(K,) worth of the samples `which` (indices or mask) that each quadric leaves out."""
-    return np.asarray(worth[which] @ outside[which])
+def _sums(outside: Matrix, reduction: Matrix, which: NDArray[Any]) -> Matrix:
+    """(K,) summed reduction of the samples `which` (indices or mask) that each quadric leaves out."""
+    return np.asarray(reduction[which] @ outside[which])
 
 
 def _exchange(
     problem: Problem,
     outside: Matrix,
-    worth: Matrix,
+    reduction: Matrix,
     chosen: list[int],
     taken: Matrix,
     opened: list[NDArray[np.int64]],
 ) -> tuple[float, Move]:
     """The best exchange of one quadric for another, and its gain.
 
-    taken (K,): worth of the covered samples that each quadric leaves out; opened: for each chosen quadric the
-    samples that it alone leaves out.
+    taken (K,): error reduction of the covered samples that each quadric leaves out; opened: for each chosen
+    quadric the samples that it alone leaves out.
     """
     best: float = 0.0
     move: Move = (None, None)
     for i, (k, rows) in enumerate(zip(chosen, opened, strict=True)):
-        back = float(worth[rows].sum()) + problem.price[k]
-        gain = back - taken - _sums(outside, worth, rows) - problem.price
+        back = float(reduction[rows].sum()) + problem.price[k]
+        gain = back - taken - _sums(outside, reduction, rows) - problem.price
         gain[chosen] = -np.inf
         add = int(np.argmax(gain))
         if gain[add] > best:
@@ -162,58 +164,60 @@ def _exchange(
     return best, move
 
 
-def seeded(problem: Problem, outside: Matrix, worth: Matrix, allowed: NDArray[np.bool_]) -> Convex:
+def grown(problem: Problem, outside: Matrix, reduction: Matrix, allowed: NDArray[np.bool_]) -> Convex:
     """A convex grown from all of space: the allowed quadrics (K,) join, best first, while that pays."""
     chosen: list[int] = []
     while True:
-        gain = np.where(allowed, -(worth @ outside) - problem.price, -np.inf)
+        gain = np.where(allowed, -(reduction @ outside) - problem.price, -np.inf)
         if chosen:
             gain[chosen] = -np.inf
         add = int(np.argmax(gain))
-        if gain[add] <= _EPSILON:
+        if gain[add] <= _MIN_GAIN:
             return tuple(chosen)
         keep = outside[:, add] == 0
-        outside, worth = outside[keep], worth[keep]
+        outside, reduction = outside[keep], reduction[keep]
         chosen.append(add)
 
 
-def best_convex(problem: Problem, worth: NDArray[np.float32]) -> tuple[Convex, float]:
-    """The most valuable convex that the search finds for samples of this worth."""
-    rows = np.flatnonzero(worth)
-    wanted = rows[worth[rows] > 0]
+def best_convex(problem: Problem, reduction: NDArray[np.float32]) -> tuple[Convex, float]:
+    """The most valuable convex that the search finds for samples that reduce the error by this much."""
+    rows = np.flatnonzero(reduction)
+    wanted = rows[reduction[rows] > 0]
     if len(wanted) == 0:
         return (), 0.0
     rng = problem.rng
-    coarse = rows if len(rows) <= _COARSE else rng.choice(rows, _COARSE, replace=False)
+    coarse = rows if len(rows) <= _COARSE_SAMPLES else rng.choice(rows, _COARSE_SAMPLES, replace=False)
     scale = np.float32(len(rows) / len(coarse))
-    outside, value = problem.outside[coarse], worth[coarse] * scale
-    share = worth[wanted].astype(np.float64)
-    seeds = rng.choice(wanted, min(_SEEDS, len(wanted)), replace=False, p=share / share.sum())
+    outside, value = problem.outside[coarse], reduction[coarse] * scale
+    share = reduction[wanted].astype(np.float64)
+    seeds = rng.choice(wanted, min(_SEED_SAMPLES, len(wanted)), replace=False, p=share / share.sum())
     tried: dict[Convex, float] = {}
     for seed in seeds:
-        convex = tuple(sorted(seeded(problem, outside, value, problem.outside[seed] == 0)))
+        convex = tuple(sorted(grown(problem, outside, value, problem.outside[seed] == 0)))
         if convex not in tried:
             cover = ~outside[:, list(convex)].any(axis=1)
             tried[convex] = float(value[cover].sum()) - problem.length(convex)
     best: tuple[Convex, float] = (), 0.0
-    full, worths = problem.outside[rows], worth[rows]
-    for convex in sorted(tried, key=lambda c: -tried[c])[:_KEPT]:
-        found = improve(problem, full, worths, convex)
+    full, reductions = problem.outside[rows], reduction[rows]
+    for convex in sorted(tried, key=lambda c: -tried[c])[:_MAX_IMPROVED]:
+        found = improve(problem, full, reductions, convex)
         if found[1] > best[1] and found[0]:
             best = found
     return best
 
 
-def fill(problem: Problem, layers: Layers, strict: float, most: int) -> Layers:
-    """Convexes added layer by layer while they pay; all layers but the last judge by `strict`.
+def fill(problem: Problem, layers: Layers, false_positive_weight: float, most: int) -> Layers:
+    """Convexes added layer by layer while they pay; all layers but the last judge by `false_positive_weight`.
 
     Under 1 it forgives what the next layer may take away again; above, convexes stay within the shape.
     """
     filled = [list(layer) for layer in layers]
     for at in range(len(filled)):
-        severity = strict if at + 1 < len(filled) else 1.0
+        weight = false_positive_weight if at + 1 < len(filled) else 1.0
         while sum(map(len, filled)) < most:
-            convex, value = best_convex(problem, problem.worth(filled, at, strict=severity))
+            convex, value = best_convex(
+                problem, problem.error_reduction(filled, at, false_positive_weight=weight)
+            )
             if value <= 0:
                 break
             filled[at].append(convex)
@@ -227,21 +231,23 @@ def polish(problem: Problem, layers: Layers, most: int, rounds: int = 6) -> Laye
     for _ in range(rounds):
         for at, layer in enumerate(layers):
             for i in reversed(range(len(layer))):
-                worth = problem.worth(layers, at, without=i)
-                rows = np.flatnonzero(worth)
-                convex, value = improve(problem, problem.outside[rows], worth[rows], layer[i])
+                reduction = problem.error_reduction(layers, at, without=i)
+                rows = np.flatnonzero(reduction)
+                convex, value = improve(problem, problem.outside[rows], reduction[rows], layer[i])
                 if value > 0 and convex:
                     layer[i] = convex
                 else:
                     layer.pop(i)
         while sum(map(len, layers)) < most:
-            options = [(*best_convex(problem, problem.worth(layers, at)), at) for at in range(len(layers))]
+            options = [
+                (*best_convex(problem, problem.error_reduction(layers, at)), at) for at in range(len(layers))
+            ]
             convex, value, at = max(options, key=lambda option: option[1])
             if value <= 0:
                 break
             layers[at].append(convex)
         now = problem.cost(layers)
-        if now > cost * (1 - _PROGRESS):
+        if now > cost * (1 - _MIN_RELATIVE_PROGRESS):
             break
         cost = now
     return layers
@@ -257,8 +263,8 @@ def ruin_and_recreate(problem: Problem, layers: Layers, most: int) -> Layers:
     if weight.sum() == 0:
         return layers
     sample = int(problem.rng.choice(wrong, p=weight / weight.sum()))
-    strict = float(problem.rng.choice(SEVERITIES))
-    tried = fill(problem, _ruined(problem, layers, sample), strict, most)
+    false_positive_weight = float(problem.rng.choice(FALSE_POSITIVE_WEIGHTS))
+    tried = fill(problem, _ruined(problem, layers, sample), false_positive_weight, most)
     tried = polish(problem, tried, most, rounds=2)
     return tried if problem.cost(tried) < problem.cost(layers) else layers
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from partwright.capri.kinds import KINDS
+from partwright.capri.quadric_kinds import KINDS
 from partwright.errors import SettingError
 from partwright.methods import Quality, check_number, preset
 

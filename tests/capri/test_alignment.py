@@ -6,21 +6,24 @@ import numpy as np
 import pytest
 import trimesh
 
-from partwright.capri import detection, rows
+from partwright.capri import detection
+from partwright.capri import quadric_rows as rows
 from partwright.capri.alignment import aligned
-from partwright.capri.detection import Surfel
-from partwright.capri.kinds import KINDS
-from partwright.capri.surface import Surface, sample
+from partwright.capri.detection import DetectedQuadric
+from partwright.capri.oriented_points import OrientedPoints, sample_surface
+from partwright.capri.quadric_kinds import KINDS
 from partwright.shapes import load_shape
 from tests.capri.meshes import drilled_plate
 
 TILT = trimesh.transformations.rotation_matrix(np.radians(0.3), (1.0, 0.4, 0.2))[:3, :3]
 
 
-def find(row: np.ndarray, kind: str, points: np.ndarray, normals: np.ndarray) -> tuple[Surfel, Surface]:
-    surface = Surface(points, normals, 1.0)
+def find(
+    row: np.ndarray, kind: str, points: np.ndarray, normals: np.ndarray
+) -> tuple[DetectedQuadric, OrientedPoints]:
+    surface = OrientedPoints(points, normals, 1.0)
     borne = detection.support(row, points, normals)
-    return Surfel(row, kind, np.arange(len(points)), True, borne), surface
+    return DetectedQuadric(row, kind, np.arange(len(points)), True, borne), surface
 
 
 def wall(axis: np.ndarray, length: float, count: int = 400) -> tuple[np.ndarray, np.ndarray]:
@@ -54,16 +57,16 @@ def test_a_smaller_plane_follows_the_larger() -> None:
     flat -= np.outer(flat @ normal, normal)
     points = np.concatenate([flat + 0.2 * normal, 0.05 * flat[:60] - 0.1 * normal])
     normals = np.repeat([normal, -normal], (300, 60), axis=0)
-    surface = Surface(points, normals, 1.0)
-    large = Surfel(rows.plane(normal, 0.2), "plane", np.arange(300), True, 600.0)
-    small = Surfel(rows.plane(-TILT @ normal, 0.1), "plane", np.arange(300, 360), True, 120.0)
+    surface = OrientedPoints(points, normals, 1.0)
+    large = DetectedQuadric(rows.plane(normal, 0.2), "plane", np.arange(300), True, 600.0)
+    small = DetectedQuadric(rows.plane(-TILT @ normal, 0.1), "plane", np.arange(300, 360), True, 120.0)
     first, second = aligned([small, large], surface)
     np.testing.assert_allclose(second.row, large.row)
     np.testing.assert_allclose(first.row, rows.plane(-normal, 0.1), atol=1e-12)
 
 
 def test_the_holes_of_a_plate_are_square_to_it() -> None:
-    surface = sample(load_shape(drilled_plate()), 6000, 0)
+    surface = sample_surface(load_shape(drilled_plate()), 6000, 0)
     found = aligned(detection.detect(surface, KINDS, 20, 0), surface)
     holes = [one.row for one in found if one.kind == "cylinder"]
     assert len(holes) == 2

@@ -6,32 +6,36 @@ import numpy as np
 import pytest
 import trimesh
 
-from partwright.capri import detection, rows, surface
-from partwright.capri.candidates import Pool, candidates, parting_planes
-from partwright.capri.kinds import KINDS
+from partwright.capri import detection
+from partwright.capri import quadric_rows as rows
+from partwright.capri.candidates import CandidatePool, candidates, parting_planes
+from partwright.capri.oriented_points import OrientedPoints, sample_surface
+from partwright.capri.quadric_kinds import KINDS
 from partwright.shapes import load_shape
 from tests.capri.meshes import drilled_plate, tilted_rod
 
 
-def found_on(mesh: trimesh.Trimesh, count: int = 6000) -> tuple[list[detection.Surfel], surface.Surface]:
-    drawn = surface.sample(load_shape(mesh), count, 0)
+def found_on(
+    mesh: trimesh.Trimesh, count: int = 6000
+) -> tuple[list[detection.DetectedQuadric], OrientedPoints]:
+    drawn = sample_surface(load_shape(mesh), count, 0)
     return detection.detect(drawn, KINDS, 20, 0), drawn
 
 
-def kinds(found: list[detection.Surfel]) -> list[str]:
+def kinds(found: list[detection.DetectedQuadric]) -> list[str]:
     return sorted(one.kind for one in found)
 
 
 def test_normals_of_a_tessellated_ball_are_those_of_the_ball() -> None:
     """Facets are up to 4 degrees off; interpolated normals are not."""
-    drawn = surface.sample(load_shape(trimesh.creation.icosphere(3)), 2000, 0)
+    drawn = sample_surface(load_shape(trimesh.creation.icosphere(3)), 2000, 0)
     radial = drawn.points / np.linalg.norm(drawn.points, axis=1, keepdims=True)
     assert np.degrees(np.arccos((drawn.normals * radial).sum(axis=1))).max() < 0.7
     assert drawn.area == pytest.approx(4 * np.pi * 0.81, rel=0.01)
 
 
 def test_normals_of_a_box_keep_its_edges() -> None:
-    drawn = surface.sample(load_shape(trimesh.creation.box((2, 1, 0.5))), 500, 0)
+    drawn = sample_surface(load_shape(trimesh.creation.box((2, 1, 0.5))), 500, 0)
     assert (np.abs(drawn.normals).max(axis=1) > 1 - 1e-9).all()
 
 
@@ -63,10 +67,10 @@ def test_holes_are_cylinders_seen_from_inside() -> None:
 def test_round_solids(mesh: trimesh.Trimesh, expected: list[str]) -> None:
     found, drawn = found_on(mesh)
     assert kinds(found) == expected
-    covered = np.concatenate([one.members for one in found])
+    covered = np.concatenate([one.inliers for one in found])
     assert len(covered) > 0.98 * len(drawn.points)
     for one in found:
-        assert np.abs(rows.distances(one.row, drawn.points[one.members])).max() < 0.006
+        assert np.abs(rows.distances(one.row, drawn.points[one.inliers])).max() < 0.006
 
 
 def test_an_ellipsoid_is_one_quadric_or_a_few() -> None:
@@ -74,14 +78,14 @@ def test_an_ellipsoid_is_one_quadric_or_a_few() -> None:
     mesh.apply_scale((1.0, 0.7, 0.5))
     found, drawn = found_on(mesh)
     assert found[0].kind == "quadric"
-    assert len(found[0].members) > 0.5 * len(drawn.points)
+    assert len(found[0].inliers) > 0.5 * len(drawn.points)
 
 
 def test_the_pool_has_planes_both_ways_and_each_quadric_once() -> None:
     found, drawn = found_on(drilled_plate())
     given = candidates(found, drawn)
-    convex = Pool.of([*given, *given], nested=False, oriented=True)
-    nested = Pool.of(given, nested=True, oriented=True)
+    convex = CandidatePool.of([*given, *given], nested=False, oriented=True)
+    nested = CandidatePool.of(given, nested=True, oriented=True)
     assert not convex.complement.any()
     assert nested.complement.sum() == 2
     assert len(nested.rows) == len(convex.rows) + 2
@@ -91,7 +95,7 @@ def test_the_pool_has_planes_both_ways_and_each_quadric_once() -> None:
 
 def test_without_cross_terms_a_tilted_rod_has_no_cylinder() -> None:
     found, drawn = found_on(tilted_rod())
-    pool = Pool.of(candidates(found, drawn), nested=False, oriented=False)
+    pool = CandidatePool.of(candidates(found, drawn), nested=False, oriented=False)
     assert rows.is_plane(pool.rows).all()
 
 
@@ -112,5 +116,5 @@ def test_few_points_on_either_side_of_a_wall_are_no_surface(up: int) -> None:
     rng = np.random.default_rng(up)
     sides = np.repeat([1.0, -1.0], [up, 6])
     points = np.c_[rng.uniform(-0.2, 0.2, (len(sides), 2)), 1e-4 * sides]
-    drawn = surface.Surface(points, np.c_[np.zeros((len(sides), 2)), sides], 0.2)
+    drawn = OrientedPoints(points, np.c_[np.zeros((len(sides), 2)), sides], 0.2)
     assert detection.detect(drawn, KINDS, 8, 0) == []

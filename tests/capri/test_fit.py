@@ -9,9 +9,10 @@ import pytest
 import trimesh
 
 from partwright.assembly import Assembly, Part
-from partwright.capri import Progress, Settings, fit, rows
+from partwright.capri import Progress, Settings, fit
+from partwright.capri import quadric_rows as rows
+from partwright.capri.csg_tree import CsgTree
 from partwright.capri.fitting import Run
-from partwright.capri.tree import Tree
 from partwright.errors import (
     GridError,
     MissingDependencyError,
@@ -102,7 +103,7 @@ def test_nothing_can_be_removed_for_free(plate: Shape) -> None:
                 rest = tuple(c for c in convex if c != one)
                 fewer = [list(x) for x in tree.layers]
                 fewer[k][i : i + 1] = [rest] if rest else []
-                less = Tree(tree.rows, tree.complement, tuple(tuple(x) for x in fewer))
+                less = CsgTree(tree.rows, tree.complement, tuple(tuple(x) for x in fewer))
                 assert (less.occupancy(points) != whole).mean() > 1e-3
 
 

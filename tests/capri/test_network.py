@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import torch
 
-from partwright.capri import layers, rows, stages
+from partwright.capri import layers, stages
+from partwright.capri import quadric_rows as rows
 from partwright.capri.network import (
-    HALF,
+    UNIT_TO_PAPER,
     CapriNet,
-    Sizes,
+    NetworkSizes,
     distances,
     load_network,
     rows_of,
@@ -20,7 +21,7 @@ from partwright.capri.stages import STAGES, Stage
 from partwright.errors import UnreadableFileError
 
 POINTS, PRIMITIVES, CONVEXES = 50, 7, 6
-TINY = Sizes(primitives=12, convexes=4, code=8, hidden=16, channels=2)
+TINY = NetworkSizes(primitives=12, convexes=4, code=8, hidden=16, channels=2)
 
 
 def problem(seed: int = 0) -> dict[str, torch.Tensor]:
@@ -148,7 +149,7 @@ def test_primitives_are_rows_of_the_unit_frame() -> None:
     assert coefficients.shape == (1, 12, 7)
     assert bool((coefficients[..., :3] >= 0).all())
     points = np.random.default_rng(0).uniform(-1, 1, (100, 3))
-    given = distances(coefficients, torch.from_numpy(HALF * points)[None])[0].detach().numpy()
+    given = distances(coefficients, torch.from_numpy(UNIT_TO_PAPER * points)[None])[0].detach().numpy()
     np.testing.assert_allclose(rows.values(rows_of(coefficients[0]), points), given, atol=1e-12)
 
 
@@ -184,7 +185,7 @@ def test_codes_of_voxels() -> None:
     codes = network.encoder(voxels)
     assert codes.shape == (2, TINY.code)
     assert float((codes[0] - codes[1]).detach().abs().max()) > 1e-4
-    assert sum(p.numel() for p in CapriNet(Sizes()).primitives.parameters()) == 257 * 512 + 513 * 7168
+    assert sum(p.numel() for p in CapriNet(NetworkSizes()).primitives.parameters()) == 257 * 512 + 513 * 7168
 
 
 def test_files_keep_the_network_to_half_precision(tmp_path) -> None:

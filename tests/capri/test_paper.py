@@ -7,21 +7,30 @@ import pytest
 import torch
 import trimesh
 
-from partwright.capri import Progress, Settings, fit, rows, stages
-from partwright.capri.collection import make_collection
-from partwright.capri.network import HALF, CapriNet, Sizes, distances, load_network, rows_of, save_network
+from partwright.capri import Progress, Settings, fit, stages
+from partwright.capri import quadric_rows as rows
+from partwright.capri.csg_tree import CsgTree
+from partwright.capri.finetuning import Finetuning, seeded, straightened
+from partwright.capri.finetuning_samples import draw_finetuning_samples
+from partwright.capri.network import (
+    UNIT_TO_PAPER,
+    CapriNet,
+    NetworkSizes,
+    distances,
+    load_network,
+    rows_of,
+    save_network,
+)
 from partwright.capri.paper import SHIPPED
+from partwright.capri.pretraining_dataset import make_pretraining_dataset
 from partwright.capri.settings import CHOICES
-from partwright.capri.supervision import supervision
-from partwright.capri.tree import Tree
-from partwright.capri.tuning import Tuning, seeded, straightened
 from partwright.errors import EmptyShapeError, SettingError
 from partwright.meshing import mesh_csg
 from partwright.shapes import Shape, load_shape
 from tests.capri.meshes import drilled_plate
 
 PAPER = {"schedule": "paper", "iterations": 3, "surface": 6000, "near": 6000, "uniform": 5000, "tries": 0}
-TINY = Sizes(primitives=32, convexes=8, code=8, hidden=16, channels=1)
+TINY = NetworkSizes(primitives=32, convexes=8, code=8, hidden=16, channels=1)
 
 
 @pytest.fixture(scope="module")
@@ -39,9 +48,9 @@ def weights(tmp_path_factory) -> str:
 
 @pytest.mark.parametrize("kind", CHOICES["supervision"])
 def test_supervision_is_near_the_surface_and_right(plate: Shape, kind: str) -> None:
-    given = supervision(kind, plate, 0)
+    given = draw_finetuning_samples(kind, plate, 0)
     assert given.points.shape == (65_536 if kind == "points" else 32_768, 3)
-    distance = plate.unit_distance(given.points / HALF)
+    distance = plate.unit_distance(given.points / UNIT_TO_PAPER)
     sure = np.abs(distance) > {"voxels": 1e-5, "points": 0.15, "samples": 1e-5}[kind]
     agreed = ((distance < 0) == (given.inside > 0))[np.abs(distance) < 0.04]
     assert agreed.mean() > 0.97  # along a normal of 1/64, the far side of something thin may come near
@@ -50,13 +59,13 @@ def test_supervision_is_near_the_surface_and_right(plate: Shape, kind: str) -> N
     assert np.mean(np.abs(distance) < 5 / 64) > 0.5
 
 
-def known() -> Tree:
+def known() -> CsgTree:
     """A slab minus a cylinder and a ball, of expressible rows, in no order."""
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     table = [rows.plane(axis, offset) for axis, offset in zip(axes, (0.9, 0.6, 0.2) * 2, strict=True)]
     table += [rows.sphere((0.4, 0.1, 0.2), 0.2), rows.cylinder((-0.3, 0, 0), (0, 0, 1), 0.25)]
     table = [rows.plane(axes[0], 0.1), *table]
-    return Tree(np.stack(table), np.zeros(9, bool), (((1, 2, 3, 4, 5, 6),), ((8,), (7,))))
+    return CsgTree(np.stack(table), np.zeros(9, bool), (((1, 2, 3, 4, 5, 6),), ((8,), (7,))))
 
 
 def test_a_seeded_network_is_the_tree() -> None:
@@ -68,12 +77,14 @@ def test_a_seeded_network_is_the_tree() -> None:
     np.testing.assert_array_equal(made.occupancy(points), tree.occupancy(points))
 
 
-def tuned(network: CapriNet, code: torch.Tensor, tree: Tree | None = None) -> Tuning:
-    from partwright.capri.supervision import Supervision
+def tuned(network: CapriNet, code: torch.Tensor, tree: CsgTree | None = None) -> Finetuning:
+    from partwright.capri.finetuning_samples import FinetuningSamples
 
     points = np.random.default_rng(1).uniform(-1, 1, (20_000, 3))
     inside = (tree or known()).occupancy(points).astype(np.float32)
-    return Tuning(network, code, Supervision((HALF * points).astype(np.float32), inside), 0)
+    return Finetuning(
+        network, code, FinetuningSamples((UNIT_TO_PAPER * points).astype(np.float32), inside), 0
+    )
 
 
 @pytest.mark.parametrize("stage", stages.STAGES)
@@ -136,7 +147,7 @@ def test_the_cheaper_start_wins_and_is_named(plate: Shape, weights: str, schedul
 
 def test_the_network_that_ships_has_learnt_the_family() -> None:
     """Parts of another seed than it was trained on: their inside, by eq. 4 and 6, from 64^3 voxels."""
-    held_out = make_collection(8, 1024, 4321)
+    held_out = make_pretraining_dataset(8, 1024, 4321)
     voxels, points, inside = held_out.draw(8, 1024, True, np.random.default_rng(0))
     network = load_network(SHIPPED)
     with torch.no_grad():

@@ -35,7 +35,7 @@ layers = st.lists(
 def test_worth_is_the_fall_of_the_error(seed: int, given: Layers, new: set[int], at: int) -> None:
     p = problem(seed)
     convex = tuple(sorted(new))
-    fall = float(p.worth(given, at)[p.covered(convex)].sum())
+    fall = float(p.error_reduction(given, at)[p.covered(convex)].sum())
     with_it = [[*layer, convex] if k == at else layer for k, layer in enumerate(given)]
     assert p.error(given) - p.error(with_it) == fall
 
@@ -44,12 +44,12 @@ def test_worth_is_the_fall_of_the_error(seed: int, given: Layers, new: set[int],
 @given(st.integers(0, 20), st.sets(st.integers(0, 7), min_size=1, max_size=4))
 def test_improving_never_loses_and_ends_where_no_single_move_gains(seed: int, start: set[int]) -> None:
     p = problem(seed)
-    worth = p.worth([[], []], 0)
+    error_reduction = p.error_reduction([[], []], 0)
 
     def value(convex: tuple[int, ...]) -> float:
-        return float(worth[p.covered(convex)].sum()) - p.length(convex)
+        return float(error_reduction[p.covered(convex)].sum()) - p.length(convex)
 
-    convex, reached = selection.improve(p, p.outside, worth, tuple(start))
+    convex, reached = selection.improve(p, p.outside, error_reduction, tuple(start))
     assert reached == value(convex) >= value(tuple(start))
     rest = set(range(8)) - set(convex)
     moves = [set(convex) | {k} for k in rest] + [set(convex) - {k} for k in convex]
@@ -61,10 +61,10 @@ def test_the_best_convex_is_the_best_of_all() -> None:
     hits = 0
     for seed in range(8):
         p = problem(seed, quadrics=6)
-        worth = p.worth([[], []], 0)
+        error_reduction = p.error_reduction([[], []], 0)
         every = [c for size in range(1, 7) for c in combinations(range(6), size)]
-        best = max(0.0, *(float(worth[p.covered(c)].sum()) - p.length(c) for c in every))
-        _, value = selection.best_convex(p, worth)
+        best = max(0.0, *(float(error_reduction[p.covered(c)].sum()) - p.length(c) for c in every))
+        _, value = selection.best_convex(p, error_reduction)
         assert value <= best + 1e-6
         hits += value > best - 1e-6
     assert hits >= 7

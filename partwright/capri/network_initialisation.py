@@ -14,17 +14,17 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from partwright.capri import rows
+from partwright.capri import quadric_rows as rows
 from partwright.capri.network import CapriNet, coefficients_of
 
-_SHARP = 3.0  # a third off a quadric's surface counts in full (eq. 4): nearer points have a gradient
-_FAINT = 1e-3  # of the rest of T: it may be taken up
-_WEIGHT = 0.2  # W at the start; L_W makes it 1
+_SHARPNESS = 3.0  # a third off a quadric's surface counts in full (eq. 4): nearer points have a gradient
+_MAX_UNSELECTED = 1e-3  # of the rest of T: it may be taken up
+_UNION_WEIGHT = 0.2  # W at the start; L_W makes it 1
 _REACH = 0.9  # unit lengths: half the longest side of any shape
 _DIRECTIONS = np.concatenate([np.eye(3), -np.eye(3)])
 
 
-def scatter(network: CapriNet, seed: int) -> None:
+def initialise_boxes(network: CapriNet, seed: int) -> None:
     """Sets T, W and the primitives' biases. Convexes share out the primitives evenly: six planes each, then
     cylinders along the axes and a sphere or two; those of the right side are smaller."""
     rng = np.random.default_rng((seed, 5))
@@ -33,11 +33,11 @@ def scatter(network: CapriNet, seed: int) -> None:
     made = [convex_rows(share, i >= convexes // 2, rng) for i in range(convexes)]
     last = cast(nn.Linear, network.primitives[2])
     with torch.no_grad():
-        network.selection.uniform_(0, _FAINT)
-        network.weights.fill_(_WEIGHT)
+        network.selection.uniform_(0, _MAX_UNSELECTED)
+        network.weights.fill_(_UNION_WEIGHT)
         for i in range(convexes):
             network.selection[i * share : (i + 1) * share, i] = 1.0
-        wanted = torch.from_numpy(coefficients_of(_SHARP * np.concatenate(made))).to(last.bias)
+        wanted = torch.from_numpy(coefficients_of(_SHARPNESS * np.concatenate(made))).to(last.bias)
         last.bias[: wanted.numel()] = wanted.flatten()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from partwright.assembly import Assembly, Part
-from partwright.capri.repeats import TOLERANCE, with_repeats
+from partwright.capri.repeated_quadrics import TOLERANCE, with_repeats
 from partwright.fields import Quadric
 from partwright.meshing import mesh_csg
 from tests.capri.test_fit import plate, quick  # noqa: F401

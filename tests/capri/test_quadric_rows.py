@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from partwright.capri import rows
+from partwright.capri import quadric_rows as rows
 from partwright.fields import Quadric
 
 POINTS = np.random.default_rng(0).uniform(-1, 1, (200, 3))

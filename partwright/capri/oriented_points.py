@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from partwright.shapes import Shape
 from partwright.shapes.sampling import sample_triangles
 
-_SMOOTH = np.cos(np.radians(32.0))  # facets that meet at less belong to one curved surface
+_MIN_SMOOTH_COSINE = np.cos(np.radians(32.0))  # facets that meet at less belong to one curved surface
 
 
 @dataclass(frozen=True)
-class Surface:
+class OrientedPoints:
     """Area-weighted points (N, 3), outward unit normals (N, 3), unit frame; `area` of the whole surface."""
 
     points: NDArray[np.float64]
@@ -27,7 +27,7 @@ class Surface:
         return float(np.sqrt(self.area / len(self.points)))
 
 
-def sample(shape: Shape, count: int, seed: int) -> Surface:
+def sample_surface(shape: Shape, count: int, seed: int) -> OrientedPoints:
     """`count` points of the shape's surface in the unit frame.
 
     A tessellated cylinder's triangles have normals up to half a facet off; where facets meet smoothly, the
@@ -41,7 +41,7 @@ def sample(shape: Shape, count: int, seed: int) -> Surface:
     weights = _barycentric(corners[face], points)
     normals = (weights[:, :, None] * smooth[face]).sum(axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
-    return Surface(points, normals, float(np.linalg.norm(cross, axis=1).sum() / 2))
+    return OrientedPoints(points, normals, float(np.linalg.norm(cross, axis=1).sum() / 2))
 
 
 def _corner_normals(
@@ -59,7 +59,7 @@ def _corner_normals(
     within = np.arange(len(owner)) - np.repeat(np.cumsum(repeat) - repeat, repeat)
     around = order[first[corner[owner]] + within]
     other, weight = around // 3, angles.ravel()[around]
-    alike = (unit[owner // 3] * unit[other]).sum(axis=1) > _SMOOTH
+    alike = (unit[owner // 3] * unit[other]).sum(axis=1) > _MIN_SMOOTH_COSINE
     total = np.zeros((len(corner), 3))
     for k in range(3):
         total[:, k] = np.bincount(owner[alike], (weight * unit[other, k])[alike], len(corner))

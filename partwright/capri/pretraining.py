@@ -19,9 +19,13 @@ import torch
 
 from partwright.atomic_io import check_folder, write_bytes
 from partwright.capri import stages
-from partwright.capri.collection import Collection, load_collection, make_collection
-from partwright.capri.network import SMALL, CapriNet, Sizes, distances, save_network
-from partwright.capri.scattering import scatter
+from partwright.capri.network import SMALL, CapriNet, NetworkSizes, distances, save_network
+from partwright.capri.network_initialisation import initialise_boxes
+from partwright.capri.pretraining_dataset import (
+    PretrainingDataset,
+    load_pretraining_dataset,
+    make_pretraining_dataset,
+)
 from partwright.errors import SettingError, UnreadableFileError
 
 NETWORK, CHECKPOINT, COLLECTION = "network.safetensors", "checkpoint.safetensors", "collection.safetensors"
@@ -29,7 +33,7 @@ _MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
 @dataclass(frozen=True)
-class Training:
+class PretrainingSettings:
     """How the network is trained. Defaults are ours, for minutes on a core; the paper's are in brackets.
 
     parts (5,000), points kept of each (24,576), batch (24), draw: points of each part a step (all); steps
@@ -59,7 +63,7 @@ class Training:
 
 
 @dataclass(frozen=True)
-class Report:
+class PretrainingReport:
     """A step's loss of reconstruction (eq. 10), mean over the steps since the last report."""
 
     step: int
@@ -73,9 +77,9 @@ Outcome = Literal["converged", "interrupted"]
 
 def train(
     folder: Path,
-    training: Training | None = None,
-    sizes: Sizes = SMALL,
-    progress: Callable[[Report], None] | None = None,
+    training: PretrainingSettings | None = None,
+    sizes: NetworkSizes = SMALL,
+    progress: Callable[[PretrainingReport], None] | None = None,
 ) -> Outcome:
     """Trains, or goes on where a training in `folder` was stopped; writes network.safetensors.
 
@@ -85,14 +89,14 @@ def train(
         SettingError: the folder holds a checkpoint of other settings.
         UnreadableFileError: a file in the folder is damaged.
     """
-    training = training or Training()
+    training = training or PretrainingSettings()
     check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / COLLECTION
     if not path.exists():
-        made = make_collection(training.parts, training.points, training.seed)
+        made = make_pretraining_dataset(training.parts, training.points, training.seed)
         made.save(path, training.parts, training.seed)
-    collection = load_collection(path, training.parts, training.points, training.seed)
+    collection = load_pretraining_dataset(path, training.parts, training.points, training.seed)
     trainer = Trainer(collection, training, sizes)
     checkpoint = folder / CHECKPOINT
     if checkpoint.exists():
@@ -110,15 +114,17 @@ def train(
 class Trainer:
     """The network, its optimiser, and the number of steps done."""
 
-    def __init__(self, collection: Collection, training: Training, sizes: Sizes) -> None:
+    def __init__(
+        self, collection: PretrainingDataset, training: PretrainingSettings, sizes: NetworkSizes
+    ) -> None:
         self.collection, self.training = collection, training
         torch.manual_seed(training.seed)
         self.network = CapriNet(sizes)
-        scatter(self.network, training.seed)
+        initialise_boxes(self.network, training.seed)
         self.optimiser = torch.optim.Adam(self.network.parameters(), training.rate, betas=(0.5, 0.999))
         self.step = 0
 
-    def run(self, checkpoint: Path, progress: Callable[[Report], None] | None) -> None:
+    def run(self, checkpoint: Path, progress: Callable[[PretrainingReport], None] | None) -> None:
         started, losses = time.monotonic(), []
         while self.step < self.training.steps:
             losses.append(self.advance())
@@ -126,7 +132,9 @@ class Trainer:
                 self.save(checkpoint)
                 if progress is not None:
                     seconds = time.monotonic() - started
-                    progress(Report(self.step, self.training.steps, float(np.mean(losses)), seconds))
+                    progress(
+                        PretrainingReport(self.step, self.training.steps, float(np.mean(losses)), seconds)
+                    )
                 losses = []
 
     def advance(self) -> float:

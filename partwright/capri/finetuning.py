@@ -10,30 +10,31 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from partwright.capri import rows, stages
+from partwright.capri import quadric_rows as rows
+from partwright.capri import stages
+from partwright.capri.csg_tree import CsgTree
+from partwright.capri.finetuning_samples import FinetuningSamples
 from partwright.capri.network import SMALL, VOXELS, CapriNet, distances, rows_of
-from partwright.capri.supervision import Supervision
-from partwright.capri.tree import Tree
 from partwright.shapes import Shape
 
-BATCH = 8_192  # points an iteration, drawn anew
-RATE, BETAS = 1e-4, (0.5, 0.999)
-_SHARP = 256.0  # what seeded rows are multiplied by: a quarter of a voxel off counts in full (eq. 4)
-_NOTHING = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # a quadric that holds no point
-_NEAREST = 16  # points that tell how steep a quadric is
-_FLAT = 2e-3  # unit lengths that a quadric may bend over the box and still count as a plane
+BATCH_POINTS = 8_192  # points an iteration, drawn anew
+LEARNING_RATE, BETAS = 1e-4, (0.5, 0.999)
+_SEED_SHARPNESS = 256.0  # what seeded rows are multiplied by: a quarter of a voxel off counts in full (eq. 4)
+_EMPTY_QUADRIC = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # a quadric that holds no point
+_NORMALISING_POINTS = 16  # points that report how steep a quadric is
+_MAX_PLANE_BEND = 2e-3  # unit lengths that a quadric may bend over the box and still count as a plane
 
 
-class Tuning:
+class Finetuning:
     """One shape's copy of the network: its code, MLP, T and W move; the encoder does not (section 3)."""
 
-    def __init__(self, network: CapriNet, code: Tensor, given: Supervision, seed: int) -> None:
+    def __init__(self, network: CapriNet, code: Tensor, samples: FinetuningSamples, seed: int) -> None:
         self.network, self.code = network, nn.Parameter(code.detach().clone())
-        self.points = torch.from_numpy(given.points).to(code.device)
-        self.inside = torch.from_numpy(given.inside).to(code.device)
+        self.points = torch.from_numpy(samples.points).to(code.device)
+        self.inside = torch.from_numpy(samples.inside).to(code.device)
         self.generator = torch.Generator().manual_seed(seed)
 
-    def run(self, stage: stages.Stage, iterations: int, tell: Callable[[float], None]) -> None:
+    def run(self, stage: stages.Stage, iterations: int, report: Callable[[float], None]) -> None:
         """So many steps of one stage; tells the share that is done. The last stage keeps T: it is binary."""
         net = self.network
         moving: list[Tensor] = [self.code, *net.primitives.parameters()]
@@ -41,14 +42,16 @@ class Tuning:
             moving.append(net.selection)
         if stage == "weighted_union":
             moving.append(net.weights)
-        optimiser = torch.optim.Adam(moving, RATE, BETAS)
+        optimiser = torch.optim.Adam(moving, LEARNING_RATE, BETAS)
         for i in range(iterations):
-            which = torch.randint(len(self.points), (BATCH,), generator=self.generator).to(self.code.device)
+            which = torch.randint(len(self.points), (BATCH_POINTS,), generator=self.generator).to(
+                self.code.device
+            )
             optimiser.zero_grad()
             self.loss(stage, self.points[which][None], self.inside[which][None]).backward()
             optimiser.step()
             if (i + 1) % 50 == 0 or i + 1 == iterations:
-                tell((i + 1) / iterations)
+                report((i + 1) / iterations)
 
     def loss(self, stage: stages.Stage, points: Tensor, inside: Tensor) -> Tensor:
         """Of a batch (1, n, 3), (1, n)."""
@@ -57,7 +60,7 @@ class Tuning:
         found = stages.sides(stage, distance, net.selection, net.weights)
         return stages.loss(stage, found, inside, net.selection, net.weights)
 
-    def tree(self) -> Tree:
+    def tree(self) -> CsgTree:
         """The tree of T_hard, in the unit frame. A convex of no primitives is left out."""
         net = self.network
         made = straightened(rows_of(net.coefficients(self.code)[0]))
@@ -65,17 +68,18 @@ class Tuning:
         convexes = [tuple(np.flatnonzero(column).tolist()) for column in chosen.T]
         half = len(convexes) // 2
         layers = tuple(tuple(c for c in side if c) for side in (convexes[:half], convexes[half:]))
-        return Tree(made, np.zeros(len(made), dtype=bool), layers)
+        return CsgTree(made, np.zeros(len(made), dtype=bool), layers)
 
 
 def straightened(given: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rows (p, 10) scaled to |grad f| = 1 where they are nearest to 0 in the unit cube, as the rest of the
     fit has them; those that hardly bend within it become planes."""
-    slope = np.linalg.norm(given[:, 3:6], axis=1)
-    flat = given[:, :3].max(axis=1) < _FLAT * slope
-    bent = np.where(flat[:, None] & (np.arange(10) < 3), 0.0, given)
+    slope = np.linalg.norm(given[:, rows.LINEAR], axis=1)
+    flat = given[:, rows.SQUARES].max(axis=1) < _MAX_PLANE_BEND * slope
+    bent = given.copy()
+    bent[flat, rows.SQUARES] = 0.0
     grid = np.stack(np.meshgrid(*[np.linspace(-0.9, 0.9, 10)] * 3), axis=-1).reshape(-1, 3)
-    nearest = np.argsort(np.abs(rows.values(bent, grid)), axis=0)[:_NEAREST].T
+    nearest = np.argsort(np.abs(rows.values(bent, grid)), axis=0)[:_NORMALISING_POINTS].T
     return np.stack([rows.normalised(row, grid[near]) for row, near in zip(bent, nearest, strict=True)])
 
 
@@ -87,7 +91,7 @@ def encoded(network: CapriNet, shape: Shape) -> Tensor:
     return code
 
 
-def seeded(tree: Tree, seed: int) -> tuple[CapriNet, Tensor]:
+def seeded(tree: CsgTree, seed: int) -> tuple[CapriNet, Tensor]:
     """A network without training that starts as a tree, and its code: the tree's rows are its first
     primitives, T is the tree's, unused convexes hold nothing, W is 1. Needs `expressible` rows."""
     torch.manual_seed(seed)
@@ -101,7 +105,7 @@ def seeded(tree: Tree, seed: int) -> tuple[CapriNet, Tensor]:
         )
     )
     code = torch.full((1, network.sizes.code), 0.5)
-    network.seed(_SHARP * np.concatenate([tree.rows[used], [_NOTHING]]), code)
+    network.seed(_SEED_SHARPNESS * np.concatenate([tree.rows[used], [_EMPTY_QUADRIC]]), code)
     half = network.sizes.convexes // 2
     with torch.no_grad():
         network.weights.fill_(1.0)

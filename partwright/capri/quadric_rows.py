@@ -13,7 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 Row = NDArray[np.float64]
 Points = NDArray[np.floating]
 
-_LEAST_SLOPE = 1e-9
+# Columns of a row.
+SQUARES, LINEAR, CONSTANT, CROSS = slice(0, 3), slice(3, 6), 6, slice(7, 10)
+
+_MIN_GRADIENT = 1e-9
 
 
 def monomials(points: Points) -> NDArray[np.float64]:
@@ -36,7 +39,7 @@ def gradients(row: Row, points: Points) -> NDArray[np.float64]:
 def distances(row: Row, points: Points) -> NDArray[np.float64]:
     """First-order distance f / |grad f| (N,) of one row at points (N, 3)."""
     slope = np.linalg.norm(gradients(row, points), axis=1)
-    return np.asarray(values(row, points)[:, 0] / np.maximum(slope, _LEAST_SLOPE))
+    return np.asarray(values(row, points)[:, 0] / np.maximum(slope, _MIN_GRADIENT))
 
 
 def split(row: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
@@ -79,7 +82,7 @@ def cone(apex: ArrayLike, axis: ArrayLike, angle: float, height: float) -> Row:
 def normalised(row: Row, points: Points) -> Row:
     """The row scaled so that |grad f| is 1 on average at points (N, 3) of its surface."""
     slope = float(np.mean(np.linalg.norm(gradients(row, points), axis=1)))
-    return row / max(slope, _LEAST_SLOPE)
+    return row / max(slope, _MIN_GRADIENT)
 
 
 def fitted(points: Points, normals: Points, rounds: int = 8) -> Row | None:
@@ -128,13 +131,15 @@ def fitted(points: Points, normals: Points, rounds: int = 8) -> Row | None:
 def is_plane(rows: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(M,) whether rows (M, 10) have no quadratic term."""
     rows = np.atleast_2d(rows)
-    return np.asarray(np.abs(rows[:, [0, 1, 2, 7, 8, 9]]).max(axis=1) == 0)
+    quadratic = np.concatenate([rows[:, SQUARES], rows[:, CROSS]], axis=1)
+    return np.asarray(np.abs(quadratic).max(axis=1) == 0)
 
 
 def expressible(rows: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(M,) whether the paper's eq. 1 can hold rows (M, 10): no cross terms, a, b, c >= 0."""
     rows = np.atleast_2d(rows)
-    return np.asarray((np.abs(rows[:, 7:]).max(axis=1) < 1e-6) & (rows[:, :3] >= -1e-9).all(axis=1))
+    plain = np.abs(rows[:, CROSS]).max(axis=1) < 1e-6
+    return np.asarray(plain & (rows[:, SQUARES] >= -1e-9).all(axis=1))
 
 
 def _about(form: NDArray[np.float64], centre: ArrayLike, radius: float) -> Row:

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from partwright.assembly import Assembly, Node, Part
-from partwright.capri import rows
+from partwright.capri import quadric_rows as rows
 from partwright.fields import Quadric
 
-_FAR = 4.0  # unit frame: what reaches further was judged by no sample there
+_MAX_REACH = 4.0  # unit frame: what reaches further was judged by no sample there
 Convex = tuple[int, ...]
 Layers = tuple[tuple[Convex, ...], ...]
 
 
 @dataclass(frozen=True)
-class Tree:
+class CsgTree:
     """Unions of intersections, added and subtracted in turn: (L0 - L1) + L2 ... (section 3.2; eq. 5 has two).
 
     rows (K, 10) in the unit frame; a convex is the indices of the quadrics that it intersects. complement
@@ -47,7 +47,7 @@ class Tree:
                 result[inside[:, list(convex)].all(axis=1)] = k % 2 == 0
         return result
 
-    def closed(self, lower: ArrayLike, upper: ArrayLike) -> Tree:
+    def closed(self, lower: ArrayLike, upper: ArrayLike) -> CsgTree:
         """Added convexes that do not end, or far off, are cut off at the box (3,), (3,) around the shape."""
         sides = [rows.plane(-e, float(-c)) for e, c in zip(np.eye(3), np.asarray(lower), strict=True)]
         sides += [rows.plane(e, float(c)) for e, c in zip(np.eye(3), np.asarray(upper), strict=True)]
@@ -55,11 +55,11 @@ class Tree:
         complement = np.r_[self.complement, np.zeros(6, dtype=bool)]
 
         def ended(convex: Convex) -> Convex:
-            open_ = np.flatnonzero(~(np.abs(self._node(convex, "").bounds()) < _FAR))
+            open_ = np.flatnonzero(~(np.abs(self._node(convex, "").bounds()) < _MAX_REACH))
             return (*convex, *(int(i) + len(self.rows) for i in open_))
 
         layers = tuple(c if k % 2 else tuple(map(ended, c)) for k, c in enumerate(self.layers))
-        return Tree(table, complement, layers)
+        return CsgTree(table, complement, layers)
 
     def assembly(self) -> Assembly:
         """Difference of two unions of intersections (eq. 5), leaves are quadrics; in the unit frame."""

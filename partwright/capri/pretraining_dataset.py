@@ -12,15 +12,15 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from partwright.capri.network import HALF, VOXELS
+from partwright.capri.network import UNIT_TO_PAPER, VOXELS
 from partwright.errors import UnreadableFileError
 
-_SIGMA = (0.02, 0.06)  # unit lengths: of the points near the surface
+_NEAR_SIGMAS = (0.02, 0.06)  # unit lengths: of the points near the surface
 _FORMAT = "partwright-capri-collection-1"
 
 
 @dataclass(frozen=True)
-class Collection:
+class PretrainingDataset:
     """voxels (N, 64^3 / 8) uint8, packed; points (N, n, 3) float16 in the paper's coordinates, the first half
     near the surface, the rest anywhere in the box; inside (N, n) bool."""
 
@@ -60,7 +60,7 @@ class Collection:
         write_bytes(path, save(arrays, {"about": json.dumps(about)}))
 
 
-def load_collection(path: Path, parts: int, points: int, seed: int) -> Collection:
+def load_pretraining_dataset(path: Path, parts: int, points: int, seed: int) -> PretrainingDataset:
     """The collection of these numbers from a file.
 
     Raises:
@@ -78,10 +78,10 @@ def load_collection(path: Path, parts: int, points: int, seed: int) -> Collectio
     if about != expected or arrays["points"].shape[1] != points:
         raise UnreadableFileError(f"{path}: holds other CAD parts ({about}); remove it, or write elsewhere")
     inside = np.unpackbits(arrays["inside"], axis=1, count=points).astype(bool)
-    return Collection(arrays["voxels"], arrays["points"], inside)
+    return PretrainingDataset(arrays["voxels"], arrays["points"], inside)
 
 
-def make_collection(parts: int, points: int, seed: int) -> Collection:
+def make_pretraining_dataset(parts: int, points: int, seed: int) -> PretrainingDataset:
     """The first `parts` CAD parts of a seed, `points` points each."""
     from partwright.datasets.cad_parts import cad_parts
     from partwright.shapes import load_shape
@@ -91,9 +91,9 @@ def make_collection(parts: int, points: int, seed: int) -> Collection:
     inside = np.zeros((parts, points), dtype=bool)
     for i, part in enumerate(cad_parts(parts, seed)):
         shape = load_shape(part.mesh)
-        near = shape.samples(points // 2, 0, seed, _SIGMA).points
+        near = shape.samples(points // 2, 0, seed, _NEAR_SIGMAS).points
         anywhere = np.random.default_rng((seed, i)).uniform(-1, 1, (points - len(near), 3))
-        places[i] = HALF * np.concatenate([near, anywhere])
-        inside[i] = shape.unit_distance(places[i].astype(np.float32) / HALF) < 0
+        places[i] = UNIT_TO_PAPER * np.concatenate([near, anywhere])
+        inside[i] = shape.unit_distance(places[i].astype(np.float32) / UNIT_TO_PAPER) < 0
         voxels[i] = np.packbits(shape.unit_occupancy(VOXELS).ravel())
-    return Collection(voxels, places, inside)
+    return PretrainingDataset(voxels, places, inside)
