@@ -40,11 +40,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Constraints:
-    """lower (N,) <= F <= upper (N,) at points (N, 3)."""
+    """lower <= F <= upper at points."""
 
     points: NDArray[np.float32]
+    """(N, 3) in the unit frame."""
     lower: Floats
+    """(N,) unit lengths; minus infinity where F may be as low as it likes."""
     upper: Floats
+    """(N,) unit lengths; infinity where it may be as high."""
 
     def violation(self, field: Floats, multipliers: Floats | float = 0.0) -> Floats:
         """(N,) how far F is outside its bounds: positive above, negative below, 0 within.
@@ -127,12 +130,16 @@ def _cuts(assembly: Assembly, shape: Shape, aim: DistanceBounds, seed: int) -> C
 
 @dataclass(frozen=True)
 class _Problem:
-    """multipliers (N,): the constraints' multipliers over `weight`, in unit lengths, signed as violations."""
+    """The loss of one round."""
 
     samples: Samples
+    """Where the occupancies are to follow the shape's."""
     constraints: Constraints
+    """(N,) of them, those of all rounds so far."""
     multipliers: Floats
+    """(N,) over `weight`, in unit lengths, signed as violations."""
     weight: float
+    """Of a squared violation beside a squared residual."""
 
     def shortfall(self, field: Floats) -> Floats:
         """(N,) violations with what lasts of earlier ones."""

@@ -29,25 +29,33 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Side:
-    """How far a bound is used: the largest distance (unit lengths, negative where nothing sticks out), and
-    where."""
+    """How far a bound is used, and where."""
 
     worst: float
+    """The largest distance, unit lengths; negative where nothing sticks out."""
     point: Floats
+    """(3,) where that is, unit frame."""
 
 
 @dataclass(frozen=True)
 class Checked:
-    """What was found, by the bounds' names; those that were not asked for are left out."""
+    """Bounds beside what was measured."""
 
     bounds: DistanceBounds
+    """What was asked."""
     found: dict[str, Side]
+    """By the bounds' names; those that were not asked for are left out."""
 
     @property
     def excess(self) -> dict[str, float]:
         """By how much (unit lengths) bounds are missed; empty where all hold."""
         over = {name: side.worst - getattr(self.bounds, name) for name, side in self.found.items()}
         return {name: by for name, by in over.items() if by > _ROUNDING}
+
+    @property
+    def total_excess(self) -> float:
+        """What all bounds are missed by (unit lengths), added; 0 where all hold."""
+        return sum(self.excess.values())
 
     @property
     def worst_ratio(self) -> float:

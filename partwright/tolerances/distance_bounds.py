@@ -19,15 +19,14 @@ Length = float | str
 
 @dataclass(frozen=True)
 class DistanceBounds:
-    """How far surfaces may be apart, in unit lengths; None where nothing is asked.
-
-    tolerance: the surfaces are nowhere further apart, both ways. contain: the shape nowhere sticks out of the
-    assembly by more. inside: the assembly nowhere sticks out of the shape by more.
-    """
+    """How far surfaces may be apart, in unit lengths; None where nothing is asked."""
 
     tolerance: float | None = None
+    """The surfaces are nowhere further apart, both ways."""
     contain: float | None = None
+    """The shape nowhere sticks out of the assembly by more."""
     inside: float | None = None
+    """The assembly nowhere sticks out of the shape by more."""
 
     @classmethod
     def of(
@@ -52,6 +51,10 @@ class DistanceBounds:
         )
         bounds._check(shape)
         return bounds
+
+    @property
+    def only_tolerance(self) -> bool:
+        return self.tolerance is not None and self.contain is None and self.inside is None
 
     @property
     def out(self) -> float:

@@ -8,12 +8,11 @@ from typing import Any
 from partwright.assembly import Assembly
 from partwright.atomic_io import finishing
 from partwright.errors import BoundsError
-from partwright.metrics.frames import in_unit_frame
 from partwright.shapes import Shape
-from partwright.tolerances.check import check, place_of
+from partwright.tolerances.check import place_of
 from partwright.tolerances.distance_bounds import DistanceBounds, Length, format_length
 from partwright.tolerances.minimising import minimise_parts
-from partwright.tolerances.satisfying import Bounded, satisfy
+from partwright.tolerances.satisfying import Bounded, measured, satisfy
 
 # A tolerance that the fit does not reach is tried again with parts that cost this share of their price.
 CHEAPER = (1 / 3, 1 / 10)
@@ -48,8 +47,7 @@ def enforce(
     """
     if outcome == "interrupted":
         with finishing():
-            local = in_unit_frame(assembly, shape.frame)
-            return Bounded(assembly, check(local, shape, bounds, seed), complete=False), outcome
+            return measured(assembly, shape, bounds, seed, complete=False), outcome
     bounded = satisfy(assembly, shape, bounds, locked, seed)
     if bounds.tolerance is not None:
         bounded = _by_parts(bounded, shape, bounds, refit, locked, seed)
@@ -76,7 +74,7 @@ def _by_parts(
         if more is None:
             break
         tried = satisfy(more, shape, bounds, locked, seed)
-        if sum(tried.checked.excess.values()) < sum(best.checked.excess.values()):
+        if tried.improves_on(best):
             best = tried
     return minimise_parts(best, shape, bounds, locked, seed) if best.satisfied and best.complete else best
 

@@ -34,10 +34,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Slope:
-    """F (N,) at the points, and its derivatives (N, P) by the free numbers of all leaves, leaf by leaf."""
+    """How an assembly's distance F at points moves with its numbers."""
 
     value: Floats
+    """(N,) F itself."""
     by_number: Floats
+    """(N, P) its derivatives by the free numbers of all leaves, leaf by leaf."""
 
 
 def free_numbers(part: Part) -> NDArray[np.bool_]:
@@ -88,8 +90,8 @@ def moved(part: Part, step: Floats) -> Part:
 
 
 def tightest(width: float, length: float) -> float:
-    """The largest bulge of a SuperFrustum: a tighter arc folds through its own centre."""
-    return math.asin(min(1.0, length / max(width, 1e-6))) / (math.pi / 2)
+    """The largest bulge of a SuperFrustum: a tighter arc folds through its own centre. 0 without a length."""
+    return math.asin(min(1.0, max(length, 0.0) / max(width, 1e-6))) / (math.pi / 2)
 
 
 def _moved(part: Part, step: Floats) -> Part:
@@ -113,10 +115,12 @@ def _moved(part: Part, step: Floats) -> Part:
 
 @dataclass(frozen=True)
 class Share:
-    """Derivatives (N,) of a node's distance by a copy's own distance, and by its blend."""
+    """How a node's distance at points moves with one copy in it."""
 
     by_value: Floats
+    """(N,) derivative by the copy's own distance."""
     by_blend: Floats
+    """(N,) derivative by its blend."""
 
     def __mul__(self, factor: Floats) -> Share:
         return Share(self.by_value * factor, self.by_blend * factor)

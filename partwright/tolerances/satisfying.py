@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -31,6 +32,7 @@ _OFFSETS, _REPAIRS = 3, 5
 _SHARES, _HOPELESS = (0.9, 0.6), 1.5
 _PATIENCE, _PROGRESS = 4, 0.9  # rounds in which the violation has to fall to this share
 _SAMPLES = 20_000
+_WORSE = 2e-3  # of the IoU: what samples tell no difference by
 _FINEST = 5e-5  # unit lengths
 
 # seeds of the samples that offsets are found on, and of those that judge
@@ -39,15 +41,27 @@ _SEEN, _JUDGED = 100, 200
 
 @dataclass(frozen=True)
 class Bounded:
-    """assembly: in the shape's own units and place. checked: on fresh samples. complete: not interrupted."""
+    """An assembly that was moved to keep bounds, and how far it does."""
 
     assembly: Assembly
+    """In the shape's own units and place."""
     checked: Checked
+    """On fresh samples."""
+    iou: float
+    """At samples of the shape."""
     complete: bool = True
+    """Whether it came to its end, and was not interrupted."""
 
     @property
     def satisfied(self) -> bool:
         return self.checked.satisfied
+
+    def improves_on(self, other: Bounded) -> bool:
+        """Whether it keeps the bounds and the other does not, or, where neither does, misses them by less and
+        fills the shape as well."""
+        if self.satisfied or other.satisfied:
+            return self.satisfied and not other.satisfied
+        return self.checked.total_excess < other.checked.total_excess and self.iou >= other.iou - _WORSE
 
 
 def satisfy(
@@ -57,50 +71,78 @@ def satisfy(
 
     Rounds of `augmented_lagrangian` lead to it, and each round's result is offset on dense samples; of those
     that keep the bounds there the tightest goes on (else the one that misses them least), and is offset on
-    fresh samples until yet others find nothing amiss. Parts named in `locked` stay. Ctrl-C ends it with the
-    best so far.
+    fresh samples until yet others find nothing amiss. Where a tolerance stays out of reach, the result is the
+    nearest to it of those that fill the shape as well as what was given: a few points that are too far off
+    are not worth the rest of the surface. Parts named in `locked` stay. Ctrl-C ends it with the best so far.
 
     Raises:
         ParameterError: a part is no SuperFrustum and no solid that is one.
     """
-    start = in_unit_frame(assembly, shape.frame)
-    checked = check(start, shape, bounds, seed + _JUDGED)
-    if checked.satisfied:
-        return Bounded(assembly, checked)
-    staying, best = frozenset(locked), start
+    start = measured(assembly, shape, bounds, seed)
+    if start.satisfied:
+        return start
+    given, complete, checked = in_unit_frame(assembly, shape.frame), True, None
+    search = _Search(given, given, start.iou - _WORSE)
     try:
         for share in _SHARES:
-            best, complete = _optimised(best, shape, bounds.narrowed(0.0, share), staying, seed)
-            if not complete:
-                raise KeyboardInterrupt
-            best, checked = _offset_on_fresh_samples(best, shape, bounds, staying, seed)
+            checked = None
+            search.run(shape, bounds.narrowed(0.0, share), frozenset(locked), seed)
+            search.nearest, checked = _offset_on_fresh_samples(
+                search.nearest, shape, bounds, frozenset(locked), seed
+            )
             if checked.satisfied or bounds.tolerance is None or checked.worst_ratio > _HOPELESS:
                 break
     except KeyboardInterrupt:
-        with finishing():
-            checked = check(best, shape, bounds, seed + _JUDGED)
-        return Bounded(_back(assembly, best, shape), checked, complete=False)
-    return Bounded(_back(assembly, best, shape), checked)
+        complete = False
+    with finishing():
+        best = _back(assembly, search.nearest, shape)
+        nearest = measured(best, shape, bounds, seed, checked, complete)
+        if nearest.satisfied or not bounds.only_tolerance:
+            return nearest
+        sound = measured(_back(assembly, search.sound, shape), shape, bounds, seed, complete=complete)
+        found = (replace(start, complete=complete), sound, nearest)
+        return reduce(lambda one, other: other if other.improves_on(one) else one, found)
 
 
-def _optimised(
-    start: Assembly, shape: Shape, bounds: DistanceBounds, locked: frozenset[str], seed: int
-) -> tuple[Assembly, bool]:
-    """The best of all rounds, offset; and whether they were left to come to an end."""
-    best, least, excesses = start, (np.inf, np.inf), list[float]()
-    try:
-        for local in _candidates(start, shape, bounds, locked, seed):
-            tried, worth = _offset(local, shape, bounds, locked, seed)
+def measured(
+    assembly: Assembly,
+    shape: Shape,
+    bounds: DistanceBounds,
+    seed: int = 0,
+    checked: Checked | None = None,
+    complete: bool = True,
+) -> Bounded:
+    """An assembly as it is, against bounds; checked: if that is known already."""
+    local = in_unit_frame(assembly, shape.frame)
+    checked = checked or check(local, shape, bounds, seed + _JUDGED)
+    return Bounded(assembly, checked, _iou(local, shape, seed), complete)
+
+
+@dataclass
+class _Search:
+    """The best of the rounds so far, also where they are interrupted."""
+
+    nearest: Assembly
+    """Misses the bounds least, and where some keep them is the tightest of those."""
+    sound: Assembly
+    """Misses the bounds least of those whose IoU is at least `least_iou`."""
+    least_iou: float
+
+    def run(self, shape: Shape, bounds: DistanceBounds, locked: frozenset[str], seed: int) -> None:
+        least, least_sound, excesses = (np.inf, np.inf), (np.inf, np.inf), list[float]()
+        for local in _candidates(self.nearest, shape, bounds, locked, seed):
+            tried, excess = _offset(local, shape, bounds, locked, seed)
+            iou = _iou(tried, shape, seed)
+            worth = (round(excess, 5), 1 - iou)
             if worth < least:
-                best, least = tried, worth
+                self.nearest, least = tried, worth
+            if worth < least_sound and iou >= self.least_iou:
+                self.sound, least_sound = tried, worth
             excesses.append(worth[0])
-            if least[0] == 0 and bounds.contain is None and bounds.inside is None:
-                break  # a tolerance asks for no more
+            if least[0] == 0 and bounds.only_tolerance:
+                break  # it asks for no more
             if min(excesses[-_PATIENCE:]) > _PROGRESS * min(excesses[:-_PATIENCE], default=np.inf):
                 break
-    except KeyboardInterrupt:
-        return best, False
-    return best, True
 
 
 def _candidates(
@@ -112,8 +154,8 @@ def _candidates(
 
 def _offset(
     local: Assembly, shape: Shape, bounds: DistanceBounds, locked: frozenset[str], seed: int
-) -> tuple[Assembly, tuple[float, float]]:
-    """The assembly offset, with what it misses after that, and 1 - IoU at samples of the shape."""
+) -> tuple[Assembly, float]:
+    """The assembly offset, and what it misses after that."""
     one_sided = bounds.tolerance is None and (bounds.contain is None) != (bounds.inside is None)
     turns = _OFFSETS if one_sided else 0  # else one bound would be met at the cost of the other
     best, excess = local, np.inf
@@ -129,9 +171,13 @@ def _offset(
         if missed == 0 or turn == turns:
             break
         local = offset_to_feasible(local, wanted, locked)
+    return best, excess
+
+
+def _iou(local: Assembly, shape: Shape, seed: int) -> float:
+    """At samples of the shape."""
     samples = shape.samples(_SAMPLES, _SAMPLES, seed + _SEEN)
-    occupied, inside = _field(best, samples.points) < 0, samples.distance < 0
-    return best, (round(excess, 5), 1 - occupancy_iou(occupied, inside))
+    return occupancy_iou(_field(local, samples.points) < 0, samples.distance < 0)
 
 
 def _offset_on_fresh_samples(
@@ -149,7 +195,7 @@ def _offset_on_fresh_samples(
             judged = check(new, shape, bounds, seed + _JUDGED + turn)
         except NoSurfaceError:
             break
-        if sum(judged.excess.values()) >= sum(checked.excess.values()):
+        if judged.total_excess >= checked.total_excess:
             break
         local, checked = new, judged
     return local, checked

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import partwright as pw
+from partwright.errors import ParameterError
 from partwright.fields import (
     Box,
     Capsule,
@@ -80,6 +81,12 @@ def test_a_grown_part_lies_that_much_further_out(field, by: float) -> None:
     else:
         assert (after > -1e-4)[before > by + 1e-4].all()
     assert (np.abs(after - before) < 3 * abs(by) + 1e-4).all()
+
+
+@pytest.mark.parametrize("field", SOLIDS, ids=lambda field: field.kind)
+def test_of_a_part_that_shrinks_by_more_than_it_is_nothing_is_left(field) -> None:
+    with pytest.raises(ParameterError):
+        grown(pw.Part(field), -1.0)
 
 
 @pytest.mark.parametrize("field", SOLIDS, ids=lambda field: field.kind)

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 import partwright as pw
+from partwright.fields import SuperFrustum
 from partwright.meshing import mesh_assembly
 from partwright.metrics.deviation import projected
-from partwright.tolerances import DistanceBounds, minimise_parts, satisfy
+from partwright.tolerances import Bounded, Checked, DistanceBounds, minimise_parts, satisfy
+from partwright.tolerances.check import Side
+from partwright.tolerances.satisfying import measured
 from tests.tolerances.shapes import ALL, boss, tube
 
 
@@ -60,6 +63,31 @@ def test_a_tolerance_holds_both_ways(name: str) -> None:
     kept = satisfy(rough, shape, DistanceBounds.of(shape, tolerance=0.01))
     assert kept.satisfied
     assert pw.evaluate(kept.assembly, shape, seed=5, emd=False).max_deviation <= 0.0105
+
+
+def test_a_tolerance_out_of_reach_does_not_cost_the_rest_of_the_shape() -> None:
+    """A box has no hole, and getting thinner brings its faces no nearer to one."""
+    mesh, _ = ALL["plate_with_hole"]()
+    shape = pw.load_shape(mesh)
+    plain = pw.Assembly([pw.Part(SuperFrustum((2, 1.2, 0.3)))])
+    asked = DistanceBounds.of(shape, tolerance="1%")
+    missed, before = satisfy(plain, shape, asked), measured(plain, shape, asked)
+    assert not missed.satisfied
+    assert missed.checked.total_excess <= before.checked.total_excess
+    assert pw.evaluate(missed.assembly, shape, emd=False).iou > 0.88  # as of the plain box
+
+
+def test_the_better_of_two_that_miss_a_bound_is_no_worse_elsewhere() -> None:
+    bounds = DistanceBounds(tolerance=0.01)
+
+    def found(worst: float, iou: float) -> Bounded:
+        return Bounded(boss()[1], Checked(bounds, {"tolerance": Side(worst, np.zeros(3))}), iou)
+
+    assert found(0.02, 0.9).improves_on(found(0.03, 0.9))
+    assert not found(0.02, 0.8).improves_on(found(0.03, 0.9))
+    assert not found(0.03, 0.9).improves_on(found(0.02, 0.8))
+    assert found(0.009, 0.8).improves_on(found(0.02, 0.9))
+    assert not found(0.02, 0.9).improves_on(found(0.009, 0.8))
 
 
 def test_what_keeps_its_bounds_comes_back_untouched() -> None:
