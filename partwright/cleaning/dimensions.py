@@ -35,10 +35,12 @@ _FREELY |= dict.fromkeys(("cylinder", "capsule", "tube", "torus"), "axis")
 
 @dataclass(frozen=True)
 class Dimension:
-    """One number of a field: `attribute`, or its entry `index` where it is a triple."""
+    """One number of a field."""
 
     attribute: str
+    """Of the field's class."""
     index: int | None = None
+    """Which entry, where the attribute is a triple."""
 
     @property
     def name(self) -> str:

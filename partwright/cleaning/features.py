@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.cleaning.dimensions import dimensions, flat, reaches, turned_freely
+from partwright.cleaning.dimensions import dimensions, flat, reaches
 from partwright.cleaning.model import Model
 from partwright.cleaning.orientations import Frames, aligned
 
@@ -24,13 +24,16 @@ _RADII = ("radius", "bottom_radius", "top_radius", "major_radius", "minor_radius
 
 @dataclass(frozen=True)
 class Feature:
-    """A number that is row @ vector: owner is the copy (of a dimension, the first of its leaf) whose it is,
-    None of the input's own origin."""
+    """A number that equations can bind: row @ vector."""
 
     kind: Kind
+    """What sort of number it is."""
     owner: int | None
+    """The copy whose it is (of a dimension, the first of its leaf); None of the input's own origin."""
     row: Floats
+    """(n,) what it takes of each entry of the model's vector."""
     name: str = ""
+    """Of its dimension, or "lower" or "upper" end."""
 
     def value(self, vector: Floats) -> float:
         return float(self.row @ vector)
@@ -38,14 +41,14 @@ class Feature:
 
 @dataclass(frozen=True)
 class Family:
-    """Features of which those that nearly coincide should: about one axis, or of one sort of dimension.
-
-    axis: (3,) direction of places along it; None for dimensions.
-    """
+    """Features of which those that nearly coincide should: about one axis, or of one sort of dimension."""
 
     kind: Kind
+    """What is compared; among sides there are faces, too."""
     members: tuple[Feature, ...]
+    """In the order of the model's copies."""
     axis: Floats | None = None
+    """(3,) direction of places along it; None for dimensions."""
 
 
 def families(model: Model, frames: Frames) -> Iterator[Family]:
@@ -71,7 +74,7 @@ def _lying(model: Model, frames: Frames, copy: int, direction: Floats, world: bo
     """The local axis of a copy that lies along a direction, -1 for any across an axis of revolution; None
     where there is none. Bodies of revolution along the input's axes are compared along these alone."""
     rotation = model.rotations[copy]
-    freely = turned_freely(model.leaves[int(model.leaf_of[copy])].field)
+    freely = model.freely(copy)
     if freely == "all":
         return -1 if world else None
     cosines = np.abs(direction @ rotation)

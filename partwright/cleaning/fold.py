@@ -17,11 +17,14 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Fold:
-    """A node: its operation over copies (by index) and further nodes; `blend` with what came before."""
+    """A node of the tree."""
 
     operation: Operation
+    """By which its children are folded, first to last."""
     children: tuple[int | Fold, ...]
+    """Copies by their index, and further nodes."""
     blend: float = 0.0
+    """With what came before it, own units."""
 
     @classmethod
     def of(cls, assembly: Assembly) -> Fold:

@@ -20,10 +20,12 @@ _TURNED = 1e-5  # degrees: what a quaternion near a right angle may lose
 
 @dataclass(frozen=True)
 class Grid:
-    """The finest lengths, in own units: `step`, a power of ten; `same`, under which two are one."""
+    """The finest lengths, in own units."""
 
     step: float
+    """A power of ten: lengths are typed to this."""
     same: float
+    """Two lengths that differ by less are one."""
 
     @classmethod
     def of(cls, longest: float) -> Grid:

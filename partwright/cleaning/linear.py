@@ -14,15 +14,18 @@ _DEPENDENT = 1e-7  # relative length of what is left of an equation by the earli
 
 @dataclass(frozen=True)
 class Equations:
-    """A vector (n,), and an orthonormal basis (m, n) of the equations that it meets.
+    """A vector and the linear equations that it meets.
 
-    The vector is the nearest to where it started, lengths weighted by `weight` (n,): adding the part of each
-    equation that is orthogonal to the earlier ones is the projection onto all of them.
+    It is the nearest to where it started: adding the part of each equation that is orthogonal to the earlier
+    ones is the projection onto all of them.
     """
 
     vector: Floats
+    """(n,) numbers that meet all equations."""
     weight: Floats
+    """(n,) by which the entries' distances count."""
     basis: Floats
+    """(m, n) orthonormal rows that span the equations, entries over their weight."""
 
     @classmethod
     def of(cls, vector: Floats, weight: Floats) -> Equations:

@@ -14,7 +14,7 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.checks import Quaternion
 from partwright.assembly.rows import as_superfrustum
 from partwright.assembly.similarity import quaternion_product, rotation_matrix
-from partwright.cleaning.dimensions import Dimension, dimensions, values, with_values
+from partwright.cleaning.dimensions import Dimension, dimensions, turned_freely, values, with_values
 from partwright.cleaning.fold import Fold
 from partwright.cleaning.linear import Equations
 from partwright.errors import UncleanableError
@@ -26,26 +26,30 @@ _RATIO_REACH = 0.5  # of the part's size: how far a ratio may move its surface
 
 @dataclass(frozen=True)
 class Variable:
-    """One entry of the vector. kind: "place" (x, y or z of a copy), "number" (of a leaf's field), "turn" (of
-    a leaf, about its local axes). weight: how far the surface moves, at most, when the entry grows by 1."""
+    """One entry of the vector."""
 
     kind: str
+    """"place" (of a copy), "number" (of a leaf's field) or "turn" (of a leaf, about its local axes)."""
     leaf: int
+    """Whose it is."""
     copy: int
+    """Whose place it is; else the first of the leaf."""
     index: int
+    """Axis of a place or turn; of a number, which of the field's dimensions."""
     weight: float
+    """How far the surface moves, at most, when the entry grows by 1."""
     dimension: Dimension | None = None
+    """Of a number."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """Leaves whose copies lie each for itself: those of one leaf share its numbers and its turns.
-
-    assembly: in own units. rotations: (C, 3, 3) of the copies, local to world, before any turn.
-    """
+    """Leaves whose copies lie each for itself: those of one leaf share its numbers and its turns."""
 
     assembly: Assembly
+    """In own units."""
     rotations: Floats
+    """(C, 3, 3) of the copies, local to world, before any turn."""
 
     @classmethod
     def of(cls, assembly: Assembly) -> Model:
@@ -81,7 +85,7 @@ class Model:
     def variables(self) -> tuple[Variable, ...]:
         found: list[Variable] = []
         for i, part in enumerate(self.leaves):
-            first, size = int(self.firsts[i]), _size(part)
+            first, size = int(self.firsts[i]), size_of(part)
             for c in range(first, first + len(part.copies)):
                 found += [Variable("place", i, c, axis, 1.0) for axis in range(3)]
             found += [Variable("turn", i, first, axis, size / 2) for axis in range(3)]
@@ -133,6 +137,10 @@ class Model:
     def blends(self) -> Floats:
         """(C,) own units."""
         return np.array([copy.blend for part in self.leaves for copy in part.copies])
+
+    def freely(self, copy: int) -> str:
+        """How a copy's field may be turned without a difference (`turned_freely`)."""
+        return turned_freely(self.leaves[int(self.leaf_of[copy])].field)
 
     def equations(self) -> Equations:
         return Equations.of(self.vector, self.weights)
@@ -242,6 +250,7 @@ def _turned(turn: Floats) -> Quaternion:
     return float(np.cos(angle / 2)), x, y, z
 
 
-def _size(part: Part) -> float:
+def size_of(part: Part) -> float:
+    """The longest side of its field's box, own units."""
     lower, upper = part.field.bounds()
     return float((upper - lower).max())

@@ -16,7 +16,7 @@ from partwright.cleaning.acceptance import AcceptanceTest
 from partwright.cleaning.deviation_samples import State
 from partwright.cleaning.dimensions import turned_freely
 from partwright.cleaning.grid import plain_rotation, rotation_of, rounded_rotations
-from partwright.cleaning.model import Model, quaternion_of
+from partwright.cleaning.model import Model, quaternion_of, size_of
 from partwright.fields import Box, Field
 
 Floats = NDArray[np.float64]
@@ -52,9 +52,10 @@ _HALF_TURNS = {
 
 @dataclass(frozen=True)
 class Frames:
-    """(3, 3) rotations along whose axes parts lie; the input's own is the first."""
+    """Directions along which parts lie."""
 
     rotations: tuple[Floats, ...] = (np.eye(3),)
+    """(3, 3) each, its columns the axes; the input's own is the first."""
 
     def axes(self) -> Iterator[Floats]:
         for rotation in self.rotations:
@@ -177,7 +178,7 @@ def _candidates(state: State, leaf: int, frames: Frames, acceptance: AcceptanceT
     if freely == "all":
         yield np.eye(3)
         return
-    fine = np.degrees(2 * acceptance.tolerance / state.samples.scale / _size(model.leaves[leaf]))
+    fine = np.degrees(2 * acceptance.tolerance / state.samples.scale / size_of(model.leaves[leaf]))
     if freely in ("axis", "arrow"):
         direction = rotation[:, 2]
         for axis in [*_near(direction, frames.axes(), _NEAR), *_sensible(direction)]:
@@ -309,8 +310,3 @@ def _isometries(frames: Frames) -> Iterator[Floats]:
                     degrees = np.zeros(3)
                     degrees[axis] = 360.0 * k / order
                     yield frame @ rotation_of(*degrees.tolist()) @ frame.T
-
-
-def _size(part: Part) -> float:
-    lower, upper = part.field.bounds()
-    return float((upper - lower).max())

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Part
-from partwright.cleaning.dimensions import turned_freely, values
+from partwright.cleaning.dimensions import values
 from partwright.cleaning.features import Feature
 from partwright.cleaning.model import Model
 from partwright.cleaning.orientations import Frames, aligned, angle, rotation_of
@@ -23,15 +23,20 @@ _FEWEST = 3
 
 @dataclass(frozen=True)
 class Circle:
-    """Copies in equal steps around an axis. rows: equations (all equal 0) that make it so; phase: the first
-    copy's angle in degrees, radius: a row whose value is its distance from the axis at that phase."""
+    """Copies in equal steps around an axis."""
 
     copies: tuple[int, ...]
+    """In their order around it."""
     axis: int
+    """Of the frame: 0, 1 or 2."""
     frame: int
+    """Which of the frames."""
     phase: float
+    """The first copy's angle in degrees."""
     centre: tuple[Floats, Floats]
+    """Rows for where the axis lies, along the two directions across it."""
     rows: tuple[Floats, ...]
+    """Equations, all equal 0, that make it a circle."""
 
     def radius(self, model: Model, frames: Frames, phase: float) -> tuple[Floats, Floats]:
         """Rows for the first copy's distance from the centre along the phase and across it."""
@@ -128,7 +133,7 @@ def _circle(
         return None
     u, v = _plane(frame, k)
     base = copies[0]
-    freely = turned_freely(model.leaves[int(model.leaf_of[base])].field)
+    freely = model.freely(base)
     first = _offset(model, base, u, v, centre)
     rows = []
     for i, copy in enumerate(copies[1:], start=1):
@@ -209,7 +214,7 @@ def mirror_pairs(
     that puts them there. planes: centres along that axis, the best supported first."""
     directions = frames.rotations[frame]
     for copies in [*_classes(model, vector, reach), *_pairs(model, vector, reach)]:
-        lying = [c for c in copies if aligned(directions, model.rotations[c], _freely(model, c)) is not None]
+        lying = [c for c in copies if aligned(directions, model.rotations[c], model.freely(c)) is not None]
         places = {c: directions.T @ vector[model.places(c)] for c in lying}
         for i, a in enumerate(lying):
             for b in lying[i + 1 :]:
@@ -231,10 +236,6 @@ def _pairs(model: Model, vector: Floats, reach: float) -> list[list[int]]:
     groups = [*equal_leaves(model, vector, reach), *([leaf] for leaf in range(len(model.leaves)))]
     classes = [np.flatnonzero(np.isin(model.leaf_of, group)).tolist() for group in groups]
     return [copies for copies in classes if len(copies) == 2]
-
-
-def _freely(model: Model, copy: int) -> str:
-    return turned_freely(model.leaves[int(model.leaf_of[copy])].field)
 
 
 def same_numbers(a: Part, b: Part, same: float) -> bool:

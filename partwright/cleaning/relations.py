@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
-from partwright.cleaning.dimensions import RATIOS, turned_freely
+from partwright.cleaning.dimensions import RATIOS
 from partwright.cleaning.features import Family, Feature, clusters, families, meaningful
 from partwright.cleaning.grid import Grid
 from partwright.cleaning.model import Model
@@ -22,12 +22,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Relation:
-    """kind: "aligned", "parallel", "coaxial", "centred", "flush", "tangent", "equal", "circle", "mirrored" or
-    "repeated". parts: their names, a copy of a repeated part as "name/2". text: the relation in words."""
+    """What holds exactly between parts."""
 
     kind: str
+    """"aligned", "parallel", "coaxial", "centred", "flush", "tangent", "equal", "circle", "mirrored" or
+    "repeated"."""
     parts: tuple[str, ...]
+    """Their names, a copy of a repeated part as "name/2"."""
     text: str
+    """The relation in words."""
 
     def __str__(self) -> str:
         return f"{', '.join(self.parts)}: {self.text}"
@@ -58,6 +61,8 @@ def relations(assembly: Assembly, frames: Frames, grid: Grid) -> tuple[Relation,
 
 @dataclass(frozen=True)
 class _Words:
+    """Numbers and parts in words."""
+
     model: Model
     unit: str | None
     grid: Grid
@@ -92,8 +97,7 @@ def _orientations(model: Model, frames: Frames, words: _Words) -> Iterator[Relat
         lying = [
             c
             for c in range(len(model.leaf_of))
-            if _freely(model, c) != "all"
-            and aligned(frame, model.rotations[c], _freely(model, c)) is not None
+            if model.freely(c) != "all" and aligned(frame, model.rotations[c], model.freely(c)) is not None
         ]
         if f == 0 and lying:
             yield Relation("aligned", words.copies(lying), "along the input's axes")
@@ -120,7 +124,7 @@ def _coaxial(model: Model, frames: Frames, words: _Words, grid: Grid) -> Iterato
     lines: dict[tuple[int, ...], list[int]] = {}
     for c in range(len(model.leaf_of)):
         for f, frame in enumerate(frames.rotations):
-            freely = _freely(model, c)
+            freely = model.freely(c)
             axes = aligned(frame, model.rotations[c], freely) if freely in ("axis", "arrow") else None
             if axes is not None:
                 k = int(np.flatnonzero(axes == 2)[0])
@@ -188,7 +192,3 @@ def _mirrors(
         plane = float((model.vector[model.places(a)] + model.vector[model.places(b)]) @ family.axis / 2)
         where = f"{words.axis(family.axis)} = {words.length(plane)}"
         yield Relation("mirrored", words.copies([a, b]), f"mirror images across {where}")
-
-
-def _freely(model: Model, copy: int) -> str:
-    return turned_freely(model.leaves[int(model.leaf_of[copy])].field)

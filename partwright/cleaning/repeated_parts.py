@@ -135,7 +135,7 @@ def unchanged(given: Model, made: Assembly, grid: Grid) -> bool:
     if not all(same_numbers(a, b, 10 * grid.same) for a, b in zip(given.leaves, other.leaves, strict=True)):
         return False
     for c in range(len(given.leaf_of)):
-        freely = turned_freely(given.leaves[int(given.leaf_of[c])].field)
+        freely = given.freely(c)
         apart = np.abs(given.vector[given.places(c)] - other.vector[other.places(c)])
         if apart.max() > 10 * grid.same or angle(given.rotations[c], other.rotations[c], freely) > _TURNED:
             return False

@@ -33,10 +33,12 @@ _ROUNDINGS = 8  # plain numbers that are tried for one entry
 
 @dataclass(frozen=True)
 class Snapped:
-    """A state, and the equations that its vector meets."""
+    """How far relations were taken on."""
 
     state: State
+    """As they make it."""
     equations: Equations
+    """Those that its vector meets."""
 
     def tried(
         self, acceptance: AcceptanceTest, rows: Sequence[tuple[Floats, float]], same: float
