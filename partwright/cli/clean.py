@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.outputs import add_output, given
+
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
@@ -16,7 +18,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option = command.add_argument
     option("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
-    option("-o", "--output", metavar="FILE", type=Path, required=True, help="where to write")
+    add_output(command, "FILE", "where to write", reads=_reads, writes=_writes)
     option("--shape", metavar="SHAPE", type=Path, help="what it stands for (default: its own surface)")
     option(
         "--clean-tolerance",
@@ -26,6 +28,16 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "(default: half a thousandth of the longest side)",
     )
     command.set_defaults(run=run)
+
+
+def _reads(arguments: argparse.Namespace) -> list[Path]:
+    return given(arguments.assembly, arguments.shape)
+
+
+def _writes(arguments: argparse.Namespace) -> list[Path]:
+    from partwright.atomic_io import report_path
+
+    return [arguments.output, report_path(arguments.output)]
 
 
 def run(arguments: argparse.Namespace) -> int:

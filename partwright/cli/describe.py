@@ -19,6 +19,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
+    from partwright.cli.terminal import say
 
-    print(load_assembly(arguments.assembly).describe(max(1, min(arguments.digits, 17))))
+    for line in load_assembly(arguments.assembly).describe(max(1, min(arguments.digits, 17))).split("\n"):
+        say(line)
     return 0

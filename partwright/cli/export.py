@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.outputs import add_output
 from partwright.export import WRITERS
 
 OPTIONS = ("density", "tolerance", "free_joint", "by_part", "resolution", "facets", "separate")
@@ -17,7 +18,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description=f"Writes an assembly in the format of FILE's suffix: {', '.join(WRITERS)}.",
     )
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
-    command.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="where to write")
+    add_output(command, "FILE", "where to write", reads=lambda a: [a.assembly], writes=_writes)
     option = command.add_argument
     option("--density", metavar="D", type=float, help="in kg/m3 (MJCF, URDF; default: water)")
     option(
@@ -31,10 +32,16 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.set_defaults(run=run)
 
 
+def _writes(arguments: argparse.Namespace) -> list[Path]:
+    from partwright.atomic_io import report_path
+
+    return [arguments.output, report_path(arguments.output)]
+
+
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
     from partwright.atomic_io import report_path
-    from partwright.cli.tables import warn
+    from partwright.cli.terminal import warn
     from partwright.export import export
 
     given = {name: getattr(arguments, name) for name in OPTIONS}

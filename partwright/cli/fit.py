@@ -104,14 +104,16 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
     from partwright.atomic_io import check_folder
+    from partwright.cli.interrupts import raising
     from partwright.cli.progress import Display
-    from partwright.cli.tables import print_relations, print_result, warn
+    from partwright.cli.tables import print_relations, print_result
+    from partwright.cli.terminal import warn
     from partwright.fitting import fit
     from partwright.shapes import load_shape
 
     folder: Path = arguments.output or Path(f"{arguments.shape.stem}-parts")
     check_folder(folder)
-    with Display() as display:
+    with raising(), Display() as display:
         shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
         result = fit(
             shape,

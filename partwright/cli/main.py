@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import warnings
@@ -10,17 +9,17 @@ from collections.abc import Sequence
 from typing import Any
 
 from partwright import __version__
-from partwright.cli import clean, describe, evaluate, export, fit, parts, segment
+from partwright.cli import clean, completion, describe, evaluate, export, fit, outputs, parts, segment
+from partwright.cli.interrupts import INTERRUPTED
+from partwright.cli.parser import Parser
+from partwright.cli.terminal import note
 from partwright.errors import PartwrightError
 
-COMMANDS = (fit, clean, evaluate, describe, export, segment, parts)
-INTERRUPTED = 130
+COMMANDS = (fit, clean, evaluate, describe, export, segment, parts, completion)
 
 
-def parser() -> argparse.ArgumentParser:
-    result = argparse.ArgumentParser(
-        prog="partwright", description="Turns a 3D shape into an editable assembly of parts."
-    )
+def parser() -> Parser:
+    result = Parser(prog="partwright", description="Turns a 3D shape into an editable assembly of parts.")
     result.add_argument("--version", action="version", version=f"partwright {__version__}")
     commands = result.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for command in COMMANDS:
@@ -30,16 +29,22 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0, 2 for errors, 130 after Ctrl-C."""
-    arguments = parser().parse_args(argv)
+    commands = parser()
+    if "_ARGCOMPLETE" in os.environ:  # set by the script of `partwright completion`
+        import argcomplete
+
+        argcomplete.autocomplete(commands)
+    arguments = commands.parse_args(argv)
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
+            outputs.check(arguments)
             return arguments.run(arguments)
     except PartwrightError as error:
-        print(f"partwright: error: {' '.join(str(error).split())}", file=sys.stderr)
+        note(f"error: {' '.join(str(error).split())}")
         return error.exit_code
     except KeyboardInterrupt:
-        print("partwright: interrupted; nothing was written", file=sys.stderr)
+        note("interrupted; nothing was written")
         return INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone; so has what Python would flush at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -47,4 +52,4 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    print(f"partwright: warning: {message}", file=sys.stderr)
+    note(f"warning: {message}")

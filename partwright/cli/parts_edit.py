@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from partwright.cli.outputs import add_output, given
+
 if TYPE_CHECKING:
     from partwright.partsdf.neural import NeuralShape
 
@@ -37,7 +39,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     command.add_argument("shape", metavar="SHAPE", help="an assembly (.json) or MODEL:NAME")
-    command.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="assembly (.json)")
+    add_output(command, "FILE", "assembly (.json)", reads=_reads, writes=_writes)
     command.add_argument("--model", metavar="FILE", help="the model of SHAPE, if it does not ship")
 
     def option(name: str, metavar: str, text: str) -> None:
@@ -52,7 +54,17 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.set_defaults(run=run)
 
 
+def _reads(arguments: argparse.Namespace) -> list[Path]:
+    others = [text.partition("=")[2] for name, text in arguments.edits if name == "swap"]
+    return given(arguments.shape, arguments.model, *others)
+
+
+def _writes(arguments: argparse.Namespace) -> list[Path]:
+    return [arguments.output, arguments.output.with_suffix(".png")]
+
+
 def run(arguments: argparse.Namespace) -> int:
+    from partwright.cli.terminal import say
     from partwright.errors import UnsupportedFormatError
     from partwright.partsdf.pictures import picture
     from partwright.partsdf.sources import open_source
@@ -67,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     source.assembly(shape).save(arguments.output)
     still = arguments.output.with_suffix(".png")
     write_png(still, picture(shape, camera=Camera(up=source.up or "z"), size=480))
-    print(f"{', '.join(shape.names())}: written to {arguments.output}, drawn in {still}")
+    say(f"{', '.join(shape.names())}: written to {arguments.output}, drawn in {still}")
     return 0
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.outputs import add_output, given
+
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
@@ -15,7 +17,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     command.add_argument("first", metavar="A", help="an assembly (.json) or MODEL:NAME")
     command.add_argument("second", metavar="B", help="another of the same model")
-    command.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="film (.gif)")
+    add_output(command, "FILE", "film (.gif)", reads=_reads, writes=_writes)
     option = command.add_argument
     option("--model", metavar="FILE", help="the model of A and B, if it does not ship")
     option("--steps", metavar="N", type=int, default=24, help="pictures one way (default: %(default)s)")
@@ -30,7 +32,16 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.set_defaults(run=run)
 
 
+def _reads(arguments: argparse.Namespace) -> list[Path]:
+    return given(arguments.first, arguments.second, arguments.model)
+
+
+def _writes(arguments: argparse.Namespace) -> list[Path]:
+    return [arguments.output, arguments.output.with_suffix(".png")]
+
+
 def run(arguments: argparse.Namespace) -> int:
+    from partwright.cli.terminal import say
     from partwright.partsdf.pictures import film
     from partwright.partsdf.sources import open_source
     from partwright.render import Camera
@@ -47,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
         Camera(up=first.up or "z"),
         _show,
     )
-    print(f"written to {arguments.output}, sheet in {still}")
+    say(f"written to {arguments.output}, sheet in {still}")
     return 0
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,10 +44,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from partwright.cli.interrupts import raising
     from partwright.cli.progress import Count
+    from partwright.cli.terminal import note
     from partwright.datasets import prepare
 
-    with Count("preparing") as count:
+    with raising(), Count("preparing") as count:
         try:
             made = prepare(
                 arguments.source,
@@ -62,10 +63,9 @@ def run(arguments: argparse.Namespace) -> int:
                 progress=lambda step: count.show(step.done, step.total, step.shape),
             )
         except KeyboardInterrupt:
-            print(
-                f"partwright: interrupted; shapes that are done are kept in {arguments.output}, and the same "
-                "command goes on from there",
-                file=sys.stderr,
+            note(
+                f"interrupted; shapes that are done are kept in {arguments.output}, and the same command "
+                "goes on from there"
             )
             return 130
     _report(made, arguments.output)
@@ -73,12 +73,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _report(made: Preparation, folder: Path) -> None:
-    from partwright.cli.tables import warn
+    from partwright.cli.terminal import say, warn
 
     warn(f"{shape.name} is left out: {shape.reason}" for shape in made.refused)
     family = made.family
     counts = ", ".join(f"{len(family.split(name))} {name}" for name in ("train", "validation", "test"))
-    print(f"{len(family)} shapes of {len(family.parts)} parts ({counts}): {folder}")
+    say(f"{len(family)} shapes of {len(family.parts)} parts ({counts}): {folder}")
 
 
 def _names(text: str) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from partwright.atomic_io import check_folder
+    from partwright.cli.interrupts import raising
     from partwright.partsdf.model import load_model
     from partwright.partsdf.reconstruction import ReconstructionSettings
     from partwright.partsdf.results import reconstruct_shape
@@ -52,7 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     )
     model = load_model(arguments.model)
     shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
-    result = reconstruct_shape(model, shape, settings, arguments.resolution, _show)
+    with raising():
+        result = reconstruct_shape(model, shape, settings, arguments.resolution, _show)
     result.save(folder)
     scores = result.report["scores"]
     absent = result.report["absent"]

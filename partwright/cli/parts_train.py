@@ -35,17 +35,19 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from dataclasses import replace
 
-    from partwright.cli.tables import warn
+    from partwright.cli.interrupts import raising
+    from partwright.cli.terminal import say, warn
     from partwright.partsdf.config import read_config
     from partwright.partsdf.training import train
 
     config = read_config(arguments.config)
     if arguments.family:
         config = replace(config, family=arguments.family)
-    trained = train(config, arguments.output, progress=_show)
+    with raising():
+        trained = train(config, arguments.output, progress=_show)
     if arguments.half:
         trained.model.save(arguments.output / "model-half.safetensors", half=True)
-    print(f"{trained.model.name}: {len(trained.model.shapes)} shapes, written to {trained.path}")
+    say(f"{trained.model.name}: {len(trained.model.shapes)} shapes, written to {trained.path}")
     if trained.outcome == "interrupted":
         warn(["interrupted: the same command goes on from here"])
         return 130

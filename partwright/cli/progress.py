@@ -10,6 +10,8 @@ from typing import Any, Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from partwright.cli.terminal import note, printable
+
 _QUIET = 1.0  # seconds between plain lines of one stage
 
 
@@ -19,9 +21,9 @@ def _bar(detail: str) -> Progress | None:
     if not console.is_terminal:
         return None
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
-        TextColumn(detail),
+        TextColumn(detail, markup=False),
         TimeRemainingColumn(compact=True),
     )
     return Progress(*columns, console=console, transient=True)
@@ -52,7 +54,9 @@ class Display:
         """One report of the method: .stage .round .rounds .parts .iou .fraction."""
         detail = f"round {step.round}/{step.rounds}  {step.parts} parts  IoU {step.iou:.3f}"
         if self._bar:
-            self._bar.update(self._task, description=step.stage, completed=step.fraction, detail=detail)
+            self._bar.update(
+                self._task, description=printable(step.stage), completed=step.fraction, detail=detail
+            )
         elif step.stage != self._last_stage or time.monotonic() - self._last_time > _QUIET:
             self._line(f"{step.stage}: {detail}  {step.fraction:.0%}")
             self._last_stage, self._last_time = step.stage, time.monotonic()
@@ -66,7 +70,7 @@ class Display:
 
     @staticmethod
     def _line(text: str) -> None:
-        print(f"partwright: {text}", file=sys.stderr, flush=True)
+        note(text)
 
 
 class Count:
@@ -92,7 +96,7 @@ class Count:
     def show(self, done: int, total: int, what: str) -> None:
         """`what` was just done, the `done`th of `total`."""
         if self._bar:
-            self._bar.update(self._task, completed=done, total=total, detail=what)
+            self._bar.update(self._task, completed=done, total=total, detail=printable(what))
         elif done == total or time.monotonic() - self._last_time > _QUIET:
-            print(f"partwright: {self._name}: {done}/{total}  {what}", file=sys.stderr, flush=True)
+            note(f"{self._name}: {done}/{total}  {what}")
             self._last_time = time.monotonic()

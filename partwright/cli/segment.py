@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.outputs import add_output, given
+
 NODES = "nodes"
 
 
@@ -17,7 +19,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     command.add_argument("shape", metavar="SHAPE", type=Path, help="the mesh or scene to label")
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
-    command.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="where to write")
+    add_output(command, "FILE", "where to write", reads=_reads, writes=_writes)
     command.add_argument(
         "--within",
         metavar="LABELS",
@@ -31,11 +33,22 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.set_defaults(run=run)
 
 
+def _reads(arguments: argparse.Namespace) -> list[Path]:
+    return given(arguments.shape, arguments.assembly, arguments.within)
+
+
+def _writes(arguments: argparse.Namespace) -> list[Path]:
+    from partwright.shapes.labels import labels_path
+
+    return [arguments.output, labels_path(arguments.output)]
+
+
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
     from partwright.cleaning.label_files import check_suffix, write_segments
     from partwright.cleaning.segmentation import check_within, node_labels, segment_faces
     from partwright.cleaning.splitting import split_at_borders
+    from partwright.cli.terminal import say
     from partwright.shapes import load_shape
     from partwright.shapes.labels import read_labels
 
@@ -51,5 +64,5 @@ def run(arguments: argparse.Namespace) -> int:
         within = None if within is None else check_within(within, len(shape.input_faces))[source]
     labels, names = segment_faces(vertices, faces, assembly, within)
     write_segments(arguments.output, vertices, faces, labels, names, assembly)
-    print(f"{len(labels)} faces, {len(set(labels.tolist()))} labels: {arguments.output}")
+    say(f"{len(labels)} faces, {len(set(labels.tolist()))} labels: {arguments.output}")
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,8 @@ from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+
+from partwright.cli.terminal import printable, say
 
 if TYPE_CHECKING:
     from partwright.cleaning import Cleaned
@@ -31,7 +32,7 @@ def print_result(result: Result, folder: Path) -> None:
     table.add_row("outcome", result.outcome.replace("_", " "))
     table.add_row("seconds", f"{result.report['seconds']['all']:.1f}")
     _print(table)
-    print(f"written to {folder}")
+    say(f"written to {folder}")
 
 
 def print_scores(name: str, scores: Scores, unit: str | None) -> None:
@@ -41,7 +42,7 @@ def print_scores(name: str, scores: Scores, unit: str | None) -> None:
 def print_relations(cleaned: Cleaned) -> None:
     """What cleaning found, a line each."""
     for relation in cleaned.relations:
-        print(relation)
+        say(relation)
 
 
 def print_cleaned(cleaned: Cleaned, path: Path) -> None:
@@ -49,19 +50,14 @@ def print_cleaned(cleaned: Cleaned, path: Path) -> None:
     print_relations(cleaned)
     before, after, unit = cleaned.before, cleaned.after, cleaned.assembly.unit
     length = f" {unit}" if unit else ""
-    print(
+    say(
         f"{before.parts} parts -> {after.parts}, IoU {before.iou:.4f} -> {after.iou:.4f}, "
         f"mean deviation {before.mean_deviation:.3g} -> {after.mean_deviation:.3g}{length}: {path}"
     )
 
 
-def warn(messages: Iterable[str]) -> None:
-    for message in messages:
-        print(f"partwright: warning: {message}", file=sys.stderr)
-
-
 def _scores_table(name: str, scores: Scores, unit: str | None) -> Table:
-    table = Table(title=escape(name), box=box.SIMPLE_HEAD, show_header=False, title_justify="left")
+    table = Table(title=escape(printable(name)), box=box.SIMPLE_HEAD, show_header=False, title_justify="left")
     table.add_column()
     table.add_column(justify="right")
     length = f" {unit}" if unit else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -52,6 +51,8 @@ def export(assembly: Assembly, path: str | Path, **options: Any) -> None:
         ParameterError: an option's value makes no sense.
         OutputError: the file cannot be written.
     """
+    import inspect  # heavy, and this module is imported by every `import partwright`
+
     suffix = _suffix(Path(path))
     write: Callable[..., None] = import_module(WRITERS[suffix]).write
     known = list(inspect.signature(write).parameters)[2:]

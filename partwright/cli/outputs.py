@@ -1,0 +1,65 @@
+"""Where a command writes: tried before the work, and never over what is read unless that was asked for."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+Paths = Callable[[argparse.Namespace], Iterable[Path]]
+_MAX_BYTES = 255  # of one name, on every common file system
+
+
+def add_output(
+    command: argparse.ArgumentParser,
+    metavar: str,
+    text: str,
+    *,
+    reads: Paths,
+    writes: Paths,
+    folder: Callable[[argparse.Namespace], Path] | None = None,
+    required: bool = True,
+) -> None:
+    """-o and --overwrite. `reads` and `writes` give the files, for `check`; `folder` the one that is made."""
+    command.add_argument("-o", "--output", metavar=metavar, type=Path, required=required, help=text)
+    command.add_argument(
+        "--overwrite", action="store_true", help="write even where that replaces what is read"
+    )
+    command.set_defaults(reads=reads, writes=writes, folder=folder)
+
+
+def check(arguments: argparse.Namespace) -> None:
+    """Before the work: whether a command with `add_output` will be able to write, and not over its inputs.
+
+    Raises:
+        OutputError: it will not.
+    """
+    from partwright.atomic_io import check_files, check_folder, check_unread
+    from partwright.errors import OutputError
+
+    if "writes" not in arguments:
+        return
+    if not arguments.folder and not arguments.output.name:
+        raise OutputError(f"cannot write {arguments.output}: give the name of a file with -o")
+    writes = list(arguments.writes(arguments))
+    if not arguments.overwrite:
+        check_unread(writes, arguments.reads(arguments))
+    if arguments.folder:
+        check_folder(arguments.folder(arguments), [path.name for path in writes])
+    else:
+        check_files(writes)
+
+
+def parts_folder(arguments: argparse.Namespace) -> Path:
+    """-o, or a folder named after SHAPE, shortened where the file system would not take the name."""
+    if arguments.output is not None:
+        return Path(arguments.output)
+    ending = "-parts"
+    stem = os.fsencode(arguments.shape.stem)[: _MAX_BYTES - len(ending)]
+    return Path(os.fsdecode(stem) + ending)
+
+
+def given(*paths: str | Path | None) -> list[Path]:
+    """Those of the optional arguments that were given."""
+    return [Path(path) for path in paths if path is not None]

@@ -1,0 +1,60 @@
+"""Mistakes in what was typed: told with the usage of the command that was meant, and a guess."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from partwright.cli.main import main, parser
+from partwright.cli.parser import Parser
+
+
+@pytest.mark.parametrize(
+    ("words", "usage", "says"),
+    [
+        ("fit a.stl --qualty high", "usage: partwright fit ", "did you mean --quality?"),
+        ("fit a.stl --max-part=3 --zzz", "usage: partwright fit ", "--zzz"),
+        (
+            "parts edit mixers:0 -o a.json --mve a=1,2,3",
+            "usage: partwright parts edit ",
+            "did you mean --move?",
+        ),
+        ("segmnt a.glb b.json", "usage: partwright [-h]", "did you mean segment?"),
+        ("fit a.stl --quality hihg", "usage: partwright fit ", "did you mean high?"),
+        ("describe a.json b.json", "usage: partwright describe ", "unrecognized arguments: b.json"),
+    ],
+)
+def test_a_mistake(words: str, usage: str, says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words.split())
+    error = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert error.startswith(usage)
+    assert says in error
+
+
+def test_an_option_with_an_optional_value_keeps_off_what_is_none() -> None:
+    made = Parser()
+    made.add_argument("shape")
+    made.add_argument("--contain", nargs="?", const="0", type=float)
+    for words, contain in (
+        ("--contain mug.stl", 0.0),
+        ("--contain 0.5 mug.stl", 0.5),
+        ("mug.stl --contain", 0.0),
+        ("mug.stl --contain=2", 2.0),
+        ("mug.stl", None),
+    ):
+        given = made.parse_args(words.split())
+        assert (given.shape, given.contain) == ("mug.stl", contain)
+
+
+def test_the_cad_measures_keep_off_the_assembly() -> None:
+    given = parser().parse_args(["evaluate", "--cad", "a.json", "b.stl"])
+    assert (given.cad, given.assembly, given.shape) == (30_000, Path("a.json"), Path("b.stl"))
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_printed(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["completion", shell]) == 0
+    assert "partwright" in capsys.readouterr().out
