@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
-from partwright.fields import Box, Quadric
+from partwright.fields import Box
 from partwright.meshing import has_exact_mesh, mesh_csg
 
 if TYPE_CHECKING:
@@ -16,10 +16,8 @@ if TYPE_CHECKING:
 
 def is_atomic(node: Node) -> bool:
     """A quadric, or an intersection of leaves with quadrics among them that has an exact mesh."""
-    if isinstance(node, Part):
-        return isinstance(node.field, Quadric)
-    quadrics = any(isinstance(part.field, Quadric) for part in node.parts)
-    return quadrics and node.operation == "intersection" and has_exact_mesh(node)
+    quadrics = any(part.field.quadric() is not None for part in node.parts)
+    return quadrics and (node.is_part or (node.operation == "intersection" and has_exact_mesh(node)))
 
 
 def atomic_mesh(node: Node, assembly: Assembly) -> trimesh.Trimesh:

@@ -15,7 +15,7 @@ from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.placed import placed_quadric
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import NoSurfaceError
-from partwright.fields import Box, Cone, Cylinder, Field, NormalForm, Quadric, Sphere, normal_form
+from partwright.fields import Box, Cone, Cylinder, Field, NormalForm, Sphere, normal_form
 
 SAME = 1e-6  # of the assembly's size: curvatures that are smaller are flat
 _ROOM = 1.02
@@ -28,13 +28,13 @@ def with_closed_quadrics(assembly: Assembly) -> Assembly:
     Raises:
         NoSurfaceError: the assembly does not end.
     """
-    if not any(isinstance(part.field, Quadric) for part in assembly.parts):
+    if all(part.field.quadric() is None for part in assembly.parts):
         return assembly
     ball = Ball.around(assembly)
 
     def closed(node: Node) -> Node:
-        if isinstance(node, Part):
-            return ball.closed(node) if isinstance(node.field, Quadric) else node
+        if node.is_part:
+            return ball.closed(node)
         node = _holes_subtracted(node, ball)
         children = node.children
         if node.operation == "difference":  # what has no surface takes nothing away
@@ -68,9 +68,9 @@ def _holes_subtracted(node: Assembly, ball: Ball) -> Assembly:
         return node
     body = dataclasses.replace(node, children=solids, name="", blend=0.0, metadata={}, unit=None, up=None)
     inside = (
-        dataclasses.replace(hole, field=hole.field.complement())
+        dataclasses.replace(hole, field=own.complement())
         for hole in holes
-        if isinstance(hole, Part) and isinstance(hole.field, Quadric)
+        if hole.is_part and (own := hole.field.quadric()) is not None
     )
     return dataclasses.replace(node, children=(body, *inside), operation="difference")
 
@@ -90,28 +90,28 @@ class Ball:
             raise NoSurfaceError("nothing to export: the solid does not end; intersect it with its bounds")
         return cls(box.mean(axis=0), _ROOM * float(np.linalg.norm(np.ptp(box, axis=0)) / 2))
 
-    def form(self, part: Part) -> NormalForm:
-        """Of the quadric of a part, about the ball's centre."""
-        field = part.field
-        assert isinstance(field, Quadric)
-        place = np.array(part.translation) - self.centre
-        return normal_form(field.moved(rotation_matrix(part.rotation), place), self.radius, SAME)
+    def form(self, node: Node) -> NormalForm | None:
+        """Of the quadric of a part, about the ball's centre; None of any other node."""
+        quadric = node.field.quadric() if node.is_part else None
+        if not node.is_part or quadric is None:
+            return None
+        place = np.array(node.translation) - self.centre
+        return normal_form(quadric.moved(rotation_matrix(node.rotation), place), self.radius, SAME)
 
     def is_hole(self, node: Node) -> bool:
         """Whether the node is the outside of a curved quadric."""
-        return isinstance(node, Part) and isinstance(node.field, Quadric) and self.form(node).complement
+        form = self.form(node)
+        return form is not None and form.complement
 
     def is_nothing(self, node: Node) -> bool:
         """Whether the node is a quadric without surface, with no point inside."""
-        if not isinstance(node, Part) or not isinstance(node.field, Quadric):
-            return False
         form = self.form(node)
-        return form.name == "none" and not form.complement
+        return form is not None and form.name == "none" and not form.complement
 
     def closed(self, part: Part) -> Node:
-        """The quadric as a named solid, or as a few, or as it is."""
+        """A quadric as a named solid, or as a few; what is none, or no named solid is like, as it is."""
         form = self.form(part)
-        if form.name not in _CLOSED:
+        if form is None or form.name not in _CLOSED:
             return part
         solids = [
             dataclasses.replace(part, field=field, translation=self._at(pose), rotation=pose.rotation)

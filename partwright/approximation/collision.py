@@ -16,7 +16,7 @@ from partwright.approximation.nearest import Approximation, nearest_solid
 from partwright.approximation.pieces import Piece, piece_mesh, pieces, require_some
 from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.fields import Field, Solid, SuperFrustum
+from partwright.fields import Field, Solid
 from partwright.meshing import mesh_part
 from partwright.shapes import MeshDistance
 
@@ -107,7 +107,7 @@ def _stand_ins(
         return whole, mesh_change
     if part is None:
         return _decomposed(piece, allowed) if convex else (whole, mesh_change)
-    if not isinstance(part.field, SuperFrustum | Solid):
+    if part.field.superfrustum() is None:
         return whole, mesh_change  # it has no arc and no hole to go by
     chain = _chain(piece, part, kinds, allowed, resolution)
     if all(geometry.part for geometry in chain):

@@ -79,7 +79,7 @@ def _convex_solids(node: Node, allowed: float, room: Part | None = None) -> list
     cut = isinstance(node, Assembly) and node.operation == "difference"
     if hull.volume() <= (1 if cut else _CHORDS) * solid.volume() + _ROUNDING * hull.volume():
         return [hull]
-    if isinstance(node, Part) and isinstance(node.field, Quadric):
+    if node.is_part and node.field.quadric() is not None:
         return [one.hull() for one in solid.decompose()]
     if isinstance(node, Part) and not node.instances:
         return [_manifold(mesh) for one in segments(node, allowed) for mesh in wedges(one, allowed, _CELLS)]
@@ -103,8 +103,8 @@ def _without_concave(node: Assembly) -> Assembly:
     rest: list[Node] = []
     taken: list[Node] = []
     for child in node.children:
-        quadric = child.field if isinstance(child, Part) and not child.instances else None
-        if isinstance(child, Part) and isinstance(quadric, Quadric) and _is_concave(quadric):
+        quadric = child.field.quadric() if child.is_part and not child.instances else None
+        if child.is_part and quadric is not None and _is_concave(quadric):
             taken.append(replace(child, field=quadric.complement()))
         else:
             rest.append(child)

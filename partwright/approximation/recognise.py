@@ -25,13 +25,14 @@ def exact_solid(field: Field) -> Solid | None:
     """The named solid that has the field's very surface, in the same place; None where there is none."""
     if isinstance(field, Solid):
         return field
-    if not isinstance(field, SuperFrustum):
+    own = field.superfrustum()
+    if own is None:
         return None
-    lower, upper = field.bounds()
+    lower, upper = own.bounds()
     same = SAME * float((upper - lower).max())
-    if same == 0 or _bent(field, same):
+    if same == 0 or _bent(own, same):
         return None
-    return _dilated(field, same) if field.dilation > same else _sharp(field, same)
+    return _dilated(own, same) if own.dilation > same else _sharp(own, same)
 
 
 def _bent(field: SuperFrustum, same: float) -> bool:

@@ -97,11 +97,12 @@ def _form(node: Node) -> NormalForm | None:
     """Of a round quadric that is a node's only leaf."""
     if isinstance(node, Assembly) and len(node.children) == 1:
         return _form(node.children[0])
-    if not isinstance(node, Part) or not isinstance(node.field, Quadric):
+    quadric = node.field.quadric() if node.is_part else None
+    if not node.is_part or quadric is None:
         return None
     if node.instances or node.translation != ORIGIN or node.rotation != NO_ROTATION:
         return None  # repeated already, further down; a tree's own leaves lie where their quadric does
-    form = normal_form(node.field)
+    form = normal_form(quadric)
     return form if form.name in _MAKERS and form.round and not form.complement else None
 
 

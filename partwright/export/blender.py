@@ -18,11 +18,9 @@ import numpy as np
 from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.palette import palette
-from partwright.assembly.rows import as_superfrustum
 from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
 from partwright.export.identifiers import comment, free_name
-from partwright.fields import Quadric, Solid, SuperFrustum
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit
 
@@ -124,16 +122,16 @@ def _part(part: Part, resolution: int) -> _Solid:
         "kind": part.field.kind,
         "blend": part.blend,
     }
-    if isinstance(part.field, SuperFrustum | Solid):
-        f = as_superfrustum(part.field)
+    f = part.field.superfrustum()
+    if f is not None:
         entry |= {name: list(v) if isinstance(v := getattr(f, name), tuple) else v for name in _PARAMETERS}
     return _Solid(entry, mesh_part(Part(part.field), resolution))
 
 
 def _atomic(node: Node, assembly: Assembly) -> _Solid:
     """Quadrics that bound one convex, in the assembly's frame; their coefficients by name."""
-    parts = (node,) if isinstance(node, Part) else node.parts
-    quadrics = {part.name: list(part.field.coefficients) for part in parts if isinstance(part.field, Quadric)}
+    fields = ((part.name, part.field.quadric()) for part in node.parts)
+    quadrics = {name: list(own.coefficients) for name, own in fields if own is not None}
     entry = {"location": [0.0] * 3, "rotation": [1.0, 0.0, 0.0, 0.0], "kind": "convex", "blend": 0.0}
     return _Solid(entry | quadrics, atomic_mesh(node, assembly))
 

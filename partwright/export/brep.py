@@ -24,7 +24,7 @@ from partwright.export.brep_bent import bent_solid
 from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
-from partwright.fields import Field, Quadric, Solid, SuperFrustum
+from partwright.fields import Field, SuperFrustum
 from partwright.meshing import mesh_part
 
 if TYPE_CHECKING:
@@ -52,12 +52,10 @@ def built(part: Part) -> Approximation | None:
     """The part as `solid_of` builds it, or unbent where its bend cannot be built and hardly shows; None where
     neither is the part's surface. `max_deviation` is 0 where all faces are the very surface."""
     field = part.field
-    if isinstance(field, Quadric):  # by `quadric_solid`, or not at all
+    if field.quadric() is not None:  # by `quadric_solid`, or not at all
         return Approximation(field, part, 0.0, 0.0)
-    if not isinstance(field, SuperFrustum | Solid):
-        return None
     f = field.superfrustum()
-    if f.thinnest < SAME * max(*f.size, f.dilation):
+    if f is None or f.thinnest < SAME * max(*f.size, f.dilation):
         return None
     for candidate in dict.fromkeys((f, dataclasses.replace(f, bulge=0.0))):
         off = _off(candidate, f)

@@ -20,7 +20,6 @@ from partwright.errors import NoSurfaceError
 from partwright.export.brep import solid_of, volume_and_area
 from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
-from partwright.fields import Quadric
 from partwright.meshing import has_exact_mesh, mesh_csg
 
 if TYPE_CHECKING:
@@ -189,8 +188,9 @@ def _operated(operation: str, first: TopoDS_Shape, second: TopoDS_Shape, label: 
 
 def placed(part: Part, ball: Ball) -> TopoDS_Shape:
     """The part's solid in the part's place."""
-    if isinstance(part.field, Quadric):
-        return _moved(quadric_solid(ball.form(part), ball.radius), NO_ROTATION, ball.centre.tolist())
+    form = ball.form(part)
+    if form is not None:
+        return _moved(quadric_solid(form, ball.radius), NO_ROTATION, ball.centre.tolist())
     return _moved(solid_of(part.field), part.rotation, part.translation)
 
 

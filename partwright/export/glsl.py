@@ -18,7 +18,6 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.rows import as_superfrustum
 from partwright.atomic_io import write_bytes
 from partwright.export.identifiers import comment, identifiers
-from partwright.fields import Quadric
 from partwright.shapes import canonical_unit
 
 if TYPE_CHECKING:
@@ -47,7 +46,7 @@ def to_glsl(assembly: Assembly) -> str:
         "",
         _formula("superfrustum.glsl"),
     ]
-    if any(isinstance(part.field, Quadric) for part in assembly.parts):
+    if any(part.field.quadric() is not None for part in assembly.parts):
         head.append(_formula("quadric.glsl"))
     table = [_constant(name, part) for name, part in zip(constants, assembly.parts, strict=True)]
     functions: list[str] = []
@@ -63,8 +62,9 @@ def _constant(name: str, part: Part) -> str:
     """The part's row, in the order of its struct."""
     w, x, y, z = part.rotation
     vectors: list[tuple[str, Sequence[float]]] = [("vec3", part.translation), ("vec4", (x, y, z, w))]
-    if isinstance(part.field, Quadric):
-        struct, terms = "Quadric", part.field.scaled_terms
+    quadric = part.field.quadric()
+    if quadric is not None:
+        struct, terms = "Quadric", quadric.scaled_terms
         vectors += [("mat3", terms.square.ravel().tolist()), ("vec3", terms.linear.tolist())]
         numbers = [terms.constant, terms.fall, terms.rise]
     else:
@@ -98,9 +98,9 @@ def _function(
 def _call(
     child: Node, constants: Iterator[str], groups: Iterator[str], functions: list[str]
 ) -> tuple[str, str]:
-    if isinstance(child, Part):
+    if child.is_part:
         constant = next(constants)
-        function = "quadric_sdf" if isinstance(child.field, Quadric) else "part_sdf"
+        function = "part_sdf" if child.field.quadric() is None else "quadric_sdf"
         return f"{function}(p, {constant})", f"{constant}.blend"
     group = next(groups)
     _function(child, group, constants, groups, functions)

@@ -85,7 +85,7 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
         raise ParameterError(f"facets: expected at least 3 of a full circle, got {facets}")
     tree, changes = solid_tree(assembly, keep=_kept, source=True)
     ball = Ball.around(tree)
-    polyhedra = [part for part in tree.parts if isinstance(part.field, Quadric)]
+    polyhedra = [part for part in tree.parts if part.field.quadric() is not None]
     changes += [Change((part.name,), "mesh", note=f"{facets} facets to a full turn") for part in polyhedra]
     parts = source_parts(tree.parts, fixed_axes_angles, _RESERVED.split())
     unit = canonical_unit(assembly.unit) if assembly.unit else None
@@ -114,15 +114,16 @@ def _table(part: SourcePart, unit: str | None) -> Iterator[str]:
 
 
 def _kept(part: Part) -> Approximation | None:
-    return Approximation(part.field, part, 0.0, 0.0) if isinstance(part.field, Quadric) else drawn(part)
+    return drawn(part) if part.field.quadric() is None else Approximation(part.field, part, 0.0, 0.0)
 
 
 def _module(part: SourcePart, ball: Ball, facets: int) -> Iterator[str]:
     names, field = part.variables(), part.part.field
+    quadric = field.quadric()
     solid = (
-        _polyhedron(part.part, ball, facets)
-        if isinstance(field, Quadric)
-        else _SOLIDS[field.kind].format(**names)
+        _SOLIDS[field.kind].format(**names)
+        if quadric is None
+        else _polyhedron(quadric, part.part, ball, facets)
     )
     yield f"module {part.function}() {{  // {part.title}"
     yield from (f"    {line}" for line in _loop(part, names))
@@ -148,13 +149,12 @@ def _loop(part: SourcePart, names: dict[str, str]) -> Iterator[str]:
         yield f"translate({names['place']}){turned}"
 
 
-def _polyhedron(part: Part, ball: Ball, facets: int) -> str:
-    """The quadric in its own frame, closed off outside the ball."""
-    assert isinstance(part.field, Quadric)
+def _polyhedron(quadric: Quadric, part: Part, ball: Ball, facets: int) -> str:
+    """The quadric of a part in its own frame, closed off outside the ball."""
     centre = Similarity(1.0, part.rotation, part.translation).inverse()(ball.centre)
     chord = ball.radius * (1 - math.cos(math.pi / facets))
     box = centre + ball.radius * np.array([[-1.0], [1.0]])
-    mesh = quadric_solid(part.field, box, chord).to_mesh64()
+    mesh = quadric_solid(quadric, box, chord).to_mesh64()
     points = ", ".join(f"[{', '.join(map(number, p))}]" for p in np.asarray(mesh.vert_properties).tolist())
     faces = np.asarray(mesh.tri_verts)[:, ::-1].tolist()  # OpenSCAD's run clockwise
     return f"polyhedron(points = [{points}], faces = {faces});"

@@ -17,7 +17,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.similarity import rotation_matrix
 from partwright.export.identifiers import comment, identifiers
 from partwright.export.instance_patterns import Poses, Ring, Row, pattern
-from partwright.fields import Field, HollowBox, HollowFrustum, Quadric, SuperFrustum
+from partwright.fields import Field, HollowBox, HollowFrustum, SuperFrustum
 
 MEANING = {
     "size": "full extents x, y, z",
@@ -129,7 +129,7 @@ def _tidy(place: tuple[float, ...]) -> tuple[float, ...]:
 
 def _parameters(field: Field) -> dict[str, Value]:
     """By name; a quadric's coefficients mean nothing to a reader."""
-    if isinstance(field, Quadric):
+    if field.quadric() is not None:
         return {}
     return {entry.name: getattr(field, entry.name) for entry in dataclasses.fields(field)}  # type: ignore[arg-type]
 

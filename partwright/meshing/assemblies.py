@@ -12,8 +12,8 @@ from partwright.assembly.rows import as_superfrustum
 from partwright.errors import NoSurfaceError
 from partwright.fields.base import LIPSCHITZ
 from partwright.meshing.csg import has_exact_mesh, mesh_csg
-from partwright.meshing.dust import without_dust
 from partwright.meshing.marching import mesh_field
+from partwright.meshing.small_components import without_small_components
 
 if TYPE_CHECKING:
     import trimesh
@@ -54,7 +54,7 @@ def mesh_assembly(
     local = assembly.transformed(frame)
     room = _ROOM + (upper - lower) * frame.scale / 2
     mesh = mesh_field(local.distance, -room, room, counts, lipschitz=_lipschitz(assembly), sharp=sharp)
-    vertices, faces = without_dust(mesh.vertices, mesh.faces, np.full(3, 2 * room.max() / counts))
+    vertices, faces = without_small_components(mesh.vertices, mesh.faces, np.full(3, 2 * room.max() / counts))
     return trimesh.Trimesh(frame.inverse()(vertices), faces, process=False)
 
 

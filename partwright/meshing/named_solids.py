@@ -21,18 +21,16 @@ from partwright.fields import (
     Torus,
     Tube,
 )
-from partwright.meshing.turned import corners_of_circle, turned
+from partwright.meshing.revolve import corners_of_circle, revolve
 
 
 def named_solid(solid: Solid, tolerance: float) -> Manifold:
     """The solid in its own frame."""
-    if isinstance(solid, Box):
-        return Manifold.cube(solid.size, True)
-    if isinstance(solid, HollowBox):
-        outer, hole = solid.pieces()
-        return named_solid(outer, tolerance) - named_solid(hole, tolerance)
+    angular = _ANGULAR.get(type(solid))
+    if angular is not None:
+        return angular(solid)
     profile = _PROFILES[type(solid)](solid, tolerance)
-    return turned(profile, corners_of_circle(float(profile[:, 0].max()), tolerance))
+    return revolve(profile, corners_of_circle(float(profile[:, 0].max()), tolerance))
 
 
 def _frustum(bottom: float, top: float, height: float) -> np.ndarray:
@@ -68,6 +66,11 @@ def _hollow_frustum(solid: HollowFrustum, _: float) -> np.ndarray:
     inner = [(share * radius, z) for radius, z in reversed(outer)]
     return np.array([*outer, *(inner if solid.top_radius > 0 else inner[1:])])
 
+
+_ANGULAR: dict[type[Solid], Callable[[Any], Manifold]] = {
+    Box: lambda box: Manifold.cube(box.size, True),
+    HollowBox: lambda box: Manifold.cube(box.size, True) - Manifold.cube(box.pieces()[1].size, True),
+}
 
 _PROFILES: dict[type[Solid], Callable[[Any, float], np.ndarray]] = {
     Cylinder: lambda s, _: _frustum(s.radius, s.radius, s.height),

@@ -10,7 +10,7 @@ import numpy as np
 from manifold3d import Manifold, OpType
 
 from partwright.fields import NormalForm, Quadric, normal_form
-from partwright.meshing.turned import closed, corners_of_circle, subdivided, turned, under_graph
+from partwright.meshing.revolve import closed, corners_of_circle, revolve, subdivided, under_graph
 
 _ROOM = 1.05  # what is cut off beyond the box, in boxes
 _CUBE = 1.5  # half the side of the cube in which graphs are sought, in half diagonals of the box
@@ -171,7 +171,7 @@ def _swept(form: NormalForm, low: float, high: float, tolerance: float) -> Manif
     ends = [[0.0, low], [0.0, high]]
     points = points[1 if points[0, 0] <= small else 0 : len(points) - (points[-1, 0] <= small)]
     points = np.concatenate([ends[:1], points, ends[1:]])
-    return turned(points, corners_of_circle(float(points[:, 0].max()), tolerance), tuple(stretch / widest))
+    return revolve(points, corners_of_circle(float(points[:, 0].max()), tolerance), tuple(stretch / widest))
 
 
 def _between_branches(form: NormalForm, half: float, along: np.ndarray, tolerance: float) -> Manifold:

@@ -18,7 +18,7 @@ def corners_of_circle(radius: float, tolerance: float) -> int:
     return 4 * math.ceil(min(max(math.pi / turn, _FEWEST), _MOST) / 4)
 
 
-def turned(profile: np.ndarray, corners: int, stretch: tuple[float, float] = (1.0, 1.0)) -> Manifold:
+def revolve(profile: np.ndarray, corners: int, stretch: tuple[float, float] = (1.0, 1.0)) -> Manifold:
     """The profile (K, 2) of radii and heights turned about z; an end on the axis is a pole.
 
     The profile runs from bottom to top, from axis to axis; one that never meets the axis is a closed loop,

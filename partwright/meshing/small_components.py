@@ -1,16 +1,18 @@
-"""Crumbs: what is left of a sheet that is thinner than the grid can show."""
+"""Small components: what is left of a sheet that is thinner than the grid can show."""
 
 from __future__ import annotations
 
 import numpy as np
 
-_SMALLEST = 3.0  # cells; a body that is shorter along each axis is a crumb
+_SMALLEST = 3.0  # cells; a component that is shorter along each axis is small
 
 
-def without_dust(vertices: np.ndarray, faces: np.ndarray, cell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (V, 3) and faces (F, 3) without closed pieces shorter than three cells along each axis.
+def without_small_components(
+    vertices: np.ndarray, faces: np.ndarray, cell: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (V, 3) and faces (F, 3) without components shorter than three cells along each axis.
 
-    Where all pieces are that small, nothing is dropped.
+    Where all are that small, nothing is dropped.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
