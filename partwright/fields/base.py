@@ -62,7 +62,7 @@ class Field(ABC):
 
     @property
     def lipschitz(self) -> float:
-        """How much its value changes per length at most."""
+        """How much its value changes per length at most, near the surface."""
         return LIPSCHITZ
 
     @property

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from partwright.meshing.blocks import Distance
 from partwright.metrics.iou import occupancy_iou
+from partwright.metrics.metric import Metric
+
+if TYPE_CHECKING:
+    from partwright.metrics.comparison import Comparison
 
 COUNT = 20_000
 SIGMA = 0.02
@@ -26,3 +32,12 @@ def bi_surface_iou(
         points = (surface + rng.normal(0.0, SIGMA, surface.shape)).astype(np.float32)
         scores.append(occupancy_iou(first(points) < 0, second(points) < 0))
     return float(np.mean(scores))
+
+
+def _measured(pair: Comparison) -> float:
+    on_result, on_shape = pair.on_result(COUNT, 3), pair.on_shape(COUNT, 3)
+    distances = pair.local.distance, pair.shape.unit_distance
+    return bi_surface_iou(*distances, on_result, on_shape, pair.streams[4])
+
+
+BI_SURFACE_IOU = Metric(_measured, "higher")

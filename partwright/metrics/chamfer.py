@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+from partwright.metrics.metric import Metric
+
+if TYPE_CHECKING:
+    from partwright.metrics.comparison import Comparison
 
 COUNT = 30_000
 
@@ -21,3 +28,11 @@ def chamfer(first: np.ndarray, second: np.ndarray) -> float:
     there = other.query(first, workers=-1)[0]
     back = one.query(second, workers=-1)[0]
     return float(np.mean(there**2) + np.mean(back**2))
+
+
+def chamfer_floor(pair: Comparison) -> float:
+    """What sampling alone costs: two samples of the shape's own surface."""
+    return chamfer(pair.on_shape(COUNT, 1), pair.on_shape(COUNT, 0))
+
+
+CHAMFER = Metric(lambda pair: chamfer(pair.on_result(COUNT, 2), pair.on_shape(COUNT, 0)), "lower")

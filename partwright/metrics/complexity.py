@@ -6,6 +6,7 @@ import numpy as np
 
 from partwright.assembly import Assembly, Part
 from partwright.assembly.placed import placed_quadric
+from partwright.metrics.metric import Metric
 
 _DIGITS = 9
 
@@ -47,3 +48,8 @@ def distinct_primitives(node: Assembly | Part) -> int:
         row = row / row[np.abs(row).argmax()]  # of the same sign, whichever side is inside
         found.add(tuple((row.round(_DIGITS) + 0.0).tolist()))
     return len(found) + others
+
+
+PRIMITIVES = Metric(lambda pair: primitives(pair.assembly), "lower")
+CONVEXES = Metric(lambda pair: convexes(pair.assembly), "lower")
+DISTINCT_PRIMITIVES = Metric(lambda pair: distinct_primitives(pair.assembly), "lower")

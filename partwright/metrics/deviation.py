@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from partwright.metrics.metric import Metric
+from partwright.shapes.distance import MeshDistance
+
+if TYPE_CHECKING:
+    from partwright.metrics.comparison import Comparison
+    from partwright.shapes import Shape
 
 COUNT = 30_000
 _STEP = 5e-4  # unit lengths: half of what a field's slope is measured over
 _STEPS = 3
+_NEARLY_ALL = 0.98
 _ON = 1e-4  # a point whose distance is less lies on the surface
 _MIDDLE = 1 / 3  # of a half extent: nearer to the middle than this a direction is not named
 
@@ -37,6 +46,35 @@ def deviation(
     worst = int(distances.argmax())
     quantile = max(float(np.quantile(there, 0.95)), float(np.quantile(back, 0.95)))
     return Deviation(float(distances[worst]), quantile, np.asarray(points[worst], dtype=np.float64))
+
+
+def surface_deviation(
+    shape: Shape,
+    distance: Callable[[np.ndarray], np.ndarray],
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    result: np.ndarray,
+    target: np.ndarray,
+) -> Deviation:
+    """Between a shape's surface and that of a field `distance` with this mesh, all in the unit frame.
+
+    result: (N, 3) points of the mesh; target: (M, 3) points of the shape's surface. The input's corners count
+    too. Where the surfaces are furthest apart the field has the word: its mesh cuts corners off.
+    """
+    corners = shape.frame.to_unit(shape.vertices)
+    if len(corners) > COUNT:
+        corners = corners[:: -(-len(corners) // COUNT)]
+    on_shape = np.concatenate([target, corners])
+    to_result = MeshDistance(vertices, np.asarray(faces), np.asarray(faces), True).unsigned(on_shape)
+    far = to_result >= np.quantile(to_result, _NEARLY_ALL)
+    feet, on_it = projected(distance, on_shape[far])
+    there = np.linalg.norm(feet - on_shape[far], axis=1)
+    to_result[far] = np.where(on_it, np.minimum(there, to_result[far]), to_result[far])
+    to_shape = shape.unit_distance(result)
+    result, far = result.copy(), np.abs(to_shape) >= np.quantile(np.abs(to_shape), _NEARLY_ALL)
+    result[far], _ = projected(distance, result[far])
+    to_shape[far] = shape.unit_distance(result[far])
+    return deviation(result, to_shape, on_shape, to_result)
 
 
 def projected(
@@ -71,3 +109,11 @@ def place_name(unit_point: np.ndarray, unit_size: np.ndarray, up: str | None = N
         share = float(unit_point @ axis) / max(float(unit_size @ np.abs(axis)) / 2, 1e-12)
         named.append(positive if share > _MIDDLE else negative if share < -_MIDDLE else "")
     return " ".join(word for word in reversed(named) if word) or "middle"
+
+
+def _in_input_units(pair: Comparison, length: float) -> float:
+    return float(pair.shape.frame.length_from_unit(length))
+
+
+MAX_DEVIATION = Metric(lambda pair: _in_input_units(pair, pair.deviation.maximum), "lower")
+DEVIATION_95 = Metric(lambda pair: _in_input_units(pair, pair.deviation.quantile_95), "lower")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from partwright.errors import SettingError
+from partwright.metrics.metric import Metric
 
 COUNT = 2_048
 
@@ -25,3 +26,6 @@ def emd(first: np.ndarray, second: np.ndarray) -> float:
     cost = cdist(first, second)
     row, column = linear_sum_assignment(cost)
     return float(cost[row, column].mean())
+
+
+EMD = Metric(lambda pair: emd(pair.on_result(COUNT, 3), pair.on_shape(COUNT, 4)), "lower")

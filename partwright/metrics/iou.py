@@ -7,6 +7,7 @@ import numpy as np
 from partwright.errors import SettingError
 from partwright.meshing import occupancy_grid
 from partwright.meshing.blocks import Distance
+from partwright.metrics.metric import Metric
 
 RESOLUTION = 128
 
@@ -28,3 +29,6 @@ def occupancy_iou(first: np.ndarray, second: np.ndarray) -> float:
         raise SettingError(f"Occupancies of shapes {first.shape} and {second.shape} cannot be compared.")
     either = int(np.count_nonzero(first | second))
     return int(np.count_nonzero(first & second)) / either if either else 1.0
+
+
+IOU = Metric(lambda pair: iou(pair.local.distance, pair.shape.unit_occupancy(RESOLUTION)), "higher")

@@ -7,6 +7,7 @@ import numpy as np
 from partwright.assembly import Assembly, Part
 from partwright.meshing import occupancy_grid
 from partwright.metrics.frames import in_own_frame
+from partwright.metrics.metric import Metric
 
 RESOLUTION = 128
 
@@ -41,3 +42,6 @@ def added_parts(node: Assembly | Part) -> list[Assembly | Part]:
         return [node]
     children = node.children if node.operation == "union" else node.children[:1]
     return [part for child in children for part in added_parts(child)]
+
+
+OVERLAP = Metric(lambda pair: overlap(pair.assembly), "lower")

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.meshing import mesh_assembly
-from partwright.metrics.deviation import COUNT, place_name, projected
-from partwright.metrics.report import surface_deviation
+from partwright.metrics.deviation import COUNT, place_name, projected, surface_deviation
 from partwright.shapes import Shape
 from partwright.shapes.sampling import sample_triangles
 from partwright.tolerances.distance_bounds import DistanceBounds

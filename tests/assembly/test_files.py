@@ -15,7 +15,6 @@ from partwright.assembly.file_text import to_text
 from partwright.assembly.files import MAX_BYTES, from_text
 from partwright.errors import AssemblyFileError, NewerVersionError, OutputError, UnreadableFileError
 from partwright.fields import KINDS, Sphere
-from partwright.fields.registry import LEARNED
 from tests.assembly.strategies import ASSEMBLIES
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "assembly.schema.json").read_text())
@@ -37,7 +36,7 @@ def test_schema_names_every_kind() -> None:
     for choice in SCHEMA["$defs"]["field"]["oneOf"]:
         kind = choice["properties"]["kind"]
         named |= set(kind.get("enum", [kind.get("const")]))
-    assert named == {*KINDS, *LEARNED}
+    assert named == set(KINDS.own)
 
 
 def test_saving_leaves_nothing_else_behind(tmp_path: Path, mug: Assembly) -> None:
