@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.metrics.metric import Metric
+from partwright.render.camera import picture_axes
 from partwright.shapes.distance import MeshDistance
 
 if TYPE_CHECKING:
@@ -101,8 +102,6 @@ def place_name(unit_point: np.ndarray, unit_size: np.ndarray, up: str | None = N
 
     unit_point: (3,) from the bounding box's centre; unit_size: (3,) its sides; up: the up axis, z if None.
     """
-    from partwright.render.camera import picture_axes
-
     words = (("right", "left"), ("upper", "lower"), ("front", "back"))
     named = []
     for axis, (positive, negative) in zip(picture_axes(up or "z"), words, strict=True):
