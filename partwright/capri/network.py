@@ -24,14 +24,18 @@ _INITIAL_WEIGHT = 1e-5  # W at the start: small, so that eq. 4 does not saturate
 
 @dataclass(frozen=True)
 class NetworkSizes:
-    """primitives p, convexes c (half of them subtracted), code: section 4.1; hidden: the MLP's middle layer;
-    channels: the encoder's first (IM-Net: 32, doubled twice)."""
+    """How large the network is (section 4.1)."""
 
     primitives: int = 1024
+    """p: quadrics that the MLP predicts."""
     convexes: int = 64
+    """c: columns of T; half of the convexes are subtracted."""
     code: int = 256
+    """Numbers of a shape's code."""
     hidden: int = 512
+    """Width of the MLP's middle layer."""
     channels: int = 32
+    """Of the encoder's first layer, doubled twice (IM-Net)."""
 
 
 SMALL = NetworkSizes(primitives=256, convexes=32, code=128, hidden=256, channels=4)  # a few megabytes

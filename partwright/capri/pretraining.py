@@ -34,23 +34,28 @@ _MOMENTS = ("exp_avg", "exp_avg_sq")
 
 @dataclass(frozen=True)
 class PretrainingSettings:
-    """How the network is trained. Defaults are ours, for minutes on a core; the paper's are in brackets.
-
-    parts (5,000), points kept of each (24,576), batch (24), draw: points of each part a step (all); steps
-    (1,000 epochs); coarse: share of the steps that draw no points near the surface, as the authors' program
-    first learns on a coarse grid; rate, falling as a half cosine (1e-4 throughout, with which W needs 10,000
-    steps to reach 1); every: steps between checkpoints.
-    """
+    """How the network is trained (section 4.1). Defaults are ours, for minutes on a core."""
 
     parts: int = 256
+    """CAD parts that are made and trained on (paper: 5,000)."""
     points: int = 2048
+    """Kept of each part (paper: 24,576)."""
     batch: int = 8
+    """Parts a step (paper: 24)."""
     draw: int = 512
+    """Points of each part a step (paper: all)."""
     steps: int = 1000
+    """Of gradient descent (paper: 1,000 epochs)."""
     coarse: float = 0.1
+    """Share of the steps that draw no points near the surface, as the authors' program first learns on a
+    coarse grid."""
     rate: float = 2e-3
+    """Adam's at the start, falling as a half cosine (paper: 1e-4 throughout, with which W needs 10,000 steps
+    to reach 1)."""
     seed: int = 0
+    """Of parts, weights and batches."""
     every: int = 50
+    """Steps between checkpoints."""
 
     def __post_init__(self) -> None:
         for name in ("parts", "points", "batch", "draw", "steps", "every"):

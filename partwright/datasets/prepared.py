@@ -44,24 +44,28 @@ _TENSORS: dict[str, tuple[str, tuple[str | int, ...]]] = {
 
 @dataclass(frozen=True)
 class PreparedShape:
-    """One shape of a family, everything in the unit frame.
-
-    points (N, 3) f32, sdf (N,) f32 of the whole shape, negative inside, part (N,) i8 the nearest part of each
-    point (PartSDF, eq. 5). poses: of the P parts; a missing part has the family's average. present (P,) u8.
-    vertices (V, 3) f32, faces (F, 3) i32, label (F,) i8: the whole surface, and the part of each triangle;
-    a family that is only trained on may leave them empty. frame: from own units to the unit frame.
-    """
+    """One shape of a family: N samples, P parts, V vertices, F faces; everything in the unit frame."""
 
     name: str
+    """Of the shape, different from all others of the family."""
     points: NDArray[np.float32]
+    """(N, 3) samples."""
     sdf: NDArray[np.float32]
+    """(N,) signed distance of the whole shape, negative inside."""
     part: NDArray[np.int8]
+    """(N,) the number of the part nearest to each sample (PartSDF, eq. 5)."""
     poses: Poses
+    """Of the P parts; a missing part has the family's average."""
     present: NDArray[np.uint8]
+    """(P,) 1 where the shape has the part."""
     vertices: NDArray[np.float32]
+    """(V, 3) of the whole surface; empty in a family that is only trained on."""
     faces: NDArray[np.int32]
+    """(F, 3) triangles of the whole surface."""
     label: NDArray[np.int8]
+    """(F,) the number of each triangle's part."""
     frame: UnitFrame
+    """From own units to the unit frame."""
 
     @property
     def translation(self) -> NDArray[np.float32]:
@@ -81,12 +85,16 @@ class PreparedShape:
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of the manifest. file: relative to the folder; split: of SPLITS; hash: SHA-256 of the file."""
+    """A line of the manifest."""
 
     name: str
+    """Of the shape."""
     file: str
+    """Relative to the folder."""
     split: str
+    """One of SPLITS."""
     hash: str
+    """SHA-256 of the file, hexadecimal."""
 
 
 class PreparedFamily:

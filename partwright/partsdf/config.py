@@ -21,28 +21,29 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class DecoderSettings:
-    """The network (PartSDF, section 3.2 and appendix B.1).
-
-    latent: Z, numbers a part. width: of hidden layers; the paper takes 512, and 256 for chairs. layers: input
-    and output counted. modulation: the latent enters every layer, else only the first (Table 3, "latMod").
-    cross_part: layers across the parts, eq. 4 (Table 3, "h_cp"). architecture: "mlp", or "transformer" with
-    `heads` attention heads over the parts (Table 7). aggregation: "min", or "softmin" over `softness`
-    (Table 7; the paper gives no width, ours is a hundredth of the unit length).
-
-    octaves: of sines and cosines of the local point that the first layer of "mlp" also sees, so that fine and
-    winding parts are learned in fewer steps; not in the paper, whose decoder has 0.
-    """
+    """The network (PartSDF, section 3.2 and appendix B.1)."""
 
     latent: int = 256
+    """Z, numbers a part."""
     width: int = 512
+    """Of hidden layers; the paper takes 512, and 256 for chairs."""
     layers: int = 8
+    """Input and output counted."""
     modulation: bool = True
+    """The latent enters every layer, else only the first (Table 3, "latMod")."""
     cross_part: bool = True
+    """Layers across the parts, eq. 4 (Table 3, "h_cp")."""
     architecture: str = "mlp"
+    """"mlp", or "transformer" (Table 7)."""
     heads: int = 4
+    """Attention heads over the parts; of a transformer."""
     aggregation: str = "min"
+    """How parts make up the whole: "min", or "softmin" (Table 7)."""
     softness: float = 0.01
+    """Width of the softmin, unit lengths; the paper gives none."""
     octaves: int = 0
+    """Of sines and cosines of the local point that the first layer of an MLP also sees, so that fine and
+    winding parts are learned in fewer steps; the paper's decoder has none."""
 
     def __post_init__(self) -> None:
         _at_least("decoder.latent", self.latent, 1)
@@ -65,21 +66,24 @@ class DecoderSettings:
 
 @dataclass(frozen=True)
 class LossSettings:
-    """Weights of the terms of eq. 6 and their constants (appendix B.2).
-
-    whole, part, inter: weights of eq. 7, 8, 9; `inter = 0` is the ablation of Figure 9. clamp: distances
-    beyond it count as it. hard: extra weight of errors towards the wrong side, 0.5 in the authors' program.
-    temperature: of eq. 9's softmax. latent: lambda, ramped in over `ramp` epochs.
-    """
+    """Weights of the terms of eq. 6 and their constants (appendix B.2)."""
 
     whole: float = 0.5
+    """Weight of eq. 7, the whole shape's distance."""
     part: float = 1.0
+    """Weight of eq. 8, the nearest part's distance."""
     inter: float = 1.0
+    """Weight of eq. 9, parts that reach into one another; 0 is the ablation of Figure 9."""
     clamp: float = 0.1
+    """Unit lengths; distances beyond it count as it."""
     hard: float = 0.5
+    """Extra weight of errors towards the wrong side, as in the authors' program."""
     temperature: float = 0.02
+    """Of eq. 9's softmax, unit lengths."""
     latent: float = 1e-4
+    """lambda, weight of the latents' squared norm."""
     ramp: int = 100
+    """Epochs over which lambda is ramped in."""
 
     def __post_init__(self) -> None:
         for name in ("whole", "part", "inter", "latent"):
@@ -93,35 +97,45 @@ class LossSettings:
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """How long and how fast (appendix B.2).
-
-    epochs; batch: shapes a step, over all devices; at_once: at most so many of them go through the decoder
-    together, 0 for all: less memory for the same gradient; points: a shape and step; samples: points of each
-    shape that are kept in memory, 0 for all; shapes: at most so many are trained on, 0 for all; validation:
-    also train on the validation shapes, as the paper's final models. rate, latent_rate: Adam's, times `decay`
-    at 80 % and 90 %. accelerator, devices: as Lightning Fabric has them; precision: "32-true", "bf16-mixed"
-    or "16-mixed" (the first and last layer and all losses stay in float32). validate: epochs between
-    validations, 0 for none, of `validate_shapes` shapes; checkpoint: minutes between checkpoints.
-    """
+    """How long and how fast (appendix B.2)."""
 
     epochs: int = 2000
+    """Times that each shape is seen."""
     batch: int = 16
+    """Shapes a step, over all devices."""
     at_once: int = 0
+    """Micro-batch: at most so many shapes go through the decoder together, 0 for all; less memory for the
+    same gradient."""
     points: int = 8192
+    """Points a shape and step, half of them inside."""
     samples: int = 0
+    """Points of each shape that are kept in memory, 0 for all."""
     shapes: int = 0
+    """At most so many shapes are trained on, 0 for all."""
     validation: bool = False
+    """Also train on the validation shapes, as the paper's final models."""
     rate: float = 5e-4
+    """Adam's learning rate of the decoder."""
     latent_rate: float = 1e-3
+    """Adam's learning rate of the latents."""
     decay: float = 0.35
+    """Factor on both rates at 80 % and at 90 % of the epochs."""
     accelerator: str = "auto"
+    """"auto", "cpu" or "cuda", as Lightning Fabric has them."""
     devices: int = 1
+    """GPUs or processes; they share the batch."""
     precision: str = "32-true"
+    """"32-true", "bf16-mixed" or "16-mixed"; the first and last layer and all losses stay in float32."""
     threads: int = 0
+    """Of the CPU, 0 for one a core."""
     validate: int = 100
+    """Epochs between validations, 0 for none."""
     validate_shapes: int = 4
+    """Shapes of a validation."""
     checkpoint: float = 5.0
+    """Minutes between checkpoints."""
     seed: int = 0
+    """Of weights, latents, the order of shapes and the points drawn."""
 
     def __post_init__(self) -> None:
         for name in ("epochs", "batch", "points", "devices", "validate_shapes"):
@@ -144,19 +158,22 @@ class TrainingSettings:
 
 @dataclass(frozen=True)
 class Config:
-    """A training. family: folder of a prepared family; name: of the model.
-
-    one_part: all parts as one, "Ours-1P" in Table 1. poses: parts have poses, else all points are given in
-    the unit frame (Table 3).
-    """
+    """A training: what `parts train` reads from a TOML file."""
 
     family: str
+    """Folder of a prepared family."""
     name: str
+    """Of the model: letters, digits, '-', '_' and '.'."""
     one_part: bool = False
+    """All parts as one, "Ours-1P" in Table 1."""
     poses: bool = True
+    """Parts have poses, else all points are given in the unit frame (Table 3)."""
     decoder: DecoderSettings = field(default_factory=DecoderSettings)
+    """The network."""
     losses: LossSettings = field(default_factory=LossSettings)
+    """What it minimises."""
     training: TrainingSettings = field(default_factory=TrainingSettings)
+    """How long and how fast."""
 
     def __post_init__(self) -> None:
         if not self.name or not all(c.isalnum() or c in "-_." for c in self.name):
