@@ -21,13 +21,13 @@ from partsdf_scores import SMALL, command_line, write
 from partwright.partsdf.autodecoder import AutoDecoder
 from partwright.partsdf.config import Config, DecoderSettings, LossSettings, TrainingSettings
 from partwright.partsdf.decoder import Decoder
+from partwright.partsdf.gradient_accumulation import backward
 from partwright.partsdf.losses import latent_penalty, terms
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.paper import ReferenceDecoder, dense_grid
 from partwright.partsdf.poses import identity
-from partwright.partsdf.reference import ReferenceDecoder, dense_grid
-from partwright.partsdf.stepping import backward
 
 PAPER = DecoderSettings()
 PARTS, SLICE, GRID = 4, 1024, 256  # parts of a mixer, points of a slice, cells along the grid
@@ -121,7 +121,7 @@ def measure(way: str, model: str | None) -> dict[str, float]:
         surfaces = mesh_shape(shape, GRID, parts=False)
         return {
             "seconds": processor_seconds() - before, "whole": 1.0, "evaluations": surfaces.evaluations,
-            "dense": surfaces.dense, "slope": shape.model.slope,
+            "dense": surfaces.dense, "lipschitz": shape.model.lipschitz,
         }  # fmt: skip
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - start
     return {"seconds": seconds, "whole": whole, "bytes": 1024.0 * peak}
@@ -177,7 +177,7 @@ def speed(arguments: argparse.Namespace) -> None:
         lines.append(
             f"| mesh at {GRID}^3, {arguments.model}, width {width} | {total:.1f} | {ours['seconds']:.1f} | "
             f"{total / ours['seconds']:.1f} | {ours['evaluations']:,.0f} of {ours['dense']:,.0f} points, "
-            f"{ours['dense'] / ours['evaluations']:.1f} times fewer; slope {ours['slope']:.2f} |"
+            f"{ours['dense'] / ours['evaluations']:.1f} times fewer; Lipschitz {ours['lipschitz']:.2f} |"
         )
         print(lines[-1], flush=True)
     for width in ("512", "128"):

@@ -14,6 +14,9 @@ from partwright.fields import NormalForm, normal_form
 if TYPE_CHECKING:
     from partwright.assembly.tree import Node, Part
 
+_LONG_NAME = 24  # characters, from which on a name is a hash and its beginning is enough
+_MAX_NUMBERS = 6  # of one parameter that are printed
+
 
 def describe(node: Node, digits: int = 4) -> str:
     """The tree, a line a node; numbers have this many digits."""
@@ -39,8 +42,8 @@ def _leaf(part: Part, digits: int) -> str:
     if quadric is not None:
         own = _quadric(normal_form(quadric), digits)
     else:
-        values = ((f.name, getattr(part.field, f.name)) for f in dataclasses.fields(part.field))  # type: ignore[arg-type]
-        numbers = [f"{name} {_numbers(value, digits)}" for name, value in values]
+        shown = [f.name for f in dataclasses.fields(part.field) if f.repr]  # type: ignore[arg-type]
+        numbers = [f"{name} {_value(getattr(part.field, name), digits)}" for name in shown]
         own = " ".join([part.field.kind, ", ".join(numbers), f"at {_numbers(part.translation, digits)}"])
     copies = f", {len(part.copies)} copies" if part.instances else ""
     blend = f", blend {_number(part.blend, digits)}" if part.blend else ""
@@ -61,6 +64,15 @@ def _quadric(form: NormalForm, digits: int) -> str:
         size = f" slope {_number(form.widening, digits)},"
     axis = "" if form.name == "sphere" else f", axis {_numbers(w, digits)}"
     return f"{outside}{form.name}{size} centre {_numbers(form.centre, digits)}{axis}"
+
+
+def _value(value: object, digits: int) -> str:
+    """Names as they are, hashes by their beginning; of a long row of numbers only its length."""
+    if isinstance(value, str):
+        return value if len(value) < _LONG_NAME else f"{value[:12]}..."
+    if isinstance(value, tuple) and len(value) > _MAX_NUMBERS:
+        return f"of {len(value)} numbers"
+    return _numbers(value, digits)
 
 
 def _numbers(values: object, digits: int) -> str:

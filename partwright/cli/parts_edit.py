@@ -64,6 +64,7 @@ def _writes(arguments: argparse.Namespace) -> list[Path]:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from partwright.cli.progress import Work
     from partwright.cli.terminal import say
     from partwright.errors import UnsupportedFormatError
     from partwright.partsdf.pictures import picture
@@ -72,13 +73,16 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.output.suffix != ".json":
         raise UnsupportedFormatError(f"{arguments.output}: an assembly is written as .json")
-    source = open_source(arguments.shape, arguments.model)
-    shape = source.shape
-    for name, text in arguments.edits:
-        shape = _edited(shape, name, text)
-    source.assembly(shape).save(arguments.output)
     still = arguments.output.with_suffix(".png")
-    write_png(still, picture(shape, camera=Camera(up=source.up or "z"), size=480))
+    with Work("reading") as work:
+        source = open_source(arguments.shape, arguments.model)
+        shape = source.shape
+        for name, text in arguments.edits:
+            shape = _edited(shape, name, text)
+        source.assembly(shape).save(arguments.output)
+        work.stage("drawing")
+        camera = Camera(up=source.up or "z")
+        write_png(still, picture(shape, camera=camera, size=480, progress=work.show))
     say(f"{', '.join(shape.names())}: written to {arguments.output}, drawn in {still}")
     return 0
 

@@ -26,7 +26,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--resolution",
         metavar="N",
         type=int,
-        default=96,
+        default=64,
         help="cells along the unit frame, a multiple of 8 (default: %(default)s)",
     )
     command.set_defaults(run=run)
@@ -41,28 +41,26 @@ def _writes(arguments: argparse.Namespace) -> list[Path]:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from partwright.cli.progress import Work
     from partwright.cli.terminal import say
-    from partwright.partsdf.pictures import film
+    from partwright.partsdf.pictures import check_film, film
     from partwright.partsdf.sources import open_source
     from partwright.render import Camera
 
-    first = open_source(arguments.first, arguments.model)
-    second = open_source(arguments.second)
-    still = film(
-        first.shape,
-        second.shape,
-        arguments.output,
-        arguments.steps,
-        arguments.resolution,
-        arguments.size,
-        Camera(up=first.up or "z"),
-        _show,
-    )
+    check_film(arguments.output, arguments.steps)
+    with Work("reading") as work:
+        first = open_source(arguments.first, arguments.model)
+        second = open_source(arguments.second)
+        work.stage("drawing")
+        still = film(
+            first.shape,
+            second.shape,
+            arguments.output,
+            arguments.steps,
+            arguments.resolution,
+            arguments.size,
+            Camera(up=first.up or "z"),
+            work.show,
+        )
     say(f"written to {arguments.output}, sheet in {still}")
     return 0
-
-
-def _show(done: int, of: int) -> None:
-    import sys
-
-    print(f"partwright: picture {done}/{of}", file=sys.stderr, flush=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from partwright.partsdf.training import Report
+    from partwright.partsdf.training import EpochReport
 
 _EPILOG = """\
 CONFIG is a TOML file; configs/ has some, docs/parts.md says what they may hold.
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _show(report: Report) -> None:
+def _show(report: EpochReport) -> None:
     import sys
 
     print(

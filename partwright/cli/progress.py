@@ -100,3 +100,43 @@ class Count:
         elif done == total or time.monotonic() - self._last_time > _QUIET:
             note(f"{self._name}: {done}/{total}  {what}")
             self._last_time = time.monotonic()
+
+
+class Work:
+    """A context in which `stage` names what goes on, and `show` says how much of it is done."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._bar = _bar("{task.percentage:.0f}%")
+        self._last_time = 0.0
+
+    def __enter__(self) -> Self:
+        if self._bar:
+            self._bar.start()
+            self._task = self._bar.add_task(self._name, total=1.0)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar:
+            self._bar.stop()
+
+    def stage(self, name: str) -> None:
+        """What begins now."""
+        self._name = name
+        if self._bar:
+            self._bar.reset(self._task, description=name, total=1.0)
+        else:
+            self._line(name)
+
+    def show(self, share: float) -> None:
+        """How much of the stage is done, from 0 to 1."""
+        if self._bar:
+            self._bar.update(self._task, completed=share)
+        elif time.monotonic() - self._last_time > _QUIET:
+            self._line(f"{self._name}: {share:.0%}")
+
+    def _line(self, text: str) -> None:
+        note(text)
+        self._last_time = time.monotonic()

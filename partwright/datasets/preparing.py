@@ -54,7 +54,7 @@ class Refused:
 
 
 @dataclass(frozen=True)
-class Progress:
+class PreparationProgress:
     """shape: what has just been done, or refused; done of total."""
 
     shape: str
@@ -91,7 +91,7 @@ def prepare(
     held_out: Sequence[str] = (),
     seed: int = 0,
     workers: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[PreparationProgress], None] | None = None,
 ) -> Preparation:
     """Prepare a folder of shapes, or `count` shapes of one of FAMILIES, for PartSDF.
 
@@ -119,7 +119,7 @@ def prepare(
         if reason:
             refused.append(Refused(job.source.name, reason))
         if progress is not None:
-            progress(Progress(job.source.name, number, len(jobs)))
+            progress(PreparationProgress(job.source.name, number, len(jobs)))
     left_out = {shape.name for shape in refused}
     jobs = [job for job in jobs if job.source.name not in left_out]
     _check_enough(name, [job.source for job in jobs], refused)

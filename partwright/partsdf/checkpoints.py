@@ -23,7 +23,7 @@ _MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
 @dataclass
-class Progress:
+class TrainingState:
     """step: steps done. sums: of the loss terms over the steps of the running epoch; seconds: so far."""
 
     step: int
@@ -37,22 +37,22 @@ def save_checkpoint(
     shapes: tuple[str, ...],
     model: torch.nn.Module,
     optimiser: torch.optim.Optimizer,
-    progress: Progress,
+    state: TrainingState,
 ) -> None:
     """Replace the checkpoint, whole or not at all."""
     from safetensors.torch import save
 
     tensors = {f"model.{name}": value for name, value in model.state_dict().items()}
     for name, parameter in model.named_parameters():
-        state = optimiser.state.get(parameter, {})
-        tensors |= {f"{moment}.{name}": state[moment] for moment in _MOMENTS if moment in state}
-    tensors["sums"] = progress.sums
+        moments = optimiser.state.get(parameter, {})
+        tensors |= {f"{moment}.{name}": moments[moment] for moment in _MOMENTS if moment in moments}
+    tensors["sums"] = state.sums
     about = {
         "format": FORMAT,
         "config": asdict(config),
         "shapes": shapes,
-        "step": progress.step,
-        "seconds": progress.seconds,
+        "step": state.step,
+        "seconds": state.seconds,
     }
     kept = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
     write_bytes(path, save(kept, {"partwright": json.dumps(about)}))
@@ -64,7 +64,7 @@ def load_checkpoint(
     shapes: tuple[str, ...],
     model: torch.nn.Module,
     optimiser: torch.optim.Optimizer,
-) -> Progress:
+) -> TrainingState:
     """Put model and optimiser back to where they were.
 
     Raises:
@@ -95,7 +95,7 @@ def load_checkpoint(
         if f"exp_avg.{name}" in tensors:
             moments = {moment: tensors[f"{moment}.{name}"].to(device) for moment in _MOMENTS}
             optimiser.state[parameter] = {"step": step.clone(), **moments}
-    return Progress(about["step"], tensors["sums"].to(device), about["seconds"])
+    return TrainingState(about["step"], tensors["sums"].to(device), about["seconds"])
 
 
 def _check_settings(path: Path, before: dict[str, object], now: dict[str, object]) -> None:

@@ -18,7 +18,7 @@ WHOLE = "whole"  # the name of the one part of "Ours-1P"
 
 
 @dataclass(frozen=True)
-class Samples:
+class FamilySamples:
     """Samples of S shapes, N each, unit frame: points (S, N, 3), sdf (S, N), part (S, N) uint8 the nearest
     part. Of each shape the first `inside` (S,) lie inside. poses (S, P, ...); present (S, P) bool."""
 
@@ -33,7 +33,7 @@ class Samples:
     def __len__(self) -> int:
         return len(self.names)
 
-    def to(self, device: torch.device | str) -> Samples:
+    def to(self, device: torch.device | str) -> FamilySamples:
         moved: dict[str, Any] = {k: v.to(device) for k, v in vars(self).items() if isinstance(v, Tensor)}
         return replace(self, **moved, poses=self.poses.map(lambda t: t.to(device)))
 
@@ -54,7 +54,7 @@ def part_names(family: PreparedFamily, config: Config) -> tuple[str, ...]:
     return (WHOLE,) if config.one_part else family.parts
 
 
-def load_samples(family: PreparedFamily, indices: list[int], config: Config) -> Samples:
+def load_samples(family: PreparedFamily, indices: list[int], config: Config) -> FamilySamples:
     """The samples of some shapes of a family, as the configuration wants them.
 
     Raises:
@@ -69,7 +69,7 @@ def load_samples(family: PreparedFamily, indices: list[int], config: Config) -> 
         )
     found = list(zip(shapes, rows, strict=True))
     poses = [pose_tensors(shape, config) for shape in shapes]
-    return Samples(
+    return FamilySamples(
         names=tuple(shape.name for shape in shapes),
         points=torch.stack([torch.from_numpy(shape.points[row]) for shape, row in found]),
         sdf=torch.stack([torch.from_numpy(shape.sdf[row]) for shape, row in found]),
@@ -93,7 +93,7 @@ def present_parts(shape: PreparedShape, config: Config) -> Tensor:
     return torch.from_numpy(present.any(keepdims=True) if config.one_part else present)
 
 
-def check_training_shapes(family: PreparedFamily, samples: Samples, config: Config) -> None:
+def check_training_shapes(family: PreparedFamily, samples: FamilySamples, config: Config) -> None:
     """Raise FamilyError unless there are two shapes or more, and each part is in one of them."""
     if len(samples) < 2:
         raise FamilyError(

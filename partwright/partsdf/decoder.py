@@ -2,7 +2,7 @@
 
 Layout: (B, P, N, D) for B shapes, P parts, N points, D features, so that the parts of all shapes share one
 matrix product a layer, and a cross-part layer is one product over the part axis of (B, P, N * D).
-`partwright.partsdf.reference` is the plain form that tests compare with.
+`partwright.partsdf.paper` is the plain form that tests compare with.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import Protocol
 import torch
 from torch import Tensor, nn
 
+from partwright.partsdf.checkpointed_linear import cross_linear, linear, working_type
 from partwright.partsdf.config import DecoderSettings
-from partwright.partsdf.recomputing import cross_linear, linear, working_type
 
 
 class Conditioned(Protocol):
@@ -112,7 +112,7 @@ class _Layers:
         kind = working_type(local)
         # In full precision at both ends: half would round coordinates and distances to 1/256.
         with torch.autocast(local.device.type, enabled=False):
-            x = linear(with_waves(local.flatten(0, 1), self.octaves), *first).to(kind).relu_()
+            x = linear(positional_encoding(local.flatten(0, 1), self.octaves), *first).to(kind).relu_()
         for number, layer in enumerate(hidden):
             x = self._behind_cross(number, layer, x).relu_()
         with torch.autocast(local.device.type, enabled=False):
@@ -122,7 +122,7 @@ class _Layers:
         return self.cross[number].then(layer, x) if self.cross else linear(x, *layer)
 
 
-def with_waves(local: Tensor, octaves: int) -> Tensor:
+def positional_encoding(local: Tensor, octaves: int) -> Tensor:
     """Local points (..., 3) with the sines and cosines of pi/2 x, pi x, 2 pi x ... behind: (..., 3 + 6 O)."""
     if not octaves:
         return local

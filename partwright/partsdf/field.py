@@ -17,7 +17,7 @@ from partwright.errors import NoSurfaceError, ParameterError, SettingError
 from partwright.fields.base import LARGEST, number, scale_lengths, vector
 from partwright.fields.joint import JointField, Member
 from partwright.fields.operations import is_tensor
-from partwright.partsdf.meshing import SparseLattice, fitting
+from partwright.partsdf.meshing import SparseLattice, resolution_for_wall
 from partwright.partsdf.model import Model, find_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
-# The box around a part is looked for in so many cells an axis, twice, within its cuboid times _REACH.
-_CELLS, _REACH = 12, 1.5
-_SIDE = 1.8  # of the box around a part that is meshed
+# The box around a part is looked for in so many cells an axis, twice, within its cuboid times _BOX_REACH.
+_BOX_CELLS, _BOX_REACH = 12, 1.5
+_MESHED_SIDE = 1.8  # of the box around a part that is meshed
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class NeuralField(JointField):
 
     @property
     def lipschitz(self) -> float:
-        return self.network.slope
+        return self.network.lipschitz
 
     @cached_property
     def wall(self) -> float:
@@ -98,12 +98,12 @@ class NeuralField(JointField):
 
     def surface(self, resolution: int) -> trimesh.Trimesh:
         lower, upper = self.bounds()
-        centre, scale = (lower + upper) / 2, _SIDE / max(float((upper - lower).max()), LARGEST**-1)
+        centre, scale = (lower + upper) / 2, _MESHED_SIDE / max(float((upper - lower).max()), LARGEST**-1)
 
         def distances(points: np.ndarray) -> np.ndarray:
             return self((centre + points / scale).astype(np.float32))[None] * np.float32(scale)
 
-        cells = fitting(self.wall * scale, round(resolution * 2 / _SIDE))
+        cells = resolution_for_wall(self.wall * scale, round(resolution * 2 / _MESHED_SIDE))
         lattice = SparseLattice(distances, 1.0, cells, self.lipschitz)
         mesh = lattice.meshes()[0]
         if mesh is None:
@@ -170,11 +170,11 @@ class NeuralField(JointField):
     @cached_property
     def _box(self) -> np.ndarray:
         """(2, 3) found by the cells that the surface can enter; a point where the part is nowhere."""
-        upper = _REACH * np.array(self.half_lengths)
+        upper = _BOX_REACH * np.array(self.half_lengths)
         box = np.array([-upper, upper])
         for _ in range(2):
-            cell = (box[1] - box[0]) / _CELLS
-            steps = np.stack(np.meshgrid(*[np.arange(_CELLS) + 0.5] * 3, indexing="ij"), axis=-1).reshape(
+            cell = (box[1] - box[0]) / _BOX_CELLS
+            steps = np.stack(np.meshgrid(*[np.arange(_BOX_CELLS) + 0.5] * 3, indexing="ij"), axis=-1).reshape(
                 -1, 3
             )
             centres = box[0] + steps * cell

@@ -10,7 +10,7 @@ from torch import Tensor
 from partwright.partsdf.config import DecoderSettings, LossSettings
 
 
-class Terms(NamedTuple):
+class LossTerms(NamedTuple):
     """The terms of eq. 6, unweighted."""
 
     whole: Tensor
@@ -25,10 +25,10 @@ class Terms(NamedTuple):
 
 def terms(
     distances: Tensor, sdf: Tensor, part: Tensor, losses: LossSettings, decoder: DecoderSettings
-) -> Terms:
+) -> LossTerms:
     """Eq. 7-9 of part distances (B, P, N) against sdf (B, N), whose nearest part is `part` (B, N)."""
     nearest = distances.gather(1, part[:, None].long()).squeeze(1)
-    return Terms(
+    return LossTerms(
         clamped_error(aggregate(distances, decoder), sdf, losses).mean(),
         clamped_error(nearest, sdf, losses).mean(),
         intersection(distances, losses.temperature),

@@ -1,11 +1,11 @@
 """Neural shapes to meshes, coarse to fine: the decoder is asked only where a surface can be.
 
-A cube whose centre is farther from zero than `slope` times its half diagonal holds no surface, so it is left
-out with the sign of its centre; the others are halved. The last level goes by half of what the slope is
-above 1, as few places are that steep, and grows: wherever a corner's sign is not the one that its neighbour
-was left out with, the neighbour is looked at, too. What that can miss is a steep piece of surface that lies
-apart from all others and is no larger than a cube. All parts are decoded in one pass, and each keeps what any
-of them needs.
+A cube that is far from all cuboids of parts is empty. One whose centre is farther from zero than `lipschitz`
+times its half diagonal holds no surface, so it is left out with the sign of its centre; the others are
+halved. The last level goes by half of what the constant is above 1, as few places are that steep, and grows:
+wherever a corner's sign is not the one that its neighbour was left out with, the neighbour is looked at, too.
+What that can miss is a steep piece of surface that lies apart from all others and is no larger than a cube.
+All parts are decoded in one pass, and each keeps what any of them needs.
 """
 
 from __future__ import annotations
@@ -27,13 +27,16 @@ if TYPE_CHECKING:
     import trimesh
 
 Distances = Callable[[np.ndarray], np.ndarray]
+Reach = Callable[[np.ndarray, float], np.ndarray]  # places (N, 3), a distance: whether a surface is so near
+ShareDone = Callable[[float], None]  # told how much is done, from 0 to 1; what it raises ends the work
 
 COARSEST = 8  # cells along a cube of the first level
 FINEST = 2  # cells along a cube whose corners are evaluated
-MOST = 1024  # cells along the box
-_USUAL, _FINE = 128, 256
-_LAST = 0.5  # of what the slope is above 1, at the last level
-_ROOM = 1.25  # a part's surface may leave its cuboid by so much
+MAX_RESOLUTION = 1024  # cells along the box
+_DEFAULT_RESOLUTION, _MAX_RESOLUTION_FOR_WALLS = 128, 256
+_BATCH = 1 << 14  # points between two reports of progress
+_LAST_EXCESS = 0.5  # of what the constant is above 1, at the last level
+_CUBOID_MARGIN = 1.25  # a part's surface may leave its cuboid by so much
 
 
 _LATTICE = np.stack(np.meshgrid(*[np.arange(FINEST + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -53,11 +56,16 @@ class Surfaces:
     dense: int
 
 
-def mesh_shape(shape: NeuralShape, resolution: int | None = None, parts: bool = True) -> Surfaces:
+def mesh_shape(
+    shape: NeuralShape,
+    resolution: int | None = None,
+    parts: bool = True,
+    progress: ShareDone | None = None,
+) -> Surfaces:
     """Mesh a neural shape in the unit frame.
 
     resolution: cells along [-1, 1], a multiple of 8; if not given, 128, or up to 256 so that the thinnest
-    part's wall is two cells. parts: also mesh each part alone.
+    part's wall is two cells. parts: also mesh each part alone. progress: told the share that is done.
 
     Raises:
         SettingError: the resolution cannot be used.
@@ -72,8 +80,15 @@ def mesh_shape(shape: NeuralShape, resolution: int | None = None, parts: bool = 
         return np.concatenate([whole, each]) if parts else whole
 
     if resolution is None:
-        resolution = fitting(float(shape.walls().min(initial=np.inf)), _USUAL)
-    lattice = SparseLattice(distances, box(shape), _checked(resolution), shape.model.slope)
+        resolution = resolution_for_wall(float(shape.walls().min(initial=np.inf)), _DEFAULT_RESOLUTION)
+    lattice = SparseLattice(
+        distances,
+        bounding_half_side(shape),
+        _checked(resolution),
+        shape.model.lipschitz,
+        _near_cuboids(shape),
+        progress,
+    )
     meshes = lattice.meshes()
     if meshes[0] is None:
         raise NoSurfaceError(
@@ -100,24 +115,43 @@ def labelled_surface(shape: NeuralShape, mesh: trimesh.Trimesh) -> LabelledSurfa
     return LabelledSurface(np.asarray(mesh.vertices), np.asarray(mesh.faces), numbers[nearest])
 
 
-def box(shape: NeuralShape) -> float:
+def bounding_half_side(shape: NeuralShape) -> float:
     """Half the side of a cube around the origin that holds [-1, 1]^3 and every part's cuboid."""
     turned = rotation_matrices(shape.poses.rotation).abs() @ shape.poses.scale[..., None]
-    reach = shape.poses.translation.abs() + _ROOM * turned.squeeze(-1)
+    reach = shape.poses.translation.abs() + _CUBOID_MARGIN * turned.squeeze(-1)
     return max(1.0, float(reach[shape.present].max()) if shape.model.config.poses else 1.0)
 
 
-def fitting(wall: float, resolution: int) -> int:
+def _near_cuboids(shape: NeuralShape) -> Reach | None:
+    """Whether places (N, 3) are so near to a part's cuboid, enlarged as its surface may leave it; None where
+    the model knows no cuboids."""
+    if not shape.model.config.poses or shape.model.config.one_part:
+        return None
+    poses = shape.poses.map(lambda t: t[shape.present])
+    turn, place = rotation_matrices(poses.rotation).numpy(), poses.translation.numpy()
+    room = _CUBOID_MARGIN * poses.scale.numpy()
+
+    def reach(points: np.ndarray, distance: float) -> np.ndarray:
+        near = np.zeros(len(points), dtype=bool)
+        for matrix, centre, half in zip(turn, place, room, strict=True):
+            near |= (np.abs((points - centre) @ matrix) <= half + distance).all(axis=1)
+        return near
+
+    return reach
+
+
+def resolution_for_wall(wall: float, resolution: int) -> int:
     """Cells along [-1, 1] that put `ACROSS` of them across a wall: at least `resolution`, in eights, and no
     more than 256 for the wall's sake."""
-    wanted = max(resolution, min(_FINE, ACROSS * 2 / max(wall, 1e-9)))
-    return int(min(MOST, COARSEST * np.ceil(wanted / COARSEST)))
+    wanted = max(resolution, min(_MAX_RESOLUTION_FOR_WALLS, ACROSS * 2 / max(wall, 1e-9)))
+    return int(min(MAX_RESOLUTION, COARSEST * np.ceil(wanted / COARSEST)))
 
 
 def _checked(resolution: int) -> int:
-    if not COARSEST <= resolution <= MOST or resolution % COARSEST:
+    if not COARSEST <= resolution <= MAX_RESOLUTION or resolution % COARSEST:
         raise SettingError(
-            f"resolution is {resolution}; expected a multiple of {COARSEST} from {COARSEST} to {MOST}"
+            f"resolution is {resolution}; expected a multiple of {COARSEST} from {COARSEST} to "
+            f"{MAX_RESOLUTION}"
         )
     return resolution
 
@@ -125,8 +159,17 @@ def _checked(resolution: int) -> int:
 class SparseLattice:
     """K fields on the cells of a cube around the origin that their surfaces can enter."""
 
-    def __init__(self, distances: Distances, half: float, resolution: int, slope: float) -> None:
-        self._distances, self._slope = distances, slope
+    def __init__(
+        self,
+        distances: Distances,
+        half: float,
+        resolution: int,
+        lipschitz: float,
+        reach: Reach | None = None,
+        progress: ShareDone | None = None,
+    ) -> None:
+        self._distances, self._lipschitz, self._progress = distances, lipschitz, progress
+        self._reach = reach
         self.cell = 2.0 / resolution
         count = COARSEST * int(np.ceil(half / (COARSEST * self.cell)))  # so that the lattice holds that of 1
         self.origin, self.cells = -count * self.cell, 2 * count
@@ -134,12 +177,24 @@ class SparseLattice:
         kept, self._inside, middles = self._refined()
         self._corners, self._values, self._cubes = self._grown(kept, middles)
 
-    def _evaluate(self, lattice: np.ndarray) -> np.ndarray:
-        """(K, N) at lattice coordinates (N, 3), which may lie between corners; beyond the box is empty."""
-        self.evaluations += len(lattice)
-        beyond = self.cell * (np.abs(lattice - self.cells / 2).max(axis=1) - (self.cells - 1) / 2)
-        points = (self.origin + self.cell * lattice).astype(np.float32)
-        return np.maximum(self._distances(points), beyond.astype(np.float32))
+    def _evaluate(self, lattice: np.ndarray, later: int = 0) -> np.ndarray:
+        """(K, N) at lattice coordinates (N, 3), which may lie between corners; beyond the box is empty.
+
+        later: about how many points will be asked for after these.
+        """
+        total = self.evaluations + len(lattice) + later
+        batches = []
+        for first in range(0, max(len(lattice), 1), _BATCH):
+            batch = lattice[first : first + _BATCH]
+            beyond = self.cell * (
+                np.abs(batch - self.cells / 2).max(axis=1, initial=0) - (self.cells - 1) / 2
+            )
+            points = (self.origin + self.cell * batch).astype(np.float32)
+            batches.append(np.maximum(self._distances(points), beyond.astype(np.float32)))
+            self.evaluations += len(batch)
+            if self._progress:
+                self._progress(self.evaluations / total)
+        return np.concatenate(batches, axis=1)
 
     def _refined(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Cubes (C, 3) of FINEST cells that a surface may enter, the side (K, G, G, G) of all others, and the
@@ -148,12 +203,18 @@ class SparseLattice:
         cubes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
         size, inside = COARSEST, None
         while True:
-            values = self._evaluate((cubes + 0.5) * size)
+            if self._reach:
+                centres = self.origin + self.cell * (cubes + 0.5) * size
+                there = self._reach(centres, size * self.cell * 3**0.5 / 2)
+                if inside is not None:
+                    inside[:, *cubes[~there].T] = False
+                cubes = cubes[there]
+            values = self._evaluate((cubes + 0.5) * size, _expected(len(cubes), size))
             if inside is None:
                 inside = np.zeros((len(values), *[len(axis)] * 3), dtype=bool)
             inside[:, cubes[:, 0], cubes[:, 1], cubes[:, 2]] = values < 0
-            slope = self._slope if size > FINEST else 1 + _LAST * (self._slope - 1)
-            near = (np.abs(values) <= slope * size * self.cell * 3**0.5 / 2).any(axis=0)
+            lipschitz = self._lipschitz if size > FINEST else 1 + _LAST_EXCESS * (self._lipschitz - 1)
+            near = (np.abs(values) <= lipschitz * size * self.cell * 3**0.5 / 2).any(axis=0)
             cubes = cubes[near]
             if size == FINEST:
                 return cubes, inside, values[:, near]
@@ -238,3 +299,12 @@ class SparseLattice:
             return None
         vertices = self.origin + self.cell * polygons.vertices
         return trimesh.Trimesh(vertices, polygons.triangles(), process=False)
+
+
+def _expected(cubes: int, size: int) -> int:
+    """About how many points are still needed when so many cubes of a size are looked at: a quarter may hold
+    a surface, which is in four times as many of half the size; the smallest have nine corners each."""
+    points, near = 0, cubes // 4
+    while size > FINEST:
+        points, near, size = points + 8 * near, 4 * near, size // 2
+    return points + 9 * near

@@ -34,8 +34,9 @@ class Model:
     """A decoder with the shapes that it was trained on.
 
     parts: names of the P parts. latents (S, P, Z), poses (S, P, ...), present (S, P) bool of the S training
-    shapes, named `shapes`; average_pose: P rows, of parts that are missing. slope: the steepest change of a
-    part's distance per length that was measured near the training shapes, with a margin. hash: of the file.
+    shapes, named `shapes`; average_pose: P rows, of parts that are missing. lipschitz: the steepest change
+    of a part's distance per length that was measured near the training shapes, with a margin. hash: of the
+    file.
     """
 
     config: Config
@@ -46,7 +47,7 @@ class Model:
     present: Tensor
     average_pose: PoseTensors
     shapes: tuple[str, ...]
-    slope: float
+    lipschitz: float
     hash: str = ""
 
     @property
@@ -99,7 +100,7 @@ class Model:
             "config": asdict(self.config),
             "parts": self.parts,
             "shapes": self.shapes,
-            "slope": self.slope,
+            "slope": self.lipschitz,
         }
         tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
         return save(tensors, {"partwright": json.dumps(about)})
@@ -193,8 +194,9 @@ def _model(about: dict[str, Any], tensors: dict[str, Tensor]) -> Model:
     stored = (PoseTensors(*(tensors[f"{key}.{k}"] for k in PoseTensors._fields))
               for key in ("poses", "average_pose"))  # fmt: skip
     poses, average = stored
-    shapes, slope = tuple(about["shapes"]), float(about["slope"])
-    return Model(config, parts, decoder, latents, poses, tensors["present"].bool(), average, shapes, slope)
+    shapes, lipschitz = tuple(about["shapes"]), float(about["slope"])
+    present = tensors["present"].bool()
+    return Model(config, parts, decoder, latents, poses, present, average, shapes, lipschitz)
 
 
 def about_file(data: bytes) -> dict[str, Any]:

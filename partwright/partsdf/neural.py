@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +17,10 @@ from partwright.partsdf.losses import aggregate
 from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, local_points
 
-_PLACES, _ROOM = 4000, 1.05  # where walls are looked for, in and around a part's cuboid
-_DEEP = 0.95
-CHUNK = 1 << 12  # pairs of point and part that are decoded at once, so that they stay in the cache
+_WALL_PLACES, _CUBOID_MARGIN = 4000, 1.05  # where walls are looked for, in and around a part's cuboid
+_WALL_QUANTILE = 0.95  # of the depths inside, which is half a wall
+CHUNK = 1 << 11  # pairs of point and part that are decoded at once, so that they stay in the cache
+_threads_lock = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -55,14 +59,18 @@ class NeuralShape:
         """Of the parts that are there."""
         return [n for n, there in zip(self.model.parts, self.present.tolist(), strict=True) if there]
 
-    @torch.no_grad()
     def part_distances(self, points: np.ndarray) -> np.ndarray:
         """(Q, N) float32 of the Q parts that are there, at points (N, 3) of the unit frame, in one pass."""
-        conditioned = self.model.condition(self.latents[None])
         size = max(256, CHUNK // len(self.latents))
         chunks = torch.from_numpy(np.array(points, np.float32, order="C")).split(size)
-        values = [conditioned(local_points(chunk, self.poses)[None])[0][self.present] for chunk in chunks]
-        return torch.cat(values, dim=1).numpy()
+        with torch.no_grad():
+            conditioned = self.model.condition(self.latents[None])
+
+        @torch.no_grad()
+        def decode(chunk: Tensor) -> Tensor:
+            return conditioned(local_points(chunk, self.poses)[None])[0][self.present]
+
+        return torch.cat(_one_core_each(decode, chunks), dim=1).numpy()
 
     def walls(self) -> np.ndarray:
         """(Q,) about how thin each part that is there is."""
@@ -71,11 +79,15 @@ class NeuralShape:
     def wall(self, name: str) -> float:
         """About how thin a part is, unit frame: twice a depth that few places inside exceed, and so at most
         about twice the depth at which training clamps. Infinite where no place inside is found."""
-        within = np.random.default_rng(0).uniform(-_ROOM, _ROOM, (_PLACES, 3)).astype(np.float32)
+        within = (
+            np.random.default_rng(0)
+            .uniform(-_CUBOID_MARGIN, _CUBOID_MARGIN, (_WALL_PLACES, 3))
+            .astype(np.float32)
+        )
         pose = self.poses.map(lambda t: t[self.model.index(name)]).numpy()
         turned = Similarity(1.0, tuple(pose.rotation.tolist()), tuple(pose.translation.tolist()))
         depth = -self.part_distances(turned(within * pose.scale))[self.names().index(name)]
-        return float(2 * np.quantile(depth[depth > 0], _DEEP)) if (depth > 0).any() else np.inf
+        return float(2 * np.quantile(depth[depth > 0], _WALL_QUANTILE)) if (depth > 0).any() else np.inf
 
     def whole(self, distances: np.ndarray) -> np.ndarray:
         """(N,) distance of the whole shape, of its parts' (Q, N)."""
@@ -84,3 +96,21 @@ class NeuralShape:
     def distances(self, points: np.ndarray) -> np.ndarray:
         """(N,) float32 of the whole shape at points (N, 3) of the unit frame."""
         return self.whole(self.part_distances(points))
+
+
+def _one_core_each(decode: Callable[[Tensor], Tensor], chunks: Sequence[Tensor]) -> list[Tensor]:
+    """Chunks side by side, each on one core.
+
+    PyTorch would share out each of a chunk's many small products instead, and wait for the slowest core after
+    each of them: on cores that others use too, that takes six times as long.
+    """
+    with _threads_lock:  # the number of threads is the whole process's
+        threads = torch.get_num_threads()
+        if threads == 1:
+            return [decode(chunk) for chunk in chunks]
+        torch.set_num_threads(1)
+        try:
+            with ThreadPoolExecutor(threads) as pool:
+                return list(pool.map(decode, chunks))
+        finally:
+            torch.set_num_threads(threads)

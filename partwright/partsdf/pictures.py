@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -12,7 +11,7 @@ import numpy as np
 from partwright.assembly.palette import palette
 from partwright.errors import NoSurfaceError, SettingError, UnsupportedFormatError
 from partwright.partsdf.editing import interpolated
-from partwright.partsdf.meshing import mesh_shape
+from partwright.partsdf.meshing import ShareDone, mesh_shape
 from partwright.partsdf.neural import NeuralShape
 from partwright.render import Camera, render_mesh, sheet, write_png
 from partwright.render.output import write
@@ -20,16 +19,19 @@ from partwright.render.output import write
 if TYPE_CHECKING:
     import trimesh
 
-_SHOWN = 8  # pictures of a contact sheet
-_FRAME = 60  # milliseconds
-_PAUSE = 8  # frames' time at either end
+PICTURE_RESOLUTION = 64  # cells along the unit frame: five pixels each, of which files have more
+_MAX_SHEET_PICTURES = 8  # pictures of a contact sheet
+_FRAME_MILLISECONDS = 60  # milliseconds
+_PAUSE_FRAMES = 8  # frames' time at either end
 
 
-def coloured_parts(shape: NeuralShape, resolution: int) -> tuple[trimesh.Trimesh, np.ndarray]:
+def coloured_parts(
+    shape: NeuralShape, resolution: int, progress: ShareDone | None = None
+) -> tuple[trimesh.Trimesh, np.ndarray]:
     """All parts as one mesh, unit frame, and a colour (F, 3) a face; raises NoSurfaceError."""
     import trimesh
 
-    parts = mesh_shape(shape, resolution).parts
+    parts = mesh_shape(shape, resolution, progress=progress).parts
     colours = palette(len(shape.model.parts))
     faces = [np.tile(colours[shape.model.index(n)], (len(m.faces), 1)) for n, m in parts.items()]
     mesh = cast("trimesh.Trimesh", trimesh.util.concatenate(list(parts.values())))
@@ -37,11 +39,15 @@ def coloured_parts(shape: NeuralShape, resolution: int) -> tuple[trimesh.Trimesh
 
 
 def picture(
-    shape: NeuralShape, resolution: int = 96, size: int = 320, camera: Camera | None = None
+    shape: NeuralShape,
+    resolution: int = PICTURE_RESOLUTION,
+    size: int = 320,
+    camera: Camera | None = None,
+    progress: ShareDone | None = None,
 ) -> np.ndarray:
     """(size, size, 3) uint8, each part in its colour; blank where the shape has no surface."""
     try:
-        mesh, colours = coloured_parts(shape, resolution)
+        mesh, colours = coloured_parts(shape, resolution, progress)
     except NoSurfaceError:
         return blank(size)
     return render_mesh(mesh, camera, (size, size), colours)
@@ -51,17 +57,27 @@ def blank(size: int) -> np.ndarray:
     return np.full((size, size, 3), 255, dtype=np.uint8)
 
 
+def check_film(path: str | Path, steps: int) -> None:
+    """Raise what `film` would, before there is any work."""
+    if Path(path).suffix.lower() != ".gif":
+        raise UnsupportedFormatError(f"{path}: films are written as .gif")
+    if steps < 2:
+        raise SettingError(f"steps is {steps}; expected 2 or more")
+
+
 def film(
     a: NeuralShape,
     b: NeuralShape,
     path: str | Path,
     steps: int = 24,
-    resolution: int = 96,
+    resolution: int = PICTURE_RESOLUTION,
     size: int = 320,
     camera: Camera | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: ShareDone | None = None,
 ) -> Path:
     """Write a GIF from a to b and back, and a contact sheet beside it (same name, .png); returns the sheet.
+
+    progress: told the share that is done.
 
     Raises:
         UnsupportedFormatError: the suffix is not .gif.
@@ -69,26 +85,27 @@ def film(
     """
     from PIL import Image
 
-    path = Path(path)
-    if path.suffix.lower() != ".gif":
-        raise UnsupportedFormatError(f"{path}: films are written as .gif")
-    if steps < 2:
-        raise SettingError(f"steps is {steps}; expected 2 or more")
+    check_film(path, steps)
     frames = []
     for i in range(steps):
-        t = i / (steps - 1)
-        frames.append(picture(interpolated(a, b, t), resolution, size, _fixed(camera)))
-        if progress:
-            progress(i + 1, steps)
+
+        def told(done: float, before: int = i) -> None:
+            if progress:
+                progress((before + done) / steps)
+
+        shape = interpolated(a, b, i / (steps - 1))
+        frames.append(picture(shape, resolution, size, _fixed(camera), told))
     first, *rest = [
         Image.fromarray(f).quantize(128, dither=Image.Dither.NONE) for f in [*frames, *frames[-2:0:-1]]
     ]
-    times = [_FRAME * (_PAUSE if i in (0, steps - 1) else 1) for i in range(len(rest) + 1)]
+    times = [
+        _FRAME_MILLISECONDS * (_PAUSE_FRAMES if i in (0, steps - 1) else 1) for i in range(len(rest) + 1)
+    ]
     options = {"save_all": True, "append_images": rest, "duration": times, "loop": 0}
     write(path, lambda name: first.save(name, format="GIF", **options))
-    chosen = np.unique(np.linspace(0, steps - 1, min(_SHOWN, steps)).round().astype(int))
+    chosen = np.unique(np.linspace(0, steps - 1, min(_MAX_SHEET_PICTURES, steps)).round().astype(int))
     captions = [f"{i / (steps - 1):.2f}" for i in chosen]
-    still = path.with_suffix(".png")
+    still = Path(path).with_suffix(".png")
     write_png(still, sheet([frames[i] for i in chosen], captions, columns=min(4, len(chosen))))
     return still
 

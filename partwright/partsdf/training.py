@@ -22,22 +22,22 @@ from partwright.atomic_io import check_folder
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import MissingDependencyError, SettingError
 from partwright.partsdf.autodecoder import AutoDecoder
-from partwright.partsdf.checkpoints import Progress, load_checkpoint, save_checkpoint
+from partwright.partsdf.checkpoints import TrainingState, load_checkpoint, save_checkpoint
 from partwright.partsdf.config import Config
-from partwright.partsdf.data import Samples, check_training_shapes, load_samples, part_names
+from partwright.partsdf.data import FamilySamples, check_training_shapes, load_samples, part_names
+from partwright.partsdf.gradient_accumulation import backward
+from partwright.partsdf.lipschitz import measured_lipschitz
 from partwright.partsdf.logs import Log
 from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, identity
-from partwright.partsdf.slope import measured_slope
-from partwright.partsdf.stepping import backward
 from partwright.partsdf.validation import Validation
 
 MODEL, CHECKPOINT = "model.safetensors", "checkpoint.safetensors"
-_DROPS = (0.8, 0.9)
+_RATE_DROPS = (0.8, 0.9)  # shares of the steps
 
 
 @dataclass(frozen=True)
-class Report:
+class EpochReport:
     """What `progress` is told after each epoch: losses are means over it, unweighted."""
 
     epoch: int
@@ -57,7 +57,9 @@ class Trained:
     outcome: str
 
 
-def train(config: Config, folder: str | Path, progress: Callable[[Report], None] | None = None) -> Trained:
+def train(
+    config: Config, folder: str | Path, progress: Callable[[EpochReport], None] | None = None
+) -> Trained:
     """Train on a prepared family, or go on where a training in `folder` was stopped.
 
     Writes model.safetensors, checkpoint.safetensors, log.csv, validation pictures and a TensorBoard log into
@@ -86,7 +88,7 @@ class Trainer:
     """One training: what `train` runs."""
 
     def __init__(
-        self, config: Config, family: PreparedFamily, samples: Samples, folder: Path, fabric: Any
+        self, config: Config, family: PreparedFamily, samples: FamilySamples, folder: Path, fabric: Any
     ) -> None:
         self.config, self.family, self.folder, self.fabric = config, family, folder, fabric
         self.settings, self.parts = config.training, part_names(family, config)
@@ -101,30 +103,30 @@ class Trainer:
         self.model, self.optimiser = fabric.setup(self.plain, optimiser)
         self.samples = samples.to(fabric.device)
         self.generator = torch.Generator(device=fabric.device)
-        self.progress = Progress(0, torch.zeros(3, device=fabric.device))
+        self.state = TrainingState(0, torch.zeros(3, device=fabric.device))
         if (folder / CHECKPOINT).exists():
-            self.progress = load_checkpoint(
+            self.state = load_checkpoint(
                 folder / CHECKPOINT, config, samples.names, self.plain, self.optimiser.optimizer
             )
         self.share = self.settings.batch // fabric.world_size
         self.steps = -(-len(samples) // self.settings.batch)  # an epoch
 
-    def run(self, report: Callable[[Report], None] | None) -> Trained:
+    def run(self, report: Callable[[EpochReport], None] | None) -> Trained:
         log = Log(self.folder, self.epoch) if self.fabric.is_global_zero else None
         validation = Validation(self.config, self.family, self.folder) if log else None
-        saved, started = time.monotonic(), time.monotonic() - self.progress.seconds
+        saved, started = time.monotonic(), time.monotonic() - self.state.seconds
         with _stopping() as stop:
-            while self.progress.step < self.settings.epochs * self.steps and not stop():
+            while self.state.step < self.settings.epochs * self.steps and not stop():
                 self._set_rates()
                 self._step()
-                self.progress.seconds = time.monotonic() - started
-                if self.progress.step % self.steps == 0:
+                self.state.seconds = time.monotonic() - started
+                if self.state.step % self.steps == 0:
                     self._end_epoch(log, validation, report)
                 if time.monotonic() - saved > 60 * self.settings.checkpoint:
                     self._save()
                     saved = time.monotonic()
             self._save()
-        done = self.progress.step >= self.settings.epochs * self.steps
+        done = self.state.step >= self.settings.epochs * self.steps
         path = self.folder / MODEL
         model = self.trained()
         if self.fabric.is_global_zero:
@@ -134,11 +136,11 @@ class Trainer:
 
     @property
     def epoch(self) -> int:
-        return self.progress.step // self.steps
+        return self.state.step // self.steps
 
     def _step(self) -> None:
         shapes = self._shapes()
-        step = self.progress.step * self.fabric.world_size + self.fabric.global_rank
+        step = self.state.step * self.fabric.world_size + self.fabric.global_rank
         self.generator.manual_seed((self.settings.seed << 32) + step)
         drawn = self.samples.draw(shapes, self.settings.points, self.generator)
         poses = self.samples.poses.map(lambda t: t[shapes])
@@ -146,36 +148,36 @@ class Trainer:
         found = backward(self.fabric, self.model, shapes, drawn, poses, self.config, self.epoch)
         self.optimiser.step()
         self.plain.limit_latents()
-        self.progress.sums += torch.stack(found)
-        self.progress.step += 1
+        self.state.sums += torch.stack(found)
+        self.state.step += 1
 
     def _shapes(self) -> Tensor:
         """This device's share of the step's shapes (B,): an epoch goes through all in an order of its own."""
         order = torch.Generator().manual_seed((self.settings.seed << 32) + self.epoch)
         shuffled = torch.randperm(len(self.samples), generator=order)
-        place = self.progress.step % self.steps
+        place = self.state.step % self.steps
         batch = shuffled[place * self.settings.batch :][: self.settings.batch]
         mine = batch[self.fabric.global_rank :: self.fabric.world_size]
         # A last batch that is too small for all devices is shared by them.
         return (mine if len(mine) else batch[:1]).to(self.fabric.device)
 
     def _set_rates(self) -> None:
-        done = self.progress.step / (self.settings.epochs * self.steps)
-        factor = self.settings.decay ** sum(done >= drop for drop in _DROPS)
+        done = self.state.step / (self.settings.epochs * self.steps)
+        factor = self.settings.decay ** sum(done >= drop for drop in _RATE_DROPS)
         rates = (self.settings.rate, self.settings.latent_rate)
         for group, rate in zip(self.optimiser.param_groups, rates, strict=True):
             group["lr"] = factor * rate
 
     def _end_epoch(
-        self, log: Log | None, validation: Validation | None, report: Callable[[Report], None] | None
+        self, log: Log | None, validation: Validation | None, report: Callable[[EpochReport], None] | None
     ) -> None:
-        whole, part, inter = (self.progress.sums / self.steps).tolist()
-        self.progress.sums.zero_()
+        whole, part, inter = (self.state.sums / self.steps).tolist()
+        self.state.sums.zero_()
         if log is None or validation is None:
             return
         row: dict[str, float] = {"whole": whole, "part": part, "inter": inter}
         row["latent_norm"] = float(self.plain.latents.detach().norm(dim=-1).mean())
-        row["rate"], row["seconds"] = self.optimiser.param_groups[0]["lr"], self.progress.seconds
+        row["rate"], row["seconds"] = self.optimiser.param_groups[0]["lr"], self.state.seconds
         every = self.settings.validate
         if every and (self.epoch % every == 0 or self.epoch == self.settings.epochs):
             scores, picture = validation.run(self.trained(), self.epoch)
@@ -183,12 +185,12 @@ class Trainer:
             log.picture(self.epoch, picture)
         log.row(self.epoch, row)
         if report:
-            report(Report(self.epoch, self.settings.epochs, whole, part, inter, self.progress.seconds))
+            report(EpochReport(self.epoch, self.settings.epochs, whole, part, inter, self.state.seconds))
 
     def _save(self) -> None:
         if self.fabric.is_global_zero:
             path, names = self.folder / CHECKPOINT, self.samples.names
-            save_checkpoint(path, self.config, names, self.plain, self.optimiser.optimizer, self.progress)
+            save_checkpoint(path, self.config, names, self.plain, self.optimiser.optimizer, self.state)
 
     def trained(self) -> Model:
         """The model as it is now, on the CPU."""
@@ -208,9 +210,9 @@ class Trainer:
             present=samples.present,
             average_pose=average,
             shapes=samples.names,
-            slope=1.0,
+            lipschitz=1.0,
         )
-        return replace(model, slope=measured_slope(model, samples))
+        return replace(model, lipschitz=measured_lipschitz(model, samples))
 
 
 def _fabric(config: Config) -> Any:

@@ -77,7 +77,9 @@ def test_edit(file: Path, model: Model, capsys: pytest.CaptureFixture[str]) -> N
     arguments = ["parts", "edit", f"{file}:lamp1", "-o", "a.json"]
     edits = ["--move", "ball=0.1,0,0", "--swap", f"plate={file}:lamp3", "--turn", "plate=0,0,1,30"]
     assert main([*arguments, *edits, "--drop", "knob"]) == 0
-    assert "plate, ball: written to a.json" in capsys.readouterr().out
+    told = capsys.readouterr()
+    assert "plate, ball: written to a.json" in told.out
+    assert "partwright: drawing\n" in told.err
     assembly = pw.load_assembly("a.json")
     start = NeuralShape.trained(model, "lamp1")
     moved = assembly["ball"].translation[0] - float(start.poses.translation[1, 0])
@@ -89,9 +91,10 @@ def test_edit(file: Path, model: Model, capsys: pytest.CaptureFixture[str]) -> N
     assert after == pytest.approx((before[0], before[1], before[2] / 2))
 
 
-def test_interpolate(file: Path) -> None:
+def test_interpolate(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["parts", "interpolate", f"{file}:lamp1", f"{file}:2", "-o", "film.gif"]
     assert main([*arguments, "--steps", "3", "--size", "64", "--resolution", "32"]) == 0
+    assert "partwright: drawing\n" in capsys.readouterr().err
     film = Image.open("film.gif")
     assert film.n_frames == 4  # there, and back
     assert film.size == (64, 64)

@@ -9,8 +9,8 @@ import torch
 
 from partwright.errors import SettingError
 from partwright.partsdf.config import DecoderSettings
-from partwright.partsdf.decoder import Decoder, with_waves
-from partwright.partsdf.reference import ReferenceDecoder
+from partwright.partsdf.decoder import Decoder, positional_encoding
+from partwright.partsdf.paper import ReferenceDecoder
 from partwright.partsdf.transformer import TransformerDecoder
 
 SMALL = DecoderSettings(latent=6, width=16, layers=5)
@@ -128,7 +128,7 @@ def test_waves_are_sines_and_cosines_in_octaves_and_the_decoder_takes_them() -> 
     settings = replace(SMALL, octaves=3)
     decoder = filled(Decoder(2, settings).double())
     z, x = inputs(2, SMALL.latent)
-    waves = with_waves(x, 3)
+    waves = positional_encoding(x, 3)
     assert waves.shape == (3, 2, 7, 3 + 6 * 3)
     torch.testing.assert_close(waves[..., :3], x)
     for axis, octave in ((0, 0), (1, 2), (2, 1)):

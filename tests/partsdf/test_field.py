@@ -165,6 +165,18 @@ def test_meshes_are_closed_and_lie_where_the_parts_are(assembly: pw.Assembly) ->
     assert (upper - lower).max() < 1.6 * np.ptp(ball.vertices, axis=0).max()
 
 
+def test_a_tree_in_words_names_the_model_and_leaves_the_latent_out(
+    lamp: NeuralShape, assembly: pw.Assembly
+) -> None:
+    lines = assembly.describe().splitlines()
+    assert len(lines) == 1 + 3
+    start = (
+        f"ball: neural model lamps, hash {lamp.model.hash[:12]}..., part ball, latent of 8 numbers, half_len"
+    )
+    assert start in lines[2]
+    assert "at (" in lines[2]
+
+
 def test_exports(assembly: pw.Assembly, tmp_path: Path) -> None:
     pw.export(assembly, tmp_path / "lamp.glb")
     scene = trimesh.load(tmp_path / "lamp.glb")

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from partwright.partsdf.config import Config
-from partwright.partsdf.losses import Terms, held_by_several, intersection, latent_penalty, terms
+from partwright.partsdf.losses import LossTerms, held_by_several, intersection, latent_penalty, terms
 from partwright.partsdf.poses import PoseTensors
 
 Drawn = tuple[Tensor, Tensor, Tensor]  # points (B, N, 3), their distances (B, N) and nearest parts (B, N)
@@ -21,7 +21,7 @@ Drawn = tuple[Tensor, Tensor, Tensor]  # points (B, N, 3), their distances (B, N
 
 def backward(
     fabric: Any, model: Any, shapes: Tensor, drawn: Drawn, poses: PoseTensors, config: Config, epoch: float
-) -> Terms:
+) -> LossTerms:
     """Adds the gradients of eq. 6 to those of the model, and returns the terms.
 
     Args:
@@ -33,7 +33,7 @@ def backward(
         epoch: for the ramp of the latent term.
     """
     most, losses = config.training.at_once or len(shapes), config.losses
-    found = Terms(*drawn[1].new_zeros(3))
+    found = LossTerms(*drawn[1].new_zeros(3))
     several = torch.zeros(drawn[1].shape, dtype=torch.bool, device=shapes.device)
     for first in range(0, len(shapes), most):
         some = slice(first, first + most)
@@ -44,10 +44,10 @@ def backward(
         share = len(points) / len(shapes)
         if share == 1:
             fabric.backward(each.total(losses) + penalty)
-            return Terms(*(term.detach() for term in each))
+            return LossTerms(*(term.detach() for term in each))
         apart = each._replace(inter=torch.zeros_like(each.inter))
         fabric.backward(share * apart.total(losses) + penalty)
-        found = Terms(*(sum_ + share * term.detach() for sum_, term in zip(found, apart, strict=True)))
+        found = LossTerms(*(sum_ + share * term.detach() for sum_, term in zip(found, apart, strict=True)))
         several[some] = held_by_several(distances.detach())
     return found._replace(inter=_inter(fabric, model, shapes, drawn[0], poses, config, several))
 

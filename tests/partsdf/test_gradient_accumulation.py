@@ -14,9 +14,9 @@ from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import SettingError
 from partwright.partsdf.autodecoder import AutoDecoder
 from partwright.partsdf.config import Config, DecoderSettings, TrainingSettings
+from partwright.partsdf.gradient_accumulation import backward
 from partwright.partsdf.losses import intersection, latent_penalty, terms
 from partwright.partsdf.poses import PoseTensors
-from partwright.partsdf.stepping import backward
 from partwright.partsdf.training import MODEL, Report, train
 from tests.partsdf.lamps import small_config
 
