@@ -34,6 +34,7 @@ from torch import Tensor
 from partwright.assembly import Assembly, Part
 from partwright.fields import reference
 from partwright.fields.base import LARGEST, Array, Field, normalise, number, scale_lengths, vector
+from partwright.fields.columns import PROPORTIONS, Column
 from partwright.meshing import mesh_field
 from partwright.shapes import Shape
 from partwright.superfrusta import growing, initialisation
@@ -43,7 +44,7 @@ from partwright.superfrusta.torch_kernel import TorchKernel
 
 SHARPEST, SOFTEST = 0.1, 2.0
 BOXY, ROUND = 0.3, 1.0  # exponents that fits start from
-ROUNDNESS, DILATION, TAPER, BULGE, ONION = range(10, 15)
+ROUNDNESS, DILATION, TAPER, BULGE, ONION = list(Column)[PROPORTIONS]
 MESH_RESOLUTION, STEEPEST = 96, 1e3
 _SMALL = 1e-6
 

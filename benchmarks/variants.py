@@ -12,6 +12,7 @@ from unittest import mock
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.fields.columns import Column
 from partwright.fields.kernel import Rows, Target
 from partwright.shapes import Shape
 from partwright.superfrusta import growing, initialisation
@@ -124,10 +125,10 @@ def one_start(
     As the measure of that, which the paper leaves to its supplement: how alike the other two extents are.
     """
     straight = initialisation.starts(points, spacing, frames)[:6:2]  # along each of the three principal axes
-    width, depth = straight[:, 7], straight[:, 8]
+    width, depth = straight[:, Column.SX], straight[:, Column.SY]
     alike = np.minimum(width, depth) / np.maximum(width, depth)
     chosen = straight[[int(alike.argmax())]]
-    chosen[:, 10] = 0.5
+    chosen[:, Column.ROUNDNESS] = 0.5
     return chosen
 
 

@@ -11,6 +11,7 @@
 #include "optimise.hpp"
 
 namespace nb = nanobind;
+using namespace nb::literals;
 using namespace partwright;
 
 namespace {
@@ -64,8 +65,12 @@ Limits limits_of(const In<float>& a) {
 }  // namespace
 
 NB_MODULE(_kernel, m) {
-  m.attr("COLUMNS") = int(COLUMNS);
-  m.attr("DERIVATIVES") = int(DERIVATIVES);
+#define PW_VALUE(name) .value(#name, name)
+  nb::enum_<Column>(m, "Column", nb::is_arithmetic(), "Columns of a parameter row.") PW_COLUMNS(PW_VALUE);
+#undef PW_VALUE
+#define PW_VALUE(name) .value(#name, D_##name)
+  nb::enum_<Derivative>(m, "Tangent", nb::is_arithmetic(), "Entries of a step, and of derivatives.") PW_TANGENT(PW_VALUE);
+#undef PW_VALUE
 
   m.def("evaluate", [](In<float> rows, In<float> points, int threads) {
     auto out = array<float>({points.shape(0)});
@@ -73,7 +78,8 @@ NB_MODULE(_kernel, m) {
     nb::gil_scoped_release release;
     evaluate(parts, points.data(), int64_t(points.shape(0)), out.data(), threads);
     return out;
-  });
+  }, "rows"_a, "points"_a, "threads"_a,
+     "Signed distances (N,) of the parts, folded first to last.");
 
   m.def("evaluate_parts", [](In<float> rows, In<float> points, int threads) {
     auto out = array<float>({rows.shape(0), points.shape(0)});
@@ -81,7 +87,8 @@ NB_MODULE(_kernel, m) {
     nb::gil_scoped_release release;
     evaluate_parts(parts, points.data(), int64_t(points.shape(0)), out.data(), threads);
     return out;
-  });
+  }, "rows"_a, "points"_a, "threads"_a,
+     "Signed distances (M, N) of each part alone.");
 
   m.def("gradients", [](In<float> rows, In<float> points, In<float> upstream, int threads) {
     auto out = array<double>({rows.shape(0), size_t(DERIVATIVES)});
@@ -89,7 +96,8 @@ NB_MODULE(_kernel, m) {
     nb::gil_scoped_release release;
     gradients(parts, points.data(), upstream.data(), int64_t(points.shape(0)), out.data(), threads);
     return out;
-  });
+  }, "rows"_a, "points"_a, "upstream"_a, "threads"_a,
+     "Derivatives (M, len(Tangent)) of sum(upstream * distance).");
 
   m.def("normal_equations", [](In<float> rows, In<uint8_t> live, In<float> points, In<float> distance, In<float> weight,
                                In<float> background, float beta, float overlap, float blending, int threads) {
@@ -110,13 +118,17 @@ NB_MODULE(_kernel, m) {
           matrix.data()[i * n + j] = matrix.data()[j * n + i] = block[r * DERIVATIVES + c];
         }
     return nb::make_tuple(system.loss, gradient, matrix);
-  });
+  }, "rows"_a, "live"_a, "points"_a, "distance"_a, "weight"_a, "background"_a,
+     "beta"_a, "overlap"_a, "blending"_a, "threads"_a,
+     "Loss, J^T r and J^T J of the weighted residuals; those of parts that are not live stay 0.");
 
   m.def("loss", [](In<float> rows, In<float> points, In<float> distance, In<float> weight, In<float> background, float beta,
                    float overlap, float blending, int threads) {
     nb::gil_scoped_release release;
     return loss(parts_of(rows), samples_of(points, distance, weight, background), beta, {overlap, blending}, threads);
-  });
+  }, "rows"_a, "points"_a, "distance"_a, "weight"_a, "background"_a, "beta"_a, "overlap"_a, "blending"_a,
+     "threads"_a,
+     "Half the sum of squared residuals.");
 
   m.def("levenberg_marquardt", [](In<float> rows, In<uint8_t> free, In<uint8_t> tied, In<float> points, In<float> distance,
                                   In<float> weight, In<float> background, In<float> stages, float overlap, float blending,
@@ -130,7 +142,9 @@ NB_MODULE(_kernel, m) {
     }
     std::copy(outcome.rows.begin(), outcome.rows.end(), out.data());
     return nb::make_tuple(out, outcome.loss, outcome.iterations);
-  });
+  }, "rows"_a, "free"_a, "tied"_a, "points"_a, "distance"_a, "weight"_a, "background"_a,
+     "stages"_a, "overlap"_a, "blending"_a, "limits"_a, "threads"_a,
+     "Rows, loss and iterations after all stages, pairs of beta and iterations.");
 
   m.def("fit_starts", [](In<float> starts, In<int64_t> first, In<int64_t> last, In<uint8_t> free, In<uint8_t> tied,
                          In<float> points, In<float> distance, In<float> weight, In<float> background, In<float> stages,
@@ -149,7 +163,9 @@ NB_MODULE(_kernel, m) {
       losses.data()[i] = outcomes[i].loss;
     }
     return nb::make_tuple(out, losses);
-  });
+  }, "starts"_a, "first"_a, "last"_a, "free"_a, "tied"_a, "points"_a, "distance"_a,
+     "weight"_a, "background"_a, "stages"_a, "overlap"_a, "blending"_a, "limits"_a, "threads"_a,
+     "Rows and losses of one single-part fit per start, each on its range first:last of the samples.");
 
   m.def("removal_counts", [](In<float> rows, In<float> points, In<uint8_t> inside, In<float> weight, int threads) {
     auto out = array<double>({rows.shape(0) + 1, 2});
@@ -157,7 +173,8 @@ NB_MODULE(_kernel, m) {
     nb::gil_scoped_release release;
     removal_counts(parts, points.data(), inside.data(), weight.data(), int64_t(points.shape(0)), out.data(), threads);
     return out;
-  });
+  }, "rows"_a, "points"_a, "inside"_a, "weight"_a, "threads"_a,
+     "Weighted intersection and union (M + 1, 2) without each part in turn, and of all.");
 
   m.def("decompose", [](In<float> field, float spacing, int regions, double fraction, double least_depth, double least_voxels) {
     const Grid grid{int(field.shape(0)), int(field.shape(1)), int(field.shape(2)), spacing};
@@ -168,5 +185,7 @@ NB_MODULE(_kernel, m) {
       depths = decompose(copy(field), grid, {regions, fraction, least_depth, least_voxels}, labels.data());
     }
     return nb::make_tuple(labels, depths);
-  });
+  }, "field"_a, "spacing"_a, "regions"_a, "fraction"_a, "least_depth"_a,
+     "least_voxels"_a,
+     "Each voxel's region, thickest first, and the regions' erosion depths.");
 }

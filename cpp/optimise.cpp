@@ -134,10 +134,10 @@ void move(float* row, const double* delta, const char* moving, const Limits& lim
   double d[DERIVATIVES];
   for (int i = 0; i < DERIVATIVES; ++i)
     d[i] = std::min(std::max(delta[i], -double(limits.step[i])), double(limits.step[i]));
-  for (int i = 0; i < 3; ++i) row[TX + i] += float(d[D_T + i]);
-  const double angle = std::sqrt(d[3] * d[3] + d[4] * d[4] + d[5] * d[5]);
+  for (int i = 0; i < 3; ++i) row[TX + i] += float(d[D_TX + i]);
+  const double angle = std::sqrt(d[D_WX] * d[D_WX] + d[D_WY] * d[D_WY] + d[D_WZ] * d[D_WZ]);
   const double s = angle > 1e-9 ? std::sin(angle / 2) / angle : 0.5, c = std::cos(angle / 2);
-  const double q[4] = {row[QW], row[QX], row[QY], row[QZ]}, v[3] = {s * d[3], s * d[4], s * d[5]};
+  const double q[4] = {row[QW], row[QX], row[QY], row[QZ]}, v[3] = {s * d[D_WX], s * d[D_WY], s * d[D_WZ]};
   const double turned[4] = {q[0] * c - q[1] * v[0] - q[2] * v[1] - q[3] * v[2],
                             q[0] * v[0] + q[1] * c + q[2] * v[2] - q[3] * v[1],
                             q[0] * v[1] - q[1] * v[2] + q[2] * c + q[3] * v[0],
@@ -152,9 +152,7 @@ void move(float* row, const double* delta, const char* moving, const Limits& lim
     entry = std::min(std::max(entry + float(d[i]), limits.lower[i]), limits.upper[i]);
   }
   if (tied && moving[D_SX]) row[SY] = row[SX];
-  // An arc tighter than half the section's width folds through its own centre.
-  if (moving[D_BULGE])
-    row[BULGE] = std::min(row[BULGE], std::asin(std::min(1.f, row[SZ] / std::max(row[SX], 1e-6f))) / HALF_PI);
+  if (moving[D_BULGE]) row[BULGE] = std::min(row[BULGE], tightest_bulge(row[SX], row[SZ]));
 }
 
 std::vector<Part> prepared(const std::vector<float>& rows) {

@@ -17,16 +17,26 @@
 
 namespace partwright {
 
-// One row of the parameter array: pose, shape, the blend with which the part joins the fold, and whether it is
-// added (+1) or subtracted (-1) there.
-enum Column {
-  TX, TY, TZ, QW, QX, QY, QZ, SX, SY, SZ, ROUNDNESS, DILATION, TAPER, BULGE, ONION, BLEND, SIGN, COLUMNS
-};
+// One row of the parameter array: translation, rotation quaternion, size, shape, the blend with which the part joins
+// the fold, and whether it is added (+1) or subtracted (-1) there.
+#define PW_COLUMNS(NAME)                                                                                          \
+  NAME(TX) NAME(TY) NAME(TZ) NAME(QW) NAME(QX) NAME(QY) NAME(QZ) NAME(SX) NAME(SY) NAME(SZ) NAME(ROUNDNESS)       \
+  NAME(DILATION) NAME(TAPER) NAME(BULGE) NAME(ONION) NAME(BLEND) NAME(SIGN)
 
-// Derivatives are taken with respect to: translation (3), a local rotation vector w with R <- R exp(w) (3),
-// size (3), roundness, dilation, taper, bulge, onion, and the blend.
-enum Derivative { D_T = 0, D_W = 3, D_SX = 6, D_SY, D_SZ, D_R, D_D, D_TAPER, D_BULGE, D_ONION, FIELD_DERIVATIVES,
-                  D_BLEND = FIELD_DERIVATIVES, DERIVATIVES };
+// What a step moves and derivatives are taken with respect to: translation, a local rotation vector w with
+// R <- R exp(w), and from the size on the columns themselves, but for the sign.
+#define PW_TANGENT(NAME)                                                                                          \
+  NAME(TX) NAME(TY) NAME(TZ) NAME(WX) NAME(WY) NAME(WZ) NAME(SX) NAME(SY) NAME(SZ) NAME(ROUNDNESS)                \
+  NAME(DILATION) NAME(TAPER) NAME(BULGE) NAME(ONION) NAME(BLEND)
+
+// Python's names come from these two tables, by way of bindings.cpp.
+#define PW_COLUMN(name) name,
+enum Column { PW_COLUMNS(PW_COLUMN) COLUMNS };
+#undef PW_COLUMN
+
+#define PW_DERIVATIVE(name) D_##name,
+enum Derivative { PW_TANGENT(PW_DERIVATIVE) DERIVATIVES, FIELD_DERIVATIVES = D_BLEND };
+#undef PW_DERIVATIVE
 
 // Below this chord the arc has no direction; the bend treats a shorter chord as this long.
 constexpr float MIN_CHORD = 1e-6f;
@@ -92,6 +102,12 @@ inline Part prepare(const float* row) {
   p.outer_length_inverse = float(1 / std::sqrt(std::max(outer2, 1e-30)));
   p.inner_length_inverse = float(1 / std::sqrt(std::max(inner2, 1e-30)));
   return p;
+}
+
+// The largest bulge of a part of these sx and sz: an arc tighter than half the section's width folds through its
+// own centre.
+inline float tightest_bulge(float width, float height) {
+  return std::asin(std::min(1.f, height / std::max(width, 1e-6f))) / HALF_PI;
 }
 
 PW_INLINE float clamp01(float v) { return std::min(std::max(v, 0.f), 1.f); }
@@ -344,17 +360,17 @@ PW_INLINE void chain_step(const Part& p, const float* s, float* out, int stride)
   const float fy = gq * std::copysign(q_dy, y);
   const float fz = f_bx * s[BX_Z * stride] + gz * s[BZ_Z * stride];
   const float* r = p.to_local;
-  out[0 * stride] = -(r[0] * fx + r[3] * fy + r[6] * fz);
-  out[1 * stride] = -(r[1] * fx + r[4] * fy + r[7] * fz);
-  out[2 * stride] = -(r[2] * fx + r[5] * fy + r[8] * fz);
-  out[3 * stride] = fy * z - fz * y;
-  out[4 * stride] = fz * x - fx * z;
-  out[5 * stride] = fx * y - fy * x;
+  out[D_TX * stride] = -(r[0] * fx + r[3] * fy + r[6] * fz);
+  out[D_TY * stride] = -(r[1] * fx + r[4] * fy + r[7] * fz);
+  out[D_TZ * stride] = -(r[2] * fx + r[5] * fy + r[8] * fz);
+  out[D_WX * stride] = fy * z - fz * y;
+  out[D_WY * stride] = fz * x - fx * z;
+  out[D_WZ * stride] = fx * y - fy * x;
   out[D_SX * stride] = -0.5f * gq * q_dx + p.share_x * f_m;
   out[D_SY * stride] = -0.5f * gq * q_dy + p.share_y * f_m;
   out[D_SZ * stride] = 0.5f * (s[F_H * stride] + f_bx * s[BX_H * stride] + gz * s[BZ_H * stride]);
-  out[D_R * stride] = f_round * p.m;
-  out[D_D * stride] = -1.f;
+  out[D_ROUNDNESS * stride] = f_round * p.m;
+  out[D_DILATION * stride] = -1.f;
   out[D_TAPER * stride] = p.m * (f_e + f_top * p.onion);
   out[D_BULGE * stride] = HALF_PI * (f_bx * s[BX_THETA * stride] + gz * s[BZ_THETA * stride]);
   out[D_ONION * stride] = p.m * (f_top * p.taper + f_bottom);

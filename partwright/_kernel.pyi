@@ -1,10 +1,45 @@
-"""Signatures of the compiled kernel; partwright.fields.kernel documents and checks them."""
+"""Signatures of the compiled kernel; a test compares both; partwright.fields.kernel documents."""
+
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-COLUMNS: int
-DERIVATIVES: int
+class Column(IntEnum):
+    TX = 0
+    TY = 1
+    TZ = 2
+    QW = 3
+    QX = 4
+    QY = 5
+    QZ = 6
+    SX = 7
+    SY = 8
+    SZ = 9
+    ROUNDNESS = 10
+    DILATION = 11
+    TAPER = 12
+    BULGE = 13
+    ONION = 14
+    BLEND = 15
+    SIGN = 16
+
+class Tangent(IntEnum):
+    TX = 0
+    TY = 1
+    TZ = 2
+    WX = 3
+    WY = 4
+    WZ = 5
+    SX = 6
+    SY = 7
+    SZ = 8
+    ROUNDNESS = 9
+    DILATION = 10
+    TAPER = 11
+    BULGE = 12
+    ONION = 13
+    BLEND = 14
 
 _F = NDArray[np.float32]
 _D = NDArray[np.float64]

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from partwright.assembly.rows import WIDTH
 from partwright.assembly.tree import Part
 from partwright.errors import ParameterError
 from partwright.fields import SuperFrustum
+from partwright.fields.columns import FIELD, POSE, UNSIGNED, Column
 
 
 def parts_from_rows(rows: np.ndarray, names: Sequence[str] = ()) -> tuple[Part, ...]:
@@ -19,14 +19,15 @@ def parts_from_rows(rows: np.ndarray, names: Sequence[str] = ()) -> tuple[Part, 
         ParameterError: the shape is wrong or a value is outside its range.
     """
     rows = np.asarray(rows)
-    if rows.ndim != 2 or rows.shape[1] != WIDTH:
-        raise ParameterError(f"parameter rows: expected shape (M, {WIDTH}), got {rows.shape}")
+    if rows.ndim != 2 or rows.shape[1] != UNSIGNED:
+        raise ParameterError(f"parameter rows: expected shape (M, {UNSIGNED}), got {rows.shape}")
     if names and len(names) != len(rows):
         raise ParameterError(f"parameter rows: got {len(rows)} rows and {len(names)} names")
     result = []
     for i, row in enumerate(rows):
         v = [float(str(value)) for value in row]
-        field = SuperFrustum.from_parameters(v[7:15])
+        tx, ty, tz, qw, qx, qy, qz = v[POSE]
+        field = SuperFrustum.from_parameters(v[FIELD])
         name = names[i] if names else ""
-        result.append(Part(field, (v[0], v[1], v[2]), (v[3], v[4], v[5], v[6]), blend=v[15], name=name))
+        result.append(Part(field, (tx, ty, tz), (qw, qx, qy, qz), blend=v[Column.BLEND], name=name))
     return tuple(result)

@@ -1,4 +1,4 @@
-"""Parts as the kernel's parameter rows: tx ty tz qw qx qy qz sx sy sz r d t b o blend."""
+"""Parts as the kernel's parameter rows, without their signs."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import numpy as np
 
 from partwright.errors import ParameterError
 from partwright.fields import Field, SuperFrustum
+from partwright.fields.columns import UNSIGNED
 
 if TYPE_CHECKING:
     from partwright.assembly.tree import Part
-
-WIDTH = 16
 
 
 def as_superfrustum(field: Field) -> SuperFrustum:
@@ -33,4 +32,4 @@ def rows(parts: Sequence[Part]) -> np.ndarray:
     copies = (copy for part in parts for copy in part.copies)
     return np.array(
         [(*p.translation, *p.rotation, *as_superfrustum(p.field).parameters(), p.blend) for p in copies]
-    ).reshape(-1, WIDTH)
+    ).reshape(-1, UNSIGNED)

@@ -1,12 +1,12 @@
 """The C++ kernel's face: SuperFrusta over many points, their derivatives, and least-squares fits of them.
 
-A *parameter row* holds one part: translation (3), rotation quaternion w, x, y, z (local to world), size
-(3), roundness, dilation, taper, bulge, onion, the blend with which it joins the fold (unused in the first
-row), and its sign: +1 where it is added to what came before it, -1 where it is subtracted from that. The sign
-may be left out of all rows (M, 16): then every part is added.
-Derivatives are ordered: translation (3), a local rotation vector w with R <- R exp(w) (3), size (3),
-roundness, dilation, taper, bulge, onion, blend. `partwright.fields.reference` is the slow form that tests
-compare with.
+A *parameter row* holds one part, in the order of `columns.Column`: translation (3), rotation quaternion
+w, x, y, z (local to world), size (3), roundness, dilation, taper, bulge, onion, the blend with which it joins
+the fold (unused in the first row), and its sign: +1 where it is added to what came before it, -1 where it is
+subtracted from that. The sign may be left out of all rows (M, 16): then every part is added.
+Derivatives are in the order of `columns.Tangent`: translation (3), a local rotation vector w with
+R <- R exp(w) (3), size (3), roundness, dilation, taper, bulge, onion, blend. `partwright.fields.reference` is
+the slow form that tests compare with.
 
 `threads=0` means one thread per core. Results do not depend on the number of threads.
 """
@@ -19,18 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from partwright import _kernel
-
-COLUMNS = ("tx", "ty", "tz", "qw", "qx", "qy", "qz", "sx", "sy", "sz",
-           "roundness", "dilation", "taper", "bulge", "onion", "blend", "sign")  # fmt: skip
-DERIVATIVES = ("tx", "ty", "tz", "wx", "wy", "wz", "sx", "sy", "sz",
-               "roundness", "dilation", "taper", "bulge", "onion", "blend")  # fmt: skip
-
-UNSIGNED = len(COLUMNS) - 1
-
-if len(COLUMNS) != _kernel.COLUMNS:
-    raise ImportError(
-        "the compiled kernel is of another version than the Python beside it: install partwright again"
-    )
+from partwright.fields.columns import STEP_WIDTH, UNSIGNED, WIDTH
 
 Rows = NDArray[np.float32]
 Floats = NDArray[np.float32]
@@ -39,8 +28,8 @@ Floats = NDArray[np.float32]
 def _rows(parameters: ArrayLike) -> Rows:
     """The rows (M, 17) with their signs."""
     rows = np.ascontiguousarray(parameters, dtype=np.float32)
-    if rows.ndim != 2 or rows.shape[1] not in (UNSIGNED, UNSIGNED + 1) or len(rows) == 0:
-        raise ValueError(f"parameter rows must be (M, {UNSIGNED} or {UNSIGNED + 1}), M > 0, got {rows.shape}")
+    if rows.ndim != 2 or rows.shape[1] not in (UNSIGNED, WIDTH) or len(rows) == 0:
+        raise ValueError(f"parameter rows must be (M, {UNSIGNED} or {WIDTH}), M > 0, got {rows.shape}")
     if rows.shape[1] == UNSIGNED:
         return np.concatenate([rows, np.ones((len(rows), 1), np.float32)], axis=1)
     return rows
@@ -71,7 +60,7 @@ def evaluate_parts(parameters: ArrayLike, points: ArrayLike, threads: int = 0) -
 def gradients(
     parameters: ArrayLike, points: ArrayLike, upstream: ArrayLike, threads: int = 0
 ) -> NDArray[np.float64]:
-    """Derivatives (M, 15) of sum(upstream * distance) by the parameters, in the order of `DERIVATIVES`."""
+    """Derivatives (M, 15) of sum(upstream * distance) by the parameters, in the order of `Tangent`."""
     points = _points(points)
     weights = np.ascontiguousarray(upstream, dtype=np.float32)
     if weights.shape != (len(points),):
@@ -167,7 +156,7 @@ def levenberg_marquardt(
     `stages` (S, 2) holds pairs of beta and iterations, run one after another. `tied` (M,) keeps sx = sy.
     """
     rows = _rows(parameters)
-    free = np.ones((len(rows), len(DERIVATIVES)), bool) if free is None else free
+    free = np.ones((len(rows), STEP_WIDTH), bool) if free is None else free
     tied = np.zeros(len(rows), bool) if tied is None else tied
     fitted, loss, iterations = _kernel.levenberg_marquardt(
         rows, free.astype(np.uint8), tied.astype(np.uint8), *target.arrays(),
@@ -191,7 +180,7 @@ def fit_starts(
 ) -> tuple[Rows, NDArray[np.float64]]:
     """One single-part fit per start (B, 17), on the samples `ranges[b, 0]:ranges[b, 1]`; rows and losses."""
     rows = _rows(starts)
-    free = np.ones((len(rows), len(DERIVATIVES)), bool) if free is None else free
+    free = np.ones((len(rows), STEP_WIDTH), bool) if free is None else free
     tied = np.zeros(len(rows), bool) if tied is None else tied
     first, last = (np.ascontiguousarray(column, np.int64) for column in np.asarray(ranges).T)
     fitted, losses = _kernel.fit_starts(

@@ -13,6 +13,7 @@ import math
 import torch
 from torch import Tensor
 
+from partwright.fields.columns import PROPORTIONS, ROTATION, SIZE, TRANSLATION, WIDTH, Column
 from partwright.fields.operations import smooth_difference, smooth_union
 
 # Added to the half height: the chord of the bend and the edges of the profile never have length zero.
@@ -164,14 +165,14 @@ def fold(distances: Tensor, blends: Tensor, signs: Tensor | None = None) -> Tens
 
 def evaluate_parts(parameters: Tensor, points: Tensor) -> Tensor:
     """Distances (M, N) of each part alone; rows (M, 16 or 17) as in `fields.kernel`, points (N, 3)."""
-    translation, rotation, size = parameters[:, 0:3], parameters[:, 3:7], parameters[:, 7:10]
-    return part_distance(points, translation, rotation, size, *parameters[:, 10:15].unbind(-1))
+    translation, rotation, size = (parameters[:, block] for block in (TRANSLATION, ROTATION, SIZE))
+    return part_distance(points, translation, rotation, size, *parameters[:, PROPORTIONS].unbind(-1))
 
 
 def evaluate(parameters: Tensor, points: Tensor) -> Tensor:
     """Distance (N,) of the whole: the parts folded as their signs say. Rows (M, 16 or 17), points (N, 3)."""
-    signs = parameters[:, 16] if parameters.shape[1] > 16 else None
-    return fold(evaluate_parts(parameters, points), parameters[:, 15], signs)
+    signs = parameters[:, Column.SIGN] if parameters.shape[1] == WIDTH else None
+    return fold(evaluate_parts(parameters, points), parameters[:, Column.BLEND], signs)
 
 
 def _edge(q: Tensor, z: Tensor, bottom: Tensor, top: Tensor, h: Tensor) -> tuple[Tensor, Tensor]:

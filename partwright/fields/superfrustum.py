@@ -17,6 +17,16 @@ from partwright.fields.superfrustum_support import support
 _TIP = 0.25  # of a wall that tapers to nothing, the part that is looked at
 
 
+def tightest_bulge(width: Any, height: Any) -> Any:
+    """The largest bulge of a part of these sx and sz: numbers or tensors.
+
+    An arc tighter than half the section's width folds through its own centre.
+    """
+    if is_tensor(width):
+        return (height / width.clamp(min=1e-6)).clamp(0, 1).asin() / (math.pi / 2)
+    return math.asin(min(1.0, max(0.0, height / max(width, 1e-6)))) / (math.pi / 2)
+
+
 @dataclass(frozen=True)
 class SuperFrustum(Field):
     """SuperFrusta, section 3.2. The axis is z; docs/superfrustum.md has the formula.
@@ -68,7 +78,7 @@ class SuperFrustum(Field):
 
     @classmethod
     def from_parameters(cls, values: Sequence[float] | np.ndarray) -> SuperFrustum:
-        """The inverse of `parameters`; also of columns 7 to 15 of a kernel row."""
+        """The inverse of `parameters`; also of the columns `columns.FIELD` of a kernel row."""
         sx, sy, sz, roundness, dilation, taper, bulge, onion = (float(value) for value in values)
         return cls((sx, sy, sz), roundness, dilation, taper, bulge, onion)
 

@@ -1,4 +1,4 @@
-"""Families of parts: SuperFrusta some of whose parameters are held at plain values (SuperFrusta, Table 2)."""
+"""Families of parts: SuperFrusta with some parameters locked at plain values (SuperFrusta, Table 2)."""
 
 from __future__ import annotations
 
@@ -7,30 +7,36 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.fields import kernel
+from partwright.fields.columns import Column
 
 Family = Literal["superfrustum", "superprimitive", "cuboid", "solid"]
 
 # family -> the parameters that its parts do not have, and the values that switch them off
-FAMILIES: dict[Family, dict[str, float]] = {
+FAMILIES: dict[Family, dict[Column, float]] = {
     "superfrustum": {},
-    "superprimitive": {"taper": 1.0, "bulge": 0.0},
-    "cuboid": {"roundness": 0.0, "dilation": 0.0, "taper": 1.0, "bulge": 0.0, "onion": 0.0},
-    "solid": {"bulge": 0.0},  # what else each part holds is its kind's: see solid_kinds.py
+    "superprimitive": {Column.TAPER: 1.0, Column.BULGE: 0.0},
+    "cuboid": {
+        Column.ROUNDNESS: 0.0,
+        Column.DILATION: 0.0,
+        Column.TAPER: 1.0,
+        Column.BULGE: 0.0,
+        Column.ONION: 0.0,
+    },
+    "solid": {Column.BULGE: 0.0},  # what else is locked in each part is its kind's: see solid_kinds.py
 }
 
 
-def held(family: Family, smooth: bool) -> dict[str, float]:
+def locked_values(family: Family, smooth: bool) -> dict[Column, float]:
     """Parameters that no fit moves; in plain unions (not `smooth`) the blend is one of them."""
-    return FAMILIES[family] if smooth else FAMILIES[family] | {"blend": 0.0}
+    return FAMILIES[family] if smooth else FAMILIES[family] | {Column.BLEND: 0.0}
 
 
-def held_down(rows: NDArray[np.float32], values: dict[str, float]) -> NDArray[np.float32]:
+def with_locked_values(rows: NDArray[np.float32], values: dict[Column, float]) -> NDArray[np.float32]:
     """Rows (K, 16) with these values instead of their own; of rows that are the same then, the first."""
     if not values:
         return rows
     rows = rows.copy()
-    for name, value in values.items():
-        rows[:, kernel.COLUMNS.index(name)] = value
+    for column, value in values.items():
+        rows[:, column] = value
     _, first = np.unique(rows, axis=0, return_index=True)
     return rows[np.sort(first)]

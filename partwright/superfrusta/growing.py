@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from partwright.fields import kernel
+from partwright.fields.columns import Column
 from partwright.superfrusta import solid_starts
-from partwright.superfrusta.families import held, held_down
+from partwright.superfrusta.families import locked_values, with_locked_values
 from partwright.superfrusta.initialisation import starts
 from partwright.superfrusta.objective import occupancy_score
 from partwright.superfrusta.refining import LIMITS, freedom, sharpened, ties
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.solid_kinds import SIGN, plainness
+from partwright.superfrusta.solid_kinds import plainness
 
 _LEAST_DEPTH = 0.15  # voxels: thinner regions are noise (half a voxel would lose thin walls)
 _LEAST_VOLUME = 2e-4  # of the shape
@@ -90,7 +91,7 @@ def _pieces(
 ) -> list[Region]:
     """Morphological decomposition of the residual, and its largest connected pieces whole."""
     grid = samples.grid
-    carved = sign > 0 and bool((rows[:, SIGN] < 0).any())
+    carved = sign > 0 and bool((rows[:, Column.SIGN] < 0).any())
     least_depth, least = _LEAST_DEPTH * grid.spacing, _LEAST_VOLUME * samples.inside_voxels
     labels, depths = kernel.decompose(
         residual, grid.spacing, settings.regions, settings.kappa, least_depth, least
@@ -134,7 +135,7 @@ def _view(samples: FitSamples, region: Region) -> View:
     missed = samples.inside[index] if region.sign > 0 else ~samples.inside[index]
     weight[wrong & missed & ~region.voxels[samples.voxel[index]]] *= region.elsewhere
     if region.under:
-        cuts = region.others[region.others[:, SIGN] < 0]
+        cuts = region.others[region.others[:, Column.SIGN] < 0]
         weight[(samples.parts_of(cuts, samples.points[index]) < 0).any(axis=0)] = 0
     if region.hull is not None:
         within = (samples.points[index] @ region.hull[:, :3].T + region.hull[:, 3] < 0).all(axis=1)
@@ -177,7 +178,7 @@ def finalists(
         samples, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings
     )
     # A thin part that shoots out of the shape passes between the few samples out there.
-    astray = samples.stray_weight(fitted) * (fitted[:, SIGN] > 0)
+    astray = samples.stray_weight(fitted) * (fitted[:, Column.SIGN] > 0)
     losses += astray / np.array([len(view.index) for view in views])[owner[kept]]
     return fitted, owner[kept], losses
 
@@ -186,8 +187,10 @@ def _guesses(samples: FitSamples, region: Region, settings: Settings) -> Rows:
     points, spacing = samples.grid_points[region.voxels], samples.grid.spacing
     if settings.family == "solid":
         return solid_starts.starts(points, spacing, region.sign, region.frames)
-    rows = held_down(starts(points, spacing, region.frames), held(settings.family, settings.smooth))
-    rows[:, SIGN] = region.sign
+    rows = with_locked_values(
+        starts(points, spacing, region.frames), locked_values(settings.family, settings.smooth)
+    )
+    rows[:, Column.SIGN] = region.sign
     return rows
 
 
@@ -237,7 +240,7 @@ def _select(samples: FitSamples, candidates: Rows, rows: Rows, price: float, mos
     What is added may join before the parts that are subtracted, or after them.
     """
     occupied = samples.parts_of(candidates, samples.points) < 0
-    added, cuts = candidates[:, SIGN] > 0, rows[rows[:, SIGN] < 0]
+    added, cuts = candidates[:, Column.SIGN] > 0, rows[rows[:, Column.SIGN] < 0]
     carved = (samples.parts_of(cuts, samples.points) < 0).any(axis=0) if len(cuts) else None
     covered = samples.field(rows) < 0
     chosen: list[tuple[bool, int]] = []

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from partwright.fields.columns import ROTATION, SIZE, TRANSLATION, WIDTH, Column
 from partwright.superfrusta.refining import START_BLEND
 from partwright.superfrusta.samples import Rows
 
@@ -43,11 +44,11 @@ def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float
     turned = np.stack([frame for frame, *_ in guesses])
     low, high = extents(local, turned)
     size = np.maximum((high - low) / (1 - 0.02 * TRIM) + 0.5 * spacing, 0.8 * spacing)
-    rows = np.empty((len(guesses), 17), np.float32)
-    rows[:, :3] = centre + np.einsum("kij,kj->ki", turned, (low + high) / 2)
-    rows[:, 3:7] = Rotation.from_matrix(turned).as_quat(scalar_first=True)
-    rows[:, 7:10] = size
-    rows[:, 10:] = [
+    rows = np.empty((len(guesses), WIDTH), np.float32)
+    rows[:, TRANSLATION] = centre + np.einsum("kij,kj->ki", turned, (low + high) / 2)
+    rows[:, ROTATION] = Rotation.from_matrix(turned).as_quat(scalar_first=True)
+    rows[:, SIZE] = size
+    rows[:, Column.ROUNDNESS :] = [
         (roundness, _DILATION, 1.0, bulge, onion, START_BLEND, 1.0) for _, roundness, bulge, onion in guesses
     ]
     return rows

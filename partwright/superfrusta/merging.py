@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.fields.columns import ROTATION, Column
 from partwright.superfrusta.growing import Region, fit_regions
 from partwright.superfrusta.objective import coverage, occupancy_score, removal_scores, score
 from partwright.superfrusta.pruning import neighbours
 from partwright.superfrusta.refining import TOUCH_UP, refine
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.solid_kinds import SIGN
 
 _TOUCHING = 0.03  # unit lengths
 _LOSS = 0.02  # of R: a merger that costs more before its refit is not tried
@@ -76,7 +76,7 @@ def mergers(
     member are fitted, in one batch."""
     without, _ = removal_scores(samples, rows)
     found = list(combinations(range(len(rows)), 2)) if apart else _touching_pairs(samples, rows)
-    found = [(i, j) for i, j in found if rows[i, SIGN] == rows[j, SIGN]]
+    found = [(i, j) for i, j in found if rows[i, Column.SIGN] == rows[j, Column.SIGN]]
     value = {pair: float(-max(without[list(pair)])) for pair in found if pair[0] >= locked}
     owner = owners(samples, rows)
     pairs = [p for p in sorted(value, key=lambda p: (value[p], p)) if np.isin(owner, p).any()][:_FITTED]
@@ -89,16 +89,16 @@ def mergers(
             _depth(samples, owner, pair),
             margin=0.2,
             elsewhere=0.15,
-            frames=rows[list(pair), 3:7],
-            sign=float(rows[pair[0], SIGN]),
-            under=bool((rows[np.delete(np.arange(len(rows)), pair), SIGN] < 0).any()),
+            frames=rows[list(pair), ROTATION],
+            sign=float(rows[pair[0], Column.SIGN]),
+            under=bool((rows[np.delete(np.arange(len(rows)), pair), Column.SIGN] < 0).any()),
         )
         for pair in pairs
     ]
     merged = fit_regions(samples, regions, settings, settings.overlap)
     occupied = samples.parts_of(rows, samples.points) < 0
     single = samples.parts_of(merged, samples.points) < 0
-    added = rows[:, SIGN] > 0
+    added = rows[:, Column.SIGN] > 0
     trials = [
         _folded(_replaced(occupied, *pair, one), np.delete(added, pair[1]))
         for pair, one in zip(pairs, single, strict=True)
@@ -111,7 +111,7 @@ def mergers(
 def _touching_pairs(samples: FitSamples, rows: Rows) -> list[tuple[int, int]]:
     near = samples.parts_of(rows, samples.points[::4]) < _TOUCHING
     inside = samples.inside[::4]
-    near &= np.where(rows[:, SIGN, None] > 0, inside, ~inside)
+    near &= np.where(rows[:, Column.SIGN, None] > 0, inside, ~inside)
     shared = near.astype(np.float32) @ near.T.astype(np.float32) > 2
     return [(int(i), int(j)) for i, j in zip(*np.nonzero(np.triu(shared, 1)), strict=True)]
 
@@ -123,7 +123,7 @@ def owners(samples: FitSamples, rows: Rows) -> NDArray[np.int64]:
     """
     inside = samples.grid.values.ravel() < 0
     owner = np.full(len(inside), -1, dtype=np.int64)
-    added = rows[:, SIGN] > 0
+    added = rows[:, Column.SIGN] > 0
     voxels = np.flatnonzero(inside)
     distance = samples.parts_of(rows, samples.grid_points[voxels])
     owner[voxels] = np.where(added[:, None], distance, np.inf).argmin(axis=0)

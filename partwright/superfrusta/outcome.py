@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 
 from partwright.assembly import Assembly, Similarity
 from partwright.assembly.parts_from_rows import parts_from_rows
+from partwright.fields.columns import UNSIGNED, Column
 from partwright.methods import Outcome
 from partwright.shapes import Shape
 from partwright.superfrusta.curve import with_parents
 from partwright.superfrusta.flat_tree import nested
 from partwright.superfrusta.samples import Rows
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.solid_kinds import SIGN, is_solid, solid
+from partwright.superfrusta.solid_kinds import is_solid, solid
 
 _STEM = {True: "part", False: "cut"}  # of the names of parts that are added, and subtracted
 
@@ -63,9 +64,9 @@ def assembly_of(
 
     moves: those of each part's further copies, if any.
     """
-    added = rows[:, SIGN] > 0
+    added = rows[:, Column.SIGN] > 0
     names = [*fixed, *(f"{_STEM[bool(added[i])]}_{i + 1:02d}" for i in range(len(fixed), len(rows)))]
-    parts = parts_from_rows(rows[:, :SIGN], names)
+    parts = parts_from_rows(rows[:, :UNSIGNED], names)
     if settings.family == "solid":
         parts = tuple(
             replace(part, field=solid(row)) if is_solid(row) else part

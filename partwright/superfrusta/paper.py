@@ -17,9 +17,18 @@ from torch import Tensor
 
 from partwright.errors import SettingError
 from partwright.fields import reference
-from partwright.fields.kernel import UNSIGNED, Rows, Target, _rows, like
+from partwright.fields.columns import (
+    ROTATION,
+    SHAPE,
+    SHAPE_STEP,
+    TRANSLATION,
+    TRANSLATION_STEP,
+    UNSIGNED,
+    Column,
+)
+from partwright.fields.kernel import Rows, Target, _rows, like
+from partwright.fields.superfrustum import tightest_bulge
 from partwright.superfrusta.refining import LIMITS
-from partwright.superfrusta.torch_equations import BULGE, SX, SZ, tightest_bulge
 
 BLOCKS = (3, 4, 3, 1, 1, 3, 1)  # columns that share a learning rate, in the order of `PaperConfig.rates`
 
@@ -93,7 +102,7 @@ class Optimised:
     existence: NDArray[np.float32]
 
 
-class Samples(NamedTuple):
+class LossSamples(NamedTuple):
     """Points (N, 3), the shape's distance and weights (N,)."""
 
     points: Tensor
@@ -142,7 +151,7 @@ def optimise(
     if not 0 <= locked <= len(start):
         raise ValueError(f"locked must be from 0 to the number of rows, {len(start)}, got {locked}")
     arrays = Target(*(np.asarray(a, np.float32) for a in (points, distance, weight))).arrays()[:3]
-    samples = Samples(*(torch.as_tensor(array, device=device) for array in arrays))
+    samples = LossSamples(*(torch.as_tensor(array, device=device) for array in arrays))
     if locked == len(start) or len(samples.points) == 0:
         return Optimised(
             like(_rows(rows).copy(), rows), np.ones(len(start), bool), np.ones(len(start), np.float32)
@@ -156,10 +165,10 @@ def optimise(
     return Optimised(like(result[kept], rows), kept, existence)
 
 
-def losses(rows: Tensor, existence: Tensor, samples: Samples, beta: float, config: PaperConfig) -> Losses:
+def losses(rows: Tensor, existence: Tensor, samples: LossSamples, beta: float, config: PaperConfig) -> Losses:
     """The three losses of rows (M, 16) whose parts exist to the degree q, `existence` (M,) in 0..1."""
     alone = reference.evaluate_parts(rows, samples.points)
-    blends = rows[:, 15]
+    blends = rows[:, Column.BLEND]
     with torch.no_grad():
         mask = reference.fold(alone, blends) < config.tau
     faded = fade(alone, existence)
@@ -206,15 +215,17 @@ def sample_existence(logits: Tensor, temperature: float, uniform: Tensor) -> Ten
 def project(rows: Tensor) -> Tensor:
     """Rows with parameters within their bounds, unit quaternions, and no arc folded over its centre."""
     lower, upper, _ = torch.as_tensor(LIMITS.array(), device=rows.device, dtype=rows.dtype)
-    translation = rows[:, :3].clamp(lower[:3], upper[:3])
-    rotation = rows[:, 3:7] / rows[:, 3:7].norm(dim=1, keepdim=True)
-    allowed = torch.cat([translation, rotation, rows[:, SX:].clamp(lower[6:], upper[6:])], 1)
-    allowed[:, BULGE] = torch.minimum(allowed[:, BULGE], tightest_bulge(allowed[:, SX], allowed[:, SZ]))
+    translation = rows[:, TRANSLATION].clamp(lower[TRANSLATION_STEP], upper[TRANSLATION_STEP])
+    rotation = rows[:, ROTATION] / rows[:, ROTATION].norm(dim=1, keepdim=True)
+    shape = rows[:, SHAPE].clamp(lower[SHAPE_STEP], upper[SHAPE_STEP])
+    allowed = torch.cat([translation, rotation, shape], 1)
+    tightest = tightest_bulge(allowed[:, Column.SX], allowed[:, Column.SZ])
+    allowed[:, Column.BULGE] = torch.minimum(allowed[:, Column.BULGE], tightest)
     return allowed
 
 
 def _descend(
-    rows: Tensor, samples: Samples, config: PaperConfig, locked: int, seed: int
+    rows: Tensor, samples: LossSamples, config: PaperConfig, locked: int, seed: int
 ) -> tuple[Tensor, Tensor]:
     """Rows of the parts that are not locked and existence probabilities (M,) of all after the last step."""
     generator = torch.Generator().manual_seed(seed)
@@ -242,7 +253,7 @@ def _descend(
         terms = losses(
             torch.cat([fixed, torch.cat(blocks, 1)]),
             torch.cat([certain, exists]),
-            Samples(*(array[drawn] for array in samples)),
+            LossSamples(*(array[drawn] for array in samples)),
             _between(config.beta, progress),
             config,
         )

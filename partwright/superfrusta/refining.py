@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.fields import kernel
-from partwright.superfrusta.families import held
+from partwright.fields.columns import STEP_WIDTH, Tangent
+from partwright.superfrusta.families import locked_values
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.solid_kinds import kind_freedom, round_parts
@@ -40,12 +41,13 @@ def penalties(settings: Settings) -> kernel.Penalties:
 
 
 def freedom(rows: Rows, moving: NDArray[np.bool_], settings: Settings) -> NDArray[np.bool_]:
-    """Which parameters (M, 15) may move: all of the parts marked in `moving` (M,), less those held by the
+    """Which parameters (M, 15) may move: all of the parts marked in `moving` (M,), less those locked by the
     family or, among solids, by the part's kind."""
-    free = np.repeat(moving[:, None], len(kernel.DERIVATIVES), axis=1)
+    free = np.repeat(moving[:, None], STEP_WIDTH, axis=1)
     if settings.family == "solid":
         return free & kind_freedom(rows)
-    free[:, [kernel.DERIVATIVES.index(name) for name in held(settings.family, settings.smooth)]] = False
+    locked = locked_values(settings.family, settings.smooth)
+    free[:, [Tangent[column.name] for column in locked]] = False
     return free
 
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.fields.columns import Column
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.solid_kinds import SIGN
 from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, image, refit
 from partwright.superfrusta.symmetry import Isometry, Symmetry, groups
 
@@ -90,7 +90,7 @@ def candidates(
             covered = images[distinct].any(axis=0) if distinct else np.zeros(len(points), bool)
             share = (parts & covered).sum(axis=1) / sizes
             share[:locked] = share[base] = 0
-            share[rows[:, SIGN] != rows[base, SIGN]] = 0
+            share[rows[:, Column.SIGN] != rows[base, Column.SIGN]] = 0
             replaced = frozenset(np.flatnonzero(share > _COVERED).tolist())
             if replaced:
                 result.append(Repeat(base, tuple(group[i] for i in distinct), replaced))

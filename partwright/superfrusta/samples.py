@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.fields.kernel import COLUMNS, Target
+from partwright.fields.columns import WIDTH
+from partwright.fields.kernel import Target
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid
 from partwright.shapes.sampling import morton_order
@@ -17,7 +18,7 @@ from partwright.superfrusta.backend import Kernel, backend
 from partwright.superfrusta.settings import Settings
 
 Rows = NDArray[np.float32]
-NOTHING: Rows = np.empty((0, len(COLUMNS)), np.float32)
+NOTHING: Rows = np.empty((0, WIDTH), np.float32)
 
 _HALF_SIDE = 1.2  # unit lengths: half the side of the cube that padding and probes fill
 _MOST_PADDING_WEIGHT = 3.0  # of one point, where the weight of a sample in the box is 1

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from partwright.errors import SettingError
 from partwright.methods import Quality, check_number, preset
-from partwright.superfrusta.families import FAMILIES, Family, held
+from partwright.superfrusta.families import FAMILIES, Family, locked_values
 
 _SMALL_PRICE = 2e-4
 
@@ -91,7 +91,7 @@ class Settings:
             raise SettingError(f'optimiser: expected "newton" or "adam", got {self.optimiser!r}')
         if self.family not in FAMILIES:
             raise SettingError(f"family: expected one of {', '.join(FAMILIES)}, got {self.family!r}")
-        if self.optimiser == "adam" and (held(self.family, self.smooth) or self.subtract):
+        if self.optimiser == "adam" and (locked_values(self.family, self.smooth) or self.subtract):
             raise SettingError(
                 'optimiser "adam" moves all parameters of parts that are added: it needs family '
                 f'"superfrustum", smooth unions and no subtraction, got {self.family!r}, '

@@ -6,19 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly.similarity import rotation_matrix
-from partwright.fields import kernel
+from partwright.fields.columns import ROTATION, SIZE, TRANSLATION, Column
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.pruning import neighbours
 from partwright.superfrusta.refining import TOUCH_UP, refine
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.solid_kinds import SIGN, SX, SY, SZ
 
 Row = NDArray[np.float32]
 
-_ROUNDNESS, _DILATION, _TAPER, _ONION = (
-    kernel.COLUMNS.index(name) for name in ("roundness", "dilation", "taper", "onion")
-)
 _LOSS = 5e-4  # of R: a plainer kind may cost so much
 _PROMISING = 0.01  # of R: a kind that costs more before its refit is not tried
 _BEYOND = 0.03  # unit lengths by which a cut goes beyond the solid
@@ -51,31 +47,31 @@ def simplify_kinds(samples: FitSamples, rows: Rows, settings: Settings, locked: 
 
 def _plainer(row: Row) -> list[Row]:
     """The row (17,) as kinds of fewer parameters, the plainest first."""
-    if row[_DILATION] > 0:
+    if row[Column.DILATION] > 0:
         return _of_dilated(row)
-    hollow = row[_ONION] > 0
-    if row[_ROUNDNESS] == 0:
+    hollow = row[Column.ONION] > 0
+    if row[Column.ROUNDNESS] == 0:
         return [_changed(row, onion=0.0)] if hollow else []
-    if row[_TAPER] in (0, 1):
+    if row[Column.TAPER] in (0, 1):
         return [_changed(row, onion=0.0)] if hollow else []
-    width = float(row[SX]) * (1 + float(row[_TAPER])) / 2
+    width = float(row[Column.SX]) * (1 + float(row[Column.TAPER])) / 2
     straight = _changed(row, sx=width, sy=width, taper=1.0)
     trials = [_changed(straight, onion=0.0)] if hollow else []
     trials += [straight]
     trials += [_changed(row, onion=0.0)] if hollow else []
-    trials += [_changed(row, taper=0.0)] if row[_TAPER] < 0.3 else []
+    trials += [_changed(row, taper=0.0)] if row[Column.TAPER] < 0.3 else []
     return trials
 
 
 def _of_dilated(row: Row) -> list[Row]:
     """Capsules as spheres, cylinders and boxes; rings as tubes."""
-    radius, length = float(row[_DILATION]), float(row[SZ])
+    radius, length = float(row[Column.DILATION]), float(row[Column.SZ])
     if length > 0:
         whole = {"sx": 2 * radius, "sy": 2 * radius, "sz": length + 2 * radius, "dilation": 0.0}
         short = _changed(row, sz=0.0, dilation=radius + length / 4)
         return [short, _changed(row, roundness=1.0, **whole), _changed(row, roundness=0.0, **whole)]
-    if row[SX] > 0:
-        outer = float(row[SX]) + 2 * radius
+    if row[Column.SX] > 0:
+        outer = float(row[Column.SX]) + 2 * radius
         return [_changed(row, sx=outer, sy=outer, sz=2 * radius, dilation=0.0, onion=1 - 4 * radius / outer)]
     return []
 
@@ -83,7 +79,7 @@ def _of_dilated(row: Row) -> list[Row]:
 def _changed(row: Row, **values: float) -> Row:
     result = row.copy()
     for name, value in values.items():
-        result[kernel.COLUMNS.index(name)] = value
+        result[Column[name.upper()]] = value
     return result
 
 
@@ -94,9 +90,9 @@ def extend_cuts(samples: FitSamples, rows: Rows, locked: int = 0) -> Rows:
     reader when every hole through one plate has another length.
     """
     least = score(samples, rows) - _HARMLESS
-    added = rows[rows[:, SIGN] > 0]
+    added = rows[rows[:, Column.SIGN] > 0]
     for index in range(locked, len(rows)):
-        if rows[index, SIGN] > 0:
+        if rows[index, Column.SIGN] > 0:
             continue
         for axis, side in _ends(rows[index]):
             trial = rows.copy()
@@ -108,22 +104,22 @@ def extend_cuts(samples: FitSamples, rows: Rows, locked: int = 0) -> Rows:
 
 def _ends(row: Row) -> list[tuple[int, float]]:
     """The faces that may move on their own: all six of a box, both ends of a straight round part."""
-    if row[_DILATION] > 0 or row[_TAPER] != 1:
+    if row[Column.DILATION] > 0 or row[Column.TAPER] != 1:
         return []
-    axes = (0, 1, 2) if row[_ROUNDNESS] == 0 and row[_ONION] == 0 else (2,)
+    axes = (0, 1, 2) if row[Column.ROUNDNESS] == 0 and row[Column.ONION] == 0 else (2,)
     return [(axis, side) for axis in axes for side in (-1.0, 1.0)]
 
 
 def _ending_beyond(samples: FitSamples, added: Rows, row: Row, axis: int, side: float) -> Row:
     """The cut (17,) with one end `_BEYOND` further than it meets any added part; longer by as much where
     these go on, which the caller will find costs too much."""
-    w, x, y, z = (float(v) for v in row[3:7])
-    turn, size = rotation_matrix((w, x, y, z)), row[[SX, SY, SZ]].astype(np.float64)
+    w, x, y, z = (float(v) for v in row[ROTATION])
+    turn, size = rotation_matrix((w, x, y, z)), row[SIZE].astype(np.float64)
     end = size[axis] / 2
     across = [np.linspace(-_WITHIN, _WITHIN, _ACROSS) * size[k] for k in range(3)]
     across[axis] = side * np.linspace(-end, end + _BEYOND, _ALONG)
     local = np.stack(np.meshgrid(*across, indexing="ij"), axis=-1).reshape(-1, 3)
-    distance = samples.parts_of(added, (row[:3] + local @ turn.T).astype(np.float32)).min(axis=0)
+    distance = samples.parts_of(added, (row[TRANSLATION] + local @ turn.T).astype(np.float32)).min(axis=0)
     inside = distance < 0
     if not inside.any():
         return row
@@ -131,6 +127,6 @@ def _ending_beyond(samples: FitSamples, added: Rows, row: Row, axis: int, side: 
     last = float((side * local[inside, axis] - distance[inside]).max())
     result = row.copy()
     change = last + _BEYOND - end
-    result[:3] += side * change / 2 * turn[:, axis]
-    result[(SX, SY, SZ)[axis]] += change
+    result[TRANSLATION] += side * change / 2 * turn[:, axis]
+    result[(Column.SX, Column.SY, Column.SZ)[axis]] += change
     return result

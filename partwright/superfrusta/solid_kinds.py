@@ -1,10 +1,11 @@
 """Kinds of solids: which parameters of a SuperFrustum a box, a cylinder or a torus has.
 
 A row says itself what kind it is: a parameter at its plain value (a roundness, a taper of 1, a size of 0) is
-held there, and so no fit changes a part's kind. The paper (section 5) mixes the parameters of all kinds with
-barycentric weights and sharpens the mix to one of them; a mix of a box and a sphere is neither, and which of
-them it leans to is settled by the first steps. Here every kind starts on its own for every region, is fitted
-by its own few parameters, and the best one wins; plainer kinds are tried again once all parts are there.
+locked there, and so no fit changes a part's kind. The paper (section 5) mixes the parameters of all kinds
+with barycentric weights and sharpens the mix to one of them; a mix of a box and a sphere is neither, and
+which of them it leans to is settled by the first steps. Here every kind starts on its own for every region,
+is fitted by its own few parameters, and the best one wins; plainer kinds are tried again once all parts are
+there.
 """
 
 from __future__ import annotations
@@ -24,18 +25,12 @@ from partwright.fields import (
     Sphere,
     Torus,
     Tube,
-    kernel,
 )
+from partwright.fields.columns import FIELD, POSE_STEP, SIZE, SIZE_STEP, STEP_WIDTH, Column, Tangent
 
 Rows = NDArray[np.float32]
 Floats = NDArray[np.float64]
 
-SX, SY, SZ = (kernel.COLUMNS.index(name) for name in ("sx", "sy", "sz"))
-_SIZE = slice(SX, SZ + 1)
-_ROUNDNESS, _DILATION, _TAPER, _ONION = (
-    kernel.COLUMNS.index(name) for name in ("roundness", "dilation", "taper", "onion")
-)
-SIGN = kernel.COLUMNS.index("sign")
 
 _THINNEST_RING = 0.999  # a torus must keep a hole
 _MORE = 0.04  # of the loss: what a further parameter must save
@@ -43,24 +38,24 @@ _MORE = 0.04  # of the loss: what a further parameter must save
 
 def kind_freedom(rows: Rows) -> NDArray[np.bool_]:
     """Parameters (M, 15) that the kind of each part leaves free; a round part's sx and sy move as one."""
-    free = np.zeros((len(rows), len(kernel.DERIVATIVES)), bool)
-    free[:, :6] = True
-    free[:, 6:9] = rows[:, _SIZE] > 0
-    taper, onion = rows[:, _TAPER], rows[:, _ONION]
-    free[:, kernel.DERIVATIVES.index("dilation")] = rows[:, _DILATION] > 0
-    free[:, kernel.DERIVATIVES.index("taper")] = (taper != 0) & (taper != 1)
-    free[:, kernel.DERIVATIVES.index("onion")] = (onion != 0) & (onion != 1)
+    free = np.zeros((len(rows), STEP_WIDTH), bool)
+    free[:, POSE_STEP] = True
+    free[:, SIZE_STEP] = rows[:, SIZE] > 0
+    taper, onion = rows[:, Column.TAPER], rows[:, Column.ONION]
+    free[:, Tangent.DILATION] = rows[:, Column.DILATION] > 0
+    free[:, Tangent.TAPER] = (taper != 0) & (taper != 1)
+    free[:, Tangent.ONION] = (onion != 0) & (onion != 1)
     return free
 
 
 def round_parts(rows: Rows) -> NDArray[np.bool_]:
     """Parts (M,) with a circular section, which stays one."""
-    return np.asarray((rows[:, _ROUNDNESS] == 1) & (rows[:, SX] > 0))
+    return np.asarray((rows[:, Column.ROUNDNESS] == 1) & (rows[:, Column.SX] > 0))
 
 
 def solid(row: Rows) -> Field:
     """The named field of a row (17,); float32 values keep their shortest decimal form."""
-    sx, sy, sz, roundness, dilation, taper, _, onion = (float(str(v)) for v in row[7:15])
+    sx, sy, sz, roundness, dilation, taper, _, onion = (float(str(v)) for v in row[FIELD])
     if sx == sy == 0:
         return Capsule(dilation, sz) if sz > 0 else Sphere(dilation)
     if sz == 0:
@@ -77,7 +72,7 @@ def solid(row: Rows) -> Field:
 
 def is_solid(row: Rows) -> bool:
     """Whether the row (17,) is of one of the kinds, so that `solid` is exact."""
-    sx, sy, sz, roundness, dilation, taper, bulge, onion = row[7:15]
+    sx, sy, sz, roundness, dilation, taper, bulge, onion = row[FIELD]
     if bulge > 0 or (sx > 0) != (sy > 0):
         return False
     if dilation > 0:
@@ -89,7 +84,7 @@ def is_solid(row: Rows) -> bool:
 
 def plainness(rows: Rows) -> Floats:
     """Factors (M,) on losses: 1 for boxes, cylinders and spheres, a little more for what has more numbers."""
-    tapered = ~np.isin(rows[:, _TAPER], (0.0, 1.0))
-    hollow = (rows[:, _ONION] > 0) & (rows[:, _DILATION] == 0)
-    other = (rows[:, _DILATION] > 0) & (rows[:, _SIZE] > 0).any(axis=1)
+    tapered = ~np.isin(rows[:, Column.TAPER], (0.0, 1.0))
+    hollow = (rows[:, Column.ONION] > 0) & (rows[:, Column.DILATION] == 0)
+    other = (rows[:, Column.DILATION] > 0) & (rows[:, SIZE] > 0).any(axis=1)
     return 1 + _MORE * (1.0 * tapered + hollow + other)

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from partwright.fields import kernel
+from partwright.fields.columns import ROTATION, SHAPE, TRANSLATION, WIDTH, Column
 from partwright.superfrusta.initialisation import ENOUGH, TRIM, along, extents, thinned
 from partwright.superfrusta.samples import Rows
-from partwright.superfrusta.solid_kinds import SIGN, SX
 
 _LEAN, _HOLE = 0.8, 0.7  # taper and onion that frusta and hollow solids start with
 _NONE = np.empty((0, 4), np.float32)
@@ -36,11 +35,11 @@ def starts(
     low, high = extents(local, turned)
     size = np.maximum((high - low) / (1 - 0.02 * TRIM) + 0.5 * spacing, 0.8 * spacing)
     size[:, 2] += 2 * spacing * (sign < 0)
-    rows = np.zeros((len(places), len(kernel.COLUMNS)), np.float32)
-    rows[:, :3] = centre + np.einsum("kij,kj->ki", turned, (low + high) / 2)
-    rows[:, 3:7] = Rotation.from_matrix(turned).as_quat(scalar_first=True)
-    rows[:, SX:SIGN] = [form(*extent) for (_, form), extent in zip(places, size, strict=True)]
-    rows[:, SIGN] = sign
+    rows = np.zeros((len(places), WIDTH), np.float32)
+    rows[:, TRANSLATION] = centre + np.einsum("kij,kj->ki", turned, (low + high) / 2)
+    rows[:, ROTATION] = Rotation.from_matrix(turned).as_quat(scalar_first=True)
+    rows[:, SHAPE] = [form(*extent) for (_, form), extent in zip(places, size, strict=True)]
+    rows[:, Column.SIGN] = sign
     return rows
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from partwright.assembly import Assembly, Part
 from partwright.assembly.rows import rows as rows_of
 from partwright.errors import SettingError
-from partwright.fields import kernel
+from partwright.fields.columns import Column
 from partwright.shapes import Shape
 from partwright.superfrusta.flat_tree import flattened
 from partwright.superfrusta.samples import NOTHING, Rows
@@ -42,7 +42,7 @@ def starting_rows(
     signs = np.array([[1.0 if plus else -1.0] for _, plus in leaves])
     rows = np.hstack([rows_of([part for part, _ in leaves]), signs]).astype(np.float32)
     if not settings.smooth:
-        rows[len(fixed) :, kernel.COLUMNS.index("blend")] = 0
+        rows[len(fixed) :, Column.BLEND] = 0
     return rows, fixed
 
 

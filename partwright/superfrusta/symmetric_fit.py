@@ -11,6 +11,19 @@ from numpy.typing import NDArray
 
 from partwright.assembly import Similarity
 from partwright.fields import kernel
+from partwright.fields.columns import (
+    POSE,
+    ROTATION,
+    ROTATION_STEP,
+    SHAPE,
+    SHAPE_STEP,
+    STEP_WIDTH,
+    TRANSLATION,
+    TRANSLATION_STEP,
+    Column,
+    Tangent,
+)
+from partwright.fields.superfrustum import tightest_bulge
 from partwright.superfrusta.refining import LIMITS, Stages, freedom, penalties, sharpened, ties
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
@@ -18,9 +31,6 @@ from partwright.superfrusta.symmetry import Isometry
 
 Floats = NDArray[np.float64]
 
-_WIDTH = len(kernel.DERIVATIVES)
-_SX, _SZ, _BULGE, _SIGN = (kernel.COLUMNS.index(name) for name in ("sx", "sz", "bulge", "sign"))
-_D_SX, _D_SY, _D_BULGE = (kernel.DERIVATIVES.index(name) for name in ("sx", "sy", "bulge"))
 # A SuperFrustum is symmetric in its local y: a mirrored one is the same field in another rigid pose.
 _FLIP = np.diag([1.0, -1.0, 1.0])
 _SETTLED = 3e-4  # relative fall of the loss that ends a stage
@@ -62,7 +72,7 @@ def rigid(row: NDArray[np.float32], isometry: Isometry) -> Similarity:
 def image(row: NDArray[np.float32], isometry: Isometry) -> NDArray[np.float32]:
     """The row (17,) of a part's image."""
     placed = rigid(row, isometry) @ _pose(row)
-    return np.array([*placed.translation, *placed.rotation, *row[7:]], dtype=np.float32)
+    return np.array([*placed.translation, *placed.rotation, *row[Column.SX :]], dtype=np.float32)
 
 
 def expanded(leaves: Sequence[RepeatedPart]) -> Rows:
@@ -84,7 +94,7 @@ def refit(
     firsts = np.stack([leaf.row for leaf in leaves])
     tied = ties(firsts, settings)
     free = freedom(firsts, moving, settings)
-    free[tied, _D_SY] = False
+    free[tied, Tangent.SY] = False
     damping, quality, threads = _DAMPING, penalties(settings), settings.threads
     for beta, iterations in sharpened(stages, samples.thickness):
         for _ in range(int(iterations)):
@@ -111,24 +121,24 @@ def _projected(
 ) -> tuple[Floats, Floats]:
     """P^T g and P^T H P, where P takes steps of the leaves to steps of their copies."""
     count = sum(1 + len(leaf.isometries) for leaf in leaves)
-    lift = np.zeros((count, _WIDTH, len(leaves), _WIDTH))
+    lift = np.zeros((count, STEP_WIDTH, len(leaves), STEP_WIDTH))
     at = 0
     for i, leaf in enumerate(leaves):
-        for block in [np.eye(_WIDTH), *(_lifted(isometry) for isometry in leaf.isometries)]:
+        for block in [np.eye(STEP_WIDTH), *(_lifted(isometry) for isometry in leaf.isometries)]:
             if tied[i]:
-                block[_D_SY] = block[_D_SX]
+                block[Tangent.SY] = block[Tangent.SX]
             lift[at, :, i] = block
             at += 1
-    flat = lift.reshape(count * _WIDTH, -1)
+    flat = lift.reshape(count * STEP_WIDTH, -1)
     return flat.T @ gradient, flat.T @ matrix @ flat
 
 
 def _lifted(isometry: Isometry) -> Floats:
     """(15, 15) a copy's step by the leaf's: the place moves in the world, the turn is about local axes."""
-    block = np.eye(_WIDTH)
-    block[:3, :3] = isometry.linear
+    block = np.eye(STEP_WIDTH)
+    block[TRANSLATION_STEP, TRANSLATION_STEP] = isometry.linear
     if isometry.improper:
-        block[3:6, 3:6] = -_FLIP  # exp(v) becomes F exp(v) F = exp(det(F) F v)
+        block[ROTATION_STEP, ROTATION_STEP] = -_FLIP  # exp(v) becomes F exp(v) F = exp(det(F) F v)
     return block
 
 
@@ -139,7 +149,7 @@ def _damped(gradient: Floats, matrix: Floats, free: NDArray[np.bool_], damping: 
     damped[np.diag_indices_from(damped)] += damping * (np.diagonal(damped) + 1e-6) + 1e-9
     step = np.zeros(len(gradient))
     step[index] = np.linalg.solve(damped, -gradient[index])
-    return step.reshape(-1, _WIDTH)
+    return step.reshape(-1, STEP_WIDTH)
 
 
 def _moved(leaf: RepeatedPart, step: Floats, free: NDArray[np.bool_], tied: bool) -> RepeatedPart:
@@ -147,23 +157,21 @@ def _moved(leaf: RepeatedPart, step: Floats, free: NDArray[np.bool_], tied: bool
     lower, upper, longest = LIMITS.array().astype(np.float64)
     step = np.clip(step, -longest, longest)
     row = leaf.row.astype(np.float64)
-    row[:3] += step[:3]
-    angle = float(np.linalg.norm(step[3:6]))
+    row[TRANSLATION] += step[TRANSLATION_STEP]
+    angle = float(np.linalg.norm(step[ROTATION_STEP]))
     half = np.sinc(angle / (2 * math.pi)) / 2
-    turn = Similarity(1.0, (math.cos(angle / 2), *(half * step[3:6]).tolist()))
-    row[3:7] = (_pose(leaf.row) @ turn).rotation
-    shape = row[_SX:_SIGN]
-    moved = np.clip(shape + step[_D_SX:], lower[_D_SX:], upper[_D_SX:])
-    row[_SX:_SIGN] = np.where(free[_D_SX:], moved, shape)
-    if tied and free[_D_SX]:
-        row[_SX + 1] = row[_SX]
-    # An arc tighter than half the section's width folds through its own centre.
-    if free[_D_BULGE]:
-        tightest = math.asin(min(1.0, row[_SZ] / max(row[_SX], 1e-6))) / (math.pi / 2)
-        row[_BULGE] = min(row[_BULGE], tightest)
+    turn = Similarity(1.0, (math.cos(angle / 2), *(half * step[ROTATION_STEP]).tolist()))
+    row[ROTATION] = (_pose(leaf.row) @ turn).rotation
+    shape = row[SHAPE]
+    moved = np.clip(shape + step[SHAPE_STEP], lower[SHAPE_STEP], upper[SHAPE_STEP])
+    row[SHAPE] = np.where(free[SHAPE_STEP], moved, shape)
+    if tied and free[Tangent.SX]:
+        row[Column.SY] = row[Column.SX]
+    if free[Tangent.BULGE]:
+        row[Column.BULGE] = min(row[Column.BULGE], tightest_bulge(row[Column.SX], row[Column.SZ]))
     return RepeatedPart(row.astype(np.float32), leaf.isometries)
 
 
 def _pose(row: NDArray[np.float32]) -> Similarity:
-    values = [float(v) for v in row[:7]]
-    return Similarity(1.0, (values[3], values[4], values[5], values[6]), (values[0], values[1], values[2]))
+    tx, ty, tz, qw, qx, qy, qz = (float(v) for v in row[POSE])
+    return Similarity(1.0, (qw, qx, qy, qz), (tx, ty, tz))

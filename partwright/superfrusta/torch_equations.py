@@ -14,22 +14,32 @@ import torch
 from torch import Tensor
 
 from partwright.fields import reference
-from partwright.fields.kernel import DERIVATIVES, Penalties
+from partwright.fields.columns import (
+    PROPORTIONS,
+    ROTATION,
+    ROTATION_STEP,
+    SHAPE,
+    SHAPE_STEP,
+    SIZE,
+    STEP_WIDTH,
+    TRANSLATION,
+    TRANSLATION_STEP,
+    Column,
+    Tangent,
+)
+from partwright.fields.kernel import Penalties
 from partwright.fields.operations import SHARP
 from partwright.fields.reference import FAR
+from partwright.fields.superfrustum import tightest_bulge
 
 # A pair whose residuals move less than this per unit of distance takes no part in a step.
 NEGLIGIBLE = 1e-6
 # As in cpp/optimise.cpp.
 DAMPING_FLOOR, RIDGE = 1e-3, 1e-9
 
-WIDTH = len(DERIVATIVES)
-D_SX, D_SY, D_BULGE = (DERIVATIVES.index(name) for name in ("sx", "sy", "bulge"))
-SX, SY, SZ, BULGE, BLEND, SIGN = 7, 8, 9, 13, 15, 16  # columns of a row
-
 
 @dataclass(frozen=True)
-class Samples:
+class SampleBatch:
     """What B fits compare with: points (B, P, 3), distance, weight and, if any, background (B, P)."""
 
     points: Tensor
@@ -37,19 +47,19 @@ class Samples:
     weight: Tensor
     background: Tensor | None
 
-    def of(self, which: Tensor) -> Samples:
+    def of(self, which: Tensor) -> SampleBatch:
         """The samples of the assemblies of that index."""
         if len(which) == len(self.points):
             return self
         behind = None if self.background is None else self.background[which]
-        return Samples(self.points[which], self.distance[which], self.weight[which], behind)
+        return SampleBatch(self.points[which], self.distance[which], self.weight[which], behind)
 
-    def pieces(self, span: int) -> Iterator[Samples]:
+    def pieces(self, span: int) -> Iterator[SampleBatch]:
         """The samples in spans of so many points."""
         for first in range(0, self.points.shape[1], span):
             part = slice(first, first + span)
             behind = None if self.background is None else self.background[:, part]
-            yield Samples(self.points[:, part], self.distance[:, part], self.weight[:, part], behind)
+            yield SampleBatch(self.points[:, part], self.distance[:, part], self.weight[:, part], behind)
 
 
 @dataclass(frozen=True)
@@ -61,7 +71,7 @@ class Problem:
     """
 
     rows: Tensor
-    samples: Samples
+    samples: SampleBatch
     free: Tensor
     tied: Tensor
     parts: Tensor
@@ -70,13 +80,13 @@ class Problem:
 
     def variables(self, gradient: Tensor) -> Tensor:
         """Entries (B, 15 L) that the next step may move: at a bound, only those that want back inside."""
-        lower, upper, _ = self.limits[:, D_SX:]
-        value = self.rows[:, self.parts, SX:SIGN]
-        slope = gradient.view(len(self.rows), len(self.parts), WIDTH)[..., D_SX:]
+        lower, upper, _ = self.limits[:, SHAPE_STEP]
+        value = self.rows[:, self.parts, SHAPE]
+        slope = gradient.view(len(self.rows), len(self.parts), STEP_WIDTH)[..., SHAPE_STEP]
         leaving = ((value <= lower) & (slope > 0)) | ((value >= upper) & (slope < 0))
         variable = self.free[:, self.parts].clone()
-        variable[..., D_SX:] &= ~leaving
-        variable[..., D_SY] &= ~self.tied[:, self.parts]
+        variable[..., SHAPE_STEP] &= ~leaving
+        variable[..., Tangent.SY] &= ~self.tied[:, self.parts]
         return variable.flatten(1)
 
     def moved(self, which: Tensor, step: Tensor, variable: Tensor) -> Tensor:
@@ -85,30 +95,24 @@ class Problem:
         Entries that are not `variable` (n, 15 L) keep their bits.
         """
         rows = self.rows[which]
-        delta = step.new_zeros(*rows.shape[:2], WIDTH)
-        delta[:, self.parts] = step.view(len(which), -1, WIDTH)
+        delta = step.new_zeros(*rows.shape[:2], STEP_WIDTH)
+        delta[:, self.parts] = step.view(len(which), -1, STEP_WIDTH)
         moving = torch.zeros_like(delta, dtype=torch.bool)
-        moving[:, self.parts] = variable.view(len(which), -1, WIDTH)
+        moving[:, self.parts] = variable.view(len(which), -1, STEP_WIDTH)
         lower, upper, longest = self.limits
         clipped = delta.clamp(-longest.double(), longest.double())
-        old = rows[..., SX:SIGN]
-        shape = (old + clipped[..., D_SX:].float()).clamp(lower[D_SX:], upper[D_SX:])
-        shape = torch.where(moving[..., D_SX:], shape, old)
-        rotation = turned(rows[..., 3:7], clipped[..., 3:6])
-        moved = torch.cat([rows[..., :3] + clipped[..., :3].float(), rotation, shape, rows[..., SIGN:]], -1)
-        together = self.tied[which] & moving[..., D_SX]
-        moved[..., SY] = torch.where(together, moved[..., SX], moved[..., SY])
-        bulge = torch.minimum(moved[..., BULGE], tightest_bulge(moved[..., SX], moved[..., SZ]))
-        moved[..., BULGE] = torch.where(moving[..., D_BULGE], bulge, moved[..., BULGE])
+        old = rows[..., SHAPE]
+        shape = (old + clipped[..., SHAPE_STEP].float()).clamp(lower[SHAPE_STEP], upper[SHAPE_STEP])
+        shape = torch.where(moving[..., SHAPE_STEP], shape, old)
+        rotation = turned(rows[..., ROTATION], clipped[..., ROTATION_STEP])
+        place = rows[..., TRANSLATION] + clipped[..., TRANSLATION_STEP].float()
+        moved = torch.cat([place, rotation, shape, rows[..., Column.SIGN :]], -1)
+        together = self.tied[which] & moving[..., Tangent.SX]
+        moved[..., Column.SY] = torch.where(together, moved[..., Column.SX], moved[..., Column.SY])
+        tightest = tightest_bulge(moved[..., Column.SX], moved[..., Column.SZ])
+        bulge = torch.minimum(moved[..., Column.BULGE], tightest)
+        moved[..., Column.BULGE] = torch.where(moving[..., Tangent.BULGE], bulge, moved[..., Column.BULGE])
         return moved
-
-
-def tightest_bulge(width: Tensor, height: Tensor) -> Tensor:
-    """The largest bulge of parts of these sx and sz.
-
-    An arc tighter than half the section's width folds through its own centre.
-    """
-    return torch.asin((height / width.clamp(min=1e-6)).clamp(max=1)) / (math.pi / 2)
 
 
 def turned(rotation: Tensor, vector: Tensor) -> Tensor:
@@ -145,12 +149,12 @@ def damped_step(matrix: Tensor, gradient: Tensor, variable: Tensor, damping: Ten
 
 def local_points(rows: Tensor, points: Tensor) -> Tensor:
     """Points (B, P, 3) in the frame of each part of rows (B, M, 17): (B, M, P, 3)."""
-    return reference.rotate_to_local(points[:, None], rows[..., :3], rows[..., 3:7])
+    return reference.rotate_to_local(points[:, None], rows[..., TRANSLATION], rows[..., ROTATION])
 
 
 def distances(rows: Tensor, local: Tensor) -> Tensor:
     """Distances (B, M, P) of each part alone at its local points (B, M, P, 3)."""
-    return reference.superfrustum(local, rows[..., SX:10], *rows[..., 10:BLEND].unbind(-1))
+    return reference.superfrustum(local, rows[..., SIZE], *rows[..., PROPORTIONS].unbind(-1))
 
 
 def fold_step(field: Tensor, g: Tensor, blend: Tensor, sign: Tensor) -> tuple[Tensor, Tensor]:
@@ -170,7 +174,7 @@ def fold(g: Tensor, rows: Tensor, background: Tensor | None) -> tuple[Tensor, Te
 
     Also the weights (B, M, P) with which what came before each part goes on.
     """
-    blends, signs = rows[..., BLEND, None], rows[..., SIGN, None]
+    blends, signs = rows[..., Column.BLEND, None], rows[..., Column.SIGN, None]
     weights = torch.zeros_like(g)
     field = background
     if field is None:
@@ -186,16 +190,16 @@ def fold_without(g: Tensor, rows: Tensor) -> Tensor:
     parts = len(g)
     field = torch.full((parts + 1, g.shape[1]), FAR, dtype=g.dtype, device=g.device)
     for part in range(parts):
-        joined, _ = fold_step(field, g[part], rows[part, BLEND], rows[part, SIGN])
+        joined, _ = fold_step(field, g[part], rows[part, Column.BLEND], rows[part, Column.SIGN])
         empty = field == FAR
-        joined = torch.where(empty, torch.where(rows[part, SIGN] > 0, g[part], FAR), joined)
+        joined = torch.where(empty, torch.where(rows[part, Column.SIGN] > 0, g[part], FAR), joined)
         joined[part] = field[part]
         field = joined
     return field
 
 
 def residuals(
-    field: Tensor, g: Tensor, added: Tensor, samples: Samples, beta: float, penalties: Penalties
+    field: Tensor, g: Tensor, added: Tensor, samples: SampleBatch, beta: float, penalties: Penalties
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Residuals (B, S, P), their derivatives by the assembly's distance, and by the occupancy of any part.
 
@@ -223,28 +227,28 @@ def residuals(
 
 
 def linearised(
-    rows: Tensor, samples: Samples, parts: Tensor, beta: float, penalties: Penalties
+    rows: Tensor, samples: SampleBatch, parts: Tensor, beta: float, penalties: Penalties
 ) -> tuple[Tensor, Tensor]:
     """Residuals (B, S P) and their Jacobian (B, S P, 15 L) by the L parts of that index."""
     local = local_points(rows, samples.points)
     g = distances(rows, local)
     field, weights = fold(g, rows, samples.background)
-    added = rows[..., SIGN] > 0
+    added = rows[..., Column.SIGN] > 0
     residual, by_field, by_part = residuals(field, g, added, samples, beta, penalties)
 
     later = torch.cat([weights[:, 1:], torch.ones_like(weights[:, :1])], 1).flip(1).cumprod(1).flip(1)
-    share = (rows[..., SIGN, None] * (1 - weights) * later)[:, parts]  # dF/dg
+    share = (rows[..., Column.SIGN, None] * (1 - weights) * later)[:, parts]  # dF/dg
     by_blend = -share * weights[:, parts]
     occupancy = torch.sigmoid(-beta * g[:, parts])
     slope = beta * occupancy * (1 - occupancy) * added[:, parts, None]
     by_distance = by_field[:, :, None] * share[:, None] - by_part[:, :, None] * slope[:, None]  # (B, S, L, P)
 
     batch, kinds, points = residual.shape
-    jacobian = rows.new_zeros(batch, kinds, points, len(parts), WIDTH)
-    jacobian[..., -1] = (by_field[:, :, None] * by_blend[:, None]).mT
+    jacobian = rows.new_zeros(batch, kinds, points, len(parts), STEP_WIDTH)
+    jacobian[..., Tangent.BLEND] = (by_field[:, :, None] * by_blend[:, None]).mT
     b, part, p = (by_distance.abs().amax(1) > NEGLIGIBLE).nonzero().unbind(1)
     pair = derivatives(rows[b, parts[part]], local[b, parts[part], p])
-    jacobian[b, :, p, part, :-1] = by_distance[b, :, part, p][..., None] * pair[:, None]
+    jacobian[b, :, p, part, : Tangent.BLEND] = by_distance[b, :, part, p][..., None] * pair[:, None]
     return residual.flatten(1), jacobian.view(batch, kinds * points, -1)
 
 
@@ -255,11 +259,11 @@ def derivatives(rows: Tensor, local: Tensor) -> Tensor:
     """
     with torch.enable_grad():
         leaves = [
-            leaf.detach().clone().requires_grad_() for leaf in (local, rows[:, SX:10], *rows[:, 10:BLEND].T)
+            leaf.detach().clone().requires_grad_() for leaf in (local, rows[:, SIZE], *rows[:, PROPORTIONS].T)
         ]
         total = reference.superfrustum(leaves[0][:, None], *leaves[1:]).sum()
         slope, size, *scalars = torch.autograd.grad(total, leaves)
     identity = torch.eye(3, dtype=rows.dtype, device=rows.device)
-    rotation = reference.rotate_to_local(identity, torch.zeros_like(rows[:, :3]), rows[:, 3:7])
+    rotation = reference.rotate_to_local(identity, torch.zeros_like(rows[:, TRANSLATION]), rows[:, ROTATION])
     translation = -(rotation * slope[:, None]).sum(-1)
     return torch.cat([translation, torch.linalg.cross(slope, local), size, torch.stack(scalars, 1)], 1)

@@ -23,14 +23,11 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
+from partwright.fields.columns import STEP_WIDTH, Column, Tangent
 from partwright.fields.kernel import Floats, Limits, Penalties, Rows, Target, _points, _rows, like
 from partwright.superfrusta.torch_equations import (
-    D_SX,
-    D_SY,
-    SIGN,
-    WIDTH,
     Problem,
-    Samples,
+    SampleBatch,
     damped_step,
     distances,
     fold,
@@ -184,12 +181,12 @@ class TorchKernel:
         for piece in self._tensor(_points(points)).split(span):
             yield distances(rows, local_points(rows, piece[None]))
 
-    def _samples(self, target: Target) -> Samples:
+    def _samples(self, target: Target) -> SampleBatch:
         points, distance, weight, background = (self._tensor(array)[None] for array in target.arrays())
-        return Samples(points, distance, weight, background if background.numel() else None)
+        return SampleBatch(points, distance, weight, background if background.numel() else None)
 
-    def _ranges(self, target: Target, ranges: NDArray[np.int64]) -> Samples:
-        """Samples of each range (B, 2), padded to the longest."""
+    def _ranges(self, target: Target, ranges: NDArray[np.int64]) -> SampleBatch:
+        """SampleBatch of each range (B, 2), padded to the longest."""
         first, last = self._tensor(np.ascontiguousarray(ranges, np.int64)).unbind(1)
         offset = torch.arange(int((last - first).max()), device=self.device)
         index = first[:, None] + offset
@@ -197,12 +194,12 @@ class TorchKernel:
         index = torch.where(real, index, 0)
         points, distance, weight, background = (self._tensor(array) for array in target.arrays())
         behind = background[index] if background.numel() else None
-        return Samples(points[index], distance[index], weight[index] * real, behind)
+        return SampleBatch(points[index], distance[index], weight[index] * real, behind)
 
     def _problem(
         self,
         rows: NDArray[np.float32],
-        samples: Samples,
+        samples: SampleBatch,
         limits: Limits,
         free: NDArray[np.bool_] | None,
         tied: NDArray[np.bool_] | None,
@@ -210,7 +207,7 @@ class TorchKernel:
     ) -> Problem:
         """`free` and `tied` as given by the caller, over all parts of all assemblies of `rows` (B, M, 17)."""
         batch = rows.shape[:2]
-        free = np.ones((*batch, WIDTH), bool) if free is None else free.reshape(*batch, WIDTH)
+        free = np.ones((*batch, STEP_WIDTH), bool) if free is None else free.reshape(*batch, STEP_WIDTH)
         tied = np.zeros(batch, bool) if tied is None else tied.reshape(batch)
         movable = self._tensor(free)
         live = movable.any(-1)
@@ -224,21 +221,21 @@ class TorchKernel:
             penalties,
         )
 
-    def _loss(self, rows: Tensor, samples: Samples, beta: float, penalties: Penalties) -> Tensor:
+    def _loss(self, rows: Tensor, samples: SampleBatch, beta: float, penalties: Penalties) -> Tensor:
         """Losses (B,)."""
         total = torch.zeros(len(rows), dtype=torch.float64, device=self.device)
         for piece in samples.pieces(self._span(rows.shape[0] * rows.shape[1], FORWARD_BYTES)):
             g = distances(rows, local_points(rows, piece.points))
             field, _ = fold(g, rows, piece.background)
-            residual, _, _ = residuals(field, g, rows[..., SIGN] > 0, piece, beta, penalties)
+            residual, _, _ = residuals(field, g, rows[..., Column.SIGN] > 0, piece, beta, penalties)
             total += 0.5 * (residual * residual).sum((1, 2), dtype=torch.float64)
         return total
 
     def _system(
-        self, rows: Tensor, samples: Samples, parts: Tensor, beta: float, penalties: Penalties
+        self, rows: Tensor, samples: SampleBatch, parts: Tensor, beta: float, penalties: Penalties
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Loss (B,), J^T r (B, 15 L) and J^T J (B, 15 L, 15 L) over the L parts of that index."""
-        size = len(parts) * WIDTH
+        size = len(parts) * STEP_WIDTH
         loss, gradient, matrix = (
             torch.zeros(len(rows), *shape, dtype=torch.float64, device=self.device)
             for shape in ((), (size,), (size, size))
@@ -293,11 +290,11 @@ class TorchKernel:
         samples, parts = problem.samples.of(which), problem.parts
         loss, gradient, matrix = self._system(problem.rows[which], samples, parts, beta, problem.penalties)
         tied = problem.tied[which][:, parts].double()
-        slope = gradient.view(len(which), len(parts), WIDTH)
-        slope[..., D_SX] += tied * slope[..., D_SY]
-        blocks = matrix.view(len(which), len(parts), WIDTH, len(parts), WIDTH)
-        blocks[:, :, D_SX] += tied[:, :, None, None] * blocks[:, :, D_SY]
-        blocks[..., D_SX] += tied[:, None, None] * blocks[..., D_SY]
+        slope = gradient.view(len(which), len(parts), STEP_WIDTH)
+        slope[..., Tangent.SX] += tied * slope[..., Tangent.SY]
+        blocks = matrix.view(len(which), len(parts), STEP_WIDTH, len(parts), STEP_WIDTH)
+        blocks[:, :, Tangent.SX] += tied[:, :, None, None] * blocks[:, :, Tangent.SY]
+        blocks[..., Tangent.SX] += tied[:, None, None] * blocks[..., Tangent.SY]
         return loss, gradient, matrix
 
 

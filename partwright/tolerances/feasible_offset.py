@@ -27,8 +27,9 @@ from partwright.fields.solids import (
     Torus,
     Tube,
 )
+from partwright.fields.superfrustum import tightest_bulge
 from partwright.tolerances.augmented_lagrangian import Constraints
-from partwright.tolerances.leaves import tightest, weigh
+from partwright.tolerances.leaves import weigh
 
 _PASSES = 20
 _LEAST_WEIGHT = 0.25
@@ -101,7 +102,8 @@ def _dilated(field: SuperFrustum, by: float) -> SuperFrustum:
     x, y, z = (v + 2 * dilation for v in field.size)
     hole = min(field.size[:2]) / 2 * field.onion - dilation if field.onion > 0 else 0.0
     onion = hole / max(min(x, y) / 2, 1e-12) if hole else 0.0
-    return replace(field, dilation=0.0, size=(x, y, z), bulge=min(field.bulge, tightest(x, z)), onion=onion)
+    bulge = min(field.bulge, tightest_bulge(x, z))
+    return replace(field, dilation=0.0, size=(x, y, z), bulge=bulge, onion=onion)
 
 
 def _grown(field: Field, by: float) -> tuple[Field, float]:

@@ -20,9 +20,13 @@ from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Node
 from partwright.errors import ParameterError
 from partwright.fields import Field, SuperFrustum, kernel
+from partwright.fields.columns import ROTATION_STEP, TRANSLATION_STEP, Tangent
 from partwright.fields.operations import SHARP
+from partwright.fields.superfrustum import tightest_bulge
 
-_POSE = 6
+_POSE = Tangent.SX  # numbers of the pose come first, as in the kernel's steps; a SuperFrustum's are those
+_WIDTH, _HEIGHT, _BULGE = (entry - _POSE for entry in (Tangent.SX, Tangent.SZ, Tangent.BULGE))
+_PROPORTIONS = Tangent.ROUNDNESS - _POSE
 _STEP = 2e-3
 # A SuperFrustum's roundness (or 1), dilation, taper, bulge and onion that are these stay: a box stays a box.
 _PLAIN = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
@@ -47,11 +51,11 @@ def free_numbers(part: Part) -> NDArray[np.bool_]:
     of a SuperFrustum's other numbers those that are not plain, and last its blend unless that is 0."""
     free = np.ones(_POSE + len(numbers(part.field)) + 1, bool)
     turn = rotation_matrix(part.rotation)
-    free[3:6] = (np.abs(turn - np.rint(turn)) > _ALONG).any()
+    free[ROTATION_STEP] = (np.abs(turn - np.rint(turn)) > _ALONG).any()
     free[-1] = part.blend > SHARP
     if isinstance(part.field, SuperFrustum):
-        free[_POSE + 3 : -1] = numbers(part.field)[3:] != _PLAIN
-        free[_POSE + 3] &= part.field.roundness != 1
+        free[Tangent.ROUNDNESS : Tangent.BLEND] = numbers(part.field)[_PROPORTIONS:] != _PLAIN
+        free[Tangent.ROUNDNESS] &= part.field.roundness != 1
     return free
 
 
@@ -89,21 +93,16 @@ def moved(part: Part, step: Floats) -> Part:
     return part
 
 
-def tightest(width: float, length: float) -> float:
-    """The largest bulge of a SuperFrustum: a tighter arc folds through its own centre. 0 without a length."""
-    return math.asin(min(1.0, max(length, 0.0) / max(width, 1e-6))) / (math.pi / 2)
-
-
 def _moved(part: Part, step: Floats) -> Part:
     values = numbers(part.field) + step[_POSE:-1]
     if isinstance(part.field, SuperFrustum):
         values = np.clip(values, 0.0, [math.inf] * 3 + [1.0, math.inf, 2.0, 1.0, 1.0])
-        values[6] = min(values[6], tightest(values[0], values[2]))
-    angle = float(np.linalg.norm(step[3:6]))
+        values[_BULGE] = min(values[_BULGE], tightest_bulge(values[_WIDTH], values[_HEIGHT]))
+    angle = float(np.linalg.norm(step[ROTATION_STEP]))
     half = np.sinc(angle / (2 * math.pi)) / 2
-    turn = Similarity(1.0, (math.cos(angle / 2), *(half * step[3:6]).tolist()))
+    turn = Similarity(1.0, (math.cos(angle / 2), *(half * step[ROTATION_STEP]).tolist()))
     pose = Similarity(1.0, part.rotation, part.translation) @ turn
-    place = np.array(part.translation) + step[:3]
+    place = np.array(part.translation) + step[TRANSLATION_STEP]
     return replace(
         part,
         field=with_numbers(part.field, values),

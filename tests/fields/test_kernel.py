@@ -11,6 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from partwright.fields import kernel, reference
+from partwright.fields.columns import (
+    POSE,
+    PROPORTIONS,
+    ROTATION,
+    SHAPE,
+    SHAPE_STEP,
+    SIZE,
+    STEP_WIDTH,
+    TRANSLATION,
+    TRANSLATION_STEP,
+    WIDTH,
+    Column,
+)
 
 # A float32 kernel picks the wrong one of two equally near edges within about sqrt(eps) of where they tie.
 STEP = 5e-4
@@ -38,9 +51,9 @@ def signed(rows: np.ndarray) -> np.ndarray:
 def inner_rows(generator: np.random.Generator, parts: int) -> np.ndarray:
     """Rows away from the ends of the ranges, where every gradient exists, and away from sx = sy."""
     rows = random_rows(generator, parts)
-    rows[:, 7:10] = generator.uniform(0.05, 1.8, (parts, 3))
-    rows[:, 10:15] = generator.uniform(0.02, 0.98, (parts, 5)) * [1, 0.3, 2, 1, 1]
-    rows[:, 15] = generator.uniform(0.01, 0.5, parts)
+    rows[:, SIZE] = generator.uniform(0.05, 1.8, (parts, 3))
+    rows[:, PROPORTIONS] = generator.uniform(0.02, 0.98, (parts, 5)) * [1, 0.3, 2, 1, 1]
+    rows[:, Column.BLEND] = generator.uniform(0.01, 0.5, parts)
     return rows
 
 
@@ -116,7 +129,7 @@ def test_parts_alone_equal_the_reference() -> None:
 
 def moved(rows: torch.Tensor, change: torch.Tensor) -> torch.Tensor:
     """Rows (..., 16) after a change (..., 15) in the kernel's order of derivatives."""
-    w, x, y, z = rows[..., 3:7].unbind(-1)
+    w, x, y, z = rows[..., ROTATION].unbind(-1)
     a, b, c = (change[..., 3:6] / 2).unbind(-1)
     turned = torch.stack(
         [
@@ -127,16 +140,19 @@ def moved(rows: torch.Tensor, change: torch.Tensor) -> torch.Tensor:
         ],
         -1,
     )
-    shape = rows[..., 7:16] + change[..., 6:]
-    return torch.cat([rows[..., :3] + change[..., :3], turned, shape, rows[..., 16:]], -1)
+    shape = rows[..., SHAPE] + change[..., SHAPE_STEP]
+    return torch.cat(
+        [rows[..., TRANSLATION] + change[..., TRANSLATION_STEP], turned, shape, rows[..., Column.SIGN :]], -1
+    )
 
 
 def folded(rows: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
     """Distance (N,) of each point (N, 3) to its own copy of the assembly: rows (M, N, 16 or 17)."""
-    pose, shape = (rows[..., :3], rows[..., 3:7]), (rows[..., 7:10], *rows[..., 10:15].unbind(-1))
-    signs = rows[:, 0, 16] if rows.shape[-1] > 16 else None
+    pose = (rows[..., TRANSLATION], rows[..., ROTATION])
+    shape = (rows[..., SIZE], *rows[..., PROPORTIONS].unbind(-1))
+    signs = rows[:, 0, Column.SIGN] if rows.shape[-1] == WIDTH else None
     alone = reference.part_distance(points[:, None], *pose, *shape)[..., 0]
-    return reference.fold(alone, rows[..., 15], signs)
+    return reference.fold(alone, rows[..., Column.BLEND], signs)
 
 
 def central_difference(
@@ -150,10 +166,10 @@ def reference_gradients(rows: np.ndarray, points: np.ndarray) -> tuple[np.ndarra
     """Autograd's gradients (N, M, 15) in float64, and whether finite differences confirm them (N,)."""
     copies = torch.tensor(rows).double()[:, None].expand(-1, len(points), -1)
     at = torch.tensor(points).double()
-    change = torch.zeros(len(rows), len(points), 15, dtype=torch.float64, requires_grad=True)
+    change = torch.zeros(len(rows), len(points), STEP_WIDTH, dtype=torch.float64, requires_grad=True)
     (gradient,) = torch.autograd.grad(folded(moved(copies, change), at).sum(), change)
     smooth = torch.ones(len(points), dtype=torch.bool)
-    for part, column in itertools.product(range(len(rows)), range(15)):
+    for part, column in itertools.product(range(len(rows)), range(STEP_WIDTH)):
         direction = torch.zeros_like(gradient)
         direction[part, :, column] = 1
         coarse, fine = (central_difference(copies, direction, at, step) for step in (STEP, STEP / 2))
@@ -170,7 +186,7 @@ def test_gradients_equal_the_reference_away_from_kinks(seed: int, parts: int, bu
         rows, points = inner_rows(generator, parts), random_points(generator, 100)
         rows = signed(rows) if turn and bulge is None else rows
         if bulge is not None:  # a straight part has to feel which way to bend
-            rows[:, 13] = bulge
+            rows[:, Column.BULGE] = bulge
         expected, smooth = reference_gradients(rows, points)
         assert smooth.mean() > 0.9
         one = np.ones(1, np.float32)
@@ -218,7 +234,7 @@ def test_no_nan_at_the_ends_of_the_ranges(seed: int) -> None:
     rows = random_rows(generator, 3)
     rows[:, 7:] = np.transpose([generator.choice(values, 3) for values in ends])
     special = generator.choice([0, 1e-7, 0.5, -0.5, 0.9], (40, 3)).astype(np.float32)
-    rows[0, :7] = [0, 0, 0, 1, 0, 0, 0]
+    rows[0, POSE] = [0, 0, 0, 1, 0, 0, 0]
     assert np.isfinite(kernel.evaluate_parts(rows, special)).all()
     assert np.isfinite(kernel.gradients(rows, special, np.ones(40, np.float32))).all()
 

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from partwright import fields
 from partwright.errors import ParameterError
 from partwright.fields import Box, Capsule, Cone, Cylinder, Field, Frustum, Sphere, SuperFrustum, Torus, Tube
+from partwright.fields.columns import FIELD
 
 POINTS = np.random.default_rng(0).uniform(-1.5, 1.5, (4000, 3))
 X, Y, Z = POINTS.T
@@ -126,7 +127,7 @@ def test_rows_and_parameters_round_trip() -> None:
     np.testing.assert_array_equal(
         row, np.float32([1, 2, 3, 0, 1, 0, 0, 0.5, 0.25, 1, 0.5, 0.125, 1.5, 0.25, 0.75, 0.5])
     )
-    assert SuperFrustum.from_parameters(row[7:15]) == field
+    assert SuperFrustum.from_parameters(row[FIELD]) == field
     assert SuperFrustum.from_parameters(field.parameters()) == field
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from partwright.fields import kernel
+from partwright.fields.columns import PROPORTIONS, ROTATION, SIZE, TRANSLATION, UNSIGNED, Column
 
 TURNED = (1.0, 0.2, 0.1, -0.1)
 
@@ -29,7 +30,7 @@ def row(
 def subtracting(rows: np.ndarray, *which: int) -> np.ndarray:
     """The rows with their signs (M, 17), those of these indices subtracted."""
     signs = np.where(np.isin(np.arange(len(rows)), which), -1.0, 1.0)
-    return np.hstack([rows[:, :16], signs[:, None]]).astype(np.float32)
+    return np.hstack([rows[:, :UNSIGNED], signs[:, None]]).astype(np.float32)
 
 
 def ball(radius: float, centre=(0.0, 0.0, 0.0)) -> np.ndarray:
@@ -56,11 +57,17 @@ def exact_target(rows: np.ndarray, count: int = 6000, seed: int = 0) -> kernel.T
 def disturbed(one: np.ndarray) -> np.ndarray:
     """The row moved, turned, resized and reshaped, all within the ranges."""
     moved = one.copy()
-    moved[:3] += (0.04, -0.03, 0.03)
-    turned = Rotation.from_quat(one[3:7], scalar_first=True) * Rotation.from_rotvec((0.1, -0.08, 0.1))
-    moved[3:7] = turned.as_quat(scalar_first=True)
-    moved[7:10] *= (1.1, 0.92, 0.9)
-    moved[10:15] += (-0.2 if one[10] > 0.5 else 0.2, 0.02, 0.15, 0.1, -0.1 if one[14] > 0.1 else 0.0)
+    moved[TRANSLATION] += (0.04, -0.03, 0.03)
+    turned = Rotation.from_quat(one[ROTATION], scalar_first=True) * Rotation.from_rotvec((0.1, -0.08, 0.1))
+    moved[ROTATION] = turned.as_quat(scalar_first=True)
+    moved[SIZE] *= (1.1, 0.92, 0.9)
+    moved[PROPORTIONS] += (
+        -0.2 if one[Column.ROUNDNESS] > 0.5 else 0.2,
+        0.02,
+        0.15,
+        0.1,
+        -0.1 if one[Column.ONION] > 0.1 else 0.0,
+    )
     return moved
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from partwright.errors import SettingError
-from partwright.fields import kernel
+from partwright.fields.columns import SIZE, Column
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Fitted, Settings, fit
-from partwright.superfrusta.families import FAMILIES, held, held_down
+from partwright.superfrusta.families import FAMILIES, locked_values, with_locked_values
 from tests.superfrusta.meshes import half_torus, table
 from tests.superfrusta.rows import row
 
@@ -27,8 +27,8 @@ def arc() -> Shape:
 @pytest.mark.parametrize("family", ["superprimitive", "cuboid"])
 def test_every_part_of_a_fit_belongs_to_the_family(arc: Shape, family) -> None:
     parts = draft(arc, family=family).assembly.parts
-    for name, value in FAMILIES[family].items():
-        assert {getattr(part.field, name) for part in parts} == {value}
+    for column, value in FAMILIES[family].items():
+        assert {getattr(part.field, column.name.lower()) for part in parts} == {value}
     assert any(part.blend > 0 for part in parts)
 
 
@@ -50,12 +50,12 @@ def test_plain_unions_do_not_blend(arc: Shape) -> None:
 
 def test_held_values_replace_others_and_make_starts_equal() -> None:
     rows = np.array([row(), row(), row(size=(1, 2, 1))], np.float32)
-    rows[:, kernel.COLUMNS.index("bulge")] = (0.2, 0.6, 0.4)
-    left = held_down(rows, held("superprimitive", smooth=True))
-    np.testing.assert_array_equal(left[:, 7:10], rows[[0, 2], 7:10])
-    assert (left[:, kernel.COLUMNS.index("bulge")] == 0).all()
-    assert rows[0, kernel.COLUMNS.index("bulge")] == np.float32(0.2)
-    np.testing.assert_array_equal(held_down(rows, held("superfrustum", smooth=True)), rows)
+    rows[:, Column.BULGE] = (0.2, 0.6, 0.4)
+    left = with_locked_values(rows, locked_values("superprimitive", smooth=True))
+    np.testing.assert_array_equal(left[:, SIZE], rows[[0, 2], SIZE])
+    assert (left[:, Column.BULGE] == 0).all()
+    assert rows[0, Column.BULGE] == np.float32(0.2)
+    np.testing.assert_array_equal(with_locked_values(rows, locked_values("superfrustum", smooth=True)), rows)
 
 
 @pytest.mark.parametrize(

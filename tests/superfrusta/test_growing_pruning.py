@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from partwright.fields import kernel
+from partwright.fields.columns import WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
 from partwright.superfrusta.growing import grow
@@ -19,7 +20,7 @@ from tests.superfrusta.meshes import box, union
 from tests.superfrusta.rows import box as box_row
 
 SETTINGS = Settings.for_quality("draft", threads=1)
-NONE = np.empty((0, 17), np.float32)
+NONE = np.empty((0, WIDTH), np.float32)
 
 # Two blocks apart along x, in the unit frame already: 1.8 long.
 LEFT = ((0.6, 0.8, 0.5), (-0.6, 0.0, 0.0))
@@ -116,7 +117,7 @@ def test_neighbours_touch(pair: FitSamples, exact: np.ndarray) -> None:
 
 def test_refining_moves_the_marked_parts_only(pair: FitSamples, exact: np.ndarray) -> None:
     moved = exact.copy()
-    moved[:, 0] += 0.03
+    moved[:, Column.TX] += 0.03
     refined = refine(pair, moved, POLISH, SETTINGS, np.array([False, True]))
     np.testing.assert_array_equal(refined[0], moved[0])
     assert refined[1, 0] == pytest.approx(0.6, abs=0.003)
@@ -124,4 +125,4 @@ def test_refining_moves_the_marked_parts_only(pair: FitSamples, exact: np.ndarra
     nothing = np.zeros(2, bool)
     np.testing.assert_array_equal(refine(pair, moved, POLISH, SETTINGS, nothing), moved)
     plain = Settings.for_quality("draft", threads=1, smooth=False)
-    np.testing.assert_array_equal(refine(pair, moved, POLISH, plain)[:, 15], moved[:, 15])
+    np.testing.assert_array_equal(refine(pair, moved, POLISH, plain)[:, Column.BLEND], moved[:, Column.BLEND])

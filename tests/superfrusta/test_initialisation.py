@@ -8,11 +8,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from partwright.fields.columns import ROTATION, SHAPE, SIZE, TRANSLATION, WIDTH, Column
 from partwright.superfrusta.initialisation import starts, thinned
 from partwright.superfrusta.refining import LIMITS
 
 SPACING = 0.03
-SHAPE = slice(7, 16)
 
 
 def voxels_of_box(size: np.ndarray, rotation: Rotation, centre: np.ndarray) -> np.ndarray:
@@ -25,17 +25,17 @@ def voxels_of_box(size: np.ndarray, rotation: Rotation, centre: np.ndarray) -> n
 
 def local(rows: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points (K, n, 3) in the frame of each row."""
-    rotations = Rotation.from_quat(rows[:, 3:7], scalar_first=True).as_matrix()
-    return np.einsum("nki,kij->knj", points[:, None] - rows[:, :3], rotations)
+    rotations = Rotation.from_quat(rows[:, ROTATION], scalar_first=True).as_matrix()
+    return np.einsum("nki,kij->knj", points[:, None] - rows[:, TRANSLATION], rotations)
 
 
 def check(rows: np.ndarray) -> None:
     """What every start must be, whatever the region: finite, in range, with a proper rotation."""
     assert rows.dtype == np.float32
-    assert rows.shape[1] == 17
+    assert rows.shape[1] == WIDTH
     assert len(rows) > 0
     assert np.isfinite(rows).all()
-    np.testing.assert_allclose(np.linalg.norm(rows[:, 3:7], axis=1), 1, atol=1e-5)
+    np.testing.assert_allclose(np.linalg.norm(rows[:, ROTATION], axis=1), 1, atol=1e-5)
     lower, upper, _ = LIMITS.array()
     assert (rows[:, SHAPE] >= lower[6:]).all()
     assert (rows[:, SHAPE] <= upper[6:]).all()
@@ -52,10 +52,10 @@ def test_starts_are_in_range_and_cover_their_region(size, angles, centre) -> Non
     region = voxels_of_box(np.array(size), Rotation.from_rotvec(angles), np.array(centre))
     rows = starts(region, SPACING)
     check(rows)
-    straight = rows[rows[:, 13] == 0]
-    inside = (np.abs(local(straight, region)) < straight[:, None, 7:10] / 2 + SPACING).all(axis=2)
+    straight = rows[rows[:, Column.BULGE] == 0]
+    inside = (np.abs(local(straight, region)) < straight[:, None, SIZE] / 2 + SPACING).all(axis=2)
     assert inside.mean(axis=1).min() > 0.8
-    assert np.linalg.norm(straight[:, :3] - np.array(centre), axis=1).max() < 0.5 * max(size)
+    assert np.linalg.norm(straight[:, TRANSLATION] - np.array(centre), axis=1).max() < 0.5 * max(size)
 
 
 @pytest.mark.parametrize("count", [1, 599, 600, 1199, 1200, 1201, 2400, 9001])
@@ -73,10 +73,10 @@ def test_thinning_takes_points_from_everywhere(count) -> None:
 def test_a_turned_bar_has_a_start_that_is_the_bar() -> None:
     size, turned = np.array([0.9, 0.5, 0.2]), Rotation.from_rotvec((0.4, -0.7, 0.3))
     rows = starts(voxels_of_box(size, turned, np.array([0.1, 0.2, -0.1])), 0.02)
-    axes = Rotation.from_quat(rows[:, 3:7], scalar_first=True).as_matrix()
+    axes = Rotation.from_quat(rows[:, ROTATION], scalar_first=True).as_matrix()
     aligned = np.abs(np.einsum("ij,kjl->kil", turned.as_matrix().T, axes)).max(axis=1).min(axis=1) > 0.995
-    fitting = (np.abs(np.sort(rows[:, 7:10], axis=1) - np.sort(size)) < 0.06).all(axis=1)
-    placed = np.linalg.norm(rows[:, :3] - (0.1, 0.2, -0.1), axis=1) < 0.03
+    fitting = (np.abs(np.sort(rows[:, SIZE], axis=1) - np.sort(size)) < 0.06).all(axis=1)
+    placed = np.linalg.norm(rows[:, TRANSLATION] - (0.1, 0.2, -0.1), axis=1) < 0.03
     assert (aligned & fitting & placed).any()
     # Each of the bar's axes is the profile axis of some start: it may be a plate, a blade or a rod.
     for axis in turned.as_matrix().T:
@@ -85,15 +85,15 @@ def test_a_turned_bar_has_a_start_that_is_the_bar() -> None:
 
 def test_there_are_solid_hollow_and_bent_ones_boxy_and_round() -> None:
     rows = starts(voxels_of_box(np.array([0.3, 0.3, 0.9]), Rotation.identity(), np.zeros(3)), SPACING)
-    roundness, bulge, onion = rows[:, 10], rows[:, 13], rows[:, 14]
+    roundness, bulge, onion = rows[:, Column.ROUNDNESS], rows[:, Column.BULGE], rows[:, Column.ONION]
     assert ((roundness < 0.5) & (bulge == 0) & (onion == 0)).any()
     assert ((roundness > 0.5) & (bulge == 0) & (onion == 0)).any()
     assert (onion > 0.5).any()
     bent = rows[bulge > 0]
-    directions = Rotation.from_quat(bent[:, 3:7], scalar_first=True).apply((-1.0, 0, 0))
+    directions = Rotation.from_quat(bent[:, ROTATION], scalar_first=True).apply((-1.0, 0, 0))
     assert len(np.unique(directions.round(3), axis=0)) == 4  # bulging to all four sides
     assert np.allclose(
-        Rotation.from_quat(bent[:, 3:7], scalar_first=True).apply((0, 0, 1.0))[:, 2] ** 2, 1, atol=1e-3
+        Rotation.from_quat(bent[:, ROTATION], scalar_first=True).apply((0, 0, 1.0))[:, 2] ** 2, 1, atol=1e-3
     )
 
 

@@ -9,6 +9,18 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from partwright.fields import kernel
+from partwright.fields.columns import (
+    FIELD,
+    ROTATION,
+    ROTATION_STEP,
+    SHAPE,
+    SIZE,
+    STEP_WIDTH,
+    TRANSLATION,
+    UNSIGNED,
+    Column,
+    Tangent,
+)
 from partwright.superfrusta.refining import LIMITS
 from tests.superfrusta.rows import (
     TURNED,
@@ -22,11 +34,11 @@ from tests.superfrusta.rows import (
 
 STAGES = ((15.0, 20), (40.0, 20), (100.0, 30))
 BOTH = kernel.Penalties(overlap=0.3, blending=0.2)
-BLEND = kernel.DERIVATIVES.index("blend")
-SX, SZ, BULGE = (kernel.DERIVATIVES.index(name) for name in ("sx", "sz", "bulge"))
-SIZES = slice(kernel.COLUMNS.index("sx"), kernel.COLUMNS.index("sign"))
+BLEND = Tangent.BLEND
+SX, SZ, BULGE = Tangent.SX, Tangent.SZ, Tangent.BULGE
+SIZES = SHAPE
 # A quaternion's entries move with the local rotation; every other derivative has a column of its own.
-COLUMN_OF = {d: kernel.COLUMNS.index(name) for d, name in enumerate(kernel.DERIVATIVES) if name[0] != "w"}
+COLUMN_OF = {d: Column[d.name] for d in Tangent if d.name[0] != "W"}
 
 POSE = ((0.1, -0.05, 0.02), TURNED)
 SOLIDS = {
@@ -47,9 +59,9 @@ def moved(rows: np.ndarray, part: int, derivative: int, step: float) -> np.ndarr
     if derivative in COLUMN_OF:
         changed[part, COLUMN_OF[derivative]] += step
         return changed
-    turn = Rotation.from_rotvec(step * np.eye(3)[derivative - kernel.DERIVATIVES.index("wx")])
-    turned = Rotation.from_quat(rows[part, 3:7], scalar_first=True) * turn
-    changed[part, 3:7] = turned.as_quat(scalar_first=True)
+    turn = Rotation.from_rotvec(step * np.eye(3)[derivative - Tangent.WX])
+    turned = Rotation.from_quat(rows[part, ROTATION], scalar_first=True) * turn
+    changed[part, ROTATION] = turned.as_quat(scalar_first=True)
     return changed
 
 
@@ -62,10 +74,10 @@ def test_a_disturbed_solid_is_found_again(name: str) -> None:
     assert loss < 1e-9
     assert loss == pytest.approx(kernel.loss(found, target, 100.0), rel=1e-3, abs=1e-12)
     assert 0 < iterations <= sum(count for _, count in STAGES)
-    np.testing.assert_allclose(found[0, :3], true[:3], atol=1e-3)
-    np.testing.assert_allclose(found[0, 7:15], true[7:15], atol=1e-3)
+    np.testing.assert_allclose(found[0, TRANSLATION], true[TRANSLATION], atol=1e-3)
+    np.testing.assert_allclose(found[0, FIELD], true[FIELD], atol=1e-3)
     if name not in ROUND:
-        np.testing.assert_allclose(found[0, 3:7], true[3:7], atol=1e-3)
+        np.testing.assert_allclose(found[0, ROTATION], true[ROTATION], atol=1e-3)
     everywhere = points_in_box(2000, seed=9)
     np.testing.assert_allclose(
         kernel.evaluate(found, everywhere), kernel.evaluate(true[None], everywhere), atol=1e-4
@@ -83,8 +95,8 @@ def test_a_disturbed_assembly_is_found_again() -> None:
     start = np.array([disturbed(true[0]), disturbed(true[1])])
     found, loss, _ = kernel.levenberg_marquardt(start, target, STAGES, LIMITS, threads=1)
     assert loss < 1e-8
-    np.testing.assert_allclose(found[:, :3], true[:, :3], atol=2e-3)
-    assert found[1, 15] == pytest.approx(0.1, abs=5e-3)
+    np.testing.assert_allclose(found[:, TRANSLATION], true[:, TRANSLATION], atol=2e-3)
+    assert found[1, Column.BLEND] == pytest.approx(0.1, abs=5e-3)
 
 
 def test_a_perfect_start_stays_bit_for_bit() -> None:
@@ -106,7 +118,7 @@ def test_the_gradient_is_the_derivative_of_the_loss(
     assert gradient[0, BLEND] == 0  # the first part joins nothing
     found = np.zeros_like(gradient)
     for part in range(3):
-        for derivative in range(15):
+        for derivative in range(STEP_WIDTH):
             ahead, behind = (moved(rows, part, derivative, step) for step in (5e-4, -5e-4))
             rise = kernel.loss(ahead, target, beta, penalties) - kernel.loss(behind, target, beta, penalties)
             found[part, derivative] = rise / 1e-3
@@ -123,7 +135,7 @@ def test_the_matrix_is_the_curvature_of_the_loss_where_it_fits() -> None:
     assert np.abs(gradient).max() == 0
     generator = np.random.default_rng(0)
     for _ in range(5):
-        v = np.zeros((2, 15))
+        v = np.zeros((2, STEP_WIDTH))
         v[:, list(COLUMN_OF)] = generator.normal(size=(2, len(COLUMN_OF))) * 1e-3
         near = rows.copy()
         for derivative, column in COLUMN_OF.items():
@@ -146,16 +158,16 @@ def test_a_subtracted_part_is_found_again() -> None:
     """A block with a bore, both disturbed."""
     true = subtracting(np.stack([row(size=(1.2, 0.9, 0.5)), row(size=(0.4, 0.4, 0.8), roundness=1.0)]), 1)
     start = true.copy()
-    start[:, :3] += 0.04
+    start[:, TRANSLATION] += 0.04
     start[:, 7:9] *= 0.9
-    free = np.ones((2, 15), bool)
+    free = np.ones((2, STEP_WIDTH), bool)
     free[:, BLEND - 5 : BLEND] = False  # sharp and straight: a length and the dilation would share the work
     target = exact_target(true)
     found, loss, _ = kernel.levenberg_marquardt(start, target, STAGES, LIMITS, free=free, threads=1)
     assert loss < 1e-7
-    np.testing.assert_allclose(found[0, 7:10], true[0, 7:10], atol=5e-3)
+    np.testing.assert_allclose(found[0, SIZE], true[0, SIZE], atol=5e-3)
     np.testing.assert_allclose(found[1, 7:9], true[1, 7:9], atol=5e-3)
-    np.testing.assert_array_equal(found[:, 16], (1, -1))
+    np.testing.assert_array_equal(found[:, Column.SIGN], (1, -1))
 
 
 def test_only_parts_that_are_added_overlap() -> None:
@@ -195,8 +207,8 @@ def test_weight_zero_is_not_there() -> None:
 def test_locked_parameters_stay_bit_for_bit(seed: int, density: float) -> None:
     generator = np.random.default_rng(seed)
     rows, target = random_rows(3, seed), exact_target(random_rows(2, seed + 1), 1500)
-    free = generator.random((3, 15)) < density
-    free[:, 3:6] = free[:, 3:4]  # a quaternion moves as a whole
+    free = generator.random((3, STEP_WIDTH)) < density
+    free[:, ROTATION_STEP] = free[:, [Tangent.WX]]  # a quaternion moves as a whole
     free[0] = False  # and a whole part stays
     free[:, BULGE] |= (
         free[:, SX] | free[:, SZ]
@@ -206,17 +218,17 @@ def test_locked_parameters_stay_bit_for_bit(seed: int, density: float) -> None:
     for derivative, column in COLUMN_OF.items():
         locked = ~free[:, derivative]
         np.testing.assert_array_equal(found[locked, column], rows[locked, column])
-    locked = ~free[:, 3]
-    np.testing.assert_array_equal(found[locked, 3:7], rows[locked, 3:7])
+    locked = ~free[:, Tangent.WX]
+    np.testing.assert_array_equal(found[locked, ROTATION], rows[locked, ROTATION])
 
 
 def test_a_locked_bulge_stays_where_the_size_shrinks() -> None:
     bent = row(size=(0.8, 0.4, 0.7), bulge=0.6)[None]
-    free = np.zeros((1, 15), bool)
+    free = np.zeros((1, STEP_WIDTH), bool)
     free[0, SZ] = True
     target = exact_target(row(size=(0.8, 0.4, 0.3))[None])
     found, _, _ = kernel.levenberg_marquardt(bent, target, STAGES, LIMITS, free=free)
-    assert found[0, 9] < 0.7
+    assert found[0, Column.SZ] < 0.7
     assert found[0, COLUMN_OF[BULGE]] == bent[0, COLUMN_OF[BULGE]]
 
 
@@ -229,7 +241,7 @@ def test_bounds_are_kept_and_the_loss_never_rises(seed: int) -> None:
     lower, upper, _ = LIMITS.array()
     assert (found[:, SIZES] >= lower[6:]).all()
     assert (found[:, SIZES] <= upper[6:]).all()
-    np.testing.assert_allclose(np.linalg.norm(found[:, 3:7], axis=1), 1, atol=1e-5)
+    np.testing.assert_allclose(np.linalg.norm(found[:, ROTATION], axis=1), 1, atol=1e-5)
     _, one_stage, _ = kernel.levenberg_marquardt(rows, target, STAGES[-1:], LIMITS, penalties=BOTH, threads=1)
     before = kernel.loss(rows, target, STAGES[-1][0], BOTH)
     assert one_stage <= before
@@ -301,6 +313,6 @@ def test_wrong_shapes_are_refused() -> None:
     with pytest.raises(ValueError, match=r"background must be \(4,\), got \(2,\)"):
         kernel.Target(points, values, values, values[:2])
     with pytest.raises(ValueError, match="parameter rows must be"):
-        kernel.loss(np.zeros((0, 16)), kernel.Target(points, values, values), 10.0)
+        kernel.loss(np.zeros((0, UNSIGNED)), kernel.Target(points, values, values), 10.0)
     with pytest.raises(ValueError, match=r"the field must be \(X, Y, Z\)"):
         kernel.decompose(np.zeros((4, 4)), 0.1, 3, 0.02, 0.0, 1)

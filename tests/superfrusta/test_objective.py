@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from partwright.fields import kernel
+from partwright.fields.columns import UNSIGNED
 from partwright.shapes.grid import DistanceGrid
 from partwright.superfrusta.backend import backend
 from partwright.superfrusta.objective import occupancy_score, removal_scores, score, volume_iou
@@ -68,7 +69,7 @@ def test_the_score_of_balls_by_hand() -> None:
 
 
 def test_nothing_scores_nothing() -> None:
-    made, none = by_hand(), np.empty((0, 16), np.float32)
+    made, none = by_hand(), np.empty((0, UNSIGNED), np.float32)
     assert score(made, none) == 0.0
     assert volume_iou(made, none) == 0.0
 

@@ -11,10 +11,11 @@ import torch
 
 from partwright.errors import SettingError
 from partwright.fields import kernel
+from partwright.fields.columns import PROPORTIONS, ROTATION, SIZE, TRANSLATION, UNSIGNED, Column
 from partwright.superfrusta.paper import (
     Losses,
+    LossSamples,
     PaperConfig,
-    Samples,
     fade,
     losses,
     optimise,
@@ -41,7 +42,7 @@ def one_thread() -> Iterator[None]:
 
 def rows_of(*parts: list[float]) -> np.ndarray:
     rows = np.array(parts, np.float32)
-    rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
+    rows[:, ROTATION] /= np.linalg.norm(rows[:, ROTATION], axis=1, keepdims=True)
     return rows
 
 
@@ -62,9 +63,9 @@ def iou(rows: np.ndarray, other: np.ndarray) -> float:
 def perturbed(rows: np.ndarray) -> np.ndarray:
     generator = np.random.default_rng(3)
     changed = rows.copy()
-    changed[:, :3] += generator.normal(size=(len(rows), 3)) * 0.05
-    changed[:, 3:7] += generator.normal(size=(len(rows), 4)) * 0.05
-    changed[:, 7:10] *= generator.uniform(0.8, 1.25, (len(rows), 3))
+    changed[:, TRANSLATION] += generator.normal(size=(len(rows), 3)) * 0.05
+    changed[:, ROTATION] += generator.normal(size=(len(rows), 4)) * 0.05
+    changed[:, SIZE] *= generator.uniform(0.8, 1.25, (len(rows), 3))
     return project(torch.tensor(changed)).numpy()
 
 
@@ -105,7 +106,7 @@ def test_losses_of_one_sphere_equal_the_numbers_worked_out_by_hand() -> None:
     points = torch.tensor(
         [[0.4, 0, 0], [0, 0.55, 0], [0, 0, 0.9]], dtype=torch.float64
     )  # F = -0.1, 0.05, 0.4
-    samples = Samples(
+    samples = LossSamples(
         points, torch.tensor([-0.1, -0.2, -0.3]).double(), torch.tensor([1.0, 2.0, 9.0]).double()
     )
     near, far, beyond = (1 / (1 + math.exp(10 * f)) for f in (-0.1, 0.05, 0.4))
@@ -135,14 +136,14 @@ def test_the_total_weighs_and_switches_off() -> None:
 @pytest.mark.parametrize("soft", [False, True])
 def test_gradients_equal_finite_differences(term: str, soft: bool) -> None:
     start = perturbed(rows_of(BOX, ROD))
-    start[:, 10:15] = [[0.4, 0.03, 0.9, 0.2, 0.3], [0.6, 0.04, 1.1, 0.1, 0.2]]
+    start[:, PROPORTIONS] = [[0.4, 0.03, 0.9, 0.2, 0.3], [0.6, 0.04, 1.1, 0.1, 0.2]]
     points, distance, weight = (torch.tensor(a).double() for a in samples_of(rows_of(BOX, ROD), count=60))
     config = PaperConfig(soft_target=soft, tau=0.5)
     rows = torch.tensor(start).double().requires_grad_()
     existence = torch.tensor([0.9, 0.8]).double().requires_grad_()
 
     def loss(rows: torch.Tensor, existence: torch.Tensor) -> torch.Tensor:
-        return getattr(losses(rows, existence, Samples(points, distance, weight), 8.0, config), term)
+        return getattr(losses(rows, existence, LossSamples(points, distance, weight), 8.0, config), term)
 
     assert torch.autograd.gradcheck(loss, (rows, existence), eps=1e-6, atol=1e-7, rtol=1e-4)
 
@@ -168,7 +169,7 @@ def test_a_redundant_part_loses_its_existence(seed: int) -> None:
     assert found.existence[2] < 0.1
     assert found.existence[:2].min() > 0.9
     np.testing.assert_array_equal(found.kept, [True, True, False])
-    assert found.rows.shape == (2, 16)
+    assert found.rows.shape == (2, UNSIGNED)
     assert iou(found.rows, truth) > 0.95
 
 
@@ -183,7 +184,7 @@ def test_without_the_count_loss_every_part_stays() -> None:
 def test_locked_rows_stay_bit_for_bit_and_exist() -> None:
     truth = rows_of(BOX, ROD)
     start = perturbed(truth)
-    start[0, 3:7] *= 1.5  # not even normalised
+    start[0, ROTATION] *= 1.5  # not even normalised
     found = optimise(start, *samples_of(truth), config=QUICK, seed=0, locked=1)
     np.testing.assert_array_equal(found.rows[0], start[0])
     assert (found.rows[1] != start[1]).any()
@@ -218,12 +219,13 @@ def test_descent_ends_inside_the_bounds() -> None:
 
 
 def test_projection_keeps_rows_inside_their_bounds() -> None:
-    wild = np.random.default_rng(0).normal(size=(200, 16)).astype(np.float32) * 4
+    wild = np.random.default_rng(0).normal(size=(200, UNSIGNED)).astype(np.float32) * 4
     rows = project(torch.tensor(wild))
-    np.testing.assert_allclose(rows[:, 3:7].norm(dim=1), 1, atol=1e-6)
-    assert ((rows[:, 10] >= 0) & (rows[:, 10] <= 1)).all()
-    assert (rows[:, 7:10] > 0).all()
-    assert (torch.sin(rows[:, 13] * math.pi / 2) <= (rows[:, 9] / rows[:, 7]).clamp(max=1) + 1e-5).all()
+    np.testing.assert_allclose(rows[:, ROTATION].norm(dim=1), 1, atol=1e-6)
+    assert ((rows[:, Column.ROUNDNESS] >= 0) & (rows[:, Column.ROUNDNESS] <= 1)).all()
+    assert (rows[:, SIZE] > 0).all()
+    slender = (rows[:, Column.SZ] / rows[:, Column.SX]).clamp(max=1)
+    assert (torch.sin(rows[:, Column.BULGE] * math.pi / 2) <= slender + 1e-5).all()
     torch.testing.assert_close(project(rows), rows)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from partwright.fields.columns import SIZE, UNSIGNED, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.samples import FitSamples
@@ -23,10 +24,10 @@ def box() -> FitSamples:
 
 def bar(reach: float, radius: float = 0.04) -> np.ndarray:
     """The box, and a thin bar along z that ends `reach` above its middle."""
-    row = np.zeros((2, 16), np.float32)
-    row[:, 3], row[:, 12] = 1.0, 1.0
-    row[0, 7:10] = 1.8, 0.9, 0.9
-    row[1, 7:10] = 2 * radius, 2 * radius, 2 * reach
+    row = np.zeros((2, UNSIGNED), np.float32)
+    row[:, Column.QW], row[:, Column.TAPER] = 1.0, 1.0
+    row[0, SIZE] = 1.8, 0.9, 0.9
+    row[1, SIZE] = 2 * radius, 2 * radius, 2 * reach
     return row
 
 

@@ -27,6 +27,7 @@ from partwright.fields import (
     Tube,
     kernel,
 )
+from partwright.fields.columns import WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta.flat_tree import flattened, nested
 from partwright.superfrusta.growing import Region, fit_regions
@@ -222,9 +223,9 @@ def test_a_cut_is_fitted_to_what_is_covered_too_much() -> None:
     corner = (samples.grid_points[:, 0] > 0) & (samples.grid_points[:, 1] > 0)
     region = Region(over.ravel() & corner, rows, 0.1, 0.2, 0.15, sign=-1.0)
     (cut,) = fit_regions(samples, [region], DRAFT)
-    assert cut[16] == -1
+    assert cut[Column.SIGN] == -1
     np.testing.assert_allclose(cut[:2], (0.6, 0.3), atol=0.01)
-    assert NOTHING.shape == (0, 17)
+    assert NOTHING.shape == (0, WIDTH)
 
 
 def test_hollow_solids_are_their_pieces() -> None:

@@ -14,6 +14,7 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.parts_from_rows import parts_from_rows
 from partwright.assembly.rows import rows
 from partwright.fields import SuperFrustum, kernel
+from partwright.fields.columns import Column
 from partwright.shapes import load_shape
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.repeated_parts import repeat
@@ -145,7 +146,7 @@ def test_copies_are_refitted_as_one(isometry: Isometry, others: list[int]) -> No
     leg = exact[1].copy()
     leg[:3] += (0.02, -0.015, 0.01)
     leg[3:7] = Similarity(1.0, (1.0, 0.02, 0.02, 0.05)).rotation
-    leg[7:9] *= 1.15
+    leg[[Column.SX, Column.SY]] *= 1.15
     fixed = [RepeatedPart(row) for row in exact[others]]
     before = [*fixed, RepeatedPart(leg, (isometry,))]
     after = refit(samples, before, ((100.0, 15),), DRAFT, locked=len(fixed))

@@ -9,6 +9,21 @@ import pytest
 import torch
 
 from partwright.fields import kernel, reference
+from partwright.fields.columns import (
+    FIELD,
+    PROPORTIONS,
+    ROTATION,
+    ROTATION_STEP,
+    SHAPE,
+    SHAPE_STEP,
+    SIZE,
+    STEP_WIDTH,
+    TRANSLATION,
+    TRANSLATION_STEP,
+    UNSIGNED,
+    Column,
+    Tangent,
+)
 from partwright.superfrusta.torch_equations import damped_step
 from partwright.superfrusta.torch_kernel import TorchKernel
 from tests.superfrusta.rows import subtracting
@@ -60,10 +75,10 @@ def target_of(rows: np.ndarray, generator: np.random.Generator, count: int = 300
 
 def perturbed(rows: np.ndarray, generator: np.random.Generator, amount: float = 0.05) -> np.ndarray:
     changed = rows.copy()
-    changed[:, :3] += generator.normal(size=(len(rows), 3)) * amount
-    changed[:, 3:7] += generator.normal(size=(len(rows), 4)) * amount
-    changed[:, 7:10] *= 1 + generator.normal(size=(len(rows), 3)) * amount
-    changed[:, 10:15] = [0.5, 0.02, 1.0, 0.1, 0.2]
+    changed[:, TRANSLATION] += generator.normal(size=(len(rows), 3)) * amount
+    changed[:, ROTATION] += generator.normal(size=(len(rows), 4)) * amount
+    changed[:, SIZE] *= 1 + generator.normal(size=(len(rows), 3)) * amount
+    changed[:, PROPORTIONS] = [0.5, 0.02, 1.0, 0.1, 0.2]
     return changed
 
 
@@ -112,16 +127,21 @@ def exact_gradient(
 ) -> np.ndarray:
     """Gradient (15 M,) of the loss by autograd through the reference, in float64."""
     start = torch.tensor(rows).double()
-    change = torch.zeros(len(rows), 15, dtype=torch.float64, requires_grad=True)
-    (w, x, y, z), (a, b, c) = start[:, 3:7].T, change[:, 3:6].T / 2
+    change = torch.zeros(len(rows), STEP_WIDTH, dtype=torch.float64, requires_grad=True)
+    (w, x, y, z), (a, b, c) = start[:, ROTATION].T, change[:, ROTATION_STEP].T / 2
     rotation = [w - x * a - y * b - z * c, x + w * a + y * c - z * b, y + w * b + z * a - x * c]
     rotation.append(z + w * c + x * b - y * a)  # q (1, w/2): R exp(w) to first order
     moved = torch.cat(
-        [start[:, :3] + change[:, :3], torch.stack(rotation, 1), start[:, 7:16] + change[:, 6:]], 1
+        [
+            start[:, TRANSLATION] + change[:, TRANSLATION_STEP],
+            torch.stack(rotation, 1),
+            start[:, SHAPE] + change[:, SHAPE_STEP],
+        ],
+        1,
     )
     points, distance, weight, background = (torch.tensor(array).double() for array in target.arrays())
     alone = reference.evaluate_parts(moved, points)
-    blends, signs = moved[:, 15], start[:, 16]
+    blends, signs = moved[:, Column.BLEND], start[:, Column.SIGN]
     if len(background):
         alone = torch.cat([background[None], alone])
         blends, signs = torch.cat([blends[:1], blends]), torch.cat([torch.ones(1), signs])
@@ -192,9 +212,9 @@ def test_bounds_and_ties_shape_the_steps_as_in_the_compiled_kernel(
 ) -> None:
     generator = np.random.default_rng(2)
     truth = random_rows(generator, 1)
-    truth[0, 10:15] = [0.0, 0.0, 1.0, 0.0, 0.0]
+    truth[0, PROPORTIONS] = [0.0, 0.0, 1.0, 0.0, 0.0]
     target, start = target_of(truth, generator), perturbed(truth, generator)
-    start[0, 7:15] = [0.5, 0.5, 0.7, 0.0, 0.0, 1.2, 0.0, 0.0]  # several parameters on their bounds
+    start[0, FIELD] = [0.5, 0.5, 0.7, 0.0, 0.0, 1.2, 0.0, 0.0]  # several parameters on their bounds
     mask = np.array([tied])
     for steps in (1, 2, 4):
         expected, loss, _ = kernel.levenberg_marquardt(start, target, [(15, steps)], LIMITS, tied=mask)
@@ -237,16 +257,16 @@ def test_a_fit_ends_where_the_compiled_one_ends(
     assert found == pytest.approx(loss, rel=0.02)
     assert found == pytest.approx(kernel.loss(rows, target, STAGES[-1][0], penalties), rel=1e-4)
     assert 0 < steps <= sum(count for _, count in STAGES)
-    np.testing.assert_allclose(np.linalg.norm(rows[:, 3:7], axis=1), 1, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(rows[:, ROTATION], axis=1), 1, atol=1e-6)
 
 
 def test_only_free_entries_move_and_ties_hold(torch_kernel: TorchKernel) -> None:
     generator = np.random.default_rng(4)
     truth = random_rows(generator, 3)
     target, start = target_of(truth, generator), perturbed(truth, generator)
-    start[1, 8] = start[1, 7]
-    start[0, 8] = 2 * start[0, 7]  # marked as tied, but nothing of it is free
-    free = np.ones((3, 15), bool)
+    start[1, Column.SY] = start[1, Column.SX]
+    start[0, Column.SY] = 2 * start[0, Column.SX]  # marked as tied, but nothing of it is free
+    free = np.ones((3, STEP_WIDTH), bool)
     free[0] = False
     free[1, 3:6] = False
     tied = np.array([True, True, False])
@@ -254,24 +274,26 @@ def test_only_free_entries_move_and_ties_hold(torch_kernel: TorchKernel) -> None
     rows, loss, _ = torch_kernel.levenberg_marquardt(start, target, STAGES, LIMITS, **options)
     _, expected, _ = kernel.levenberg_marquardt(start, target, STAGES, LIMITS, **options)
     np.testing.assert_array_equal(rows[0], start[0])
-    np.testing.assert_array_equal(rows[1, 3:7], start[1, 3:7])
-    assert rows[1, 7] == rows[1, 8] != start[1, 7]
+    np.testing.assert_array_equal(rows[1, ROTATION], start[1, ROTATION])
+    assert rows[1, Column.SX] == rows[1, Column.SY] != start[1, Column.SX]
     assert loss == pytest.approx(expected, rel=0.02)
 
 
 def test_a_fit_stays_in_the_box_and_off_folded_arcs(torch_kernel: TorchKernel) -> None:
     generator = np.random.default_rng(5)
     bent = random_rows(generator, 1)
-    bent[0, 7:15] = [0.5, 0.3, 0.55, 0.5, 0.01, 1.0, 1.0, 0.0]
+    bent[0, FIELD] = [0.5, 0.3, 0.55, 0.5, 0.01, 1.0, 1.0, 0.0]
     target = target_of(bent, generator)
     start = perturbed(bent, generator, 0.02)
-    start[0, 7:10] = [0.4, 0.3, 0.3]
-    start[0, 13] = 0.5
+    start[0, SIZE] = [0.4, 0.3, 0.3]
+    start[0, Column.BULGE] = 0.5
     rows, _, _ = torch_kernel.levenberg_marquardt(start, target, STAGES, LIMITS)
     lower, upper, _ = LIMITS.array()
     assert (rows[0, 7:] >= lower[6:]).all()
     assert (rows[0, 7:] <= upper[6:]).all()
-    assert np.sin(rows[0, 13] * np.pi / 2) <= min(1.0, rows[0, 9] / rows[0, 7]) + 1e-5
+    assert (
+        np.sin(rows[0, Column.BULGE] * np.pi / 2) <= min(1.0, rows[0, Column.SZ] / rows[0, Column.SX]) + 1e-5
+    )
 
 
 def test_a_bulge_that_is_not_free_keeps_its_bits(torch_kernel: TorchKernel) -> None:
@@ -279,13 +301,13 @@ def test_a_bulge_that_is_not_free_keeps_its_bits(torch_kernel: TorchKernel) -> N
     truth = random_rows(generator, 1)
     target = target_of(truth, generator)
     start = perturbed(truth, generator, 0.02)
-    start[0, 13] = 0.9  # tighter than its size allows
-    start[0, 9] = 0.5 * start[0, 7]
-    free = np.ones((1, 15), bool)
+    start[0, Column.BULGE] = 0.9  # tighter than its size allows
+    start[0, Column.SZ] = 0.5 * start[0, Column.SX]
+    free = np.ones((1, STEP_WIDTH), bool)
     free[0, 12] = False
     rows, _, _ = torch_kernel.levenberg_marquardt(start, target, STAGES, LIMITS, free=free)
-    assert rows[0, 13] == start[0, 13]
-    assert (rows[0, 7:10] != start[0, 7:10]).all()
+    assert rows[0, Column.BULGE] == start[0, Column.BULGE]
+    assert (rows[0, SIZE] != start[0, SIZE]).all()
 
 
 def test_starts_of_unequal_ranges_each_fit_like_alone(torch_kernel: TorchKernel) -> None:
@@ -304,14 +326,14 @@ def test_starts_of_unequal_ranges_each_fit_like_alone(torch_kernel: TorchKernel)
     ends = 1 + np.cumsum([900, 1500, 600])
     ranges = np.stack([ends - [900, 1500, 600], ends], 1)
     starts = np.concatenate([perturbed(truths, generator), perturbed(truths, generator)])
-    free = np.ones((6, 15), bool)
-    free[2, 12] = False  # the bulge of one start
+    free = np.ones((6, STEP_WIDTH), bool)
+    free[2, Tangent.BULGE] = False  # the bulge of one start
     ranges = np.concatenate([ranges, ranges])
     expected, expected_losses = kernel.fit_starts(starts, ranges, joined, STAGES, LIMITS, free=free)
     rows, losses = torch_kernel.fit_starts(starts, ranges, joined, STAGES, LIMITS, free=free)
     initial = np.array([kernel.loss(s[None], targets[i % 3], STAGES[-1][0]) for i, s in enumerate(starts)])
     assert rows.shape == expected.shape
-    assert rows[2, 13] == starts[2, 13]
+    assert rows[2, Column.BULGE] == starts[2, Column.BULGE]
     np.testing.assert_array_less(np.abs(losses - expected_losses), 0.02 * expected_losses + 1e-4 * initial)
     for i in range(6):
         _, alone, _ = torch_kernel.levenberg_marquardt(
@@ -353,4 +375,4 @@ def test_wrong_shapes_are_refused() -> None:
     with pytest.raises(ValueError, match="parameter rows must be"):
         TorchKernel("cpu").evaluate(np.zeros((2, 12)), np.zeros((4, 3)))
     with pytest.raises(ValueError, match="points must be"):
-        TorchKernel("cpu").evaluate(np.ones((2, 16)), np.zeros((4, 2)))
+        TorchKernel("cpu").evaluate(np.ones((2, UNSIGNED)), np.zeros((4, 2)))
