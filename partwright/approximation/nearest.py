@@ -22,12 +22,15 @@ from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import NO_ROTATION, quaternion_product, rotation_matrix
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.fields import Box, Capsule, Cone, Cylinder, Field, Frustum, Sphere, Torus, Tube
+from partwright.least_squares import Damping, minimise
 
 SOLIDS: tuple[type[Field], ...] = (Box, Cylinder, Cone, Frustum, Sphere, Capsule, Tube, Torus)
 
 _CELLS, _MARGIN, _STRIDE = 24, 3, 3  # of the lattice; every third point of it is fitted to
 _BAND = 2.0  # cells of the coarse lattice in which distances count
-_FINALISTS, _STEPS = 3, 4
+_FINALISTS = 3  # starts that are fitted
+_DAMPING = Damping(trials=4, start=1e-2, down=0.2, up=10.0)
+_LONGEST_STEP = 0.5  # of the logarithm of a length, and of the place where the part's longest side is 1
 _A_LENGTH = 2e-3  # of IoU: what a solid with one more length must be better by
 _STEP = 1e-3  # of the finite differences; the part's longest side is 1
 _THIRD = (0.5, 0.5, 0.5, 0.5)  # z to x, x to y, y to z
@@ -165,23 +168,18 @@ class _Lattice:
         def residual(solid: _Placed) -> np.ndarray:
             return np.clip(solid(points), -band, band) - target
 
-        best, error = start, residual(start)
-        damping = 1e-2
-        for _ in range(_STEPS):
-            numbers = best.numbers()
-            nudged = numbers + _STEP * np.eye(len(numbers))
-            jacobian = np.stack([(residual(best.moved(row)) - error) / _STEP for row in nudged], axis=1)
-            normal = jacobian.T @ jacobian
-            normal[np.diag_indices_from(normal)] *= 1 + damping
-            normal[np.diag_indices_from(normal)] += 1e-9
-            change = np.linalg.solve(normal, jacobian.T @ error)
-            trial = best.moved(numbers - np.clip(change, -0.5, 0.5))
-            trial_error = residual(trial)
-            if trial_error @ trial_error < error @ error:
-                best, error, damping = trial, trial_error, damping / 5
-            else:
-                damping *= 10
-        return best
+        def linearise(at: tuple[_Placed, np.ndarray]) -> tuple[float, np.ndarray, np.ndarray]:
+            solid, error = at
+            nudged = solid.numbers() + _STEP * np.eye(len(solid.numbers()))
+            jacobian = np.stack([(residual(solid.moved(row)) - error) / _STEP for row in nudged], axis=1)
+            return float(error @ error), jacobian.T @ error, jacobian.T @ jacobian
+
+        def move(at: tuple[_Placed, np.ndarray], step: np.ndarray) -> tuple[_Placed, np.ndarray]:
+            solid = at[0].moved(at[0].numbers() + np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
+            return solid, residual(solid)
+
+        found = minimise((start, residual(start)), linearise, lambda at: float(at[1] @ at[1]), move, _DAMPING)
+        return found.state[0]
 
 
 @lru_cache(maxsize=256)  # copies of a part, and segments of a bent one, are often the same

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -10,14 +12,14 @@ from partwright.cleaning.deviation_samples import BAND, State
 from partwright.cleaning.model import Model
 from partwright.errors import ParameterError
 from partwright.fields import kernel
+from partwright.least_squares import Damping, minimise
 
 Floats = NDArray[np.float64]
 
 _SOFT = 0.03  # unit lengths: the residual is tanh(F / soft) - tanh(S / soft)
 _NUDGE = 1e-3  # unit lengths that a difference quotient moves the surface by
 _LONGEST = 0.03  # unit lengths, a step
-_SETTLED = 1e-4  # relative fall of the loss that ends it
-_DAMPING, _CALM, _HARSH = 1e-3, 0.2, 8.0
+_DAMPING = Damping(trials=0, start=1e-3, down=0.2, up=8.0, floor=1e-6, ridge=1e-6, settled=1e-4)
 
 
 def refit(state: State, freedom: Floats, iterations: int) -> State:
@@ -25,32 +27,25 @@ def refit(state: State, freedom: Floats, iterations: int) -> State:
     (Levenberg-Marquardt); the loss never rises."""
     if freedom.shape[1] == 0:
         return state
-    damping, loss = _DAMPING, _loss(state)
     leaves = _moving(state.model, freedom)
-    for _ in range(iterations):
-        jacobian = _jacobian(state, freedom, leaves)
-        residual = _residual(state)
+
+    def linearise(at: State) -> tuple[float, Floats, Floats]:
+        jacobian = _jacobian(at, freedom, leaves)
         matrix = freedom.T @ (jacobian.T @ jacobian) @ freedom
-        gradient = freedom.T @ (jacobian.T @ residual)
-        matrix[np.diag_indices_from(matrix)] *= 1 + damping
-        matrix[np.diag_indices_from(matrix)] += 1e-6 * max(float(matrix.diagonal().max()), 1e-12)
-        step = freedom @ np.linalg.solve(matrix, -gradient)
-        step *= min(
-            1.0, _LONGEST / max(float(np.abs(step * state.model.weights).max() * state.samples.scale), 1e-12)
-        )
+        gradient = freedom.T @ (jacobian.T @ _residual(at))
+        largest = max(float(matrix.diagonal().max()), 1e-12)  # of which floor and ridge are shares
+        return _loss(at), gradient / largest, matrix / largest
+
+    def move(at: State, step: Floats) -> State | None:
+        along = freedom @ step
+        reach = float(np.abs(along * at.model.weights).max() * at.samples.scale)
+        along *= min(1.0, _LONGEST / max(reach, 1e-12))
         try:
-            trial = state.changed(state.model, state.vector + step, leaves)
+            return at.changed(at.model, at.vector + along, leaves)
         except ParameterError:  # a length fell below zero, or a ratio left its range
-            damping *= _HARSH
-            continue
-        fallen = loss - _loss(trial)
-        if fallen <= 0:
-            damping *= _HARSH
-            continue
-        state, loss, damping = trial, loss - fallen, damping * _CALM
-        if fallen < _SETTLED * loss:
-            break
-    return state
+            return None
+
+    return minimise(state, linearise, _loss, move, replace(_DAMPING, trials=iterations)).state
 
 
 def _moving(model: Model, freedom: Floats) -> list[int]:

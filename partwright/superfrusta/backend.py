@@ -23,6 +23,24 @@ class Kernel(Protocol):
         self, parameters: ArrayLike, points: ArrayLike, threads: int = 0
     ) -> NDArray[np.float32]: ...
 
+    def normal_equations(
+        self,
+        parameters: ArrayLike,
+        target: kernel.Target,
+        beta: float,
+        penalties: kernel.Penalties = NO_PENALTIES,
+        threads: int = 0,
+    ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]: ...
+
+    def loss(
+        self,
+        parameters: ArrayLike,
+        target: kernel.Target,
+        beta: float,
+        penalties: kernel.Penalties = NO_PENALTIES,
+        threads: int = 0,
+    ) -> float: ...
+
     def levenberg_marquardt(
         self,
         parameters: ArrayLike,
@@ -49,6 +67,16 @@ class Kernel(Protocol):
         penalties: kernel.Penalties = NO_PENALTIES,
         threads: int = 0,
     ) -> tuple[NDArray[np.float32], NDArray[np.float64]]: ...
+
+    def decompose(
+        self,
+        field: ArrayLike,
+        spacing: float,
+        regions: int,
+        fraction: float,
+        least_depth: float,
+        least_voxels: float,
+    ) -> tuple[NDArray[np.int32], list[float]]: ...
 
     def removal_counts(
         self,

@@ -93,7 +93,7 @@ def _pieces(
     grid = samples.grid
     carved = sign > 0 and bool((rows[:, Column.SIGN] < 0).any())
     least_depth, least = _LEAST_DEPTH * grid.spacing, _LEAST_VOLUME * samples.inside_voxels
-    labels, depths = kernel.decompose(
+    labels, depths = samples.kernel.decompose(
         residual, grid.spacing, settings.regions, settings.kappa, least_depth, least
     )
     found = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from partwright.fields.columns import (
     Tangent,
 )
 from partwright.fields.superfrustum import tightest_bulge
+from partwright.least_squares import Damping, minimise
 from partwright.superfrusta.refining import LIMITS, Stages, freedom, penalties, sharpened, ties
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
@@ -33,8 +34,9 @@ Floats = NDArray[np.float64]
 
 # A SuperFrustum is symmetric in its local y: a mirrored one is the same field in another rigid pose.
 _FLIP = np.diag([1.0, -1.0, 1.0])
-_SETTLED = 3e-4  # relative fall of the loss that ends a stage
-_DAMPING, _CALM, _HARSH = 1e-2, 0.3, 5.0
+_DAMPING = Damping(trials=0, start=1e-2, down=0.3, up=5.0, least=1e-6, floor=1e-6, settled=3e-4)
+
+Terms = tuple[kernel.Target, float, kernel.Penalties, int]
 
 
 @dataclass(frozen=True)
@@ -88,32 +90,37 @@ def refit(
     The kernel's normal equations of all copies are projected onto the leaves' parameters; the damped steps
     are those of Levenberg and Marquardt. The first `locked` leaves stay.
     """
-    leaves = list(leaves)
+    parts = list(leaves)
     target = samples.target(samples.optimised_indices)
     moving = np.arange(len(leaves)) >= locked
     firsts = np.stack([leaf.row for leaf in leaves])
     tied = ties(firsts, settings)
     free = freedom(firsts, moving, settings)
     free[tied, Tangent.SY] = False
-    damping, quality, threads = _DAMPING, penalties(settings), settings.threads
+    free_entries = np.flatnonzero(free)
+    damping = _DAMPING
     for beta, iterations in sharpened(stages, samples.thickness):
-        for _ in range(int(iterations)):
-            rows = expanded(leaves)
-            loss, gradient, matrix = kernel.normal_equations(rows, target, float(beta), quality, threads)
-            gradient, matrix = _projected(leaves, tied, gradient, matrix)
-            step = _damped(gradient, matrix, free.ravel(), damping)
-            moved = [
-                _moved(leaf, s, f, t) if moves else leaf
-                for leaf, s, f, t, moves in zip(leaves, step, free, tied, moving, strict=True)
+        terms = (target, float(beta), penalties(settings), settings.threads)
+
+        def linearise(at: list[RepeatedPart], terms: Terms = terms) -> tuple[float, Floats, Floats]:
+            loss, gradient, matrix = samples.kernel.normal_equations(expanded(at), *terms)
+            gradient, matrix = _projected(at, tied, gradient, matrix)
+            return loss, gradient[free_entries], matrix[np.ix_(free_entries, free_entries)]
+
+        def loss(at: list[RepeatedPart], terms: Terms = terms) -> float:
+            return samples.kernel.loss(expanded(at), *terms)
+
+        def move(at: list[RepeatedPart], entries: Floats) -> list[RepeatedPart]:
+            step = np.zeros(free.shape)
+            step[free] = entries
+            return [
+                _moved(part, s, f, t) if moves else part
+                for part, s, f, t, moves in zip(at, step, free, tied, moving, strict=True)
             ]
-            fallen = loss - kernel.loss(expanded(moved), target, float(beta), quality, threads)
-            if fallen <= 0:
-                damping *= _HARSH
-                continue
-            leaves, damping = moved, max(damping * _CALM, 1e-6)
-            if fallen < _SETTLED * loss:
-                break
-    return leaves
+
+        found = minimise(parts, linearise, loss, move, replace(damping, trials=int(iterations)))
+        parts, damping = found.state, replace(damping, start=found.damping)
+    return parts
 
 
 def _projected(
@@ -140,16 +147,6 @@ def _lifted(isometry: Isometry) -> Floats:
     if isometry.improper:
         block[ROTATION_STEP, ROTATION_STEP] = -_FLIP  # exp(v) becomes F exp(v) F = exp(det(F) F v)
     return block
-
-
-def _damped(gradient: Floats, matrix: Floats, free: NDArray[np.bool_], damping: float) -> Floats:
-    """Steps (L, 15)."""
-    index = np.flatnonzero(free)
-    damped = matrix[np.ix_(index, index)]
-    damped[np.diag_indices_from(damped)] += damping * (np.diagonal(damped) + 1e-6) + 1e-9
-    step = np.zeros(len(gradient))
-    step[index] = np.linalg.solve(damped, -gradient[index])
-    return step.reshape(-1, STEP_WIDTH)
 
 
 def _moved(leaf: RepeatedPart, step: Floats, free: NDArray[np.bool_], tied: bool) -> RepeatedPart:

@@ -23,6 +23,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
+from partwright.fields import kernel
 from partwright.fields.columns import STEP_WIDTH, Column, Tangent
 from partwright.fields.kernel import Floats, Limits, Penalties, Rows, Target, _points, _rows, like
 from partwright.superfrusta.torch_equations import (
@@ -93,6 +94,18 @@ class TorchKernel:
             counts += torch.stack([(both * mass[span]).sum(1), (either * mass[span]).sum(1)], 1)
             first = span.stop
         return counts.cpu().numpy()
+
+    def decompose(
+        self,
+        field: ArrayLike,
+        spacing: float,
+        regions: int,
+        fraction: float,
+        least_depth: float,
+        least_voxels: float,
+    ) -> tuple[NDArray[np.int32], list[float]]:
+        """As in `fields.kernel`, and by it: distance transforms of one small grid, on the processor."""
+        return kernel.decompose(field, spacing, regions, fraction, least_depth, least_voxels)
 
     @torch.no_grad()
     def normal_equations(

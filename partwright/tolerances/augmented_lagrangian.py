@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
 from partwright.errors import NoSurfaceError
+from partwright.least_squares import Damping, minimise
 from partwright.meshing import mesh_assembly
 from partwright.shapes import Samples, Shape
 from partwright.tolerances.check import assembly_points, shape_points
@@ -29,7 +30,8 @@ from partwright.tolerances.leaves import free_numbers, moved, slope, weigh
 _NEAR, _UNIFORM = 4_000, 2_000
 _SURFACE, _DENSE = 6_000, 40_000
 _CELLS = 64
-_ROUNDS, _ITERATIONS = 10, 3
+_ROUNDS = 10
+_DAMPING = Damping(trials=15, start=1e-2, down=0.3, up=5.0, least=1e-6, floor=1e-6, steps=3, refusals=5)
 _SHARPNESS = 60.0  # of the occupancy sigmoid, per unit length
 _FIRST, _RISE = 10.0, 3.0  # weight of the violations beside the reconstruction, and its rise
 _KEPT = 500  # fresh violated points that a round adds
@@ -106,7 +108,7 @@ def augmented_lagrangian(
     aim = bounds.narrowed(_MARGIN)
     wanted = on_shape(shape, aim, _SURFACE, seed + 12)
     multipliers = np.zeros(len(wanted.points))
-    weight, damping = _FIRST, 1e-2
+    weight, damping = _FIRST, _DAMPING.start
     for round_ in range(_ROUNDS):
         try:
             cuts = _cuts(assembly, shape, aim, seed + 13 + round_)
@@ -177,19 +179,15 @@ class _Problem:
 def _descend(
     assembly: Assembly, problem: _Problem, free: list[NDArray[np.bool_]], damping: float
 ) -> tuple[Assembly, float]:
-    """A few steps of Levenberg and Marquardt."""
-    for _ in range(_ITERATIONS):
-        loss, gradient, matrix = problem.normal_equations(assembly, free)
-        for _ in range(5):
-            damped = matrix + np.diag(damping * (np.diagonal(matrix) + 1e-6) + 1e-9)
-            tried = _stepped(assembly, np.asarray(np.linalg.solve(damped, -gradient), dtype=np.float64), free)
-            if problem.loss(tried) < loss:
-                assembly, damping = tried, max(0.3 * damping, 1e-6)
-                break
-            damping *= 5
-        else:
-            break
-    return assembly, min(damping, 1.0)
+    """A few damped steps, and the damping for those of the next round."""
+    found = minimise(
+        assembly,
+        lambda at: problem.normal_equations(at, free),
+        problem.loss,
+        lambda at, step: _stepped(at, step, free),
+        replace(_DAMPING, start=damping),
+    )
+    return found.state, min(found.damping, 1.0)
 
 
 def _stepped(assembly: Assembly, step: Floats, free: list[NDArray[np.bool_]]) -> Assembly:
