@@ -22,11 +22,11 @@ from partwright.superfrusta.solid_kinds import plainness
 _LEAST_DEPTH = 0.15  # voxels: thinner regions are noise (half a voxel would lose thin walls)
 _LEAST_VOLUME = 2e-4  # of the shape
 _LARGEST = 2  # connected pieces of the residual that are also seeded whole
-_EAGER = 3  # growth asks this part of a part's price: the thinning finds what is worth the whole
-_PLENTY = 3000  # samples that one part is fitted to
+_PRICE_DIVISOR = 3  # of a part's price while growing: the thinning finds what is worth the whole
+_MOST_SAMPLES = 3000  # samples that one part is fitted to
 _SCREEN_EVERY = 3  # screening uses every third of them
-_KEPT = 4  # starts that survive screening
-_GENEROUS = 0.1  # weight of too much where it can be carved away again
+_SCREENED_STARTS = 4  # starts that survive screening
+_CARVABLE_WEIGHT = 0.1  # weight of too much where it can be carved away again
 _SCREEN = ((15.0, 5),)
 _FIT = ((15.0, 4), (40.0, 10))
 
@@ -118,7 +118,7 @@ def grow(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Grow
     if not wanted or most <= 0:
         return Grown(NOTHING, NOTHING)
     candidates = fit_regions(samples, wanted, settings)
-    return _select(samples, candidates, rows, settings.price / _EAGER, most)
+    return _select(samples, candidates, rows, settings.price / _PRICE_DIVISOR, most)
 
 
 def _view(samples: FitSamples, region: Region) -> View:
@@ -126,8 +126,8 @@ def _view(samples: FitSamples, region: Region) -> View:
     low, high = voxels.min(axis=0), voxels.max(axis=0)
     margin = max(0.06, region.margin * float((high - low).max()))
     index = np.flatnonzero(((samples.points > low - margin) & (samples.points < high + margin)).all(axis=1))
-    if len(index) > _PLENTY:
-        index = index[np.linspace(0, len(index) - 1, _PLENTY).astype(np.int64)]
+    if len(index) > _MOST_SAMPLES:
+        index = index[np.linspace(0, len(index) - 1, _MOST_SAMPLES).astype(np.int64)]
     index = np.concatenate([index, samples.far_indices])
     background = samples.distance_of(region.others, samples.points[index])
     weight = samples.weight[index].copy()
@@ -139,7 +139,7 @@ def _view(samples: FitSamples, region: Region) -> View:
         weight[(samples.parts_of(cuts, samples.points[index]) < 0).any(axis=0)] = 0
     if region.hull is not None:
         within = (samples.points[index] @ region.hull[:, :3].T + region.hull[:, 3] < 0).all(axis=1)
-        weight[within & ~samples.inside[index]] *= _GENEROUS
+        weight[within & ~samples.inside[index]] *= _CARVABLE_WEIGHT
     return View(index, weight / max(float(weight.sum()), 1e-9), background)
 
 
@@ -173,7 +173,7 @@ def finalists(
         overlap,
         settings,
     )
-    kept = np.concatenate([_best(losses, owner, i, _KEPT) for i in range(len(wanted))])
+    kept = np.concatenate([_best(losses, owner, i, _SCREENED_STARTS) for i in range(len(wanted))])
     fitted, losses = _run(
         samples, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings
     )

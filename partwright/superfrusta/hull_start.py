@@ -13,8 +13,8 @@ from partwright.superfrusta.growing import Region, fit_regions
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 
-_MOST = 4000  # voxels that the hull is made of
-_MARGIN = 0.2
+_HULL_VOXELS = 4000  # voxels that the hull is made of
+_MARGIN = 0.2  # share of the longest side within which samples around the hull count
 
 
 def convex_hull_start(samples: FitSamples, settings: Settings) -> Rows:
@@ -22,7 +22,7 @@ def convex_hull_start(samples: FitSamples, settings: Settings) -> Rows:
     inside = samples.grid.values.ravel() < 0
     points = samples.grid_points[inside]
     try:
-        hull = ConvexHull(points[:: max(1, len(points) // _MOST)])
+        hull = ConvexHull(points[:: max(1, len(points) // _HULL_VOXELS)])
     except QhullError:
         return NOTHING
     depth = float(-samples.grid.values.min())

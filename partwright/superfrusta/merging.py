@@ -18,7 +18,7 @@ from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 
 _TOUCHING = 0.03  # unit lengths
-_LOSS = 0.02  # of R: a merger that costs more before its refit is not tried
+_UNREFITTED_SCORE_LOSS = 0.02  # of R: a merger that costs more before its refit is not tried
 _FITTED = 20  # pairs that get a part fitted
 _TRIED = 6  # of them, pairs that are tried with a refit
 
@@ -41,7 +41,7 @@ def merge(samples: FitSamples, rows: Rows, settings: Settings, locked: int = 0) 
     gone: set[int] = set()
     alive = np.arange(len(rows))
     for merger in mergers(samples, rows, settings, locked)[:_TRIED]:
-        if merger.gain < -_LOSS or gone & set(merger.pair):
+        if merger.gain < -_UNREFITTED_SCORE_LOSS or gone & set(merger.pair):
             continue
         first, second = (int(np.flatnonzero(alive == part)[0]) for part in merger.pair)
         trial = _carried_out(samples, rows, first, second, merger.part, settings, locked)

@@ -230,7 +230,7 @@ def _descend(
     """Rows of the parts that are not locked and existence probabilities (M,) of all after the last step."""
     generator = torch.Generator().manual_seed(seed)
     device = rows.device
-    fixed, free = rows[:locked], rows[locked:]
+    locked_rows, free = rows[:locked], rows[locked:]
     blocks = [block.clone().requires_grad_() for block in free.split(BLOCKS, 1)]
     odds = math.log(config.existence / (1 - config.existence))
     logits = torch.full((len(free),), odds, device=device, requires_grad=True)
@@ -251,7 +251,7 @@ def _descend(
             exists = sample_existence(logits, _between(config.temperature, progress), uniform)
         optimiser.zero_grad()
         terms = losses(
-            torch.cat([fixed, torch.cat(blocks, 1)]),
+            torch.cat([locked_rows, torch.cat(blocks, 1)]),
             torch.cat([certain, exists]),
             LossSamples(*(array[drawn] for array in samples)),
             _between(config.beta, progress),

@@ -19,7 +19,7 @@ _EVERY = 6  # samples that matching looks at
 _SELF = 0.5  # IoU from which a part and its image are the same place
 _COVERED = 0.6  # share of a part within the images of another from which they replace it
 _TRIED = 24  # repeats that are scored
-_LOSS = 0.01  # of R: a repeat that costs more before a refit is not tried
+_UNREFITTED_SCORE_LOSS = 0.01  # of R: a repeat that costs more before a refit is not tried
 _GRID_EVERY = 3
 _TOLERANCE = np.array([2e-3, 1e-3])  # of R and of IoU, that all repeats together may cost
 _REFIT = ((100.0, 12),)
@@ -116,7 +116,7 @@ def _chosen(samples: FitSamples, rows: Rows, wanted: list[Repeat]) -> list[Repea
     taken: set[int] = set()
     for cost, one in sorted(priced, key=lambda entry: (-len(entry[1].replaced), entry[0])):
         involved = {one.base, *one.replaced}
-        if cost <= _LOSS and not taken & involved:
+        if cost <= _UNREFITTED_SCORE_LOSS and not taken & involved:
             chosen.append((cost, one))
             taken |= involved
     return [one for _, one in sorted(chosen, key=lambda entry: entry[0])]

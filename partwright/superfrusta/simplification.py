@@ -15,11 +15,11 @@ from partwright.superfrusta.settings import Settings
 
 Row = NDArray[np.float32]
 
-_LOSS = 5e-4  # of R: a plainer kind may cost so much
-_PROMISING = 0.01  # of R: a kind that costs more before its refit is not tried
+_SCORE_LOSS = 5e-4  # of R: a plainer kind may cost so much
+_UNREFITTED_SCORE_LOSS = 0.01  # of R: a kind that costs more before its refit is not tried
 _BEYOND = 0.03  # unit lengths by which a cut goes beyond the solid
 _ACROSS, _ALONG, _WITHIN = 7, 60, 0.35  # points across and along a cut, and how far out of its middle
-_HARMLESS = 2e-5  # of R
+_EXTENSION_SCORE_LOSS = 2e-5  # of R: what a cut that goes on may cost
 
 
 def simplify_kinds(samples: FitSamples, rows: Rows, settings: Settings, locked: int = 0) -> Rows:
@@ -33,13 +33,13 @@ def simplify_kinds(samples: FitSamples, rows: Rows, settings: Settings, locked: 
         for plainer in _plainer(rows[index]):
             trial = rows.copy()
             trial[index] = plainer
-            if score(samples, trial) < whole - _PROMISING:
+            if score(samples, trial) < whole - _UNREFITTED_SCORE_LOSS:
                 continue
             moving = neighbours(samples, rows, index)
             moving[index], moving[:locked] = True, False
             trial = refine(samples, trial, TOUCH_UP, settings, moving)
             reached = score(samples, trial)
-            if reached >= whole - _LOSS:
+            if reached >= whole - _SCORE_LOSS:
                 rows, whole = trial, reached
                 break
     return rows
@@ -89,7 +89,7 @@ def extend_cuts(samples: FitSamples, rows: Rows, locked: int = 0) -> Rows:
     A fit does not care how far a cut goes where nothing is; a CAD program does when two faces coincide, and a
     reader when every hole through one plate has another length.
     """
-    least = score(samples, rows) - _HARMLESS
+    least = score(samples, rows) - _EXTENSION_SCORE_LOSS
     added = rows[rows[:, Column.SIGN] > 0]
     for index in range(locked, len(rows)):
         if rows[index, Column.SIGN] > 0:
