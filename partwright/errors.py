@@ -6,11 +6,23 @@ exits with `exit_code`; a traceback that reaches a user is a defect.
 
 from __future__ import annotations
 
+LONGEST_MESSAGE = 1000  # characters; what is quoted of a user's data may be of any length
+
+
+def shortened(message: str) -> str:
+    """A message without its middle where it is too long to be read: what is wrong, and what to do, stay."""
+    if len(message) <= LONGEST_MESSAGE:
+        return message
+    return f"{message[: LONGEST_MESSAGE * 2 // 3]} [...] {message[-LONGEST_MESSAGE // 4 :]}"
+
 
 class PartwrightError(Exception):
     """Root of all named errors."""
 
     exit_code = 2
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(shortened(str(message)))
 
 
 class UnreadableFileError(PartwrightError):

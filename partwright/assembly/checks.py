@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from partwright.errors import ParameterError
+from partwright.fields.base import LARGEST
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -29,10 +30,20 @@ def number(value: object, name: str) -> float:
 
 
 def vector(value: Sequence[float], name: str) -> Vector:
-    """`value` as three finite floats."""
+    """`value` as three floats as `length` has them."""
     value = _sequence(value, 3, "(x, y, z)", name)
-    x, y, z = (number(component, f"{name}[{i}]") for i, component in enumerate(value))
+    x, y, z = (length(component, f"{name}[{i}]") for i, component in enumerate(value))
     return x, y, z
+
+
+def length(value: object, name: str) -> float:
+    """`value` as a float whose square still fits into float32, in which distances are computed."""
+    result = number(value, name)
+    if abs(result) > LARGEST:
+        raise ParameterError(
+            f"{name}: expected a number between -{LARGEST:g} and {LARGEST:g}, got {result:g}"
+        )
+    return result
 
 
 def unit_quaternion(value: Sequence[float], name: str) -> Quaternion:
@@ -49,7 +60,7 @@ def unit_quaternion(value: Sequence[float], name: str) -> Quaternion:
 
 def blend_width(value: object) -> float:
     """`value` as a float of at least 0."""
-    width = number(value, "blend")
+    width = length(value, "blend")
     if width < 0:
         raise ParameterError(f"blend: expected a number of at least 0, got {width:g}")
     return width

@@ -14,6 +14,7 @@ from partwright.assembly.similarity import Similarity
 from partwright.assembly.tree import MAX_DEPTH, Assembly, Node, Part
 from partwright.errors import AssemblyFileError, NewerVersionError, ParameterError, UnreadableFileError
 from partwright.fields import from_dict
+from partwright.input_files import check_file
 
 MAX_BYTES = 64 * 1024 * 1024
 MAX_PARTS = 100_000
@@ -32,8 +33,8 @@ def load_assembly(path: str | Path) -> Assembly:
         AssemblyFileError: it is truncated, too large, or breaks the schema; the message names the place.
     """
     path = Path(path)
+    size = check_file(path)
     try:
-        size = path.stat().st_size
         if size > MAX_BYTES:
             raise AssemblyFileError(f"{path}: {size:,} bytes; an assembly file has at most {MAX_BYTES:,}")
         data = path.read_bytes()

@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from partwright.errors import ParameterError, SettingError, UnsupportedFormatError
+from partwright.errors import NothingToExportError, ParameterError, SettingError, UnsupportedFormatError
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly
@@ -64,6 +64,12 @@ def export(assembly: Assembly, path: str | Path, **options: Any) -> None:
     cells = options.get("resolution", 1)
     if isinstance(cells, bool) or not isinstance(cells, int) or cells < 1:
         raise ParameterError(f"resolution: expected a number of cells, at least 1, got {cells!r}")
+    lower, upper = assembly.bounds()
+    if suffix != ".json" and not (upper > lower).any():
+        raise NothingToExportError(
+            f"cannot export {Path(path).name}: nothing is inside of the assembly; its parts have no size, or "
+            "what is intersected does not overlap"
+        )
     write(assembly, path, **options)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.errors import EmptyShapeError, UnreadableFileError
+from partwright.input_files import check_file
 
 _LARGEST = 1 << 30  # bytes of one array
 # What numpy and zipfile raise on bytes that are not what the suffix says.
@@ -33,17 +34,15 @@ _READ_ERRORS = (
 _BINVOX_HEADER = 1000  # bytes
 
 
-def check_file(path: Path) -> None:
-    """Raise UnreadableFileError for a file that is not there, EmptyShapeError for one without a byte."""
-    if not path.is_file():
-        raise UnreadableFileError(f"{path}: no such file; check the path")
-    if path.stat().st_size == 0:
+def check_shape_file(path: Path) -> None:
+    """Raise UnreadableFileError as `check_file` does, EmptyShapeError for a file without a byte."""
+    if check_file(path) == 0:
         raise EmptyShapeError(f"{path}: the file is empty (0 bytes); export the shape again")
 
 
 def read_npy(path: Path) -> NDArray[Any]:
     """The array of an NPY file. Raises UnreadableFileError when it is none, too large, or holds objects."""
-    check_file(path)
+    check_shape_file(path)
     try:
         with path.open("rb") as file:
             return _read_array(file, path.name, path.stat().st_size)
@@ -53,7 +52,7 @@ def read_npy(path: Path) -> NDArray[Any]:
 
 def read_npz(path: Path) -> dict[str, NDArray[Any]]:
     """The arrays of an NPZ file by name. Raises UnreadableFileError as `read_npy` does."""
-    check_file(path)
+    check_shape_file(path)
     arrays = {}
     try:
         with zipfile.ZipFile(path) as archive:
@@ -102,7 +101,7 @@ def read_xyz(path: Path) -> NDArray[np.float64]:
     A first line with one number (a count) and everything behind a # are skipped.
     Raises UnreadableFileError when a line is of another kind, EmptyShapeError without any.
     """
-    check_file(path)
+    check_shape_file(path)
     if path.stat().st_size > _LARGEST:
         raise UnreadableFileError(f"{path}: is larger than {_LARGEST >> 20} MiB; thin the points out")
     try:
@@ -125,7 +124,7 @@ def read_binvox(path: Path) -> tuple[NDArray[np.bool_], NDArray[np.float64], flo
 
     Raises UnreadableFileError for a header that makes no sense, and for data that do not fill the grid.
     """
-    check_file(path)
+    check_shape_file(path)
     try:
         with path.open("rb") as file:
             sides, place, scale = _binvox_header(file)

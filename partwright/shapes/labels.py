@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.errors import UnreadableFileError
+from partwright.input_files import check_file
 
 
 def read_labels(path: str | Path) -> NDArray[Any]:
@@ -22,6 +23,7 @@ def read_labels(path: str | Path) -> NDArray[Any]:
         UnreadableFileError: the file is missing, or holds no labels.
     """
     path = Path(path)
+    check_file(path)
     try:
         labels = _read(path)
     except (OSError, ValueError, IndexError, KeyError, TypeError, EOFError, RecursionError) as error:

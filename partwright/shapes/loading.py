@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.errors import EmptyShapeError, UnreadableFileError
-from partwright.shapes.array_files import check_file
+from partwright.errors import EmptyShapeError, NotFiniteError, UnreadableFileError
+from partwright.shapes.array_files import check_shape_file
+from partwright.shapes.gltf_tree import check_gltf
 from partwright.shapes.point_cloud import source_of_points
 from partwright.shapes.source import Piece, Source
 from partwright.shapes.units import canonical_unit
@@ -23,7 +24,10 @@ if TYPE_CHECKING:
     import trimesh
 
 MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf", ".3mf")
-_LARGEST_UNPACKED = 4 << 30  # bytes; a 3MF is a zip archive, and a small one can claim terabytes
+# A 3MF is a zip archive, and a small one can claim terabytes; what is read takes thirty times its bytes.
+_LARGEST_UNPACKED = 1 << 29  # bytes
+_SURELY_FINE = 1 << 26  # bytes
+_TIGHTEST = 25  # times smaller; the XML of real meshes packs to a fifth or a tenth
 
 # What trimesh, numpy, json, lxml and zipfile raise on bytes that are not what the suffix says. A parser fails
 # wherever the bytes first stop making sense, so the families are wide; none of them can come from our own
@@ -107,9 +111,13 @@ def source_of_mesh(mesh: trimesh.Trimesh | tuple[Any, Any]) -> Source:
 def _load_scene(path: Path, suffix: str) -> trimesh.Scene:
     import trimesh
 
-    check_file(path)
+    check_shape_file(path)
     if suffix == ".3mf":
         _refuse_zip_bomb(path)
+    if suffix == ".stl":
+        _refuse_cut_stl(path)
+    if suffix in (".glb", ".gltf"):
+        check_gltf(path)
     # Textures and colours are never used, so they are never decoded: that is faster and safer.
     options: dict[str, Any] = {"process": False}
     if suffix in (".obj", ".glb", ".gltf"):
@@ -131,12 +139,29 @@ def _refuse_zip_bomb(path: Path) -> None:
     try:
         with zipfile.ZipFile(path) as archive:
             unpacked = sum(entry.file_size for entry in archive.infolist())
-    except (zipfile.BadZipFile, OSError, ValueError) as error:
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
         raise UnreadableFileError(f"{path}: is not a 3MF archive ({error}); export it again") from error
-    if unpacked > _LARGEST_UNPACKED:
+    most = min(_LARGEST_UNPACKED, max(_SURELY_FINE, _TIGHTEST * path.stat().st_size))
+    if unpacked > most:
         raise UnreadableFileError(
-            f"{path}: would unpack to {unpacked / 2**30:.0f} GiB; "
-            f"at most {_LARGEST_UNPACKED >> 30} are accepted"
+            f"{path}: would unpack to {unpacked >> 20} MiB; at most {most >> 20} are accepted of a file of "
+            "this size. Export it as GLB, STL or PLY"
+        )
+
+
+def _refuse_cut_stl(path: Path) -> None:
+    """A binary STL says how many triangles it has; fewer bytes are a file that was cut."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(1000)
+    if len(head) < 84 or (head.lstrip()[:5].lower() == b"solid" and b"facet" in head):
+        return
+    (count,) = struct.unpack("<I", head[80:84])
+    there = (size - 84) // 50
+    if there < count:
+        raise UnreadableFileError(
+            f"{path}: says that it has {count} triangles and holds {there}: the file is cut, or no STL. "
+            "Export or download it again"
         )
 
 
@@ -168,16 +193,28 @@ def _placed(
     scene: trimesh.Scene, node: str, geometry: str, where: str
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     mesh = scene.geometry[geometry]
-    vertices = np.array(getattr(mesh, "vertices", ()), dtype=np.float64).reshape(-1, 3)
-    faces = np.array(getattr(mesh, "faces", ()), dtype=np.int64).reshape(-1, 3)
-    faces = _valid(faces, len(vertices), where)
+    vertices = _in_threes(getattr(mesh, "vertices", ()), np.float64, where)
+    faces = _valid(_in_threes(getattr(mesh, "faces", ()), np.int64, where), len(vertices), where)
     matrix = np.asarray(scene.graph[node][0], dtype=np.float64)
+    if not np.isfinite(matrix).all():
+        raise NotFiniteError(f"{where}: the transform of node {node} holds NaN or infinity; export it again")
     if not np.array_equal(matrix, np.eye(4)):
         with np.errstate(all="ignore"):  # a NaN vertex that no face uses may pass through here
             vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
         if np.linalg.det(matrix[:3, :3]) < 0:  # a mirror turns every triangle inside out
             faces = faces[:, ::-1]
     return vertices, np.ascontiguousarray(faces)
+
+
+def _in_threes(rows: Any, kind: type, where: str) -> NDArray[Any]:
+    """Rows (N, 3); parsers hand on what they found, which in a file that was cut may be less."""
+    array: NDArray[Any] = np.array(rows, dtype=kind)
+    if array.size and (array.ndim != 2 or array.shape[1] != 3):
+        raise UnreadableFileError(
+            f"{where}: vertices or triangles come with {array.shape[-1]} numbers, not three; the file is cut "
+            "or damaged. Export it again"
+        )
+    return array.reshape(-1, 3)
 
 
 def _valid(faces: NDArray[np.int64], vertex_count: int, where: str) -> NDArray[np.int64]:

@@ -15,7 +15,7 @@ from partwright.shapes.array_files import read_binvox, read_npy, read_npz, read_
 from partwright.shapes.loading import MESH_SUFFIXES, read_mesh, source_of_mesh
 from partwright.shapes.point_cloud import source_of_points
 from partwright.shapes.source import Source
-from partwright.shapes.step import STEP_SUFFIXES, read_step
+from partwright.shapes.step_process import STEP_SUFFIXES, read_step
 from partwright.shapes.voxels import source_of_grid
 
 if TYPE_CHECKING:

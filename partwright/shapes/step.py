@@ -1,4 +1,7 @@
-"""STEP files to triangles, by OpenCASCADE of the `cad` extra: a named piece a solid, the file's own unit."""
+"""STEP files to triangles, by OpenCASCADE of the `cad` extra: a named piece a solid, the file's own unit.
+
+OpenCASCADE follows wrong references into memory that is not its own, so `step_process` has it run by itself.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.errors import EmptyShapeError, MissingDependencyError, SettingError, UnreadableFileError
-from partwright.shapes.array_files import check_file
+from partwright.errors import EmptyShapeError, SettingError, UnreadableFileError
 from partwright.shapes.source import Piece, Source
 from partwright.shapes.units import METRES, canonical_unit
 
@@ -20,27 +22,13 @@ if TYPE_CHECKING:
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS_Shape
 
-STEP_SUFFIXES = (".step", ".stp")
 TOLERANCE = 5e-4  # of the diagonal of the bounding box: how far triangles may lie off the surface
 NO_NAMES = ("", "SOLID", "COMPOUND", "SHELL", "FACE")  # what CAD programs write where there is no name
 ANGLE = 0.3  # radians between neighbouring triangles of a curved face
 
 
-def read_step(path: Path) -> Source:
-    """Read a STEP file; each solid, or sheet where there is none, is a piece named after its product.
-
-    Raises:
-        MissingDependencyError: OpenCASCADE is not installed.
-        UnreadableFileError: the file is missing or no STEP file.
-        EmptyShapeError: it holds no faces.
-    """
-    check_file(path)
-    try:
-        import OCP.STEPCAFControl  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"{path}: STEP needs OpenCASCADE; install it with: pip install 'partwright[cad]'"
-        ) from error
+def source_of_step(path: Path) -> Source:
+    """What `read_step` gives, in this process: damaged references may end it."""
     document, unit = _read(path)
     solids = list(_named_solids(document))
     _tessellate([solid for _, solid in solids])

@@ -10,8 +10,9 @@ import pytest
 
 from partwright.assembly import Assembly, Part
 from partwright.cli.main import main
+from partwright.errors import ParameterError
 from partwright.export import WRITERS
-from partwright.fields import Box, SuperFrustum
+from partwright.fields import Box, Quadric, SuperFrustum
 
 CUBE = Assembly((Part(Box((1, 1, 1)), name="box"),), unit="mm", up="z")
 SHEET = Assembly((Part(SuperFrustum((1, 1, 1), onion=1.0), name="sheet"),), unit="mm", up="z")
@@ -100,3 +101,23 @@ def test_a_unit_that_the_format_cannot_say(capsys: Any, folder: Path) -> None:
     assert "3MF cannot say km" in error(capsys, kilometres, folder, "a.3mf")
     micrometres = Assembly(CUBE.children, unit="um", up="z")
     assert "too small for MuJoCo" in error(capsys, micrometres, folder, "a.mjcf.xml")
+
+
+APART = Assembly(
+    tuple(Part(Quadric.plane(normal, -1.0)) for normal in ((1, 0, 0), (-1, 0, 0))), "intersection"
+)
+NO_SIZE = Assembly((Part(Box((0, 0, 0))),))
+
+
+@pytest.mark.parametrize("suffix", [".scad", ".glb", ".mjcf.xml"])
+@pytest.mark.parametrize("assembly", [APART, NO_SIZE], ids=["half-spaces without overlap", "box of size 0"])
+def test_nothing_inside(assembly: Assembly, suffix: str, tmp_path: Path, capsys: Any) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    assert "nothing is inside" in error(capsys, assembly, folder, f"empty{suffix}")
+
+
+@pytest.mark.parametrize("place", [(1e200, 0, 0), (0, -1e13, 0)])
+def test_a_place_beyond_all_measure(place: tuple[float, float, float]) -> None:
+    with pytest.raises(ParameterError, match=r"expected a number between -1e\+12 and 1e\+12"):
+        Part(Box((1, 1, 1)), place)
