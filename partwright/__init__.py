@@ -10,12 +10,23 @@ from partwright.export import export
 
 __version__ = "0.1.0"
 
-# Public name -> module that defines it. Imported on first use, so that `import partwright` stays cheap.
+# Public name -> module that defines it, and its name there if it is another. Imported on first use, so that
+# `import partwright` stays cheap.
 _PUBLIC = {
     "load_shape": "partwright.shapes",
     "Shape": "partwright.shapes",
     "fit": "partwright.fitting",
+    "fit_nodes": "partwright.fitting",
     "fit_many": "partwright.batch",
+    "Result": "partwright.fitting",
+    "Start": "partwright.fitting",
+    "Tolerance": "partwright.fitting",
+    "Clean": "partwright.fitting",
+    "Cancellation": "partwright.methods",
+    "SuperFrusta": "partwright.superfrusta:Settings",
+    "Solids": "partwright.superfrusta.solids:Settings",
+    "Capri": "partwright.capri:Settings",
+    "LearnedParts": "partwright.partsdf:Settings",
     "Part": "partwright.assembly",
     "Assembly": "partwright.assembly",
     "load_assembly": "partwright.assembly",
@@ -30,7 +41,8 @@ __all__ = ["__version__", "export", *_PUBLIC, *_MODULES]
 
 def __getattr__(name: str) -> Any:
     if name in _PUBLIC:
-        return getattr(importlib.import_module(_PUBLIC[name]), name)
+        module, _, own_name = _PUBLIC[name].partition(":")
+        return getattr(importlib.import_module(module), own_name or name)
     if name in _MODULES:
         return importlib.import_module(f"partwright.{name}")
     raise AttributeError(f"module 'partwright' has no attribute '{name}'")

@@ -115,3 +115,9 @@ class UncleanableError(PartwrightError):
 
 class NothingToCleanError(PartwrightError):
     """Every number of an assembly is plain already, and every relation between them holds."""
+
+
+class CancelledError(PartwrightError):
+    """A run was cancelled before there was anything to keep."""
+
+    exit_code = 130

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from typing import Any
 
-from partwright.errors import PartwrightError, SettingError
-from partwright.fitting import fit
-from partwright.results import Result
+from partwright.errors import CancelledError, PartwrightError, SettingError
+from partwright.fitting import Result, fit
+from partwright.methods import Cancellation, Progress, interruptible
 from partwright.shapes import Shape
 
 _ON_A_DEVICE = 4
@@ -20,7 +20,8 @@ _ON_A_DEVICE = 4
 def fit_many(
     shapes: Sequence[Shape],
     at_once: int = 0,
-    progress: Callable[[int, Any], None] | None = None,
+    progress: Callable[[int, Progress], None] | None = None,
+    cancel: Cancellation | None = None,
     **options: Any,
 ) -> list[Result | PartwrightError | None]:
     """Fit every shape as `fit` does, `at_once` of them at a time (0: one a core, 4 on an accelerator).
@@ -30,11 +31,12 @@ def fit_many(
 
     Args:
         progress: called with the shape's index and the method's progress, from several threads.
+        cancel: ends the running fits with their best so far. If not given, Ctrl-C does.
         options: of `fit`, for all shapes.
 
     Returns:
-        In the order of the shapes: its result, or the error that kept it from one. Ctrl-C ends the running
-        fits with their best so far; shapes that were not begun give None.
+        In the order of the shapes: its result, or the error that kept it from one. Where it was cancelled,
+        shapes that were not begun, or had nothing to keep, give None.
 
     Raises:
         SettingError: `at_once` is no count, or an option has a value that cannot be used.
@@ -44,40 +46,24 @@ def fit_many(
     cores = os.cpu_count() or 1
     at_once = at_once or (_ON_A_DEVICE if options.get("device") == "cuda" else cores)
     options = {"threads": max(1, cores // at_once), **options}
-    stopping = threading.Event()
+    stop = cancel or Cancellation()
 
-    def one(index: int) -> Result | PartwrightError:
-        def told(step: Any) -> None:
-            if progress is not None:
-                progress(index, step)
-            if stopping.is_set():
-                raise KeyboardInterrupt
-
+    def one(index: int) -> Result | PartwrightError | None:
+        if stop.requested:
+            return None
+        told = partial(progress, index) if progress else None
         try:
             with _stream(options.get("device", "auto")):
-                return fit(shapes[index], progress=told, **options)
+                return fit(shapes[index], progress=told, cancel=stop, **options)
         except SettingError:
             raise
+        except CancelledError:
+            return None
         except PartwrightError as error:
             return error
 
-    with ThreadPoolExecutor(at_once) as pool:
-        futures: list[Future[Result | PartwrightError]] = []
-        try:
-            futures += [pool.submit(one, i) for i in range(len(shapes))]
-            wait(futures)
-        except KeyboardInterrupt:
-            stopping.set()
-            pool.shutdown(cancel_futures=True)
-    outcomes = [None if future.cancelled() else _outcome(future) for future in futures]
-    return outcomes + [None] * (len(shapes) - len(outcomes))
-
-
-def _outcome(future: Future[Result | PartwrightError]) -> Result | PartwrightError | None:
-    try:
-        return future.result()
-    except KeyboardInterrupt:  # stopped before there was anything to keep
-        return None
+    with interruptible(stop) if cancel is None else nullcontext(), ThreadPoolExecutor(at_once) as pool:
+        return list(pool.map(one, range(len(shapes))))
 
 
 def _stream(device: str) -> AbstractContextManager[Any]:

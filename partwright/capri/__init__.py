@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from partwright.capri.fitting import Fitted, fit
+from partwright.capri.method import METHOD
 from partwright.capri.settings import Settings
-from partwright.methods import Progress
 
-__all__ = ["Fitted", "Progress", "Settings", "fit"]
+__all__ = ["METHOD", "Settings"]

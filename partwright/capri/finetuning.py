@@ -34,8 +34,17 @@ class Finetuning:
         self.inside = torch.from_numpy(samples.inside).to(code.device)
         self.generator = torch.Generator().manual_seed(seed)
 
-    def run(self, stage: stages.Stage, iterations: int, report: Callable[[float], None]) -> None:
-        """So many steps of one stage; tells the share that is done. The last stage keeps T: it is binary."""
+    def run(
+        self,
+        stage: stages.Stage,
+        iterations: int,
+        report: Callable[[float], None],
+        pause: Callable[[], None] | None = None,
+    ) -> None:
+        """So many steps of one stage, with a pause before each; reports the share that is done.
+
+        The last stage keeps T: it is binary.
+        """
         net = self.network
         moving: list[Tensor] = [self.code, *net.primitives.parameters()]
         if stage != "binary_selection":
@@ -44,6 +53,8 @@ class Finetuning:
             moving.append(net.weights)
         optimiser = torch.optim.Adam(moving, LEARNING_RATE, BETAS)
         for i in range(iterations):
+            if pause is not None:
+                pause()
             which = torch.randint(len(self.points), (BATCH_POINTS,), generator=self.generator).to(
                 self.code.device
             )

@@ -16,6 +16,7 @@ from partwright.capri.finetuning_samples import draw_finetuning_samples
 from partwright.capri.network import CapriNet, device_of, load_network, rows_of
 from partwright.capri.pruning import pruned
 from partwright.capri.settings import Settings
+from partwright.methods import Run
 from partwright.shapes import Shape
 
 SHIPPED = Path(__file__).parent / "models" / "cad_parts.safetensors"
@@ -36,30 +37,33 @@ def fine_tuned(
     shape: Shape,
     seeds: CsgTree | None,
     settings: Settings,
+    run: Run,
     points: NDArray[np.floating],
     accept: Callable[[CsgTree], None],
     report: Callable[[str, float], None],
+    pause: Callable[[], None],
 ) -> None:
     """Runs the three stages, from a tree or (None) from the pre-trained network, and keeps the pruned tree.
 
-    points (N, 3): unit frame; what pruning looks at. An interruption keeps what there is, and goes on.
+    points (N, 3): unit frame; what pruning looks at. pause: called at each step; where it raises, what there
+    is is kept.
     """
     import torch
 
-    if settings.threads:
-        torch.set_num_threads(settings.threads)
-    device = device_of(settings.device)
+    if run.threads:
+        torch.set_num_threads(run.threads)
+    device = device_of(run.device)
     if seeds is None:
         network = network_of(settings)
         code = encoded(network, shape)
     else:
-        network, code = seeded(seeds, settings.seed)
-    samples = draw_finetuning_samples(settings.supervision, shape, settings.seed)
-    tuning = Finetuning(network.to(device), code.to(device), samples, settings.seed)
+        network, code = seeded(seeds, run.seed)
+    samples = draw_finetuning_samples(settings.supervision, shape, run.seed)
+    tuning = Finetuning(network.to(device), code.to(device), samples, run.seed)
     try:
         for i, stage in enumerate(stages.STAGES):
             stage_report = partial(_report_stage, report, stage.replace("_", " "), i)
-            tuning.run(stage, settings.iterations, stage_report)
+            tuning.run(stage, settings.iterations, stage_report, pause)
     finally:
         accept(pruned(tuning.tree(), points))
 

@@ -8,6 +8,7 @@ drop a convex) changes the objective by a sum over the samples: one matrix produ
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -33,7 +34,8 @@ class Problem:
     """outside (N, K) float32: 1 where quadric k leaves sample n out; inside (N,) bool: the shape's own side;
     weight (N,): what a sample on the wrong side costs; all of the shape's inside costs 1.
 
-    price (K,), convex_price: what each quadric and a convex cost (the description length).
+    price (K,), convex_price: what each quadric and a convex cost (the description length). pause: called
+    before each local search; where it raises, the search ends.
     """
 
     outside: NDArray[np.float32]
@@ -42,7 +44,12 @@ class Problem:
     price: NDArray[np.float64]
     convex_price: float
     rng: np.random.Generator = field(repr=False)
+    pause: Callable[[], None] | None = field(default=None, repr=False)
     known: dict[Convex, NDArray[np.bool_]] = field(default_factory=dict, repr=False)
+
+    def step(self) -> None:
+        if self.pause is not None:
+            self.pause()
 
     def covered(self, convex: Convex) -> NDArray[np.bool_]:
         """(N,) samples within a convex."""
@@ -103,6 +110,7 @@ def improve(problem: Problem, outside: Matrix, reduction: Matrix, convex: Convex
     them. What each quadric would take from the convex is kept up to date by the samples that a move changes:
     weights are whole numbers, so the sums stay exact.
     """
+    problem.step()
     chosen = list(convex)
     count = outside[:, chosen].sum(axis=1)
     taken = _sums(outside, reduction, count == 0)
@@ -166,6 +174,7 @@ def _exchange(
 
 def grown(problem: Problem, outside: Matrix, reduction: Matrix, allowed: NDArray[np.bool_]) -> Convex:
     """A convex grown from all of space: the allowed quadrics (K,) join, best first, while that pays."""
+    problem.step()
     chosen: list[int] = []
     while True:
         gain = np.where(allowed, -(reduction @ outside) - problem.price, -np.inf)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from partwright.capri.quadric_kinds import KINDS
 from partwright.errors import SettingError
-from partwright.methods import Quality, check_number, preset
+from partwright.methods import check_number, preset
 
 Schedule = Literal["search", "paper"]
 Start = Literal["seeds", "weights", "auto"]
@@ -51,9 +51,10 @@ class Settings:
         paper, or "samples" of the surface itself, whose detail is not lost between voxels. weights: file of a
         pre-trained network (`python -m partwright.capri`), in place of the one that ships.
 
-    symmetry: holes of one size and direction become one leaf with copies. threads is an option of all methods
-    that a tree has no use for; curve is refused.
+    symmetry: holes of one size and direction become one leaf with copies.
     """
+
+    method: ClassVar[str] = "capri"
 
     schedule: Schedule = "search"
     start: Start = "seeds"
@@ -73,19 +74,14 @@ class Settings:
     iterations: int = 12_000
     supervision: str = "samples"
     weights: str | None = None
-    curve: bool = False
     symmetry: bool = True
-    seed: int = 0
-    threads: int = 0
-    device: str = "auto"
 
     def __post_init__(self) -> None:
         for name in ("surface", "near", "uniform"):
             check_number(name, getattr(self, name), low=1000)
         for name in ("least", "iterations"):
             check_number(name, getattr(self, name), low=1)
-        for name in ("tries", "seed", "threads"):
-            check_number(name, getattr(self, name), low=0)
+        check_number("tries", self.tries, low=0)
         for name in ("price", "convex_price"):
             check_number(name, getattr(self, name), low=1e-6, high=1.0)
         if self.max_parts is not None:
@@ -101,8 +97,6 @@ class Settings:
         unknown = set(self.kinds) - set(KINDS)
         if unknown or "plane" not in self.kinds:
             raise SettingError(f"kinds: expected plane and any of {', '.join(KINDS[1:])}, got {self.kinds}")
-        if self.curve:
-            raise SettingError("curve: a CAPRI tree has no curve of sizes; give max_parts or min_iou")
         if self.weights is not None and not Path(self.weights).is_file():
             raise SettingError(f"weights: there is no file {self.weights}")
 
@@ -115,7 +109,7 @@ class Settings:
         return replace(self, kinds=kinds, oriented=False, nested=False)
 
     @classmethod
-    def for_quality(cls, quality: Quality = "normal", **changes: Any) -> Settings:
+    def for_quality(cls, quality: str = "normal", **changes: Any) -> Settings:
         """The preset `draft`, `normal` or `high`, with `changes` on top.
 
         Raises:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -25,11 +26,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option(
         "--method",
-        choices=("superfrusta", "solids", "capri"),
+        metavar="NAME",
         default="superfrusta",
-        help="kind of parts: SuperFrusta; boxes, cylinders and other named solids; or capri, a CSG tree of "
-        "quadrics (default: %(default)s)",
+        help="superfrusta; solids: boxes, cylinders and other named solids; capri: a CSG tree of quadrics; "
+        "parts: those of a learned model; or one that an installed package adds (default: %(default)s)",
     )
+    option("--model", metavar="MODEL", help="of method parts: a model that ships, or a file (.safetensors)")
     option(
         "--quality",
         choices=("draft", "normal", "high"),
@@ -64,14 +66,14 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option(
         "--symmetry",
         action=argparse.BooleanOptionalAction,
-        default=True,
+        default=None,
         help="where the shape is symmetric, parts come as repeats (default: on)",
     )
     option(
         "--subtract",
         action=argparse.BooleanOptionalAction,
         default=None,
-        help="parts may also be subtracted: holes, slots, pockets (default: on for solids only)",
+        help="parts may also be subtracted: holes, slots, pockets (default: on for solids and capri)",
     )
     option("--clean", action="store_true", help="make numbers plain and relations exact after the fit")
     option(
@@ -101,51 +103,51 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.set_defaults(run=run)
 
 
+# Options that are settings of methods; those not given are left to the method.
+_SETTINGS = ("max_parts", "min_iou", "curve", "symmetry", "subtract", "model")
+
+
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
     from partwright.atomic_io import check_folder
-    from partwright.cli.interrupts import raising
+    from partwright.cli.interrupts import stopping
     from partwright.cli.progress import Display
-    from partwright.cli.tables import print_relations, print_result
-    from partwright.cli.terminal import warn
-    from partwright.fitting import fit
+    from partwright.cli.tables import finish_fit
+    from partwright.errors import SettingError
+    from partwright.fitting import Clean, Start, Tolerance, fit, fit_nodes
+    from partwright.fitting.report import check_density_of
+    from partwright.methods import Cancellation
     from partwright.shapes import load_shape
 
     folder: Path = arguments.output or Path(f"{arguments.shape.stem}-parts")
     check_folder(folder)
-    with raising(), Display() as display:
+    cancel = Cancellation()
+    settings = {name: getattr(arguments, name) for name in _SETTINGS}
+    options: dict[str, Any] = {
+        "quality": arguments.quality,
+        "seed": arguments.seed,
+        "device": arguments.device,
+        "threads": arguments.threads,
+        "tolerance": Tolerance(arguments.tolerance, arguments.contain, arguments.inside),
+        "cancel": cancel,
+        "clean": Clean.keeping(arguments.clean, arguments.clean_tolerance),
+        **{name: value for name, value in settings.items() if value not in (None, False)},
+        **{name: False for name in ("symmetry", "subtract") if settings[name] is False},
+    }
+    with Display() as display:
         shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
-        result = fit(
-            shape,
-            arguments.method,
-            quality=arguments.quality,
-            max_parts=arguments.max_parts,
-            min_iou=arguments.min_iou,
-            curve=arguments.curve,
-            start=load_assembly(arguments.start) if arguments.start else None,
-            locked=[name for name in (arguments.lock or "").split(",") if name],
-            per_node=arguments.per_node,
-            symmetry=arguments.symmetry,
-            subtract=arguments.subtract,
-            seed=arguments.seed,
-            device=arguments.device,
-            threads=arguments.threads,
-            progress=display.show,
-            source=arguments.shape.name,
-            density=arguments.density,
-            tolerance=arguments.tolerance,
-            contain=arguments.contain,
-            inside=arguments.inside,
-            clean=arguments.clean,
-            clean_tolerance=arguments.clean_tolerance,
-        )
+        check_density_of(arguments.density, shape.unit)
+        begun = load_assembly(arguments.start) if arguments.start else None
+        start = Start.locking(begun, [name for name in (arguments.lock or "").split(",") if name])
+        if arguments.per_node and start is not None:
+            raise SettingError("--per-node fits every node anew, so it takes no --start")
+        with stopping(cancel.request):
+            if arguments.per_node:
+                result = fit_nodes(shape, arguments.method, progress=display.show, **options)
+            else:
+                result = fit(shape, arguments.method, start=start, progress=display.show, **options)
+        if arguments.density is not None:
+            result = result.with_density(arguments.density)
         display.stage("writing")
         result.save(folder)
-    print_result(result, folder)
-    if result.clean:
-        print_relations(result.clean)
-    warn(result.warnings)
-    if result.outcome == "interrupted":
-        warn([f"interrupted: {folder} holds the best assembly so far"])
-        return 130
-    return 0
+    return finish_fit(result, folder)

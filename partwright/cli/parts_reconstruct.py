@@ -40,32 +40,28 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from partwright.atomic_io import check_folder
-    from partwright.cli.interrupts import raising
-    from partwright.partsdf.model import load_model
-    from partwright.partsdf.reconstruction import ReconstructionSettings
-    from partwright.partsdf.results import reconstruct_shape
+    from partwright.cli.interrupts import stopping
+    from partwright.cli.progress import Display
+    from partwright.cli.tables import finish_fit
+    from partwright.fitting import fit
+    from partwright.partsdf.settings import Settings
+    from partwright.methods import Cancellation
     from partwright.shapes import load_shape
 
     folder: Path = arguments.output or Path(f"{arguments.shape.stem}-parts")
     check_folder(folder)
-    settings = ReconstructionSettings(
-        arguments.iterations, arguments.points, start=arguments.start, seed=arguments.seed
+    settings = Settings(
+        arguments.model,
+        arguments.resolution,
+        iterations=arguments.iterations,
+        points=arguments.points,
+        start=arguments.start,
     )
-    model = load_model(arguments.model)
-    shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
-    with raising():
-        result = reconstruct_shape(model, shape, settings, arguments.resolution, _show)
-    result.save(folder)
-    scores = result.report["scores"]
-    absent = result.report["absent"]
-    print(f"parts: {', '.join(result.neural.names())}" + (f"; absent: {', '.join(absent)}" if absent else ""))
-    print(f"IoU {scores['iou']:.4f}, Chamfer x 10,000 {1e4 * scores['chamfer']:.2f}")
-    print(f"written to {folder}")
-    return 0
-
-
-def _show(done: int, of: int, loss: float) -> None:
-    import sys
-
-    if done == 1 or done % 50 == 0 or done == of:
-        print(f"partwright: step {done}/{of}  loss {loss:.5f}", file=sys.stderr, flush=True)
+    cancel = Cancellation()
+    with Display() as display:
+        shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
+        with stopping(cancel.request):
+            result = fit(shape, settings, seed=arguments.seed, progress=display.show, cancel=cancel)
+        display.stage("writing")
+        result.save(folder)
+    return finish_fit(result, folder)

@@ -15,8 +15,20 @@ from partwright.cli.terminal import printable, say
 
 if TYPE_CHECKING:
     from partwright.cleaning import Cleaned
+    from partwright.fitting import Result
     from partwright.metrics import CadScores, Scores
-    from partwright.results import Result
+
+
+def finish_fit(result: Result, folder: Path) -> int:
+    """Prints the outcome of a fit that was written to a folder; the exit code."""
+    print_result(result, folder)
+    if result.clean:
+        print_relations(result.clean)
+    warn(result.warnings)
+    if result.outcome == "interrupted":
+        warn([f"interrupted: {folder} holds the best assembly so far"])
+        return 130
+    return 0
 
 
 def print_result(result: Result, folder: Path) -> None:

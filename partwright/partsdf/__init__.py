@@ -15,8 +15,8 @@ from partwright.partsdf.config import Config, config_from, read_config
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct
-from partwright.partsdf.results import reconstruct_shape
+from partwright.partsdf.reconstruction import reconstruct
+from partwright.partsdf.settings import ReconstructionSettings, Settings
 from partwright.partsdf.training import train
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "Model",
     "NeuralShape",
     "ReconstructionSettings",
+    "Settings",
     "config_from",
     "editing",
     "from_assembly",
@@ -31,7 +32,6 @@ __all__ = [
     "mesh_shape",
     "read_config",
     "reconstruct",
-    "reconstruct_shape",
     "to_assembly",
     "train",
 ]

@@ -9,50 +9,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from partwright.datasets.prepared import PreparedShape
-from partwright.errors import ModelError, SettingError
+from partwright.errors import CancelledError, ModelError
+from partwright.methods import Cancellation, Checkpoint
 from partwright.partsdf.config import LossSettings
 from partwright.partsdf.data import pose_tensors, present_parts
 from partwright.partsdf.losses import aggregate, clamped_error, latent_penalty, terms
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors, local_points
+from partwright.partsdf.settings import ReconstructionSettings
 from partwright.shapes import Shape
 
-STARTS = ("nearest", "mean")
-Progress = Callable[[int, int, float], None]
+
+class Step(NamedTuple):
+    """One iteration, the `number`th `of` all."""
+
+    number: int
+    of: int
+    loss: float
+    shape: Callable[[], NeuralShape]
+    """Makes the shape as it is now."""
 
 
-@dataclass(frozen=True)
-class ReconstructionSettings:
-    """iterations, points a step, rate of Adam: the paper takes 800, 8,000 (all that it samples), 5e-3; the
-    rate falls by `decay` at half time, when the whole shape's loss joins in. start: "nearest" training shape,
-    or the "mean" of all (poses unknown only). starts: so many nearest ones are tried for an eighth of the
-    iterations, and the best goes on. pose_rate: of poses; pose_delay: the share of the iterations
-    for which they wait until latents have found the rough form. seed: of the points drawn.
-    """
-
-    iterations: int = 400
-    points: int = 2048
-    rate: float = 5e-3
-    decay: float = 0.1
-    start: str = "nearest"
-    starts: int = 4
-    pose_rate: float = 2e-3
-    pose_delay: float = 0.1
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name in ("iterations", "points", "starts"):
-            if getattr(self, name) < 1:
-                raise SettingError(f"{name} is {getattr(self, name)}; expected 1 or more")
-        if self.start not in STARTS:
-            raise SettingError(f"start is {self.start!r}; expected one of {', '.join(STARTS)}")
+Told = Callable[[Step], None]
 
 
 @dataclass(frozen=True)
@@ -83,18 +69,21 @@ NEAR = (0.005**0.5, 0.0005**0.5)  # section B.4 gives variances
 def reconstruct(
     model: Model,
     shape: Shape | PreparedShape,
-    settings: ReconstructionSettings = ReconstructionSettings(),
-    progress: Progress | None = None,
+    settings: ReconstructionSettings | None = None,
+    seed: int = 0,
+    told: Told | None = None,
+    cancel: Cancellation | None = None,
 ) -> NeuralShape:
     """The latents and poses that decode to a shape. A prepared shape has known parts, another has not.
 
-    progress: told iteration, iterations and loss.
+    seed: of the samples drawn. told: of each iteration. cancel: ends it with what was found.
 
     Raises:
         ModelError: the prepared shape has other parts than the model.
     """
+    checkpoint, settings = Checkpoint(cancel or Cancellation()), settings or ReconstructionSettings()
     if isinstance(shape, Shape):
-        return reconstruct_unknown(model, Target.of_shape(shape, seed=settings.seed), settings, progress)
+        return reconstruct_unknown(model, Target.of_shape(shape, seed=seed), settings, seed, told, checkpoint)
     count = 1 if model.config.one_part else len(shape.present)
     if count != len(model.parts):
         raise ModelError(
@@ -105,25 +94,31 @@ def reconstruct(
     target = Target(torch.tensor(shape.points), torch.tensor(shape.sdf), part.long())
     start = NeuralShape.mean(model, present_parts(shape, model.config))
     # Latents start at N(0, 0.01^2), as the authors': near the centre of their prior.
-    noise = torch.Generator().manual_seed(settings.seed)
+    noise = torch.Generator().manual_seed(seed)
     latents = 0.01 * torch.randn(start.latents.shape, generator=noise)
     start = replace(start, latents=latents, poses=pose_tensors(shape, model.config))
-    return _optimised(start, target, settings, progress, move_poses=False)[0]
+    return _optimised(start, target, settings, seed, told, checkpoint, move_poses=False)[0]
 
 
 def reconstruct_unknown(
     model: Model,
     target: Target,
-    settings: ReconstructionSettings = ReconstructionSettings(),
-    progress: Progress | None = None,
+    settings: ReconstructionSettings | None = None,
+    seed: int = 0,
+    told: Told | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> NeuralShape:
-    """Latents and poses, without knowing which part a sample belongs to."""
+    """Latents and poses, without knowing which part a sample belongs to.
+
+    Once the checkpoint's cancellation is requested, it ends with what was found.
+    """
+    settings = settings or ReconstructionSettings()
     if settings.start == "nearest":
         starts = nearest_trained(model, target, settings.starts)
     else:
         starts = [NeuralShape.mean(model)]
     starts = [replace(start, present=torch.ones_like(start.present)) for start in starts]
-    found = _scouted(starts, target, settings, progress)
+    found = _scouted(starts, target, settings, seed, told, checkpoint)
     return replace(found, present=_filling(found, target))
 
 
@@ -140,7 +135,12 @@ def _filling(shape: NeuralShape, target: Target) -> Tensor:
 
 
 def _scouted(
-    starts: list[NeuralShape], target: Target, settings: ReconstructionSettings, progress: Progress | None
+    starts: list[NeuralShape],
+    target: Target,
+    settings: ReconstructionSettings,
+    seed: int = 0,
+    told: Told | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> NeuralShape:
     """From the start that a few iterations bring closest: one that is close as it is may be a dead end, as a
     tube with flanges is for one without."""
@@ -148,18 +148,19 @@ def _scouted(
     scouts = starts if len(starts) > 1 else []
     steps = settings.iterations + len(scouts) * few.iterations
 
-    def after(done: int) -> Progress | None:
-        return progress and (lambda step, _, loss: progress(done + step, steps, loss))
+    def after(done: int) -> Told | None:
+        return told and (lambda step: told(step._replace(number=done + step.number, of=steps)))
 
     tried: list[NeuralShape] = []
     for i, start in enumerate(scouts):
-        shape, finished = _optimised(start, target, few, after(i * few.iterations), start.model.config.poses)
+        ahead = after(i * few.iterations)
+        shape, finished = _optimised(start, target, few, seed, ahead, checkpoint, start.model.config.poses)
         tried.append(shape)
         if not finished:
             return _closest(tried, target)
     best = _closest(tried or starts, target)
-    told = after(len(scouts) * few.iterations)
-    return _optimised(best, target, settings, told, best.model.config.poses)[0]
+    ahead = after(len(scouts) * few.iterations)
+    return _optimised(best, target, settings, seed, ahead, checkpoint, best.model.config.poses)[0]
 
 
 def _closest(shapes: list[NeuralShape], target: Target) -> NeuralShape:
@@ -194,11 +195,13 @@ def _optimised(
     start: NeuralShape,
     target: Target,
     settings: ReconstructionSettings,
-    progress: Progress | None,
+    seed: int,
+    told: Told | None,
+    checkpoint: Checkpoint | None,
     move_poses: bool,
 ) -> tuple[NeuralShape, bool]:
-    """Adam on the latents, and on the poses if they are to move; Ctrl-C keeps what was found. Also whether
-    all iterations were done."""
+    """Adam on the latents, and on the poses if they are to move; a cancellation keeps what was found. Also
+    whether all iterations were done."""
     losses = start.model.config.losses
     latents = start.latents.clone().requires_grad_()
     poses = start.poses.map(lambda t: t.clone().requires_grad_(move_poses))
@@ -208,9 +211,15 @@ def _optimised(
     if move_poses:
         groups.append({"params": [poses.translation, poses.rotation, size], "lr": settings.pose_rate})
     optimiser = torch.optim.Adam(groups)
-    generator = torch.Generator().manual_seed(settings.seed)
+    generator = torch.Generator().manual_seed(seed)
     halves = target.halves()
-    finished = False
+
+    def found() -> NeuralShape:
+        final = PoseTensors(poses.translation, poses.rotation, size.exp()) if move_poses else start.poses
+        unit = final.rotation / final.rotation.norm(dim=-1, keepdim=True)
+        placed = final._replace(rotation=unit).map(lambda t: t.detach().clone())
+        return replace(start, latents=latents.detach().clone(), poses=placed)
+
     try:
         for i in range(settings.iterations):
             if i == settings.iterations // 2:
@@ -224,15 +233,13 @@ def _optimised(
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
-            if progress:
-                progress(i + 1, settings.iterations, float(loss.detach()))
-        finished = True
-    except KeyboardInterrupt:
-        pass
-    final = PoseTensors(poses.translation, poses.rotation, size.exp()) if move_poses else start.poses
-    unit = final.rotation / final.rotation.norm(dim=-1, keepdim=True)
-    poses = final._replace(rotation=unit).map(Tensor.detach)
-    return replace(start, latents=latents.detach(), poses=poses), finished
+            if told:
+                told(Step(i + 1, settings.iterations, float(loss.detach()), found))
+            if checkpoint:
+                checkpoint()
+    except CancelledError:
+        return found(), False
+    return found(), True
 
 
 def _loss(

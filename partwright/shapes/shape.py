@@ -55,7 +55,8 @@ class NodeLeftOutWarning(UserWarning):
 class Shape:
     """What comes in. Build one with `load_shape`.
 
-    name: of the file, without its suffix, or of the node. vertices (V, 3) float64 and faces (F, 3) int64: the
+    name: of the file, without its suffix, or of the node. file: its name with the suffix, None for what was
+    in memory. vertices (V, 3) float64 and faces (F, 3) int64: the
     repaired outer surface in own units. input_vertices, input_faces: as read, before any repair; `nodes` are
     ranges of input_faces. frame: to the unit frame and back. unit: "mm", "m" ... or None; up: "x", "y", "z",
     "-z" ... or None. repairs: what was done to the surface, a sentence each. openings: how much of the
@@ -68,6 +69,7 @@ class Shape:
         offsets = np.cumsum([0] + [len(p.vertices) for p in pieces])
         ends = np.cumsum([0] + [len(p.faces) for p in pieces]).tolist()
         self.name, self.unit, self.up = name, source.unit, source.up
+        self.file = source.file
         self.input_vertices = np.concatenate([p.vertices for p in pieces])
         self.input_faces = np.concatenate([p.faces + o for p, o in zip(pieces, offsets[:-1], strict=True)])
         self.nodes = tuple(Node(p.name, a, b) for p, a, b in zip(pieces, ends[:-1], ends[1:], strict=True))
@@ -251,7 +253,10 @@ def load_shape(
     """
     stated_unit = None if unit is None else canonical_unit(unit)
     stated_up = None if up is None else canonical_up(up)
-    read = read_source(Path(source)) if isinstance(source, (str, Path)) else source_of(source)
+    if isinstance(source, (str, Path)):
+        read = replace(read_source(Path(source)), file=Path(source).name)
+    else:
+        read = source_of(source)
     return Shape(replace(read, unit=stated_unit or read.unit, up=stated_up or read.up))
 
 

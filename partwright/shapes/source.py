@@ -21,7 +21,8 @@ class Piece:
 class Source:
     """Named pieces, and what the file says of units.
 
-    `repairs` and `confidence`: how the surface was made where the file holds none, and how sure it is.
+    `repairs` and `confidence`: how the surface was made where the file holds none, and how sure it is. file:
+    the file's name with its suffix, None for what was in memory.
     """
 
     name: str
@@ -30,3 +31,4 @@ class Source:
     up: str | None = None
     repairs: tuple[str, ...] = ()
     confidence: float = 1.0
+    file: str | None = None

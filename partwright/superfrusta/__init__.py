@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from partwright.methods import Progress
-from partwright.superfrusta.outcome import CurvePoint, Fitted
-from partwright.superfrusta.resfit import fit
+from partwright.superfrusta.method import METHOD
 from partwright.superfrusta.settings import Settings
 
-__all__ = ["CurvePoint", "Fitted", "Progress", "Settings", "fit"]
+__all__ = ["METHOD", "Settings"]

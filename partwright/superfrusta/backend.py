@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Protocol, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from partwright.errors import MissingDependencyError, SettingError
 from partwright.fields import kernel
+from partwright.methods import DEVICES, Checkpoint
 
 NO_PENALTIES = kernel.Penalties()
-DEVICES = ("auto", "cpu", "cuda")
 
 
 class Kernel(Protocol):
@@ -88,13 +88,28 @@ class Kernel(Protocol):
     ) -> NDArray[np.float64]: ...
 
 
-def backend(device: str) -> Kernel:
+class _Watched:
+    """A kernel that passes a checkpoint before each of its functions."""
+
+    def __init__(self, watched: Any, checkpoint: Checkpoint) -> None:
+        self._watched, self._checkpoint = watched, checkpoint
+
+    def __getattr__(self, name: str) -> Any:
+        self._checkpoint()
+        return getattr(self._watched, name)
+
+
+def backend(device: str, checkpoint: Checkpoint | None = None) -> Kernel:
     """The kernel for "cpu" or "cuda"; "auto" is the compiled kernel, which needs no other package.
+
+    A fit spends its time in here, so the checkpoint, passed before every call, ends it soon.
 
     Raises:
         SettingError: the device is unknown, or there is no such accelerator.
         MissingDependencyError: PyTorch is not installed.
     """
+    if checkpoint is not None:
+        return cast(Kernel, _Watched(backend(device), checkpoint))
     if device not in DEVICES:
         raise SettingError(f"device: expected one of {', '.join(DEVICES)}, got {device!r}")
     if device != "cuda":

@@ -230,7 +230,7 @@ def _run(
         free=freedom(rows, np.ones(len(rows), bool), settings),
         tied=ties(rows, settings),
         penalties=kernel.Penalties(overlap=overlap),
-        threads=settings.threads,
+        threads=samples.threads,
     )
 
 

@@ -1,4 +1,4 @@
-"""What a fit tells on its way and returns in the end, and rows of the kernel as an assembly."""
+"""Rows of the kernel as an assembly, and the sizes on the way to fewer parts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from partwright.assembly import Assembly, Similarity
 from partwright.assembly.parts_from_rows import parts_from_rows
 from partwright.fields.columns import UNSIGNED, Column
-from partwright.methods import Outcome
 from partwright.shapes import Shape
 from partwright.superfrusta.curve import with_parents
 from partwright.superfrusta.flat_tree import nested
@@ -17,30 +16,6 @@ from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.solid_kinds import is_solid, solid
 
 _STEM = {True: "part", False: "cut"}  # of the names of parts that are added, and subtracted
-
-
-@dataclass(frozen=True)
-class CurvePoint:
-    """The assembly of one size on the way down: R of the objective, and IoU at the fit's own samples."""
-
-    parts: int
-    score: float
-    iou: float
-    assembly: Assembly
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """A fit's result: the assembly in the shape's own units and place, and how it came about.
-
-    curve: from many parts to few, where the settings asked for it.
-    """
-
-    assembly: Assembly
-    outcome: Outcome
-    seconds: dict[str, float]
-    history: list[dict[str, float | str]]
-    curve: tuple[CurvePoint, ...] = ()
 
 
 @dataclass(frozen=True)

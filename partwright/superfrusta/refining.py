@@ -72,7 +72,7 @@ def optimise(samples: FitSamples, rows: Rows, stages: Stages, settings: Settings
             samples.distance[index],
             samples.weight[index],
             config=config,
-            seed=settings.seed,
+            seed=samples.seed,
             locked=locked,
             device="cuda" if settings.device == "cuda" else "cpu",
         ).rows
@@ -98,6 +98,6 @@ def refine(
         free=freedom(rows, moving, settings),
         tied=ties(rows, settings),
         penalties=penalties(settings),
-        threads=settings.threads,
+        threads=samples.threads,
     )
     return refined

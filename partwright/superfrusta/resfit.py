@@ -6,21 +6,22 @@ explains more than stopping early.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from partwright.assembly import Assembly
-from partwright.errors import EmptyShapeError
-from partwright.methods import Outcome, Progress, timed
+from partwright.errors import CancelledError, EmptyShapeError
+from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outcome, Progress, timed
 from partwright.shapes import Shape
 from partwright.superfrusta.growing import grow
 from partwright.superfrusta.hull_start import convex_hull_start
 from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
-from partwright.superfrusta.outcome import CurvePoint, Fitted, Step, assembly_of
+from partwright.superfrusta.outcome import Step, assembly_of
 from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
 from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimise
 from partwright.superfrusta.repeated_parts import repeat
@@ -38,66 +39,66 @@ _OPENING = 4  # rounds
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
 
 
-def fit(
-    shape: Shape,
-    settings: Settings | None = None,
-    progress: Callable[[Progress], None] | None = None,
-    start: Assembly | None = None,
-    locked: Sequence[str] = (),
-) -> Fitted:
+def fit(request: FitRequest[Settings]) -> Fitted:
     """Fits an assembly of SuperFrusta to a shape.
 
-    `start` is refined and continued; its parts named in `locked` come first and stay bit for bit. Ctrl-C ends
-    the fit with the best assembly so far and the outcome "interrupted".
+    The start is refined and continued; its locked parts come first and stay bit for bit.
 
     Raises:
         EmptyShapeError: nothing could be fitted (the shape is thinner than the samples can see).
-        SettingError: `start` is no union of SuperFrusta, or a locked name is none of its parts.
+        CancelledError: cancelled before there was a part.
+        SettingError: the start is no union of SuperFrusta, or a locked name is none of its parts.
     """
-    settings = settings or Settings()
-    rows, fixed = starting_rows(shape, start, locked, settings)
+    shape, settings, run = request.shape, request.settings, request.run
+    rows, fixed = starting_rows(shape, request.start, request.locked, settings)
     seconds: dict[str, float] = {}
+    checkpoint = Checkpoint(run.cancel)
     with timed(seconds, "prepare"):
-        samples = FitSamples.of(shape, settings)
-    run = Run(samples, settings, progress, len(fixed), seconds=seconds)
+        samples = FitSamples.of(shape, settings, run, checkpoint)
+    assembled = partial(assembly_of, shape, settings=settings, fixed=fixed)
+    search = ResidualFit(samples, settings, run.told, len(fixed), assembled, checkpoint, seconds=seconds)
     try:
-        outcome = run.through(rows)
-        if settings.symmetry and run.best is not None:
-            run.find_repeats(shape)
-    except KeyboardInterrupt:
-        if run.best is None and run.earlier is None:
+        outcome = search.run(rows)
+        if settings.symmetry and search.best is not None:
+            search.find_repeats(shape)
+    except CancelledError:
+        if search.best is None and search.earlier is None:
             raise
         outcome = "interrupted"
-        run.choose()
-    run.enforce_budget()
-    if run.best is None:
+        search.choose()
+    search.enforce_budget()
+    if search.best is None:
         raise EmptyShapeError(
             f"{shape.name}: no part could be placed; the shape has no volume that {settings.near} samples "
             "can see. Check its thickness, or use --quality high"
         )
-    leaves = run.leaves or [RepeatedPart(row) for row in run.best]
-    moves = [leaf.moves for leaf in leaves]
-    assembly = assembly_of(shape, np.stack([leaf.row for leaf in leaves]), settings, fixed, moves=moves)
+    leaves = search.leaves or [RepeatedPart(row) for row in search.best]
+    assembly = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
     curve: list[CurvePoint] = []
-    for step in run.curve:
+    for step in search.curve:
         smaller = curve[-1].assembly if curve else None
-        one = assembly_of(shape, step.rows, settings, fixed, smaller)
+        one = assembled(step.rows, smaller=smaller)
         curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
-    return Fitted(assembly, outcome, run.seconds, run.history, tuple(reversed(curve)))
+    return Fitted(assembly, outcome, search.seconds, search.history, tuple(reversed(curve)))
 
 
 @dataclass
-class Run:
+class ResidualFit:
     """State of one fit: the samples that all its scores are of, and the best rows so far, of which the first
-    `locked` never change."""
+    `locked` never change.
+
+    report: told of each step. assembled: makes the assembly of rows. number: of the attempt, from 0.
+    """
 
     samples: FitSamples
     settings: Settings
     report: Callable[[Progress], None] | None = None
     locked: int = 0
+    assembled: Callable[[Rows], Assembly] | None = None
+    checkpoint: Callable[[], None] | None = None
+    number: int = 0
     best: Rows | None = None
     best_objective: float = -np.inf
-    attempt: int = 0
     earlier: Rows | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
@@ -107,11 +108,12 @@ class Run:
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage)
 
-    def through(self, start: Rows = NOTHING) -> Outcome:
+    def run(self, start: Rows = NOTHING) -> Outcome:
+        """All attempts; the best of them is kept."""
         settings = self.settings
         converged = True
-        for self.attempt in range(settings.attempts):
-            converged = self.once(start) and converged
+        for self.number in range(settings.attempts):
+            converged = self.attempt(start) and converged
             self.choose()
         if self.best is None:
             return "converged"
@@ -120,14 +122,14 @@ class Run:
                 plain = simplify_kinds(self.samples, self.best, settings, self.locked)
                 self.best = extend_cuts(self.samples, plain, self.locked)
         if settings.curve:
-            self.descend(self.best)
+            self.detail_curve(self.best)
         if settings.min_iou is not None and volume_iou(self.samples, self.best) >= settings.min_iou:
             return "target_reached"
         if settings.max_parts is not None and len(self.best) >= settings.max_parts:
             return "budget_reached"
         return "converged" if converged else "budget_reached"
 
-    def once(self, start: Rows) -> bool:
+    def attempt(self, start: Rows) -> bool:
         """Grown and thinned out from the start, beside earlier attempts; says whether growth converged."""
         if self.best is not None:
             self.earlier = self.best
@@ -146,13 +148,20 @@ class Run:
     def opening(self) -> Rows:
         """A few rounds from nothing and from a body to carve from; whichever gets further."""
         brief = replace(self.settings, rounds=min(_OPENING, self.settings.rounds))
-        tried = []
+        tried: list[Rows] = []
         for start in (NOTHING, convex_hull_start(self.samples, self.settings)):
-            run = Run(self.samples, brief, None, self.locked, attempt=self.attempt, seconds=self.seconds)
-            run.growth(start)
-            self.samples = run.samples
-            if run.best is not None:
-                tried.append(run.best)
+            opening = ResidualFit(
+                self.samples, brief, locked=self.locked, number=self.number, seconds=self.seconds
+            )
+            try:
+                opening.growth(start)
+            except CancelledError:
+                found = tried if opening.best is None else [*tried, opening.best]
+                self.best = max(found, key=self.objective, default=self.best)
+                raise
+            self.samples = opening.samples
+            if opening.best is not None:
+                tried.append(opening.best)
         return max(tried, key=self.objective) if tried else NOTHING
 
     def choose(self) -> None:
@@ -200,7 +209,7 @@ class Run:
         with self.timed("thin"):
             while len(rows) > max(1, self.locked):
                 if len(rows) > most:
-                    rows = self.one_less(rows)
+                    rows = self.remove_or_merge(rows)
                     continue
                 thinned, kept, whole = cheapest_removal(self.samples, rows, settings, self.locked)
                 if not self.worthwhile(thinned, kept, whole):
@@ -222,7 +231,7 @@ class Run:
     @property
     def regions(self) -> int:
         """Regions a round: each further attempt takes fewer or more, which leads it to other assemblies."""
-        aside = (self.attempt + 1) // 2 * (2 if self.attempt % 2 == 0 else -2)
+        aside = (self.number + 1) // 2 * (2 if self.number % 2 == 0 else -2)
         return max(1, self.settings.regions + aside)
 
     def regrowth(self, rows: Rows) -> Rows:
@@ -233,7 +242,7 @@ class Run:
         with self.timed("optimise"):
             return optimise(self.samples, new.joined(rows, self.locked), FINE, self.settings, self.locked)
 
-    def one_less(self, rows: Rows) -> Rows:
+    def remove_or_merge(self, rows: Rows) -> Rows:
         """The cheapest way to do with one part less: a removal or a merger."""
         thinned, kept, _ = cheapest_removal(self.samples, rows, self.settings, self.locked, coverage)
         merged = (
@@ -241,12 +250,12 @@ class Run:
         )
         return merged[0] if merged is not None and merged[1] > kept else thinned
 
-    def descend(self, rows: Rows) -> None:
+    def detail_curve(self, rows: Rows) -> None:
         """The curve: one part less at a time, each size polished; from few parts to many."""
         with self.timed("curve"):
             steps = [Step(rows, score(self.samples, rows), volume_iou(self.samples, rows))]
             while len(rows) > max(1, self.locked):
-                rows = self.one_less(rows)
+                rows = self.remove_or_merge(rows)
                 rows = optimise(self.samples, rows, FINE, self.settings, self.locked)
                 steps.append(Step(rows, score(self.samples, rows), volume_iou(self.samples, rows)))
         self.curve = steps[::-1]
@@ -255,11 +264,11 @@ class Run:
         self.enforce_budget()
         assert self.best is not None
         with self.timed("symmetry"):
-            found = symmetries(shape, self.settings)
+            found = symmetries(shape, self.settings, self.samples.seed)
             self.leaves = repeat(self.samples, self.best, found, self.settings, self.locked)
             rows = expanded(self.leaves)
         reached, iou = score(self.samples, rows), volume_iou(self.samples, rows)
-        self.tell("symmetry", self.settings.rounds, len(self.leaves), reached, iou, 1.0)
+        self.report_progress("symmetry", self.settings.rounds, len(self.leaves), reached, iou, 1.0)
 
     def enforce_budget(self) -> None:
         """What an interruption or a fit without thinning left over the part budget goes, without refits."""
@@ -280,7 +289,7 @@ class Run:
         total = settings.rounds + settings.cycles
         done = min(1.0, (settings.rounds + round_ if stage == "thin" else round_) / total)
         reached, iou = score(self.samples, rows), volume_iou(self.samples, rows)
-        self.tell(stage, round_, len(rows), reached, iou, (self.attempt + done) / settings.attempts)
+        self.report_progress(stage, round_, len(rows), reached, iou, (self.number + done) / settings.attempts)
         return progressed
 
     def sampled_strays(self, rows: Rows) -> bool:
@@ -302,11 +311,16 @@ class Run:
             return True
         return self.due(rows, volume_iou(self.samples, rows))
 
-    def tell(self, stage: str, round_: int, parts: int, reached: float, iou: float, fraction: float) -> None:
+    def report_progress(
+        self, stage: str, round_: int, parts: int, reached: float, iou: float, fraction: float
+    ) -> None:
         entry: dict[str, float | str] = {"stage": stage, "round": round_, "parts": parts}
         self.history.append(entry | {"score": reached, "iou": iou})
         if self.report is not None:
-            self.report(Progress(stage, round_, self.settings.rounds, parts, iou, fraction))
+            best = partial(self.assembled, self.best) if self.assembled and self.best is not None else None
+            self.report(Progress(stage, round_, self.settings.rounds, parts, iou, fraction, best))
+        if self.checkpoint is not None:
+            self.checkpoint()
 
     def due(self, rows: Rows, iou: float) -> bool:
         """Whether the best so far misses the part budget or the target, or is larger than it need be."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from partwright.fields.columns import WIDTH
 from partwright.fields.kernel import Target
+from partwright.methods import Checkpoint, Run
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid
 from partwright.shapes.sampling import morton_order
@@ -43,6 +44,7 @@ class FitSamples:
     """(N,) 1 + sigmoid(curvature) near the surface (eq. 7), 1 in the box."""
     near: int
     grid: DistanceGrid
+    seed: int
     threads: int
     kernel: Kernel
     measure: Callable[[NDArray[np.float32]], NDArray[np.float32]]
@@ -53,18 +55,23 @@ class FitSamples:
     """(n, 3) points that are no samples yet, where a part that goes astray is looked for."""
 
     @classmethod
-    def of(cls, shape: Shape, settings: Settings) -> FitSamples:
+    def of(
+        cls, shape: Shape, settings: Settings, run: Run | None = None, checkpoint: Checkpoint | None = None
+    ) -> FitSamples:
+        """Of a shape. The checkpoint is passed before every call of the kernel."""
+        run = run or Run()
         grid = shape.unit_grid(settings.resolution)
-        drawn = shape.samples(settings.near, settings.uniform, settings.seed)
-        around, padding_weight = padding(grid, settings)
+        drawn = shape.samples(settings.near, settings.uniform, run.seed)
+        around, padding_weight = padding(grid, settings.uniform, run.seed)
         return cls(
             np.concatenate([drawn.points, around]),
             np.concatenate([drawn.distance, shape.unit_distance(around)]),
             np.concatenate([drawn.weight, np.full(len(around), padding_weight, np.float32)]),
             drawn.near,
             grid,
-            settings.threads,
-            backend(settings.device),
+            run.seed,
+            run.threads,
+            backend(run.device, checkpoint),
             shape.unit_distance,
             settings.uniform / float(np.prod(grid.spacing * np.array(grid.values.shape))),
             _probes(grid),
@@ -157,7 +164,7 @@ class FitSamples:
         return self.kernel.evaluate_parts(rows, points, self.threads)
 
 
-def padding(grid: DistanceGrid, settings: Settings) -> tuple[NDArray[np.float32], float]:
+def padding(grid: DistanceGrid, uniform: int, seed: int) -> tuple[NDArray[np.float32], float]:
     """Points (G, 3) around the box that the uniform samples fill, and the weight of each.
 
     Without them nothing would stop a part from growing out of the box. The weight makes up for their lower
@@ -165,12 +172,12 @@ def padding(grid: DistanceGrid, settings: Settings) -> tuple[NDArray[np.float32]
     """
     low = grid.origin
     high = low + grid.spacing * (np.array(grid.values.shape) - 1)
-    rng = np.random.default_rng(settings.seed + 1)
-    points = rng.uniform(-_HALF_SIDE, _HALF_SIDE, (settings.uniform // 3, 3)).astype(np.float32)
+    rng = np.random.default_rng(seed + 1)
+    points = rng.uniform(-_HALF_SIDE, _HALF_SIDE, (uniform // 3, 3)).astype(np.float32)
     points = points[((points < low) | (points > high)).any(axis=1)]
     points = points[morton_order(points)]
     around = (2 * _HALF_SIDE) ** 3 - float(np.prod(high - low))
-    density = around / max(len(points), 1) * settings.uniform / float(np.prod(high - low))
+    density = around / max(len(points), 1) * uniform / float(np.prod(high - low))
     return points, min(density, _MOST_PADDING_WEIGHT)
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from partwright.errors import SettingError
-from partwright.methods import Quality, check_number, preset
+from partwright.methods import check_number, preset
 from partwright.superfrusta.families import FAMILIES, Family, locked_values
 
 _SMALL_PRICE = 2e-4
@@ -47,6 +47,8 @@ class Settings:
         near, uniform: sample points near the surface and in the box. resolution: grid of the decomposition.
     """
 
+    method: ClassVar[str] = "superfrusta"
+
     rounds: int = 10
     regions: int = 7
     kappa: float = 0.02
@@ -67,9 +69,6 @@ class Settings:
     near: int = 30_000
     uniform: int = 30_000
     resolution: int = 96
-    seed: int = 0
-    threads: int = 0
-    device: str = "auto"
     curve: bool = False
     symmetry: bool = True
 
@@ -85,8 +84,6 @@ class Settings:
             check_number("max_parts", self.max_parts, low=1)
         if self.min_iou is not None:
             check_number("min_iou", self.min_iou, low=0.0, high=1.0)
-        check_number("seed", self.seed, low=0)
-        check_number("threads", self.threads, low=0)
         if self.optimiser not in ("newton", "adam"):
             raise SettingError(f'optimiser: expected "newton" or "adam", got {self.optimiser!r}')
         if self.family not in FAMILIES:
@@ -99,7 +96,7 @@ class Settings:
             )
 
     @classmethod
-    def for_quality(cls, quality: Quality = "normal", **changes: Any) -> Settings:
+    def for_quality(cls, quality: str = "normal", **changes: Any) -> Settings:
         """The preset `draft`, `normal` or `high`, with `changes` on top.
 
         Raises:

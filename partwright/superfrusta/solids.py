@@ -7,17 +7,13 @@ primitives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from partwright.assembly import Assembly
 from partwright.errors import SettingError
-from partwright.methods import Progress, Quality
-from partwright.shapes import Shape
-from partwright.superfrusta import resfit, settings
+from partwright.superfrusta import settings
 from partwright.superfrusta.families import Family
-from partwright.superfrusta.outcome import Fitted
+from partwright.superfrusta.method import SuperFrusta
 
 
 @dataclass(frozen=True)
@@ -27,6 +23,8 @@ class Settings(settings.Settings):
     family, smooth: named solids that do not blend. subtract: on. alpha: a hole is a part and moves R by less
     than a part of the body does.
     """
+
+    method: ClassVar[str] = "solids"
 
     family: Family = "solid"
     smooth: bool = False
@@ -41,7 +39,7 @@ class Settings(settings.Settings):
             )
 
     @classmethod
-    def for_quality(cls, quality: Quality = "normal", **changes: Any) -> Settings:
+    def for_quality(cls, quality: str = "normal", **changes: Any) -> Settings:
         """The preset `draft`, `normal` or `high`, with `changes` on top.
 
         Raises:
@@ -55,15 +53,13 @@ class Settings(settings.Settings):
         return cls(**{name: value for name, value in preset.items() if name not in own} | changes)
 
 
-def fit(
-    shape: Shape,
-    settings: Settings | None = None,
-    progress: Callable[[Progress], None] | None = None,
-    start: Assembly | None = None,
-    locked: Sequence[str] = (),
-) -> Fitted:
-    """Fits an assembly of named solids to a shape; as `partwright.superfrusta.fit`.
+class Solids(SuperFrusta):
+    """Parts of the start that are no named solid become the nearest one, unless they are locked."""
 
-    Parts of `start` that are no named solid become the nearest one, unless they are locked.
-    """
-    return resfit.fit(shape, settings or Settings(), progress, start, locked)
+    name = "solids"
+
+    def settings(self, quality: str = "normal", **changes: Any) -> Settings:
+        return Settings.for_quality(quality, **changes)
+
+
+METHOD = Solids()

@@ -100,7 +100,7 @@ def refit(
     free_entries = np.flatnonzero(free)
     damping = _DAMPING
     for beta, iterations in sharpened(stages, samples.thickness):
-        terms = (target, float(beta), penalties(settings), settings.threads)
+        terms = (target, float(beta), penalties(settings), samples.threads)
 
         def linearise(at: list[RepeatedPart], terms: Terms = terms) -> tuple[float, Floats, Floats]:
             loss, gradient, matrix = samples.kernel.normal_equations(expanded(at), *terms)

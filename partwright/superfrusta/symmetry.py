@@ -80,14 +80,16 @@ class Symmetry:
         return _fixed_point(self.isometry)
 
 
-def symmetries(shape: Shape, settings: Settings, tolerance: float = TOLERANCE) -> tuple[Symmetry, ...]:
+def symmetries(
+    shape: Shape, settings: Settings, seed: int = 0, tolerance: float = TOLERANCE
+) -> tuple[Symmetry, ...]:
     """The shape's symmetries in the unit frame, the most exact first; none where it has none.
 
     Candidates are the principal axes and the world's axes and diagonals through the centre of volume; each is
     refined by Gauss-Newton on the distances of the moved surface samples.
     """
     grid = shape.unit_grid(settings.resolution)
-    points = shape.unit_surface(_SAMPLES, settings.seed).points.astype(np.float64)
+    points = shape.unit_surface(_SAMPLES, seed).points.astype(np.float64)
     inside = grid.points()[grid.values.ravel() < 0]
     if not len(inside):
         return ()

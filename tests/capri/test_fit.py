@@ -9,10 +9,11 @@ import pytest
 import trimesh
 
 from partwright.assembly import Assembly, Part
-from partwright.capri import Progress, Settings, fit
+from partwright.capri import Settings
 from partwright.capri import quadric_rows as rows
 from partwright.capri.csg_tree import CsgTree
-from partwright.capri.fitting import Run
+from partwright.capri.method import Found, found
+from partwright.capri.tree_search import TreeSearch
 from partwright.errors import (
     GridError,
     MissingDependencyError,
@@ -22,14 +23,15 @@ from partwright.errors import (
 )
 from partwright.fields import Cylinder
 from partwright.meshing import mesh_csg
+from partwright.methods import Cancellation, FitRequest, Progress, Run
 from partwright.shapes import Shape, load_shape
 from tests.capri.meshes import bracket, drilled_plate, tilted_rod
 
 FAST = {"surface": 6000, "near": 6000, "uniform": 5000, "tries": 2, "least": 20}
 
 
-def quick(shape: Shape, progress=None, **changes):
-    return fit(shape, Settings(**FAST | changes), progress)
+def quick(shape: Shape, run: Run | None = None, **changes) -> Found:
+    return found(FitRequest(shape, Settings(**FAST | changes), run or Run()))
 
 
 def solid(assembly: Assembly) -> trimesh.Trimesh:
@@ -109,7 +111,7 @@ def test_nothing_can_be_removed_for_free(plate: Shape) -> None:
 
 def test_the_same_seed_gives_the_same_bytes(tmp_path) -> None:
     for name in ("a", "b"):
-        quick(load_shape(bracket()), seed=3).assembly.save(tmp_path / name)
+        quick(load_shape(bracket()), Run(seed=3)).assembly.save(tmp_path / name)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
@@ -128,16 +130,14 @@ def test_a_target_takes_the_cheapest_tree_that_reaches_it(plate: Shape) -> None:
 
 def test_progress_and_interruption(plate: Shape) -> None:
     seen: list[Progress] = []
-    quick(plate, seen.append)
+    quick(plate, Run(progress=seen.append))
     fractions = [step.fraction for step in seen]
     assert fractions == sorted(fractions)
     assert 0 < fractions[0] < fractions[-1] == 1
     assert seen[-1].iou > 0.98
 
-    def interrupt(_: Progress) -> None:
-        raise KeyboardInterrupt
-
-    fitted = quick(plate, interrupt)
+    cancel = Cancellation()
+    fitted = quick(plate, Run(progress=lambda _: cancel.request(), cancel=cancel))
     assert fitted.outcome == "interrupted"
     assert solid(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.1)
 
@@ -193,20 +193,20 @@ def test_settings_that_cannot_be_used_are_named(plate: Shape) -> None:
         ({"price": 0.0}, "price"),
         ({"schedule": "fast"}, 'schedule: expected "search" or "paper"'),
         ({"kinds": ("sphere",)}, "kinds: expected plane"),
-        ({"curve": True}, "curve"),
+        ({"curve": True}, "unknown settings: curve"),
         ({"weights": "/nowhere"}, "weights: there is no file"),
         ({"colour": 1}, "unknown settings: colour"),
     ]:
         with pytest.raises(SettingError, match=message):
             Settings.for_quality("draft", **changes)
-    with pytest.raises(SettingError, match="locked"):
-        fit(plate, Settings(**FAST), locked=("a",))
+    with pytest.raises(SettingError, match="the search of trees runs on the CPU"):
+        quick(plate, Run(device="cuda"))
 
 
 def test_surfaces_of_a_given_assembly_join(plate: Shape) -> None:
     """A cylinder that the shape does not show is among the quadrics, in the shape's frame."""
     rod = Part(Cylinder(0.37, 1.0), (0.3, 0.2, 0.1))
-    run = Run(Settings(**FAST))
+    run = TreeSearch(Settings(**FAST))
     run.prepare(plate, None)
     before = run.pool.rows
     run.prepare(plate, Assembly((rod,)))
@@ -220,4 +220,4 @@ def test_without_torch_the_network_is_asked_for_by_name(plate: Shape, monkeypatc
     for name in ("partwright.capri.paper", "partwright.capri.network"):
         monkeypatch.delitem(sys.modules, name, raising=False)
     with pytest.raises(MissingDependencyError, match="needs PyTorch"):
-        fit(plate, Settings(**FAST, schedule="paper"))
+        quick(plate, schedule="paper")

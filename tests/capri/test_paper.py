@@ -7,11 +7,12 @@ import pytest
 import torch
 import trimesh
 
-from partwright.capri import Progress, Settings, fit, stages
+from partwright.capri import Settings, stages
 from partwright.capri import quadric_rows as rows
 from partwright.capri.csg_tree import CsgTree
 from partwright.capri.finetuning import Finetuning, seeded, straightened
 from partwright.capri.finetuning_samples import draw_finetuning_samples
+from partwright.capri.method import Found, found
 from partwright.capri.network import (
     UNIT_TO_PAPER,
     CapriNet,
@@ -26,10 +27,17 @@ from partwright.capri.pretraining_dataset import make_pretraining_dataset
 from partwright.capri.settings import CHOICES
 from partwright.errors import EmptyShapeError, SettingError
 from partwright.meshing import mesh_csg
+from partwright.methods import Cancellation, FitRequest, Progress, Run
 from partwright.shapes import Shape, load_shape
 from tests.capri.meshes import drilled_plate
 
 PAPER = {"schedule": "paper", "iterations": 3, "surface": 6000, "near": 6000, "uniform": 5000, "tries": 0}
+
+
+def fit(shape: Shape, settings: Settings, run: Run | None = None) -> Found:
+    return found(FitRequest(shape, settings, run or Run()))
+
+
 TINY = NetworkSizes(primitives=32, convexes=8, code=8, hidden=16, channels=1)
 
 
@@ -122,7 +130,7 @@ def test_straight_rows_keep_their_surface() -> None:
 
 def test_seeds_go_through_the_paper_s_schedule(plate: Shape) -> None:
     seen: list[Progress] = []
-    fitted = fit(plate, Settings(**PAPER), seen.append)
+    fitted = fit(plate, Settings(**PAPER), Run(progress=seen.append))
     made = mesh_csg(fitted.assembly)
     assert made.is_watertight
     assert made.volume == pytest.approx(drilled_plate().volume, rel=0.02)
@@ -171,11 +179,13 @@ def test_searching_among_the_shipped_network_s_quadrics(plate: Shape) -> None:
 
 
 def test_an_interruption_keeps_what_there_is(plate: Shape) -> None:
+    cancel = Cancellation()
+
     def stop(step: Progress) -> None:
         if step.stage == "weighted union":
-            raise KeyboardInterrupt
+            cancel.request()
 
-    fitted = fit(plate, Settings(**PAPER), stop)
+    fitted = fit(plate, Settings(**PAPER), Run(progress=stop, cancel=cancel))
     assert fitted.outcome == "interrupted"
     assert mesh_csg(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.02)
 

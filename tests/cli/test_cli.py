@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from partwright.results import FILES
 
 import partwright
 from partwright.assembly import load_assembly
@@ -18,7 +19,6 @@ from partwright.cli.main import main
 from partwright.errors import PartwrightError
 from partwright.fields import Box
 from partwright.fitting import fit
-from partwright.results import FILES
 from partwright.shapes import load_shape
 from tests.cli.conftest import BoxMethod
 

@@ -59,10 +59,12 @@ def test_reconstruct(
     mesh.export(tmp_path / "lamp.ply")
     quick = ["--iterations", "60", "--points", "400", "--resolution", "48"]
     assert main(["parts", "reconstruct", str(file), "lamp.ply", "-o", "out", *quick]) == 0
-    assert "parts: plate, ball" in capsys.readouterr().out
+    assert "written to out" in capsys.readouterr().out
     report = json.loads(Path("out/report.json").read_text())
+    assert (report["method"], report["outcome"], report["parts"]) == ("parts", "converged", 2)
+    assert report["learned"][0]["absent"] == ["knob"]
     assert report["scores"]["iou"] > 0.75
-    assert report["evaluations"]["meshing"] < report["evaluations"]["dense grid"]
+    assert report["learned"][0]["evaluations"]["meshing"] < report["learned"][0]["evaluations"]["dense grid"]
     surface = trimesh.load("out/surface.ply")
     assert surface.is_watertight
     np.testing.assert_allclose(surface.center_mass, mesh.center_mass, atol=0.15)  # of a size of 3.6
@@ -112,7 +114,7 @@ def test_interpolate(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["edit", "sofas:1", "-o", "a.json"], "no model is named 'sofas'"),
         (["interpolate", "{}:1", "{}:2", "-o", "a.avi"], "written as .gif"),
         (["reconstruct", "{}", "none.ply"], "none.ply"),
-        (["reconstruct", "{}", "none.ply", "--iterations", "0"], "iterations is 0"),
+        (["reconstruct", "{}", "none.ply", "--iterations", "0"], "iterations: expected a whole number of at least 1"),
         (["train", "none.toml", "-o", "out"], "cannot read none.toml"),
     ],
 )

@@ -14,12 +14,13 @@ import partwright as pw
 from partwright.datasets.poses import Poses
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import ModelError, SettingError
+from partwright.methods import Cancellation, Checkpoint
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import rotation_matrices
 from partwright.partsdf.reconstruction import (
-    ReconstructionSettings,
+    Step,
     Target,
     _error,
     _scouted,
@@ -27,6 +28,7 @@ from partwright.partsdf.reconstruction import (
     reconstruct,
     reconstruct_unknown,
 )
+from partwright.partsdf.settings import ReconstructionSettings
 
 QUICK = ReconstructionSettings(iterations=150, points=512)
 
@@ -95,12 +97,14 @@ def test_repeats_by_seed(model: Model, lamps: PreparedFamily) -> None:
     assert first.equal(again)
 
 
-def test_ctrl_c_keeps_what_was_found(model: Model, lamps: PreparedFamily) -> None:
-    def stop(done: int, of: int, loss: float) -> None:
-        if done == 20:
-            raise KeyboardInterrupt
+def test_a_cancellation_keeps_what_was_found(model: Model, lamps: PreparedFamily) -> None:
+    cancel = Cancellation()
 
-    stopped = reconstruct(model, lamps.load(1), QUICK, stop)
+    def stop(step: Step) -> None:
+        if step.number == 20:
+            cancel.request()
+
+    stopped = reconstruct(model, lamps.load(1), QUICK, told=stop, cancel=cancel)
     whole = reconstruct(model, lamps.load(1), replace(QUICK, iterations=40))
     assert stopped.latents.shape == whole.latents.shape
     assert float(stopped.latents.abs().max()) > 0.03  # not where it started, which was 0.01 wide
@@ -111,7 +115,7 @@ def test_a_shape_of_another_family_is_refused(model: Model, lamps: PreparedFamil
     poses = Poses(*(a[:2] for a in (shape.translation, shape.rotation, shape.scale)))
     with pytest.raises(ModelError, match=r"lamp0 has 2 parts, but lamps knows 3: plate, ball, knob"):
         reconstruct(model, replace(shape, poses=poses, present=shape.present[:2]), QUICK)
-    with pytest.raises(SettingError, match="iterations is 0"):
+    with pytest.raises(SettingError, match="iterations: expected a whole number of at least 1, got 0"):
         ReconstructionSettings(iterations=0)
     with pytest.raises(SettingError, match="start is 'best'"):
         ReconstructionSettings(start="best")
@@ -144,7 +148,7 @@ def test_the_start_that_a_few_iterations_bring_closest_goes_on(model: Model, lam
     good = nearest_trained(model, target)[0]
     generator = torch.Generator().manual_seed(0)
     bad = replace(good, latents=torch.randn(good.latents.shape, generator=generator))
-    alone, together = (_scouted(starts, target, few, None) for starts in ([bad], [bad, good]))
+    alone, together = (_scouted(starts, target, few) for starts in ([bad], [bad, good]))
     assert _error(together, target) < 0.7 * _error(alone, target)
     order = nearest_trained(model, target, 3)
     assert len(order) == 3
@@ -154,18 +158,22 @@ def test_the_start_that_a_few_iterations_bring_closest_goes_on(model: Model, lam
     assert errors == sorted(errors)
 
 
-def test_progress_counts_all_starts_and_ctrl_c_ends_at_once(model: Model, lamps: PreparedFamily) -> None:
+def test_progress_counts_all_starts_and_a_cancellation_ends_at_once(
+    model: Model, lamps: PreparedFamily
+) -> None:
     target, settings = held_out(lamps), replace(QUICK, iterations=16, starts=3)
     seen: list[tuple[int, int]] = []
-    reconstruct_unknown(model, target, settings, lambda step, of, _: seen.append((step, of)))
+    reconstruct_unknown(model, target, settings, told=lambda step: seen.append((step.number, step.of)))
     assert seen == [(step, 22) for step in range(1, 23)]  # three times two, and sixteen
 
-    def stop(step: int, of: int, loss: float) -> None:
-        seen.append((step, of))
-        if step == 3:  # the second start's first
-            raise KeyboardInterrupt
+    cancel = Cancellation()
+
+    def stop(step: Step) -> None:
+        seen.append((step.number, step.of))
+        if step.number == 3:  # the second start's first
+            cancel.request()
 
     seen.clear()
-    found = reconstruct_unknown(model, target, settings, stop)
+    found = reconstruct_unknown(model, target, settings, told=stop, checkpoint=Checkpoint(cancel))
     assert len(seen) == 3
     assert np.isfinite(found.distances(target.points[:10].numpy())).all()

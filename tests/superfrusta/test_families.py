@@ -7,15 +7,17 @@ import pytest
 
 from partwright.errors import SettingError
 from partwright.fields.columns import SIZE, Column
+from partwright.methods import FitRequest, Fitted, Run
 from partwright.shapes import Shape, load_shape
-from partwright.superfrusta import Fitted, Settings, fit
+from partwright.superfrusta import Settings
 from partwright.superfrusta.families import FAMILIES, locked_values, with_locked_values
 from tests.superfrusta.meshes import half_torus, table
 from tests.superfrusta.rows import row
 
 
 def draft(shape: Shape, **changes) -> Fitted:
-    return fit(shape, Settings.for_quality("draft", threads=1, cycles=2, **changes))
+    settings = Settings.for_quality("draft", cycles=2, **changes)
+    return FitRequest(shape, settings, Run(threads=1)).fitted()
 
 
 @pytest.fixture(scope="module")

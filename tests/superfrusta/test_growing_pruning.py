@@ -19,7 +19,7 @@ from partwright.superfrusta.samples import FitSamples
 from tests.superfrusta.meshes import box, union
 from tests.superfrusta.rows import box as box_row
 
-SETTINGS = Settings.for_quality("draft", threads=1)
+SETTINGS = Settings.for_quality("draft")
 NONE = np.empty((0, WIDTH), np.float32)
 
 # Two blocks apart along x, in the unit frame already: 1.8 long.
@@ -69,8 +69,7 @@ def test_growing_repeats_at_any_number_of_threads(pair: FitSamples) -> None:
     first = grow(pair, NONE, SETTINGS, most=5).last
     for threads in (1, 2):
         again = dataclasses.replace(pair, threads=threads)
-        changed = Settings.for_quality("draft", threads=threads)
-        np.testing.assert_array_equal(grow(again, NONE, changed, most=5).last, first)
+        np.testing.assert_array_equal(grow(again, NONE, SETTINGS, most=5).last, first)
 
 
 def test_pruning_drops_copies_crumbs_and_strays_only(pair: FitSamples, exact: np.ndarray) -> None:
@@ -124,5 +123,5 @@ def test_refining_moves_the_marked_parts_only(pair: FitSamples, exact: np.ndarra
     assert score(pair, refined) > score(pair, moved)
     nothing = np.zeros(2, bool)
     np.testing.assert_array_equal(refine(pair, moved, POLISH, SETTINGS, nothing), moved)
-    plain = Settings.for_quality("draft", threads=1, smooth=False)
+    plain = Settings.for_quality("draft", smooth=False)
     np.testing.assert_array_equal(refine(pair, moved, POLISH, plain)[:, Column.BLEND], moved[:, Column.BLEND])

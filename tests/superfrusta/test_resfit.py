@@ -9,20 +9,22 @@ import pytest
 import trimesh
 
 from partwright.assembly import Assembly
-from partwright.errors import SettingError
+from partwright.errors import CancelledError, SettingError
+from partwright.methods import Cancellation, FitRequest, Fitted, Progress, Run
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import iou
 from partwright.shapes import Shape, load_shape
-from partwright.superfrusta import Fitted, Progress, Settings, fit
-from partwright.superfrusta.resfit import Run
+from partwright.superfrusta import Settings
+from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import FitSamples
 from tests.superfrusta.meshes import box, bracket, corner_tie, half_torus, pipe, table, union
 
 OUTCOMES = {"converged", "budget_reached", "target_reached", "interrupted"}
 
 
-def draft(shape: Shape, threads: int = 1, progress=None, **changes) -> Fitted:
-    return fit(shape, Settings.for_quality("draft", threads=threads, **changes), progress)
+def draft(shape: Shape, threads: int = 1, progress=None, seed: int = 0, cancel=None, **changes) -> Fitted:
+    run = Run(seed, threads=threads, progress=progress, cancel=cancel or Cancellation())
+    return FitRequest(shape, Settings.for_quality("draft", **changes), run).fitted()
 
 
 def reached(assembly: Assembly, shape: Shape) -> float:
@@ -109,22 +111,26 @@ def test_progress_tells_where_the_fit_is(table_shape: Shape) -> None:
 
 
 def test_an_interruption_returns_the_best_so_far(table_shape: Shape) -> None:
-    def interrupt(_: Progress) -> None:
-        raise KeyboardInterrupt
+    cancel = Cancellation()
+    seen: list[Progress] = []
 
-    fitted = draft(table_shape, progress=interrupt)
+    def interrupt(step: Progress) -> None:
+        seen.append(step)
+        cancel.request()
+
+    fitted = draft(table_shape, progress=interrupt, cancel=cancel)
+    assert len(seen) == 1
+    assert seen[0].assembly() == fitted.assembly
     assert fitted.outcome == "interrupted"
     assert len(fitted.assembly) >= 1
     assert reached(fitted.assembly, table_shape) > 0.5
 
 
-def test_an_interruption_before_there_is_anything_goes_through(table_shape: Shape, monkeypatch) -> None:
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("partwright.superfrusta.resfit.FitSamples.of", interrupt)
-    with pytest.raises(KeyboardInterrupt):
-        draft(table_shape)
+def test_an_interruption_before_there_is_anything_is_an_error(table_shape: Shape) -> None:
+    cancel = Cancellation()
+    cancel.request()
+    with pytest.raises(CancelledError):
+        draft(table_shape, cancel=cancel)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +157,6 @@ def test_settings_that_cannot_be_used_are_named() -> None:
         ({"max_parts": 0}, "max_parts: expected a number of at least 1, got 0"),
         ({"min_iou": 1.5}, "min_iou: expected a number of at least 0 and at most 1, got 1.5"),
         ({"min_iou": float("nan")}, "min_iou"),
-        ({"seed": -1}, "seed"),
         ({"max_parts": "4"}, "max_parts"),
         ({"optimiser": "sgd"}, "optimiser"),
         ({"colour": "red"}, "unknown settings: colour"),
@@ -163,31 +168,31 @@ def test_settings_that_cannot_be_used_are_named() -> None:
 
 
 def test_of_several_attempts_the_best_is_kept(table_shape: Shape) -> None:
-    settings = Settings.for_quality("draft", threads=1)
-    samples = FitSamples.of(table_shape, settings)
-    single, several = Run(samples, settings), Run(samples, replace(settings, attempts=3))
-    single.through()
+    settings = Settings.for_quality("draft")
+    samples = FitSamples.of(table_shape, settings, Run(threads=1))
+    single, several = ResidualFit(samples, settings), ResidualFit(samples, replace(settings, attempts=3))
+    single.run()
     seen: list[float] = []
     several.report = lambda step: seen.append(step.fraction)
-    several.through()
+    several.run()
     assert single.best is not None
     assert several.best is not None
     assert several.objective(several.best) >= replace(single, samples=several.samples).objective(single.best)
     assert several.best_objective == several.objective(several.best)
     assert seen == sorted(seen)
     assert len([entry for entry in several.history if entry["stage"] == "thin"]) == 3
-    assert [Run(samples, Settings(), attempt=i).regions for i in range(5)] == [7, 5, 9, 3, 11]
+    assert [ResidualFit(samples, Settings(), number=i).regions for i in range(5)] == [7, 5, 9, 3, 11]
 
 
 def test_an_interruption_in_a_later_attempt_keeps_the_earlier_ones_result(table_shape: Shape) -> None:
-    settings = Settings.for_quality("draft", threads=1, attempts=2, symmetry=False)
-    alone = fit(table_shape, replace(settings, attempts=1))
+    cancel = Cancellation()
 
     def stop(step: Progress) -> None:
         if step.fraction > 0.5:
-            raise KeyboardInterrupt
+            cancel.request()
 
-    stopped = fit(table_shape, settings, stop)
+    alone = draft(table_shape, symmetry=False)
+    stopped = draft(table_shape, progress=stop, cancel=cancel, attempts=2, symmetry=False)
     assert stopped.outcome == "interrupted"
     assert len(stopped.assembly) <= len(alone.assembly)
     assert reached(stopped.assembly, table_shape) > reached(alone.assembly, table_shape) - 0.01

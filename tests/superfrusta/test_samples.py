@@ -12,7 +12,7 @@ from partwright.superfrusta.objective import score
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 
-SETTINGS = Settings.for_quality("draft", threads=1)
+SETTINGS = Settings.for_quality("draft")
 
 
 @pytest.fixture

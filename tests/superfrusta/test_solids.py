@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,16 +29,23 @@ from partwright.fields import (
     kernel,
 )
 from partwright.fields.columns import WIDTH, Column
-from partwright.shapes import load_shape
+from partwright.methods import FitRequest, Fitted, Run
+from partwright.shapes import Shape, load_shape
 from partwright.superfrusta.flat_tree import flattened, nested
 from partwright.superfrusta.growing import Region, fit_regions
 from partwright.superfrusta.samples import NOTHING, FitSamples
 from partwright.superfrusta.simplification import extend_cuts
 from partwright.superfrusta.solid_kinds import is_solid, kind_freedom, round_parts, solid
-from partwright.superfrusta.solids import Settings, fit
+from partwright.superfrusta.solids import Settings
 from tests.superfrusta.rows import row, subtracting
 
-DRAFT = Settings.for_quality("draft", threads=1)
+DRAFT = Settings.for_quality("draft")
+
+
+def fit(shape: Shape, settings: Settings, **given: Any) -> Fitted:
+    return FitRequest(shape, settings, Run(threads=1), **given).fitted()
+
+
 SOLIDS: list[tuple[Field, int]] = [  # and the number of its own parameters, sx = sy counted once
     (Box((0.5, 0.25, 0.75)), 3),
     (Cylinder(0.25, 0.5), 2),
@@ -109,7 +117,7 @@ def test_a_fit_of_solids_goes_on_from_its_own_tree_and_keeps_what_is_locked() ->
     shape = load_shape(plate())
     holes = [Part(Cylinder(0.1, 0.4), (x, 0.3, 0), name=f"hole_{i}") for i, x in enumerate((-0.6, 0.6))]
     start = Assembly((Part(Box((1.8, 1.2, 0.2)), name="plate"), *holes), operation="difference")
-    fitted = fit(shape, dataclasses.replace(DRAFT, symmetry=False), start=start, locked=["plate"])
+    fitted = fit(shape, dataclasses.replace(DRAFT, symmetry=False), start=start, locked=("plate",))
     locked = fitted.assembly["plate"].field
     assert isinstance(locked, Box)
     np.testing.assert_allclose(locked.size, (1.8, 1.2, 0.2), rtol=1e-6)

@@ -15,10 +15,10 @@ from partwright.assembly.parts_from_rows import parts_from_rows
 from partwright.assembly.rows import rows
 from partwright.fields import SuperFrustum, kernel
 from partwright.fields.columns import Column
+from partwright.methods import FitRequest
 from partwright.shapes import load_shape
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.repeated_parts import repeat
-from partwright.superfrusta.resfit import fit
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, image, refit, rigid
@@ -157,9 +157,9 @@ def test_copies_are_refitted_as_one(isometry: Isometry, others: list[int]) -> No
 
 def test_a_fit_repeats_parts_only_if_asked() -> None:
     shape = load_shape(table())
-    on, off = (fit(shape, replace(DRAFT, symmetry=flag)).assembly for flag in (True, False))
+    on, off = (FitRequest(shape, replace(DRAFT, symmetry=flag)).fitted().assembly for flag in (True, False))
     assert len(on) < len(off)
     assert sum(len(part.copies) for part in on.parts) >= 5
     assert not any(part.instances for part in off.parts)
-    again = fit(shape, DRAFT, start=on, locked=[on.parts[-1].name])
+    again = FitRequest(shape, DRAFT, start=on, locked=(on.parts[-1].name,)).fitted()
     assert again.assembly.parts[0].instances == ()  # a locked part's copies stay as parts of their own

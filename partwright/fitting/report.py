@@ -1,18 +1,23 @@
-"""What a fit's report says of its input, its masses, and what a user should be told."""
+"""What report.json says: of the fit, its input, its masses, and what a user should be told."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from partwright.assembly import Similarity
+from partwright import __version__
+from partwright.assembly import Assembly, Similarity
 from partwright.errors import SettingError
+from partwright.methods import Fitted, Run
 from partwright.shapes import METRES, Shape
+from partwright.tolerances import Bounded, bounds_report, bounds_warnings
 
 if TYPE_CHECKING:
     import trimesh
 
+    from partwright.cleaning import Cleaned
     from partwright.metrics import Scores
 
 POOR_IOU = 0.85
@@ -22,9 +27,48 @@ MUCH_MISSING = 0.02  # of the surface
 SAME_VOLUME = 0.01  # of the input's triangles and of its inside: then no surface runs through it twice
 
 
-def about_input(shape: Shape, source: str | None) -> dict[str, Any]:
+def report(
+    shape: Shape,
+    assembly: Assembly,
+    surface: trimesh.Trimesh,
+    scores: Scores,
+    *,
+    how: Mapping[str, Any],
+    run: Run,
+    seconds: Mapping[str, float],
+    fitted: Sequence[Fitted],
+    enforced: Bounded | None,
+    cleaned: Cleaned | None,
+) -> dict[str, Any]:
+    """What report.json holds (docs/report.md). how: outcome, method and settings, as they are to stand."""
+    told = {
+        **how,
+        "version": __version__,
+        "seed": run.seed,
+        "device": run.device,
+        "threads": run.threads,
+        "input": about_input(shape),
+        "seconds": {stage: round(spent, 3) for stage, spent in seconds.items()},
+        "parts": len(assembly),
+        "instances": sum(len(part.copies) for part in assembly.parts),
+        "scores": scores.to_dict(),
+        "mass_properties": masses(surface, shape, None),
+        "warnings": warnings(shape, scores) + (bounds_warnings(enforced, shape) if enforced else []),
+    }
+    for name in dict.fromkeys(name for one in fitted for name in one.details):
+        told[name] = [one.details[name] for one in fitted]
+    if enforced is not None:
+        told["bounds"] = bounds_report(enforced, shape, float(surface.volume))
+    if fitted[0].curve:
+        told["curve"] = [{"parts": p.parts, "score": p.score, "iou": p.iou} for p in fitted[0].curve]
+    if cleaned is not None:
+        told["clean"] = cleaned.to_dict()
+    return told
+
+
+def about_input(shape: Shape) -> dict[str, Any]:
     return {
-        "file": source or shape.name,
+        "file": shape.file or shape.name,
         "unit": shape.unit,
         "up": shape.up,
         "triangles": len(shape.input_faces),

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from partwright.assembly import Assembly
 from partwright.atomic_io import finishing, replacing_files, write_bytes
+from partwright.fitting.report import check_density_of, masses
+from partwright.methods import CurvePoint
 from partwright.shapes import Shape
 
 if TYPE_CHECKING:
@@ -17,7 +19,6 @@ if TYPE_CHECKING:
 
     from partwright.cleaning import Cleaned
     from partwright.metrics import Scores
-    from partwright.superfrusta import CurvePoint
 
 FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
 CURVE_SIZES = (1, 2, 4, 8, 16, 32, 64)
@@ -46,6 +47,16 @@ class Result:
     def warnings(self) -> tuple[str, ...]:
         """What a user should be told about the result, a sentence each; empty where it is good."""
         return tuple(self.report["warnings"])
+
+    def with_density(self, density: float) -> Result:
+        """The result whose report has the mass and its inertia, in kilograms and metres; density in kg/m3.
+
+        Raises:
+            SettingError: it is no density, or the shape's length unit is unknown.
+        """
+        check_density_of(density, self.shape.unit)
+        weighed = {"mass_properties": masses(self.surface, self.shape, density)}
+        return dataclasses.replace(self, report=self.report | weighed)
 
     def save(self, folder: str | Path) -> None:
         """Write assembly.json, parts.glb, surface.ply, report.json and preview.png, all or none.

@@ -1,13 +1,13 @@
-"""A shape to a CSG tree of quadrics: detect, select, prune (schedule "search"), or the paper's network."""
+"""One way to a CSG tree of quadrics: detect, select, prune (schedule "search"), or the paper's network."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 
@@ -20,116 +20,31 @@ from partwright.capri.candidates import CandidatePool, candidates
 from partwright.capri.csg_tree import CsgTree
 from partwright.capri.detection import detect
 from partwright.capri.initialisation import start_surface
-from partwright.capri.overlap import overlapped
-from partwright.capri.repeated_quadrics import with_repeats
 from partwright.capri.samples import OccupancySamples
 from partwright.capri.selection import Problem
 from partwright.capri.settings import Settings
-from partwright.errors import EmptyShapeError, MissingDependencyError, SettingError
-from partwright.methods import Outcome, Progress, timed
-from partwright.metrics.complexity import convexes, distinct_primitives, primitives
+from partwright.errors import MissingDependencyError, SettingError
+from partwright.methods import Checkpoint, Outcome, Progress, Run, timed
 from partwright.shapes import Shape
-
-ORIGINS = {"seeds": "detected surfaces", "weights": "pre-trained network"}
 
 _MAX_CONVEXES = 64  # convexes: the paper's c (section 4.1)
 _PRICE_FACTOR = 1.5  # factor between the prices that are tried for a budget or a target
 _PRICE_STEPS = 16  # prices that are tried at most
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """A fit's result: the assembly in the shape's own units and place, and how it came about.
-
-    details: for the report: which start was best, primitives, convexes, distinct primitives, quadrics among
-    which was chosen.
-    """
-
-    assembly: Assembly
-    outcome: Outcome
-    seconds: dict[str, float]
-    history: list[dict[str, float | str]]
-    tree: CsgTree
-    details: dict[str, Any] = field(default_factory=dict)
-    curve: tuple[Any, ...] = ()
-
-
-def fit(
-    shape: Shape,
-    settings: Settings | None = None,
-    progress: Callable[[Progress], None] | None = None,
-    start: Assembly | None = None,
-    locked: Sequence[str] = (),
-) -> Fitted:
-    """Fits a CSG tree of quadrics to a shape.
-
-    `start`: quadrics detected on its surface join those on the shape's.
-    Ctrl-C ends the fit with the best tree so far and the outcome "interrupted".
-
-    Raises:
-        EmptyShapeError: no tree explains anything (the shape is thinner than the samples can see).
-        SettingError: parts are locked.
-        NoSurfaceError: the start has no surface.
-        MissingDependencyError: the paper's schedule or the pre-trained network is asked for without PyTorch.
-    """
-    settings = (settings or Settings()).of_schedule()
-    if locked:
-        raise SettingError("capri keeps no part locked; give the start alone, or use method superfrusta")
-    origins = ("seeds", "weights") if settings.start == "auto" else (settings.start,)
-    runs = [Run(settings, progress, origin, (i, len(origins))) for i, origin in enumerate(origins)]
-    interrupted = False
-    try:
-        for run in runs:
-            run.prepare(shape, start)
-            run.make(shape)
-    except KeyboardInterrupt:
-        interrupted = True
-        if not any(run.placed for run in runs):
-            raise
-    done = [run for run in runs if run.placed]
-    if not done and settings.schedule == "paper":
-        raise EmptyShapeError(
-            f"{shape.name}: after 3 x {settings.iterations} iterations no convex holds anything; give more "
-            'iterations, or start "seeds"'
-        )
-    if not done:
-        raise EmptyShapeError(
-            f"{shape.name}: no convex could be placed; the shape has no volume that {settings.near} samples "
-            "can see. Check its thickness, or use --quality high"
-        )
-    run = min(done, key=Run.cost)
-    corners = shape.frame.to_unit(shape.vertices)
-    tree = overlapped(run.tree(), run.samples).closed(corners.min(axis=0), corners.max(axis=0))
-    whole = with_repeats(tree.assembly()) if settings.symmetry else tree.assembly()
-    whole = replace(whole, unit=shape.unit)
-    assembly = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
-    details = {
-        "schedule": settings.schedule,
-        "start": ORIGINS[run.origin],
-        "costs": {ORIGINS[one.origin]: round(one.cost(), 5) for one in done},
-        "candidates": len(run.pool.rows),
-        "primitives": primitives(assembly),
-        "convexes": convexes(assembly),
-        "distinct_primitives": distinct_primitives(assembly),
-    }
-    seconds: dict[str, float] = {}
-    for one in runs:
-        seconds |= {stage: seconds.get(stage, 0.0) + spent for stage, spent in one.seconds.items()}
-    outcome: Outcome = "interrupted" if interrupted else run.outcome
-    return Fitted(assembly, outcome, seconds, run.history, tree, details)
-
-
 @dataclass
-class Run:
-    """State of one fit from one origin: the samples, the pool, and the cheapest layers so far.
+class TreeSearch:
+    """State of one search from one origin: the samples, the pool, and the cheapest layers so far.
 
-    turn: which of how many runs this is. tuned: what the paper's schedule made.
+    turn: which of how many searches this is. tuned: what the paper's schedule made.
     """
 
     settings: Settings
-    report: Callable[[Progress], None] | None = None
+    run: Run = field(default_factory=Run)
+    checkpoint: Checkpoint | None = None
     origin: str = "seeds"
     turn: tuple[int, int] = (0, 1)
+    assembled: Callable[[CsgTree], Assembly] | None = None
     best: selection.Layers | None = None
     tuned: CsgTree | None = None
     outcome: Outcome = "converged"
@@ -145,17 +60,17 @@ class Run:
         """Samples, and the pool of quadrics."""
         s = self.settings
         with self.timed("prepare"):
-            self.samples = sampling.draw_samples(shape, s.near, s.uniform, s.seed)
-            surface = oriented_points.sample_surface(shape, s.surface, s.seed)
+            self.samples = sampling.draw_samples(shape, s.near, s.uniform, self.run.seed)
+            surface = oriented_points.sample_surface(shape, s.surface, self.run.seed)
         with self.timed("detect" if self.origin == "seeds" else "predict"):
-            found = detect(surface, s.kinds, s.least, s.seed) if self.origin == "seeds" else []
+            found = detect(surface, s.kinds, s.least, self.run.seed) if self.origin == "seeds" else []
             found = aligned(found, surface)
             if start is not None:
-                seen = start_surface(start, shape, s.surface, s.seed)
-                found = [*found, *aligned(detect(seen, s.kinds, s.least, s.seed), seen)]
+                seen = start_surface(start, shape, s.surface, self.run.seed)
+                found = [*found, *aligned(detect(seen, s.kinds, s.least, self.run.seed), seen)]
             given = candidates(found, surface)
             if self.origin == "weights":
-                given += list(_paper().predicted(shape, s))
+                given += list(paper_schedule().predicted(shape, s))
             pool = CandidatePool.of(given, nested=s.nested, oriented=s.oriented)
             held = rows.expressible(pool.rows) | (s.schedule == "search")
             self.pool = CandidatePool(pool.rows[held], pool.complement[held])
@@ -170,8 +85,15 @@ class Run:
             with self.timed("fine-tune"):
                 seeds = self.tree() if self.placed else None
                 if seeds is not None or self.origin == "weights":
-                    _paper().fine_tuned(
-                        shape, seeds, s, self.samples.points, self.accept_tuned, self.report_finetuning
+                    paper_schedule().fine_tuned(
+                        shape,
+                        seeds,
+                        s,
+                        self.run,
+                        self.samples.points,
+                        self.accept_tuned,
+                        self.report_finetuning,
+                        self.pause,
                     )
 
     @property
@@ -186,8 +108,12 @@ class Run:
 
     def report_finetuning(self, stage: str, done: float) -> None:
         """Progress of fine-tuning."""
-        if self.report is not None:
-            self.report(Progress(stage, 1, 1, 0, 0.0, self.fraction(0.3 + 0.7 * done)))
+        self.run.told(Progress(stage, 1, 1, 0, 0.0, self.fraction(0.3 + 0.7 * done)))
+
+    def pause(self) -> None:
+        """Where the search may end, if it was cancelled."""
+        if self.checkpoint is not None:
+            self.checkpoint()
 
     def fraction(self, done: float) -> float:
         """Of all runs, where this one has done so much."""
@@ -210,7 +136,8 @@ class Run:
             self.samples.weight,
             dearer * volume * price,
             dearer * volume * s.convex_price,
-            np.random.default_rng((s.seed, 3)),
+            np.random.default_rng((self.run.seed, 3)),
+            self.pause,
         )
 
     def search(self) -> Outcome:
@@ -267,10 +194,11 @@ class Run:
         tree = self.tree() if self.best else None
         parts, iou = (tree.primitives, self.iou(self.best)) if tree and self.best else (0, 0.0)
         self.history.append({"stage": stage, "round": round_, "parts": parts, "iou": iou})
-        if self.report is not None:
-            done = 0.1 + 0.3 * round_ / rounds if stage == "select" else 0.4 + 0.6 * round_ / rounds
-            done *= 0.3 if self.settings.schedule == "paper" else 1.0
-            self.report(Progress(stage, round_, rounds, parts, iou, self.fraction(done)))
+        done = 0.1 + 0.3 * round_ / rounds if stage == "select" else 0.4 + 0.6 * round_ / rounds
+        done *= 0.3 if self.settings.schedule == "paper" else 1.0
+        best = partial(self.assembled, tree) if tree and self.assembled else None
+        self.run.told(Progress(stage, round_, rounds, parts, iou, self.fraction(done), best))
+        self.pause()
 
     def iou(self, layers: selection.Layers) -> float:
         """IoU over the uniform samples."""
@@ -286,7 +214,7 @@ class Run:
         return CsgTree(self.pool.rows, self.pool.complement, layers)
 
 
-def _paper() -> ModuleType:
+def paper_schedule() -> ModuleType:
     """The module of the network, which needs PyTorch."""
     try:
         return import_module("partwright.capri.paper")

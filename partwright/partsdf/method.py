@@ -1,0 +1,100 @@
+"""Method "parts": the parts of a trained model that make up a plain shape (PartSDF, section 3.4)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from partwright.errors import SettingError
+from partwright.methods import Ability, Checkpoint, FitRequest, Fitted, Method, Progress, preset, timed
+from partwright.partsdf.assemblies import to_assembly
+from partwright.partsdf.meshing import mesh_shape
+from partwright.partsdf.model import load_model
+from partwright.partsdf.reconstruction import Step, Target, reconstruct_unknown
+from partwright.partsdf.settings import Settings
+
+_PRESETS: dict[str, dict[str, Any]] = {
+    "draft": {"iterations": 100, "starts": 2},
+    "normal": {},
+    "high": {"iterations": 800, "points": 8_000},  # the paper's
+}
+_TOLD = 20  # steps between two reports of progress
+_PROBED = 2_048  # samples that the IoU in a report is of
+
+
+class LearnedParts(Method[Settings]):
+    name = "parts"
+    can = frozenset({Ability.PER_NODE})
+
+    def settings(self, quality: str = "normal", **changes: Any) -> Settings:
+        model = changes.pop("model", None)
+        if not model:
+            raise SettingError(
+                'method parts needs a model: give model="cars", or another that ships or a file'
+            )
+        presets = {name: Settings(model, **values) for name, values in _PRESETS.items()}
+        return preset(presets, quality, changes)
+
+    def fit(self, request: FitRequest[Settings]) -> Fitted:
+        """The parts of the model that a plain shape is made of. Its shape has to stand as those that the
+        model was trained on.
+
+        Raises:
+            ModelError: there is no such model.
+            NoSurfaceError: what was found has no surface.
+        """
+        shape, settings, run = request.shape, request.settings, request.run
+        seconds: dict[str, float] = {}
+        model = load_model(settings.model)
+        checkpoint = Checkpoint(run.cancel)
+        with timed(seconds, "prepare"):
+            target = Target.of_shape(shape, seed=run.seed)
+            rows = np.linspace(0, len(target.sdf) - 1, _PROBED).astype(int)
+            points, inside = target.points[rows].numpy(), target.sdf[rows].numpy() < 0
+            checkpoint()
+        history: list[dict[str, float | str]] = []
+
+        def told(step: Step) -> None:
+            if step.number % _TOLD and step.number not in (1, step.of):
+                return
+            neural = step.shape()
+            occupied = neural.distances(points) < 0
+            iou = float((occupied & inside).sum() / max((occupied | inside).sum(), 1))
+            parts = len(neural.names())
+            history.append({"stage": "optimise", "round": step.number, "parts": parts, "loss": step.loss})
+            run.told(
+                Progress(
+                    "optimise",
+                    step.number,
+                    step.of,
+                    parts,
+                    iou,
+                    step.number / step.of,
+                    lambda: to_assembly(neural, shape.frame, shape.unit, shape.up),
+                )
+            )
+
+        with timed(seconds, "optimise"):
+            found = reconstruct_unknown(model, target, settings, run.seed, told, checkpoint)
+        with timed(seconds, "mesh"):
+            meshed = mesh_shape(found, settings.resolution, parts=False)
+        surface = meshed.whole
+        surface.vertices = shape.frame.from_unit(surface.vertices)
+        learned = {
+            "model": {"name": model.name, "hash": model.hash},
+            "absent": [name for name in model.parts if name not in found.names()],
+            "resolution": meshed.resolution,
+            "evaluations": {"meshing": meshed.evaluations, "dense grid": meshed.dense},
+        }
+        return Fitted(
+            to_assembly(found, shape.frame, shape.unit, shape.up),
+            "interrupted" if run.cancel.requested else "converged",
+            seconds,
+            history,
+            details={"learned": learned},
+            surface=surface,
+        )
+
+
+METHOD = LearnedParts()

@@ -1,0 +1,54 @@
+"""Settings of fits by learned parts. Defaults that differ from the paper say so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from partwright.errors import SettingError
+from partwright.methods import check_count, check_number
+
+START_SHAPES = ("nearest", "mean")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReconstructionSettings:
+    """How latents and poses are optimised until they decode to a shape (section 4.1)."""
+
+    iterations: int = 400
+    """Steps (paper: 800)."""
+    points: int = 2048
+    """Samples a step, half of them inside (paper: 8,000, all that it draws)."""
+    rate: float = 5e-3
+    """Of Adam, for latents."""
+    decay: float = 0.1
+    """What the rates fall by at half time, when the whole shape's loss joins in."""
+    start: Literal["nearest", "mean"] = "nearest"
+    """From the nearest training shapes, or from the mean of all; where poses are unknown only."""
+    starts: int = 4
+    """So many nearest shapes are tried for an eighth of the iterations each, and the best goes on."""
+    pose_rate: float = 2e-3
+    """Of Adam, for poses."""
+    pose_delay: float = 0.1
+    """Share of the iterations for which poses wait until latents have found the rough form."""
+
+    def __post_init__(self) -> None:
+        for name in ("iterations", "points", "starts"):
+            check_count(name, getattr(self, name), low=1)
+        for name in ("rate", "decay", "pose_rate", "pose_delay"):
+            check_number(name, getattr(self, name), low=0.0, high=1.0)
+        if self.start not in START_SHAPES:
+            raise SettingError(f"start is {self.start!r}; expected one of {', '.join(START_SHAPES)}")
+
+
+@dataclass(frozen=True)
+class Settings(ReconstructionSettings):
+    """Which model's parts a shape is made of, and how they are found: `pw.LearnedParts("cars")`."""
+
+    method: ClassVar[str] = "parts"
+
+    model: str
+    """A model that ships (cars, chairs, mixers), or a file (.safetensors)."""
+    resolution: int | None = None
+    """Cells along the unit frame of the surface's mesh, a multiple of 8 (None: 128, up to 256 where walls are
+    thin)."""
