@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 import partwright as pw
-from partwright.results import FILES, Result
+from partwright.fitting import FILES, Result
 
 CENTRE = np.array([100.0, -40.0, 7.0])
 
@@ -34,7 +34,7 @@ def shape(tmp_path_factory: pytest.TempPathFactory) -> pw.Shape:
 
 @pytest.fixture(scope="module")
 def result(shape: pw.Shape) -> Result:
-    return pw.fit(shape, quality="draft", threads=1, source="table.stl")
+    return pw.fit(shape, quality="draft", threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -140,10 +140,8 @@ def test_the_preview_is_a_picture(folder: Path) -> None:
 
 
 def test_an_interrupted_fit_is_a_result(shape: pw.Shape, tmp_path: Path) -> None:
-    def interrupt(_: object) -> None:
-        raise KeyboardInterrupt
-
-    stopped = pw.fit(shape, quality="draft", threads=1, progress=interrupt)
+    cancel = pw.Cancellation()
+    stopped = pw.fit(shape, quality="draft", threads=1, progress=lambda _: cancel.request(), cancel=cancel)
     assert stopped.outcome == stopped.report["outcome"] == "interrupted"
     stopped.save(tmp_path / "out")
     assert pw.load_assembly(tmp_path / "out" / "assembly.json") == stopped.assembly

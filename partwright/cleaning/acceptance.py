@@ -6,7 +6,7 @@ Of a thin part, less is allowed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ from partwright.cleaning.deviation_samples import State
 from partwright.cleaning.linear import Equations
 from partwright.cleaning.model import Model
 from partwright.cleaning.refitting import refit
-from partwright.errors import ParameterError
+from partwright.errors import CancelledError, ParameterError
+from partwright.methods import Cancellation
 
 Floats = NDArray[np.float64]
 
@@ -32,16 +33,22 @@ class AcceptanceTest:
     """(L,) mean deviation that each part's own surface may have, unit lengths."""
     tolerance: float
     """How much of that the cleaning may add, unit lengths."""
+    cancel: Cancellation = field(default_factory=Cancellation)
+    """Asked before each change."""
 
     @classmethod
-    def of(cls, state: State, tolerance: float) -> AcceptanceTest:
+    def of(cls, state: State, tolerance: float, cancel: Cancellation) -> AcceptanceTest:
         fields = (as_superfrustum(part.field) for part in state.model.leaves)
         thickness = np.array([field.thinnest for field in fields]) * state.samples.scale
-        return cls(state.deviations + np.minimum(tolerance, thickness / _THIN), tolerance)
+        return cls(state.deviations + np.minimum(tolerance, thickness / _THIN), tolerance, cancel)
 
     def without_limit(self) -> AcceptanceTest:
         """One that accepts whatever the fields allow."""
-        return AcceptanceTest(np.full(len(self.limit), np.inf), self.tolerance)
+        return replace(self, limit=np.full(len(self.limit), np.inf))
+
+    def _check_cancelled(self) -> None:
+        if self.cancel.requested:
+            raise CancelledError("cancelled before the assembly was clean; it stays as it was")
 
     def accepts(self, state: State) -> bool:
         return bool((state.deviations <= self.limit + 1e-9).all())
@@ -49,6 +56,7 @@ class AcceptanceTest:
     def leaf(self, state: State, leaf: int, model: Model, locked: Sequence[str] = ()) -> State | None:
         """The state with one leaf otherwise, its own numbers but those `locked` (variable kinds or names of
         dimensions) fitted anew; None where that costs too much."""
+        self._check_cancelled()
         try:
             trial = state.changed(model, model.vector, [leaf])
         except ParameterError:
@@ -68,6 +76,7 @@ class AcceptanceTest:
         leaves = sorted({v.leaf for v, one in zip(state.model.variables, moved, strict=True) if one})
         if not leaves:
             return state
+        self._check_cancelled()
         try:
             trial = state.changed(state.model, equations.vector, leaves)
         except ParameterError:

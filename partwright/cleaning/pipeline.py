@@ -26,6 +26,7 @@ from partwright.cleaning.snapping import snapped
 from partwright.cleaning.solid_kinds import plainer
 from partwright.errors import SettingError
 from partwright.meshing import occupancy_grid
+from partwright.methods import Cancellation
 from partwright.metrics.iou import RESOLUTION, iou
 from partwright.shapes import Shape
 from partwright.tolerances.noise import roughness
@@ -78,7 +79,12 @@ class Cleaned:
         }
 
 
-def clean(assembly: Assembly, shape: Shape | None = None, tolerance: float | None = None) -> Cleaned:
+def clean(
+    assembly: Assembly,
+    shape: Shape | None = None,
+    tolerance: float | None = None,
+    cancel: Cancellation | None = None,
+) -> Cleaned:
     """The assembly with plain numbers: relations between parts made exact, lengths on a grid.
 
     What a person may have typed already stays, so that a second time changes nothing.
@@ -87,8 +93,10 @@ def clean(assembly: Assembly, shape: Shape | None = None, tolerance: float | Non
         shape: what the assembly stands for, in the same units; the assembly's own surface if not given.
         tolerance: how much further from the shape the surface of any part may come to lie, on average, in
             own units; half a thousandth of the longest side if not given.
+        cancel: asked before each change, from any thread.
 
     Raises:
+        CancelledError: cancelled on the way; half cleaned, an assembly is neither as fitted nor plain.
         UncleanableError: a part is neither a SuperFrustum nor a named solid.
         SettingError: the tolerance is no positive length, too large, or below the mesh's own noise.
         NoSurfaceError: nothing is left of the assembly.
@@ -99,7 +107,7 @@ def clean(assembly: Assembly, shape: Shape | None = None, tolerance: float | Non
     grid = Grid.of(_longest(target))
     samples = DeviationSamples.of(model, shape)
     given = State.of(samples, model)
-    acceptance = AcceptanceTest.of(given, tolerance * samples.scale)
+    acceptance = AcceptanceTest.of(given, tolerance * samples.scale, cancel or Cancellation())
     state, frames = turned(plainer(given, acceptance, grid), acceptance)
     state = snapped(state, acceptance, frames, grid)
     tidied = np.array([tidy(value, grid) for value in state.vector.tolist()])

@@ -13,7 +13,7 @@ from partwright.cli import clean, completion, describe, evaluate, export, fit, o
 from partwright.cli.interrupts import INTERRUPTED
 from partwright.cli.parser import Parser
 from partwright.cli.terminal import note
-from partwright.errors import PartwrightError
+from partwright.errors import CancelledError, PartwrightError
 
 COMMANDS = (fit, clean, evaluate, describe, export, segment, parts, completion)
 
@@ -40,12 +40,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             warnings.showwarning = _show_warning
             outputs.check(arguments)
             return arguments.run(arguments)
+    except (CancelledError, KeyboardInterrupt):
+        note("interrupted; nothing was written")
+        return INTERRUPTED
     except PartwrightError as error:
         note(f"error: {' '.join(str(error).split())}")
         return error.exit_code
-    except KeyboardInterrupt:
-        note("interrupted; nothing was written")
-        return INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone; so has what Python would flush at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1

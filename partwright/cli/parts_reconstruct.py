@@ -44,8 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
     from partwright.cli.progress import Display
     from partwright.cli.tables import finish_fit
     from partwright.fitting import fit
-    from partwright.partsdf.settings import Settings
     from partwright.methods import Cancellation
+    from partwright.partsdf.settings import Settings
     from partwright.shapes import load_shape
 
     folder: Path = arguments.output or Path(f"{arguments.shape.stem}-parts")

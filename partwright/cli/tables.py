@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from partwright.cli.terminal import printable, say
+from partwright.cli.terminal import printable, say, warn
 
 if TYPE_CHECKING:
     from partwright.cleaning import Cleaned

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from partwright.assembly import Assembly
 from partwright.assembly.checks import MAX_NAME
-from partwright.errors import SettingError
+from partwright.errors import CancelledError, SettingError
 from partwright.fitting.former import former
 from partwright.fitting.options import Clean, Start, Tolerance, check_able, suitable
 from partwright.fitting.report import report
@@ -255,14 +255,18 @@ class _Task:
 
         assert self.bounds is not None
         locked = self.start.locked if self.start else ()
-        return enforce(assembly, self.shape, self.bounds, outcome, refit, locked, self.run.seed)
+        run = self.run
+        return enforce(assembly, self.shape, self.bounds, outcome, refit, locked, run.seed, run.cancel)
 
     def cleaned(self, assembly: Assembly, outcome: str) -> tuple[Cleaned | None, str]:
         """None, and interrupted, where it was cancelled: the fit is then kept as it was."""
         from partwright.cleaning import clean
 
         assert self.clean is not None
-        return clean(assembly, self.shape, self.clean.tolerance), outcome
+        try:
+            return clean(assembly, self.shape, self.clean.tolerance, self.run.cancel), outcome
+        except CancelledError:
+            return None, "interrupted"
 
 
 def _settings(method: Method[Any], given: str | SettingsOfMethod, quality: str | None, changes: Any) -> Any:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from partwright.assembly import Assembly
-from partwright.atomic_io import finishing
 from partwright.errors import BoundsError
+from partwright.methods import Cancellation
 from partwright.shapes import Shape
 from partwright.tolerances.check import place_of
 from partwright.tolerances.distance_bounds import DistanceBounds, Length, format_length
@@ -39,18 +40,19 @@ def enforce(
     refit: Callable[[float], Assembly | None],
     locked: Sequence[str] = (),
     seed: int = 0,
+    cancel: Cancellation | None = None,
 ) -> tuple[Bounded, str]:
     """An assembly that keeps the bounds, or comes nearest to it, and how the fit ended with that in mind.
 
     outcome: of the fit; one that was interrupted is measured only. refit: makes an assembly of more parts, at
-    a share of their price (None where there may be no more). Parts in `locked` stay.
+    a share of their price (None where there may be no more). Parts in `locked` stay. `cancel` ends it with
+    the best so far.
     """
     if outcome == "interrupted":
-        with finishing():
-            return measured(assembly, shape, bounds, seed, complete=False), outcome
-    bounded = satisfy(assembly, shape, bounds, locked, seed)
+        return measured(assembly, shape, bounds, seed, complete=False), outcome
+    bounded = satisfy(assembly, shape, bounds, locked, seed, cancel)
     if bounds.tolerance is not None:
-        bounded = _by_parts(bounded, shape, bounds, refit, locked, seed)
+        bounded = _by_parts(bounded, shape, bounds, refit, locked, seed, cancel)
     if not bounded.complete:
         return bounded, "interrupted"
     if not bounded.satisfied:
@@ -65,6 +67,7 @@ def _by_parts(
     refit: Callable[[float], Assembly | None],
     locked: Sequence[str],
     seed: int,
+    cancel: Cancellation | None,
 ) -> Bounded:
     """More parts until a tolerance is kept, and then the fewest that keep it."""
     for share in CHEAPER:
@@ -73,10 +76,11 @@ def _by_parts(
         more = refit(share)
         if more is None:
             break
-        tried = satisfy(more, shape, bounds, locked, seed)
-        if tried.improves_on(best):
-            best = tried
-    return minimise_parts(best, shape, bounds, locked, seed) if best.satisfied and best.complete else best
+        tried = satisfy(more, shape, bounds, locked, seed, cancel)
+        best = replace(tried if tried.improves_on(best) else best, complete=tried.complete)
+    if not (best.satisfied and best.complete):
+        return best
+    return minimise_parts(best, shape, bounds, locked, seed, cancel)
 
 
 def bounds_report(bounded: Bounded, shape: Shape, volume: float) -> dict[str, Any]:

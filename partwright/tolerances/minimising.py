@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from partwright.assembly import Assembly
 from partwright.errors import ParameterError
+from partwright.methods import Cancellation
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import occupancy_iou
 from partwright.shapes import Shape
@@ -19,33 +20,35 @@ _TRIALS = 2  # single parts whose removal is tried before it ends
 
 
 def minimise_parts(
-    kept: Bounded, shape: Shape, bounds: DistanceBounds, locked: Sequence[str] = (), seed: int = 0
+    kept: Bounded,
+    shape: Shape,
+    bounds: DistanceBounds,
+    locked: Sequence[str] = (),
+    seed: int = 0,
+    cancel: Cancellation | None = None,
 ) -> Bounded:
     """An assembly that keeps the bounds with as few parts as removals find; `kept` keeps them to begin with.
 
     A quarter of the parts is tried first, those that the IoU misses least; what fails is tried with half as
-    many. Ctrl-C ends it with the fewest so far.
+    many. `cancel` ends it with the fewest so far.
     """
     at_once = max(1, round(_AT_ONCE * len(kept.assembly)))
     failed = 0
-    try:
-        while failed < _TRIALS and len(kept.assembly) > 1:
-            names = _cheapest(kept.assembly, shape, locked, at_once, failed if at_once == 1 else 0, seed)
-            thinned = _without(kept.assembly, names)
-            if thinned is None:
-                return kept
-            tried = satisfy(thinned, shape, bounds, locked, seed)
-            if not tried.complete:
-                return replace(kept, complete=False)
-            if tried.satisfied:
-                kept, failed = tried, 0
-                at_once = min(at_once, max(1, round(_AT_ONCE * len(kept.assembly))))
-            elif at_once > 1:
-                at_once //= 2
-            else:
-                failed += 1
-    except KeyboardInterrupt:
-        return replace(kept, complete=False)
+    while failed < _TRIALS and len(kept.assembly) > 1:
+        names = _cheapest(kept.assembly, shape, locked, at_once, failed if at_once == 1 else 0, seed)
+        thinned = _without(kept.assembly, names)
+        if thinned is None:
+            return kept
+        tried = satisfy(thinned, shape, bounds, locked, seed, cancel)
+        if not tried.complete:
+            return replace(kept, complete=False)
+        if tried.satisfied:
+            kept, failed = tried, 0
+            at_once = min(at_once, max(1, round(_AT_ONCE * len(kept.assembly))))
+        elif at_once > 1:
+            at_once //= 2
+        else:
+            failed += 1
     return kept
 
 

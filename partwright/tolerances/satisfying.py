@@ -9,8 +9,8 @@ from functools import reduce
 import numpy as np
 
 from partwright.assembly import Assembly, Similarity
-from partwright.atomic_io import finishing
 from partwright.errors import NoSurfaceError
+from partwright.methods import Cancellation
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import occupancy_iou
 from partwright.shapes import Shape
@@ -65,7 +65,12 @@ class Bounded:
 
 
 def satisfy(
-    assembly: Assembly, shape: Shape, bounds: DistanceBounds, locked: Sequence[str] = (), seed: int = 0
+    assembly: Assembly,
+    shape: Shape,
+    bounds: DistanceBounds,
+    locked: Sequence[str] = (),
+    seed: int = 0,
+    cancel: Cancellation | None = None,
 ) -> Bounded:
     """Makes an assembly keep bounds on a shape; one that keeps them already comes back as it is.
 
@@ -73,7 +78,8 @@ def satisfy(
     that keep the bounds there the tightest goes on (else the one that misses them least), and is offset on
     fresh samples until yet others find nothing amiss. Where a tolerance stays out of reach, the result is the
     nearest to it of those that fill the shape as well as what was given: a few points that are too far off
-    are not worth the rest of the surface. Parts named in `locked` stay. Ctrl-C ends it with the best so far.
+    are not worth the rest of the surface. Parts named in `locked` stay. `cancel` ends it with the best so
+    far.
 
     Raises:
         ParameterError: a part is no SuperFrustum and no solid that is one.
@@ -81,27 +87,25 @@ def satisfy(
     start = measured(assembly, shape, bounds, seed)
     if start.satisfied:
         return start
-    given, complete, checked = in_unit_frame(assembly, shape.frame), True, None
-    search = _Search(given, given, start.iou - _WORSE)
-    try:
-        for share in _SHARES:
-            checked = None
-            search.run(shape, bounds.narrowed(0.0, share), frozenset(locked), seed)
-            search.nearest, checked = _offset_on_fresh_samples(
-                search.nearest, shape, bounds, frozenset(locked), seed
-            )
-            if checked.satisfied or bounds.tolerance is None or checked.worst_ratio > _HOPELESS:
-                break
-    except KeyboardInterrupt:
-        complete = False
-    with finishing():
-        best = _back(assembly, search.nearest, shape)
-        nearest = measured(best, shape, bounds, seed, checked, complete)
-        if nearest.satisfied or not bounds.only_tolerance:
-            return nearest
-        sound = measured(_back(assembly, search.sound, shape), shape, bounds, seed, complete=complete)
-        found = (replace(start, complete=complete), sound, nearest)
-        return reduce(lambda one, other: other if other.improves_on(one) else one, found)
+    given, staying = in_unit_frame(assembly, shape.frame), frozenset(locked)
+    cancel = cancel or Cancellation()
+    search, checked = _Search(given, given, start.iou - _WORSE), start.checked
+    for share in _SHARES:
+        search.run(shape, bounds.narrowed(0.0, share), staying, seed, cancel)
+        search.nearest, checked = _offset_on_fresh_samples(
+            search.nearest, shape, bounds, staying, seed, cancel
+        )
+        hopeless = bounds.tolerance is None or checked.worst_ratio > _HOPELESS
+        if checked.satisfied or hopeless or cancel.requested:
+            break
+    complete = not cancel.requested
+    best = _back(assembly, search.nearest, shape)
+    nearest = measured(best, shape, bounds, seed, checked, complete)
+    if nearest.satisfied or not bounds.only_tolerance:
+        return nearest
+    sound = measured(_back(assembly, search.sound, shape), shape, bounds, seed, complete=complete)
+    found = (replace(start, complete=complete), sound, nearest)
+    return reduce(lambda one, other: other if other.improves_on(one) else one, found)
 
 
 def measured(
@@ -120,7 +124,7 @@ def measured(
 
 @dataclass
 class _Search:
-    """The best of the rounds so far, also where they are interrupted."""
+    """The best of the rounds so far."""
 
     nearest: Assembly
     """Misses the bounds least, and where some keep them is the tightest of those."""
@@ -128,7 +132,14 @@ class _Search:
     """Misses the bounds least of those whose IoU is at least `least_iou`."""
     least_iou: float
 
-    def run(self, shape: Shape, bounds: DistanceBounds, locked: frozenset[str], seed: int) -> None:
+    def run(
+        self,
+        shape: Shape,
+        bounds: DistanceBounds,
+        locked: frozenset[str],
+        seed: int,
+        cancel: Cancellation,
+    ) -> None:
         least, least_sound, excesses = (np.inf, np.inf), (np.inf, np.inf), list[float]()
         for local in _candidates(self.nearest, shape, bounds, locked, seed):
             tried, excess = _offset(local, shape, bounds, locked, seed)
@@ -138,6 +149,8 @@ class _Search:
                 self.nearest, least = tried, worth
             if worth < least_sound and iou >= self.least_iou:
                 self.sound, least_sound = tried, worth
+            if cancel.requested:
+                break
             excesses.append(worth[0])
             if least[0] == 0 and bounds.only_tolerance:
                 break  # it asks for no more
@@ -181,12 +194,17 @@ def _iou(local: Assembly, shape: Shape, seed: int) -> float:
 
 
 def _offset_on_fresh_samples(
-    local: Assembly, shape: Shape, bounds: DistanceBounds, locked: frozenset[str], seed: int
+    local: Assembly,
+    shape: Shape,
+    bounds: DistanceBounds,
+    locked: frozenset[str],
+    seed: int,
+    cancel: Cancellation,
 ) -> tuple[Assembly, Checked]:
     """Offset on fresh samples until others find nothing, or it does not get better."""
     checked = check(local, shape, bounds, seed + _JUDGED)
     for turn in range(1, _REPAIRS + 1):
-        if checked.satisfied:
+        if checked.satisfied or cancel.requested:
             break
         try:
             # a little more each time: what lies between these samples is the next check's to find

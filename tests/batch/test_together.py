@@ -13,8 +13,7 @@ import trimesh
 import partwright as pw
 from partwright.batch import fit_many
 from partwright.errors import SettingError
-from partwright.fitting import fit
-from partwright.results import Result
+from partwright.fitting import Result, fit
 
 SHAPES = [
     trimesh.creation.box((2, 1, 0.6)),

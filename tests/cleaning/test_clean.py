@@ -14,9 +14,10 @@ from partwright.assembly import Assembly, Part, Similarity, load_assembly
 from partwright.cleaning import clean
 from partwright.cleaning.dimensions import values, with_values
 from partwright.cli.main import main
-from partwright.errors import SettingError, UncleanableError
+from partwright.errors import CancelledError, SettingError, UncleanableError
 from partwright.fields import Box, Capsule, Cylinder, Field, Frustum, Solid, Sphere, SuperFrustum
 from partwright.meshing import mesh_assembly
+from partwright.methods import Cancellation
 from partwright.shapes import load_shape
 
 ALONG_X, ALONG_Y = (math.sqrt(0.5), 0, math.sqrt(0.5), 0), (0.5, -0.5, 0.5, 0.5)
@@ -214,12 +215,12 @@ def test_a_tolerance_below_the_meshs_noise_is_refused() -> None:
 def test_a_fit_to_be_cleaned_fails_before_it_starts() -> None:
     import trimesh
 
-    from partwright.fitting import fit
+    from partwright.fitting import Clean, fit
 
     block = load_shape(trimesh.creation.box((3, 2, 1)))
     for tolerance in (1e-9, 1.0, math.nan):
         with pytest.raises(SettingError, match="clean tolerance"):
-            fit(block, "solids", clean=True, clean_tolerance=tolerance, progress=pytest.fail)
+            fit(block, "solids", clean=Clean(tolerance), progress=pytest.fail)
 
 
 def test_a_field_of_another_kind_is_refused() -> None:
@@ -262,6 +263,13 @@ def test_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert not again.exists()
     assert main(["clean", str(given), "-o", str(tmp_path / "x.step")]) == 2
     assert "use a .json" in capsys.readouterr().err
+
+
+def test_cancelled_it_leaves_the_assembly() -> None:
+    cancel = Cancellation()
+    cancel.request()
+    with pytest.raises(CancelledError):
+        clean(shaken(bracket(), 0), tolerance=TOLERANCE, cancel=cancel)
 
 
 def test_forty_parts_become_two() -> None:

@@ -3,80 +3,69 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 import trimesh
 
-from partwright import fitting
 from partwright.assembly import Assembly, Part
-from partwright.errors import SettingError
 from partwright.fields import Box
-from partwright.shapes import Shape
+from partwright.methods import (
+    METHODS,
+    Ability,
+    FitRequest,
+    Fitted,
+    Method,
+    Outcome,
+    Progress,
+    check_number,
+    preset,
+)
 
 
 @dataclass(frozen=True)
 class Settings:
-    max_parts: int = 24
-    seed: int = 0
+    method: ClassVar[str] = "superfrusta"
 
-    @classmethod
-    def for_quality(cls, quality: str, *, max_parts: int | None = None, seed: int = 0, **_: Any) -> Settings:
-        if max_parts is not None and max_parts < 1:
-            raise SettingError(f"max_parts: expected at least 1, got {max_parts}")
-        return cls(max_parts or 24, seed)
+    max_parts: int | None = None
+    min_iou: float | None = None
 
-
-@dataclass(frozen=True)
-class Progress:
-    stage: str = "optimising"
-    round: int = 1
-    rounds: int = 2
-    parts: int = 1
-    iou: float = 0.5
-    fraction: float = 0.5
+    def __post_init__(self) -> None:
+        if self.max_parts is not None:
+            check_number("max_parts", self.max_parts, low=1)
 
 
-@dataclass(frozen=True)
-class Fitted:
-    assembly: Assembly
-    outcome: str = "converged"
-    seconds: dict[str, float] = field(default_factory=lambda: {"seeding": 0.25})
-    curve: tuple[Any, ...] = ()
-
-
-class BoxMethod(ModuleType):
+class BoxMethod(Method[Settings]):
     """Fits the bounding box, shrunk by `shrink`, and ends with `outcome`."""
 
-    Settings = Settings
+    name = "superfrusta"
+    can = frozenset(Ability)
     shrink = 1.0
-    outcome = "converged"
+    outcome: Outcome = "converged"
 
-    def fit(
-        self,
-        shape: Shape,
-        settings: Settings,
-        progress: Callable[[Any], None] | None = None,
-        start: Assembly | None = None,
-        locked: Sequence[str] = (),
-    ) -> Fitted:
-        if progress:
-            progress(Progress())
-        lower, upper = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+    def settings(self, quality: str = "normal", **changes: Any) -> Settings:
+        return preset({"draft": Settings(), "normal": Settings()}, quality, changes)
+
+    def fit(self, request: FitRequest[Settings]) -> Fitted:
+        corners = request.shape.vertices
+        lower, upper = corners.min(axis=0), corners.max(axis=0)
         size = tuple(((upper - lower) * self.shrink).tolist())
-        part = Part(Box(size), tuple(((lower + upper) / 2).tolist()))
-        return Fitted(Assembly((part,)), self.outcome)
+        assembly = Assembly((Part(Box(size), tuple(((lower + upper) / 2).tolist())),))
+        request.run.told(Progress("optimising", 1, 2, 1, 0.5, 0.5, lambda: assembly))
+        outcome = "interrupted" if request.run.cancel.requested else self.outcome
+        return Fitted(assembly, outcome, {"seeding": 0.25})
 
 
 @pytest.fixture
 def method(monkeypatch: pytest.MonkeyPatch) -> BoxMethod:
-    made = BoxMethod("box_method")
-    monkeypatch.setitem(sys.modules, "box_method", made)
-    monkeypatch.setitem(fitting.METHODS, "superfrusta", "box_method")
+    made = BoxMethod()
+    monkeypatch.setitem(METHODS._own, "superfrusta", "tests.cli.box_method:METHOD")
+    module = ModuleType("tests.cli.box_method")
+    module.METHOD = made  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "tests.cli.box_method", module)
     return made
 
 

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from partwright.results import FILES
 
 import partwright
-from partwright.assembly import load_assembly
+from partwright.assembly import Assembly, Part, load_assembly
 from partwright.cli.main import main
-from partwright.errors import PartwrightError
+from partwright.errors import CancelledError, PartwrightError
 from partwright.fields import Box
-from partwright.fitting import fit
+from partwright.fitting import FILES, fit, fit_nodes
 from partwright.shapes import load_shape
 from tests.cli.conftest import BoxMethod
 
@@ -50,7 +49,8 @@ def test_every_option_is_passed_on(method: BoxMethod, block: Path, tmp_path: Pat
     assert main(["fit", str(block), "-o", str(tmp_path / "out"), *options.split()]) == 0
     expected = {"quality": "draft", "max_parts": 5, "min_iou": 0.9, "unit": "mm", "up": "x", "device": "cpu"}
     assert expected.items() <= seen.items()
-    assert (seen["seed"], seen["threads"], seen["per_node"]) == (7, 2, False)
+    assert (seen["seed"], seen["threads"]) == (7, 2)
+    assert not {"curve", "symmetry", "subtract", "model"} & seen.keys()  # left to the method
 
 
 def test_fit_writes_five_files(method: BoxMethod, block: Path, tmp_path: Path, capsys: Any) -> None:
@@ -148,7 +148,7 @@ def test_an_interrupted_fit_writes_what_it_has(
 
 def test_an_interruption_ends_a_scene_early(method: BoxMethod, scene: Path) -> None:
     method.outcome = "interrupted"
-    result = fit(load_shape(scene), per_node=True)
+    result = fit_nodes(load_shape(scene))
     assert (result.outcome, len(result.assembly)) == ("interrupted", 1)
 
 
@@ -156,7 +156,7 @@ def test_an_interruption_before_there_is_anything(
     method: BoxMethod, block: Path, tmp_path: Path, monkeypatch: Any, capsys: Any
 ) -> None:
     def interrupt(*_: Any, **__: Any) -> None:
-        raise KeyboardInterrupt
+        raise CancelledError("cancelled before there was anything to keep")
 
     monkeypatch.setattr(method, "fit", interrupt, raising=False)
     assert main(["fit", str(block), "-o", str(tmp_path / "out")]) == 130
@@ -186,7 +186,7 @@ def test_export(method: BoxMethod, block: Path, tmp_path: Path) -> None:
         (["fit", "missing.stl"], "missing.stl"),
         (["fit", "{block}", "-o", "{block}"], "is a file"),
         (["fit", "{block}", "--unit", "parsec"], "parsec"),
-        (["fit", "{block}", "--max-parts", "0"], "max_parts: expected at least 1, got 0"),
+        (["fit", "{block}", "--max-parts", "0"], "max_parts: expected a number of at least 1, got 0"),
         (["fit", "{block}", "--density", "2700"], "state it by --unit"),
         (["fit", "{block}", "--unit", "mm", "--density", "-1"], "density: expected a positive number"),
         (["evaluate", "{block}", "{block}"], "not UTF-8"),
@@ -248,7 +248,10 @@ def test_clean_after_a_fit(
 
 @pytest.mark.parametrize(
     ("options", "says"),
-    [(["--clean-tolerance", "0.1"], "add --clean"), (["--clean", "--lock", "a"], "clean or lock")],
+    [
+        (["--clean-tolerance", "0.1"], "add --clean"),
+        (["--clean", "--start", "a.json", "--lock", "a"], "clean or lock"),
+    ],
 )
 def test_options_that_do_not_go_with_cleaning(
     options: list[str],
@@ -256,8 +259,11 @@ def test_options_that_do_not_go_with_cleaning(
     block: Path,
     method: BoxMethod,
     tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.chdir(tmp_path)
+    Assembly((Part(Box((1, 1, 1)), name="a"),)).save("a.json")
     assert main(["fit", str(block), "-o", str(tmp_path / "out"), *options]) == 2
     assert says in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

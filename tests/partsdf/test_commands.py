@@ -114,7 +114,10 @@ def test_interpolate(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["edit", "sofas:1", "-o", "a.json"], "no model is named 'sofas'"),
         (["interpolate", "{}:1", "{}:2", "-o", "a.avi"], "written as .gif"),
         (["reconstruct", "{}", "none.ply"], "none.ply"),
-        (["reconstruct", "{}", "none.ply", "--iterations", "0"], "iterations: expected a whole number of at least 1"),
+        (
+            ["reconstruct", "{}", "none.ply", "--iterations", "0"],
+            "iterations: expected a whole number of at least 1",
+        ),
         (["train", "none.toml", "-o", "out"], "cannot read none.toml"),
     ],
 )

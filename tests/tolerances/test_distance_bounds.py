@@ -71,7 +71,9 @@ def test_a_tolerance_below_the_noise_is_refused() -> None:
     assert DistanceBounds.of(rough, tolerance="3%").tolerance
 
 
-@pytest.mark.parametrize("other", [{"curve": True}, {"min_iou": 0.9}, {"per_node": True}])
+@pytest.mark.parametrize("other", [{"curve": True}, {"min_iou": 0.9}])
 def test_options_that_contradict_a_tolerance(shape: pw.Shape, other: dict) -> None:
     with pytest.raises(BoundsError):
         pw.fit(shape, tolerance="1%", **other)
+    with pytest.raises(BoundsError):
+        pw.fit_nodes(shape, tolerance=pw.Tolerance("1%"))

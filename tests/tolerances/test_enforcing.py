@@ -14,7 +14,7 @@ def shape() -> pw.Shape:
 
 
 def test_a_fit_contains_its_shape_with_few_parts(shape: pw.Shape) -> None:
-    result = pw.fit(shape, quality="draft", contain=True, max_parts=2, threads=1)
+    result = pw.fit(shape, quality="draft", tolerance=pw.Tolerance(contain=True), max_parts=2, threads=1)
     bound = result.report["bounds"]
     assert bound["contain"]["kept"]
     assert len(result.assembly) <= 2

@@ -8,6 +8,7 @@ import pytest
 import partwright as pw
 from partwright.fields import SuperFrustum
 from partwright.meshing import mesh_assembly
+from partwright.methods import Cancellation
 from partwright.metrics.deviation import projected
 from partwright.tolerances import Bounded, Checked, DistanceBounds, minimise_parts, satisfy
 from partwright.tolerances.check import Side
@@ -118,14 +119,22 @@ def test_parts_that_a_tolerance_does_not_need_go() -> None:
     assert "chip" not in [part.name for part in thinned.assembly.parts]
 
 
-def test_ctrl_c_keeps_the_best_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cancelled_it_keeps_the_best_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh, rough = boss()
-    shape = pw.load_shape(mesh)
-
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("partwright.tolerances.satisfying.augmented_lagrangian", interrupted)
-    stopped = satisfy(rough, shape, DistanceBounds(contain=0.0))
+    shape, cancel = pw.load_shape(mesh), Cancellation()
+    cancel.request()
+    monkeypatch.setattr("partwright.tolerances.satisfying.augmented_lagrangian", pytest.fail)
+    stopped = satisfy(rough, shape, DistanceBounds(contain=0.0), cancel=cancel)
     assert not stopped.complete
-    assert stopped.satisfied  # the start, closed
+    assert stopped.satisfied  # the start, offset
+
+
+def test_a_cancelled_removal_keeps_the_parts() -> None:
+    mesh, _ = tube()
+    shape, cancel = pw.load_shape(mesh), Cancellation()
+    loose = pw.Assembly([pw.Part(pw.fields.Tube(1.01, 0.32, 2.02), name=name) for name in ("one", "two")])
+    kept = measured(loose, shape, DistanceBounds(tolerance=0.05))
+    cancel.request()
+    stopped = minimise_parts(kept, shape, DistanceBounds(tolerance=0.001), cancel=cancel)
+    assert not stopped.complete
+    assert stopped.assembly is loose
