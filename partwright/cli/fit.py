@@ -131,7 +131,7 @@ def run(arguments: argparse.Namespace) -> int:
         "tolerance": Tolerance(arguments.tolerance, arguments.contain, arguments.inside),
         "cancel": cancel,
         "clean": Clean.keeping(arguments.clean, arguments.clean_tolerance),
-        **{name: value for name, value in settings.items() if value not in (None, False)},
+        **{name: value for name, value in settings.items() if value is not None and value is not False},
         **{name: False for name in ("symmetry", "subtract") if settings[name] is False},
     }
     with Display() as display:

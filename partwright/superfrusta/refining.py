@@ -74,7 +74,7 @@ def optimise(samples: FitSamples, rows: Rows, stages: Stages, settings: Settings
             config=config,
             seed=samples.seed,
             locked=locked,
-            device="cuda" if settings.device == "cuda" else "cpu",
+            device="cuda" if samples.device == "cuda" else "cpu",
         ).rows
     return refine(samples, rows, stages, settings, np.arange(len(rows)) >= locked)
 

@@ -46,6 +46,7 @@ class FitSamples:
     grid: DistanceGrid
     seed: int
     threads: int
+    device: str
     kernel: Kernel
     measure: Callable[[NDArray[np.float32]], NDArray[np.float32]]
     """Signed distance (n,) of the shape at points (n, 3)."""
@@ -71,6 +72,7 @@ class FitSamples:
             grid,
             run.seed,
             run.threads,
+            run.device,
             backend(run.device, checkpoint),
             shape.unit_distance,
             settings.uniform / float(np.prod(grid.spacing * np.array(grid.values.shape))),
