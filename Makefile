@@ -6,7 +6,9 @@ BUILD_INPUTS := pyproject.toml CMakeLists.txt $(wildcard cpp/*)
 INSTALLED := .venv/installed-$(shell find partwright -name '*.py' | LC_ALL=C sort | cksum | cut -d' ' -f1)
 DEMO_SHAPE := examples/shapes/watering_can.ply
 
-.PHONY: setup demo test lint types bench clean
+LOWEST_TESTS := tests/shapes tests/assembly tests/meshing tests/render tests/cli
+
+.PHONY: setup demo test test-lowest lint types bench clean
 setup: $(INSTALLED)
 
 # torch first and alone: it is the one big download, and stays when the package is rebuilt.
@@ -25,6 +27,15 @@ demo: setup
 test: setup
 	$(BIN)/python -m pytest -n auto
 
+# The lowest versions that pyproject.toml declares. Takes some minutes, so it is not in .ci/run: before a
+# release, and when a dependency is used in a new way.
+test-lowest:
+	$(PYTHON) -m venv .venv-lowest
+	.venv-lowest/bin/pip install --quiet uv
+	.venv-lowest/bin/uv pip install --quiet --python .venv-lowest/bin/python --resolution lowest-direct \
+		-e . "pytest>=8.0" "hypothesis>=6.100" "jsonschema>=4.20"
+	.venv-lowest/bin/python -m pytest $(LOWEST_TESTS)
+
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -37,6 +48,6 @@ bench: setup
 	$(BIN)/python benchmarks/fit.py
 
 clean:
-	rm -rf .venv build dist demo-output .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	rm -rf .venv .venv-lowest build dist demo-output .pytest_cache .hypothesis .mypy_cache .ruff_cache
 	find partwright tests examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 	rm -f partwright/*.so

@@ -121,3 +121,10 @@ def test_nothing_inside(assembly: Assembly, suffix: str, tmp_path: Path, capsys:
 def test_a_place_beyond_all_measure(place: tuple[float, float, float]) -> None:
     with pytest.raises(ParameterError, match=r"expected a number between -1e\+12 and 1e\+12"):
         Part(Box((1, 1, 1)), place)
+
+
+def test_a_value_of_a_megabyte_is_not_quoted(capsys: Any) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["export", "a.json", "-o", "a.glb", "--resolution", "x" * 1_000_000])
+    assert ended.value.code == 2
+    assert len(capsys.readouterr().err.splitlines()[-1]) < 1100
