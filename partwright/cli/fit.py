@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from partwright.cli.outputs import add_output_folder
+
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
@@ -16,14 +18,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option = command.add_argument
     option("shape", metavar="SHAPE", type=Path, help="mesh, scene, points, grid or STEP file")
-    option(
-        "-o",
-        "--output",
-        metavar="DIR",
-        type=Path,
-        default=None,
-        help="where to write; SHAPE-parts if not given",
-    )
+    add_output_folder(command)
     option(
         "--method",
         metavar="NAME",
@@ -109,7 +104,6 @@ _SETTINGS = ("max_parts", "min_iou", "curve", "symmetry", "subtract", "model")
 
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
-    from partwright.atomic_io import check_folder
     from partwright.cli.interrupts import stopping
     from partwright.cli.progress import Display
     from partwright.cli.tables import finish_fit
@@ -119,8 +113,6 @@ def run(arguments: argparse.Namespace) -> int:
     from partwright.methods import Cancellation
     from partwright.shapes import load_shape
 
-    folder: Path = arguments.output or Path(f"{arguments.shape.stem}-parts")
-    check_folder(folder)
     cancel = Cancellation()
     settings = {name: getattr(arguments, name) for name in _SETTINGS}
     options: dict[str, Any] = {
@@ -149,5 +141,5 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.density is not None:
             result = result.with_density(arguments.density)
         display.stage("writing")
-        result.save(folder)
-    return finish_fit(result, folder)
+        result.save(arguments.output)
+    return finish_fit(result, arguments.output)

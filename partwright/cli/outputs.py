@@ -29,6 +29,12 @@ def add_output(
     command.set_defaults(reads=reads, writes=writes, folder=folder)
 
 
+def add_output_folder(command: argparse.ArgumentParser) -> None:
+    """The same for commands that write a fit's files into a folder, which is made if need be."""
+    text = "where to write; SHAPE-parts if not given"
+    add_output(command, "DIR", text, reads=_fit_reads, writes=_fit_writes, folder=_folder, required=False)
+
+
 def check(arguments: argparse.Namespace) -> None:
     """Before the work: whether a command with `add_output` will be able to write, and not over its inputs.
 
@@ -40,24 +46,40 @@ def check(arguments: argparse.Namespace) -> None:
 
     if "writes" not in arguments:
         return
-    if not arguments.folder and not arguments.output.name:
+    if arguments.folder:
+        arguments.output = arguments.folder(arguments)
+    elif not arguments.output.name:
         raise OutputError(f"cannot write {arguments.output}: give the name of a file with -o")
     writes = list(arguments.writes(arguments))
     if not arguments.overwrite:
         check_unread(writes, arguments.reads(arguments))
     if arguments.folder:
-        check_folder(arguments.folder(arguments), [path.name for path in writes])
+        check_folder(arguments.output, [path.name for path in writes])
     else:
         check_files(writes)
 
 
-def parts_folder(arguments: argparse.Namespace) -> Path:
+def _folder(arguments: argparse.Namespace) -> Path:
     """-o, or a folder named after SHAPE, shortened where the file system would not take the name."""
     if arguments.output is not None:
         return Path(arguments.output)
     ending = "-parts"
     stem = os.fsencode(arguments.shape.stem)[: _MAX_BYTES - len(ending)]
     return Path(os.fsdecode(stem) + ending)
+
+
+def _fit_reads(arguments: argparse.Namespace) -> list[Path]:
+    start, model = (getattr(arguments, name, None) for name in ("start", "model"))
+    return given(arguments.shape, start if isinstance(start, Path) else None, model)
+
+
+def _fit_writes(arguments: argparse.Namespace) -> list[Path]:
+    """A result's files, and those of an earlier one that it removes."""
+    from partwright.fitting.result import CURVE_FILES, FILES
+
+    folder: Path = arguments.output
+    there = sorted(folder.iterdir()) if folder.is_dir() else []
+    return [folder / name for name in FILES] + [path for path in there if CURVE_FILES.fullmatch(path.name)]
 
 
 def given(*paths: str | Path | None) -> list[Path]:

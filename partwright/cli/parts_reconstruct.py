@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.outputs import add_output_folder
+
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
@@ -17,7 +19,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.add_argument("model", metavar="MODEL", help="a model that ships, or a file (.safetensors)")
     command.add_argument("shape", metavar="SHAPE", type=Path, help="mesh, points, grid or STEP file")
     option = command.add_argument
-    option("-o", "--output", metavar="DIR", type=Path, help="where to write; SHAPE-parts if not given")
+    add_output_folder(command)
     option("--iterations", metavar="N", type=int, default=400, help="steps (default: %(default)s)")
     option("--points", metavar="N", type=int, default=2048, help="samples a step (default: %(default)s)")
     option(
@@ -39,7 +41,6 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from partwright.atomic_io import check_folder
     from partwright.cli.interrupts import stopping
     from partwright.cli.progress import Display
     from partwright.cli.tables import finish_fit
@@ -48,8 +49,6 @@ def run(arguments: argparse.Namespace) -> int:
     from partwright.partsdf.settings import Settings
     from partwright.shapes import load_shape
 
-    folder: Path = arguments.output or Path(f"{arguments.shape.stem}-parts")
-    check_folder(folder)
     settings = Settings(
         arguments.model,
         arguments.resolution,
@@ -63,5 +62,5 @@ def run(arguments: argparse.Namespace) -> int:
         with stopping(cancel.request):
             result = fit(shape, settings, seed=arguments.seed, progress=display.show, cancel=cancel)
         display.stage("writing")
-        result.save(folder)
-    return finish_fit(result, folder)
+        result.save(arguments.output)
+    return finish_fit(result, arguments.output)

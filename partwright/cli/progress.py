@@ -10,9 +10,11 @@ from typing import Any, Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from partwright.cli.terminal import note, printable
+from partwright.cli.terminal import counted, note, printable
 
 _QUIET = 1.0  # seconds between plain lines of one stage
+# Where on the bar each begins: reading takes what is before the fit, writing what is left.
+_FIT, _SCORES, _WRITING = 0.1, 0.75, 0.85
 
 
 def _bar(detail: str) -> Progress | None:
@@ -52,11 +54,11 @@ class Display:
 
     def show(self, step: Any) -> None:
         """One report of the method: .stage .round .rounds .parts .iou .fraction."""
-        detail = f"round {step.round}/{step.rounds}  {step.parts} parts  IoU {step.iou:.3f}"
+        detail = f"round {step.round}/{step.rounds}  {counted(step.parts, 'part')}  IoU {step.iou:.3f}"
         if self._bar:
-            self._bar.update(
-                self._task, description=printable(step.stage), completed=step.fraction, detail=detail
-            )
+            stage = printable(step.stage) if step.fraction < 1 else "scores"
+            done = _FIT + step.fraction * (_SCORES - _FIT)
+            self._bar.update(self._task, description=stage, completed=done, detail=detail)
         elif step.stage != self._last_stage or time.monotonic() - self._last_time > _QUIET:
             self._line(f"{step.stage}: {detail}  {step.fraction:.0%}")
             self._last_stage, self._last_time = step.stage, time.monotonic()
@@ -64,7 +66,7 @@ class Display:
     def stage(self, name: str) -> None:
         """A stage without rounds, after the method's own."""
         if self._bar:
-            self._bar.update(self._task, description=name, completed=1.0)
+            self._bar.update(self._task, description=name, completed=_WRITING)
         else:
             self._line(name)
 

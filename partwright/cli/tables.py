@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from partwright.cli.terminal import printable, say, warn
+from partwright.cli.terminal import counted, printable, say, warn
 
 if TYPE_CHECKING:
     from partwright.cleaning import Cleaned
@@ -63,7 +63,7 @@ def print_cleaned(cleaned: Cleaned, path: Path) -> None:
     before, after, unit = cleaned.before, cleaned.after, cleaned.assembly.unit
     length = f" {unit}" if unit else ""
     say(
-        f"{before.parts} parts -> {after.parts}, IoU {before.iou:.4f} -> {after.iou:.4f}, "
+        f"{counted(before.parts, 'part')} -> {after.parts}, IoU {before.iou:.4f} -> {after.iou:.4f}, "
         f"mean deviation {before.mean_deviation:.3g} -> {after.mean_deviation:.3g}{length}: {path}"
     )
 

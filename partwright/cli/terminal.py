@@ -14,6 +14,11 @@ def printable(text: object) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(text))
 
 
+def counted(number: int, noun: str) -> str:
+    """`1 part`, `2 parts`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def say(text: object, to: TextIO | None = None) -> None:
     """One line on stdout, or `to`."""
     print(printable(text), file=to or sys.stdout, flush=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from partwright.cleaning import Cleaned
     from partwright.metrics import Scores
 
+# Of an earlier result with a curve: one without it removes them.
+CURVE_FILES = re.compile(r"curve_\d{2,}\.json|curve\.png")
 FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
 CURVE_SIZES = (1, 2, 4, 8, 16, 32, 64)
 
@@ -68,7 +71,7 @@ class Result:
         from partwright.export.ply import write_mesh
         from partwright.render import preview
 
-        with finishing(), replacing_files(folder) as staging:
+        with finishing(), replacing_files(folder, CURVE_FILES) as staging:
             self.assembly.save(staging / "assembly.json")
             export(self.assembly, staging / "parts.glb")
             write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
@@ -84,6 +87,6 @@ class Result:
         shown = [p for p in self.curve if p.parts in CURVE_SIZES or p is self.curve[0]][::-1]
         for point in shown:
             point.assembly.save(folder / f"curve_{point.parts:02d}.json")
-        captions = [f"{p.parts} parts, IoU {p.iou:.3f}" for p in shown]
+        captions = [f"{p.parts} part{'s' * (p.parts != 1)}, IoU {p.iou:.3f}" for p in shown]
         assemblies = [dataclasses.replace(p.assembly, up=self.assembly.up) for p in shown]
         curve_sheet(assemblies, captions, folder / "curve.png", title=self.shape.name)

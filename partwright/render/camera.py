@@ -74,6 +74,16 @@ class Camera:
         """(3,) unit vector."""
         return picture_axes(self.up)[1]
 
+    def framed(self, points: np.ndarray, side: int, least: int) -> tuple[int, int]:
+        """Width and height of a picture that these points (N, 3) fill.
+
+        It has about side * side pixels, and no side under `least`.
+        """
+        view = self.fitted(points, side, side)
+        wide, high = (np.ptp(points @ axis) for axis in (view.right, view.up))
+        stretch = math.sqrt(min(max(wide / max(high, 1e-9 * wide), (least / side) ** 2), (side / least) ** 2))
+        return round(side * stretch), round(side / stretch)
+
     def fitted(self, points: np.ndarray, width: int, height: int) -> View:
         """The view that just holds all points (N, 3) and centres them in a picture of that shape."""
         side, up_axis, front = picture_axes(self.up)

@@ -28,8 +28,11 @@ def round_limit(deviation: np.ndarray) -> float:
     return next(step * power for step in (1, 2, 5, 10) if step * power >= most * (1 - 1e-9))
 
 
-def add_legend(image: np.ndarray, limit: float, unit: str | None) -> np.ndarray:
-    """The picture with a colour bar along its lower edge, labelled in the input's unit."""
+def add_legend(image: np.ndarray, limit: float, unit: str | None, most: float = 0.0) -> np.ndarray:
+    """The picture with a colour bar along its lower edge, labelled in the input's unit.
+
+    most: the largest deviation in the picture, which is said where the bar ends before it.
+    """
     height, width = image.shape[:2]
     left, right = round(0.24 * width), round(0.76 * width)
     y = height - 30
@@ -38,7 +41,7 @@ def add_legend(image: np.ndarray, limit: float, unit: str | None) -> np.ndarray:
     suffix = f" {unit}" if unit else ""
     labels = [
         (left, y + 17, f"-{limit:g}{suffix}"),
-        ((left + right) / 2, y + 17, "0"),
+        ((left + right) / 2, y + 17, "0" if most <= limit else f"largest {most:.2g}{suffix}"),
         (right, y + 17, f"+{limit:g}{suffix}"),
         (left - 34, y + 3, "missing"),
         (right + 36, y + 3, "too much"),

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from partwright.shapes import Shape
 
 CAPTIONS = ("input", "parts", "surface", "error")
+_SIDE, _LEAST_SIDE = 400, 310  # pixels of a panel: as a square, and the least; the legend wants some
 
 
 def preview(
@@ -34,7 +35,7 @@ def preview(
     *,
     title: str = "",
     camera: Camera | None = None,
-    panel: tuple[int, int] = (400, 400),
+    panel: tuple[int, int] | None = None,
 ) -> np.ndarray:
     """Draw input | parts | surface | error as one picture (H, W, 3) uint8, and write it as PNG to `path`.
 
@@ -42,13 +43,15 @@ def preview(
     colours the input by the assembly's signed distance there: red where the assembly covers the input's
     surface, blue where it does not reach it, with a legend in the input's unit.
 
-    surface: the assembly's mesh in the input's units, if it is known already.
+    surface: the assembly's mesh in the input's units, if it is known already. panel: width and height of each
+    of the four in pixels; as the object is long and high if None.
     """
     surface = mesh_assembly(assembly) if surface is None else surface
     camera = camera or Camera(up=shape.up or "z", margin=0.1)
-    width, height = panel
     given, made = Scene(shape.vertices, shape.faces), Scene(surface.vertices, surface.faces)
-    view = camera.fitted(np.concatenate([given.vertices, made.vertices]), width, height)
+    both = np.concatenate([given.vertices, made.vertices])
+    width, height = panel or camera.framed(both, _SIDE, _LEAST_SIDE)
+    view = camera.fitted(both, width, height)
     with ThreadPoolExecutor(2) as pool:
         views = pool.map(lambda scene: look(scene, camera, view, width, height), (given, made))
         input_view, result_view = views
@@ -62,7 +65,7 @@ def preview(
             input_view.image(np.array(NEUTRAL)),
             result_view.image(palette(len(assembly))[nearest]),
             result_view.image(np.array(NEUTRAL)),
-            add_legend(error, limit, shape.unit),
+            add_legend(error, limit, shape.unit, float(np.abs(deviation).max(initial=0.0))),
         ],
         CAPTIONS,
         title=title,

@@ -50,7 +50,7 @@ def look(scene: Scene, camera: Camera, view: View, width: int, height: int, grou
     rays = view.rays(width * k, height * k)
     hits = cast(scene, view, rays)
     up = camera.up_axis
-    start = replace(hits, point=hits.point + 1e-4 * scene.size * hits.normal)
+    start = replace(hits, point=hits.round + 1e-4 * scene.size * hits.normal)
     key = -0.45 * view.right + 0.75 * view.up + 0.62 * view.back
     key = key / np.linalg.norm(key)
     toward = np.clip(hits.normal @ key, 0.0, None)

@@ -59,7 +59,7 @@ def draw_text(
     canvas = Image.fromarray(image)
     draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(size=size)
     for x, y, text in labels:
-        shown = text
+        shown = "".join(c if c.isprintable() else " " for c in text)  # names may hold anything
         while len(shown) > 4 and draw.textlength(shown, font=font) > image.shape[1] - 8:
             shown = shown.removesuffix("...")[:-1] + "..."
         draw.text((x, y), shown, fill=colour, font=font, anchor="mm")

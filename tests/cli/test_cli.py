@@ -72,7 +72,7 @@ def test_fit_writes_five_files(method: BoxMethod, block: Path, tmp_path: Path, c
     captured = capsys.readouterr()
     assert "bi-surface IoU" in captured.out
     assert f"written to {folder}" in captured.out
-    assert "optimising: round 1/2  1 parts  IoU 0.500  50%" in captured.err
+    assert "optimising: round 1/2  1 part  IoU 0.500  50%" in captured.err
     assert "warning" not in captured.err
 
 
@@ -98,6 +98,27 @@ def test_an_existing_folder_keeps_its_other_files(method: BoxMethod, block: Path
     assert main(["fit", str(block), "-o", str(folder)]) == 0
     assert (folder / "notes.txt").read_text() == "mine"
     assert json.loads((folder / "report.json").read_text())["method"] == "superfrusta"
+
+
+def test_what_would_be_in_the_way_is_found_before_the_fit(
+    method: BoxMethod, block: Path, tmp_path: Path, monkeypatch: Any, capsys: Any
+) -> None:
+    def work(*_: Any, **__: Any) -> None:
+        raise AssertionError("fitted before it looked")
+
+    monkeypatch.setattr(method, "fit", work, raising=False)
+    (tmp_path / "out" / "surface.ply").mkdir(parents=True)
+    assert main(["fit", str(block), "-o", str(tmp_path / "out")]) == 2
+    assert "surface.ply: a folder of that name is in the way" in capsys.readouterr().err
+
+
+def test_a_later_fit_removes_an_earlier_ones_curve(method: BoxMethod, block: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for name in ("curve_04.json", "curve.png", "curve_of_mine.json"):
+        (folder / name).write_text("old")
+    assert main(["fit", str(block), "-o", str(folder)]) == 0
+    assert sorted(p.name for p in folder.iterdir()) == sorted((*FILES, "curve_of_mine.json"))
 
 
 def test_the_default_folder_is_named_after_the_shape(

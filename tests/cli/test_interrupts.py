@@ -53,6 +53,37 @@ def test_in_the_first_second(ball: Path, delay: float) -> None:
     assert list(ball.parent.iterdir()) == [ball]
 
 
+def test_a_fit_says_at_once_that_it_stops_and_keeps_its_best(ball: Path) -> None:
+    process = start("fit", str(ball), "-o", str(ball.parent / "out"), "--quality", "high")
+    assert process.stderr is not None
+    while "IoU" not in process.stderr.readline():
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    sent = time.monotonic()
+    while "stopping after this step; Ctrl-C again to stop at once" not in process.stderr.readline():
+        assert time.monotonic() - sent < 1.0
+    _, error = process.communicate(timeout=120)
+    assert process.returncode == 130, error
+    assert "holds the best assembly so far" in error
+    assert (ball.parent / "out" / "preview.png").exists()
+
+
+def test_the_second_press_ends_a_fit_within_a_second(ball: Path) -> None:
+    process = start("fit", str(ball), "-o", str(ball.parent / "out"), "--quality", "high")
+    assert process.stderr is not None
+    while "IoU" not in process.stderr.readline():
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    sent = time.monotonic()
+    _, error = process.communicate(timeout=60)
+    assert time.monotonic() - sent < 1.0
+    assert process.returncode == 130
+    assert error.splitlines()[-1] == "partwright: interrupted; nothing was written"
+    assert list(ball.parent.iterdir()) == [ball]
+
+
 def test_a_handler_that_catches_everything_does_not_keep_it() -> None:
     code = (
         "import os, signal, time\nfrom partwright.cli.interrupts import listen\nlisten()\n"

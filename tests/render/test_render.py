@@ -18,7 +18,7 @@ from partwright.fields import Box, Sphere
 from partwright.meshing import mesh_assembly
 from partwright.render import Camera, preview, render_mesh, sheet, turntable, write_png
 from partwright.render.camera import picture_axes
-from partwright.render.deviation_map import deviation_colours, round_limit
+from partwright.render.deviation_map import add_legend, deviation_colours, round_limit
 from partwright.render.normals import corner_normals
 from partwright.render.raycast import Scene, cast
 from partwright.render.shading import BACKGROUND
@@ -220,3 +220,44 @@ def test_unwritable_place_is_named_and_leaves_nothing(tmp_path) -> None:
     with pytest.raises(OutputError):
         write_png(tmp_path / "a.png", np.zeros((2, 2, 3), np.uint8))
     assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
+
+
+@pytest.mark.parametrize("stretch", [(4, 1, 1), (1, 1, 4), (1, 1, 1)])
+def test_a_framed_object_fills_its_picture_both_ways(stretch: tuple[float, float, float]) -> None:
+    points = trimesh.creation.icosphere(3).vertices * stretch
+    camera = Camera(margin=0.1)
+    width, height = camera.framed(points, 400, 240)
+    assert width * height == pytest.approx(400**2, rel=0.01)
+    assert min(width, height) >= 240
+    view = camera.fitted(points, width, height)
+    depth = (view.eye - points) @ view.back
+    filled = [
+        np.ptp((points - view.eye) @ axis / depth / half) / 2
+        for axis, half in zip((view.right, view.up), view.half, strict=True)
+    ]
+    assert max(filled) == pytest.approx(0.8, abs=0.01)
+    assert min(filled) > 0.6
+
+
+def test_light_starts_on_the_round_surface_that_facets_stand_for() -> None:
+    ball = trimesh.creation.icosphere(2)
+    scene = Scene(ball.vertices, ball.faces)
+    view = Camera().fitted(ball.vertices, 60, 60)
+    hits = cast(scene, view, view.rays(60, 60))
+    below, left = (1 - np.linalg.norm(place, axis=1) for place in (hits.point, hits.round))
+    assert below.max() > 0.015
+    assert left.max() < 0.1 * below.max()  # out of the shade of the neighbouring facets
+    assert left.min() > -below.max()
+    cube = trimesh.creation.box()
+    scene = Scene(cube.vertices, cube.faces)
+    hits = cast(scene, view, view.rays(60, 60))
+    np.testing.assert_allclose(hits.round, hits.point, atol=1e-5)
+
+
+def test_a_scale_that_ends_before_the_errors_do_says_so() -> None:
+    blank = np.full((310, 400, 3), 255, dtype=np.uint8)
+    within, beyond = add_legend(blank, 0.2, "mm", 0.2), add_legend(blank, 0.2, "mm", 1.57)
+    np.testing.assert_array_equal(within, add_legend(blank, 0.2, "mm"))
+    changed = np.argwhere((within != beyond).any(axis=-1))
+    assert len(changed) > 100  # "largest 1.6 mm" in place of "0"
+    assert abs(changed[:, 1].mean() - 200) < 5
