@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from partwright.errors import SettingError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 T = TypeVar("T")
 
@@ -47,6 +48,8 @@ class Registry(Generic[T]):
         """
         place = self._own.get(name) or self._added().get(name)
         if place is None:
+            import difflib
+
             near = difflib.get_close_matches(str(name), list(self), n=1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             raise SettingError(f"unknown {self.kind} {name!r}; expected one of {', '.join(self)}{hint}")
@@ -69,6 +72,8 @@ class Registry(Generic[T]):
 
 @cache
 def _installed(group: str) -> tuple[EntryPoint, ...]:
+    from importlib.metadata import entry_points  # slow, and seldom asked for
+
     return tuple(sorted(entry_points(group=group), key=lambda point: point.name))
 
 

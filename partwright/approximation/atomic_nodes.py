@@ -1,4 +1,4 @@
-"""Nodes that formats of meshes take as one thing: quadrics, which rarely end, and what intersects them."""
+"""Nodes that formats of meshes take as one thing: quadrics, which rarely end, and what is cut by others."""
 
 from __future__ import annotations
 
@@ -7,17 +7,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
+from partwright.assembly.tree import Operation
 from partwright.fields import Box
-from partwright.meshing import has_exact_mesh, mesh_csg
+from partwright.meshing import has_exact_mesh, mesh_assembly, mesh_csg
 
 if TYPE_CHECKING:
     import trimesh
+
+_CELLS = 64  # along the longest side of what has no exact mesh
 
 
 def is_atomic(node: Node) -> bool:
     """A quadric, or an intersection of leaves with quadrics among them that has an exact mesh."""
     quadrics = any(part.field.quadric() is not None for part in node.parts)
     return quadrics and (node.is_part or (node.operation == "intersection" and has_exact_mesh(node)))
+
+
+def is_operation(node: Node, operation: Operation) -> bool:
+    """Whether the node is an assembly of that operation."""
+    return isinstance(node, Assembly) and node.operation == operation
 
 
 def atomic_mesh(node: Node, assembly: Assembly) -> trimesh.Trimesh:
@@ -29,7 +37,7 @@ def atomic_mesh(node: Node, assembly: Assembly) -> trimesh.Trimesh:
     lower, upper = assembly.bounds()
     if not np.isfinite(node.bounds()).all() and np.isfinite([lower, upper]).all():
         node = Assembly((box_between(lower, upper), node), "intersection")
-    return mesh_csg(node)
+    return mesh_csg(node) if has_exact_mesh(node) else mesh_assembly(node, _CELLS)
 
 
 def box_between(lower: np.ndarray, upper: np.ndarray) -> Part:

@@ -95,11 +95,15 @@ def piece_meshes(assembly: Assembly, resolution: int) -> list[tuple[Piece, trime
 def require_some(assembly: Assembly, found: list[T]) -> list[T]:
     """What is to be written, if that is anything."""
     if not found:
-        raise NothingToExportError(
-            f"none of the {len(assembly)} parts has a volume: there is nothing to export; "
-            "give them a size, or remove those that are empty"
-        )
+        raise nothing_to_export(assembly)
     return found
+
+
+def nothing_to_export(assembly: Assembly) -> NothingToExportError:
+    return NothingToExportError(
+        f"none of the {len(assembly)} parts has a volume: there is nothing to export; "
+        "give them a size, or remove those that are empty"
+    )
 
 
 def surfaces(assembly: Assembly, by_part: bool, resolution: int | None) -> list[tuple[str, trimesh.Trimesh]]:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from partwright.cli.outputs import add_output
-from partwright.export import WRITERS
+from partwright.export.formats import FORMATS
 
 OPTIONS = ("density", "tolerance", "free_joint", "by_part", "resolution", "facets", "separate")
 
@@ -15,7 +15,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
         "export",
         help="write an assembly in another format",
-        description=f"Writes an assembly in the format of FILE's suffix: {', '.join(WRITERS)}.",
+        description=f"Writes an assembly in the format of FILE's suffix: {', '.join(FORMATS.own)}.",
     )
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     add_output(command, "FILE", "where to write", reads=lambda a: [a.assembly], writes=_writes)
@@ -40,14 +40,25 @@ def _writes(arguments: argparse.Namespace) -> list[Path]:
 
 def run(arguments: argparse.Namespace) -> int:
     from partwright.assembly import load_assembly
-    from partwright.atomic_io import report_path
-    from partwright.cli.terminal import warn
+    from partwright.cli.terminal import say
     from partwright.export import export
 
     given = {name: getattr(arguments, name) for name in OPTIONS}
     options = {name: value for name, value in given.items() if value is not None}
-    export(load_assembly(arguments.assembly), arguments.output, **options)
-    if report_path(arguments.output).exists():
-        report = report_path(arguments.output)
-        warn([f"this format cannot hold all of it: {report} says what is off and by how much"])
+    assembly = load_assembly(arguments.assembly)
+    export(assembly, arguments.output, **options)
+    say(_what_was_written(arguments.output, len(assembly)))
     return 0
+
+
+def _what_was_written(path: Path, parts: int) -> str:
+    """One line: the file, its format and size, and what of the assembly it could not hold."""
+    from partwright.atomic_io import report_path
+    from partwright.export.export_report import approximated_parts
+    from partwright.export.formats import format_of
+
+    line = f"wrote {path}: {format_of(path).name}, {path.stat().st_size / 1000:.3g} kB"
+    changed = approximated_parts(path)
+    if not changed:
+        return line
+    return f"{line}; {len(changed)} of {parts} parts approximated, {report_path(path)} says how far off"

@@ -20,6 +20,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.palette import palette
 from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
+from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment, free_name
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit
@@ -139,3 +140,10 @@ def _atomic(node: Node, assembly: Assembly) -> _Solid:
 def _literal(value: Any) -> str:
     """A Python literal on one line, ASCII only."""
     return ascii(value)
+
+
+FORMAT = Format(
+    "Blender",
+    write,
+    frozenset({Holds.NAMES, Holds.PARAMETERS, Holds.SUBTRACTION, Holds.BLENDS, Holds.LEARNED}),
+)

@@ -19,7 +19,7 @@ from partwright.approximation.nearest import Approximation
 from partwright.approximation.recognise import SAME
 from partwright.assembly import Part
 from partwright.assembly.rows import as_superfrustum
-from partwright.errors import MissingDependencyError, NoSurfaceError
+from partwright.errors import NoSurfaceError
 from partwright.export.brep_bent import bent_solid
 from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
 from partwright.export.brep_solids import revolved
@@ -36,16 +36,6 @@ _STRAIGHT = 1e-4  # radians: an arc of this half angle is none
 # What is built may be off by this share of volume and longest side; the mesh that it is held against lacks a
 # few percent of thin walls, and where OpenCASCADE fails it loses a whole wall, hole or end.
 _SAME_VOLUME, _SAME_PLACE = 0.05, 2e-3
-
-
-def require_cad() -> None:
-    """Raise MissingDependencyError unless OpenCASCADE's Python package is installed."""
-    try:
-        import OCP.TopoDS  # noqa: F401
-    except ImportError as error:
-        raise MissingDependencyError(
-            "STEP needs OpenCASCADE; install it with: pip install 'partwright[cad]'"
-        ) from error
 
 
 def built(part: Part) -> Approximation | None:

@@ -18,6 +18,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.euler_angles import own_axes_angles
 from partwright.atomic_io import write_bytes
 from partwright.export.export_report import write_report
+from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
 from partwright.export.instance_patterns import Poses, Row
 from partwright.export.solid_source import (
@@ -145,3 +146,10 @@ def _tree(node: Node, functions: dict[str, str], indent: str) -> str:
     operator = _OPERATORS[node.operation]
     rest = "".join(f"\n{inner}{operator} {other}" for other in others)
     return f"(\n{inner}{first}{rest}\n{indent})"
+
+
+FORMAT = Format(
+    "build123d",
+    write,
+    frozenset({Holds.NAMES, Holds.COPIES, Holds.PARAMETERS, Holds.EXACT, Holds.SUBTRACTION, Holds.LEARNED}),
+)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from partwright import __version__
 from partwright.atomic_io import report_path, write_bytes
-from partwright.errors import OutputError
 
 if TYPE_CHECKING:
     from partwright.approximation.change import Change
@@ -19,19 +18,14 @@ if TYPE_CHECKING:
 def write_report(
     assembly: Assembly, path: str | Path, changes: Sequence[Change], notes: Sequence[str] = (), **more: Any
 ) -> None:
-    """Write FILE.report.json beside an export that changed something; remove one that no longer holds.
+    """Write FILE.report.json beside an export that changed something, and none beside any other.
 
     notes: what else a reader should know. more: further entries, as JSON types.
 
     Raises:
-        OutputError: it cannot be written, or removed.
+        OutputError: it cannot be written.
     """
-    target = report_path(path)
     if not changes:
-        try:
-            target.unlink(missing_ok=True)
-        except OSError as error:
-            raise OutputError(f"cannot remove the old report {target}: {error.strerror}") from error
         return
     report = {
         "file": Path(path).name,
@@ -41,4 +35,13 @@ def write_report(
         "approximated": [change.to_dict() for change in changes],
         "notes": list(notes),
     }
-    write_bytes(target, (json.dumps(report | more, indent=2) + "\n").encode())
+    write_bytes(report_path(path), (json.dumps(report | more, indent=2) + "\n").encode())
+
+
+def approximated_parts(path: str | Path) -> list[str]:
+    """Names of the parts that an export to `path` changed, by its report; none where it has no report."""
+    target = report_path(path)
+    if not target.exists():
+        return []
+    changes = json.loads(target.read_text("utf-8")).get("approximated", [])
+    return list(dict.fromkeys(name for change in changes for name in change["parts"]))

@@ -5,6 +5,8 @@ its numbers stay as they are, and `asset.extras` says so. Each part is meshed in
 its node, so that a far place costs no digits and a node turns about the part's own origin. The copies of a
 repeated part are nodes below the part's own, named leg/2, leg/3 ..., and share its mesh. An intersection of
 quadrics (a convex of CAPRI-Net's) is one node, since its leaves alone have no end; its `extras` list them.
+glTF knows no booleans: of a difference each part is shown as what is left of it, and what is subtracted is
+there without a mesh, for its parameters.
 """
 
 from __future__ import annotations
@@ -16,13 +18,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from partwright import __version__
-from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic
+from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic, is_operation
+from partwright.approximation.decomposition import separated
+from partwright.approximation.pieces import require_some
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.file_text import instance_dict
 from partwright.assembly.palette import palette
 from partwright.assembly.similarity import NO_ROTATION
 from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
+from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import free_name
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
@@ -44,7 +49,11 @@ _TO_Y_UP = {
 
 
 def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
-    """Write the parts; `resolution` is the number of cells along each part."""
+    """Write the parts; `resolution` is the number of cells along each part.
+
+    Raises:
+        NothingToExportError: no part has a surface.
+    """
     from trimesh.exchange.gltf import export_glb
 
     def describe(tree: dict[str, Any]) -> None:
@@ -52,7 +61,9 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
         tree["asset"]["extras"] = _about(assembly)
         _say_targets(tree)
 
-    data = export_glb(_scene(assembly, resolution), include_normals=False, tree_postprocessor=describe)
+    scene = _Scene(assembly, resolution).scene
+    require_some(assembly, list(scene.geometry))
+    data = export_glb(scene, include_normals=False, tree_postprocessor=describe)
     write_bytes(path, data)
 
 
@@ -78,68 +89,86 @@ def _about(assembly: Assembly) -> dict[str, Any]:
     return about | ({"metadata": dict(assembly.metadata)} if assembly.metadata else {})
 
 
-def _scene(assembly: Assembly, resolution: int) -> trimesh.Scene:
-    import trimesh
+class _Scene:
+    """Adds nodes to a scene."""
 
-    scene = trimesh.Scene(base_frame="world")
-    colours = dict(zip((p.name for p in assembly.parts), palette(len(assembly)), strict=True))
-    taken = {"world", *colours}
+    def __init__(self, assembly: Assembly, resolution: int) -> None:
+        import trimesh
 
-    def add_copies(part: Part) -> None:
-        own = Similarity(1.0, part.rotation, part.translation)
-        for i, move in enumerate(part.instances, start=2):
-            copy = free_name(f"{part.name}/{i}", taken)
-            within = own.inverse().conjugate(move).matrix()
-            extras = {"role": "copy"}
-            scene.graph.update(
-                frame_to=copy, frame_from=part.name, matrix=within, geometry=part.name, metadata=extras
-            )
+        self.scene = trimesh.Scene(base_frame="world")
+        self.assembly, self.resolution = assembly, resolution
+        self.colours = dict(zip((p.name for p in assembly.parts), palette(len(assembly)), strict=True))
+        self.taken = {"world", *self.colours}
+        self.add(assembly, "world", to_gltf(assembly).matrix(), {})
 
-    def add_atomic(node: Node, parent: str, pose: np.ndarray, about: dict[str, Any]) -> None:
-        """A leaf or an intersection, its mesh in the assembly's own frame."""
-        parts = (node,) if isinstance(node, Part) else node.parts
-        name = free_name(node.name or "convex", taken) if isinstance(node, Assembly) else node.name
-        about = about | {"operation": "intersection", "parts": [{"name": p.name} | _extras(p) for p in parts]}
-        try:
-            mesh = coloured(atomic_mesh(node, assembly), colours[parts[0].name])
-        except NoSurfaceError:
-            scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=about)
-        else:
-            scene.add_geometry(mesh, name, name, parent, pose, metadata=about)
-
-    def add(node: Node, parent: str, pose: np.ndarray, role: str) -> None:
-        extras: dict[str, Any] = {"role": role} if role else {}
-        if is_atomic(node):
-            add_atomic(node, parent, pose, extras)
+    def add(self, node: Node, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> None:
+        """A node below another. A difference holds what is left of it, and what it subtracts without mesh."""
+        if is_atomic(node) or is_operation(node, "intersection"):
+            self._add_whole(node, parent, pose, extras)
             return
         if isinstance(node, Part):
-            placed = pose @ Similarity(1.0, node.rotation, node.translation).matrix()
-            mesh = _local_mesh(node, resolution)
-            about = _extras(node) | extras
-            if mesh is None:
-                about["note"] = "no surface of its own at this resolution"
-                scene.graph.update(frame_to=node.name, frame_from=parent, matrix=placed, metadata=about)
-            else:
-                mesh = coloured(mesh, colours[node.name])
-                scene.add_geometry(mesh, node.name, node.name, parent, placed, metadata=about)
-                add_copies(node)
+            self._add_part(node, parent, pose, extras)
             return
-        name = free_name(node.name or "assembly", taken)
-        extras |= {"operation": node.operation, "blend": node.blend}
-        scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=extras)
-        for i, child in enumerate(node.children):
-            add(child, name, np.eye(4), "subtracted" if node.operation == "difference" and i else "")
+        name = free_name(node.name or "assembly", self.taken)
+        about = extras | {"operation": node.operation, "blend": node.blend}
+        self.scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=about)
+        subtracts = is_operation(node, "difference")
+        for child in separated(node) if subtracts else node.children:
+            add = self._add_whole if is_operation(child, "difference") and subtracts else self.add
+            add(child, name, np.eye(4), {})
+        for cutter in node.children[1:] if subtracts else ():
+            for part in (cutter,) if isinstance(cutter, Part) else cutter.parts:
+                placed = Similarity(1.0, part.rotation, part.translation).matrix()
+                about = _extras(part) | {"role": "subtracted"}
+                self.scene.graph.update(frame_to=part.name, frame_from=name, matrix=placed, metadata=about)
 
-    add(assembly, "world", to_gltf(assembly).matrix(), "")
-    return scene
+    def _add_part(self, part: Part, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> None:
+        own = Similarity(1.0, part.rotation, part.translation)
+        about = _extras(part) | extras
+        try:
+            mesh = mesh_part(Part(part.field), self.resolution)
+        except NoSurfaceError:  # it only shows where it blends
+            self._add_bare(part.name, parent, pose @ own.matrix(), about)
+            return
+        mesh = coloured(mesh, self.colours[part.name])
+        self.scene.add_geometry(mesh, part.name, part.name, parent, pose @ own.matrix(), metadata=about)
+        for i, move in enumerate(part.instances, start=2):
+            copy = free_name(f"{part.name}/{i}", self.taken)
+            within = own.inverse().conjugate(move).matrix()
+            about = {"role": "copy"}
+            self.scene.graph.update(
+                frame_to=copy, frame_from=part.name, matrix=within, geometry=part.name, metadata=about
+            )
 
+    def _add_whole(self, node: Node, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> None:
+        """One mesh in the assembly's own frame, in the colour of what is left of it or comes first."""
+        parts = (node,) if isinstance(node, Part) else node.parts
+        operation = "intersection" if isinstance(node, Part) else node.operation
+        about = extras | {
+            "operation": operation,
+            "parts": [{"name": p.name} | _extras(p) for p in parts],
+        }
+        name = self._name_of_whole(node)
+        try:
+            mesh = coloured(atomic_mesh(node, self.assembly), self.colours[parts[0].name])
+        except NoSurfaceError:
+            self._add_bare(name, parent, pose, about)
+        else:
+            self.scene.add_geometry(mesh, name, name, parent, pose, metadata=about)
 
-def _local_mesh(part: Part, resolution: int) -> trimesh.Trimesh | None:
-    """The part in its own frame; None for one without volume, which only shows where it blends."""
-    try:
-        return mesh_part(Part(part.field), resolution)
-    except NoSurfaceError:
-        return None
+    def _name_of_whole(self, node: Node) -> str:
+        """A part that was cut keeps its name; of a repeated one, the first copy does."""
+        if isinstance(node, Part):
+            return node.name
+        first = node.children[0]
+        cut = node.operation == "difference" and isinstance(first, Part)
+        if cut and first.name not in self.scene.graph.nodes:
+            return first.name
+        return free_name(node.name or ("convex" if is_atomic(node) else node.operation), self.taken)
+
+    def _add_bare(self, name: str, parent: str, pose: np.ndarray, about: dict[str, Any]) -> None:
+        about = about | {"note": "no surface of its own at this resolution"}
+        self.scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=about)
 
 
 def _extras(part: Part) -> dict[str, Any]:
@@ -166,3 +195,12 @@ def coloured(mesh: trimesh.Trimesh, colour: np.ndarray) -> trimesh.Trimesh:
     material = PBRMaterial(baseColorFactor=rgba, metallicFactor=0.0, roughnessFactor=0.7)
     mesh.visual = TextureVisuals(material=material)
     return mesh
+
+
+FORMAT = Format(
+    "GLB",
+    write,
+    frozenset({Holds.NAMES, Holds.GROUPS, Holds.COPIES, Holds.PARAMETERS, Holds.LEARNED}),
+    lengths="metres",
+    up="y",
+)

@@ -17,6 +17,7 @@ import numpy as np
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.rows import as_superfrustum
 from partwright.atomic_io import write_bytes
+from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment, identifiers
 from partwright.shapes import canonical_unit
 
@@ -105,3 +106,8 @@ def _call(
     group = next(groups)
     _function(child, group, constants, groups, functions)
     return f"{group}(p)", _numbers([child.blend])
+
+
+FORMAT = Format(
+    "GLSL", write, frozenset({Holds.NAMES, Holds.PARAMETERS, Holds.EXACT, Holds.SUBTRACTION, Holds.BLENDS})
+)

@@ -16,6 +16,7 @@ import numpy as np
 from partwright.approximation.collision import TOLERANCE, Geometry
 from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.errors import UnitError
+from partwright.export.formats import Format, Holds
 from partwright.export.rigid_body import DENSITY, Body, numbers
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.mass import MassProperties
@@ -111,3 +112,6 @@ def _size(field: Field) -> tuple[float, ...]:
         case Ellipsoid(radii=radii):
             return radii
     raise AssertionError(f"{field.kind} is not among GEOMS")
+
+
+FORMAT = Format("MJCF", write, frozenset({Holds.NAMES, Holds.EXACT, Holds.LEARNED}), lengths="metres", up="z")

@@ -9,6 +9,7 @@ import numpy as np
 
 from partwright.approximation.pieces import surfaces
 from partwright.atomic_io import write_bytes
+from partwright.export.formats import Format, Holds
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly
@@ -27,3 +28,6 @@ def write(assembly: Assembly, path: str | Path, by_part: bool = False, resolutio
         lines += ["f {} {} {}".format(*face) for face in (mesh.faces + first).tolist()]
         first += len(mesh.vertices)
     write_bytes(path, ("\n".join(lines) + "\n").encode())
+
+
+FORMAT = Format("OBJ", write, frozenset({Holds.BLENDS, Holds.LEARNED}))

@@ -23,6 +23,7 @@ from partwright.assembly.euler_angles import fixed_axes_angles
 from partwright.atomic_io import write_bytes
 from partwright.errors import ParameterError
 from partwright.export.export_report import write_report
+from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
 from partwright.export.instance_patterns import Poses, Ring, Row
 from partwright.export.solid_source import (
@@ -168,3 +169,10 @@ def _tree(node: Node, modules: dict[str, str], indent: str) -> Iterator[str]:
     for child in node.children:
         yield from _tree(child, modules, indent + "    ")
     yield indent + "}"
+
+
+FORMAT = Format(
+    "OpenSCAD",
+    write,
+    frozenset({Holds.NAMES, Holds.COPIES, Holds.PARAMETERS, Holds.EXACT, Holds.SUBTRACTION, Holds.LEARNED}),
+)

@@ -9,6 +9,7 @@ import numpy as np
 
 from partwright.approximation.pieces import one_surface
 from partwright.atomic_io import write_bytes
+from partwright.export.formats import Format, Holds
 
 if TYPE_CHECKING:
     import trimesh
@@ -43,3 +44,6 @@ def write_mesh(mesh: trimesh.Trimesh, path: str | Path, unit: str | None = None)
     ]
     vertices = np.ascontiguousarray(mesh.vertices, dtype="<f8")
     write_bytes(path, "\n".join(header).encode() + vertices.tobytes() + faces.tobytes())
+
+
+FORMAT = Format("PLY", write, frozenset({Holds.BLENDS, Holds.LEARNED}))

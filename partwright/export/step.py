@@ -18,9 +18,10 @@ from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly
 from partwright.atomic_io import replacing
 from partwright.errors import OutputError
-from partwright.export.brep import built, require_cad
+from partwright.export.brep import built
 from partwright.export.brep_tree import Compromises, combined
 from partwright.export.export_report import write_report
+from partwright.export.formats import Format, Holds
 from partwright.shapes import METRES, canonical_unit
 
 if TYPE_CHECKING:
@@ -36,12 +37,9 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     """Write the assembly as one product; with `separate`, each child of its union as one of its own.
 
     Raises:
-        MissingDependencyError: OpenCASCADE is not installed.
         NoSurfaceError: nothing to export, or a part is too thin for a B-rep.
-        SettingError: the unit is unknown to STEP.
         OutputError: the file cannot be written.
     """
-    require_cad()
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     scale = METRES[unit] / _WORKING if unit else 1.0
     scaled, changes = solid_tree(assembly.scaled(scale), built, 1 / scale)
@@ -100,3 +98,8 @@ def _write(document: TDocStd_Document, path: Path, unit: str, wanted: Path) -> N
     header.SetOriginatingSystem(TCollection_HAsciiString(f"Partwright {__version__}"))
     if writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise OutputError(f"cannot write {wanted}; choose another place with -o")
+
+
+FORMAT = Format(
+    "STEP", write, frozenset({Holds.EXACT, Holds.LEARNED}), units=tuple(_UNITS), needs=("OCP.TopoDS", "cad")
+)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from partwright.approximation.pieces import one_surface
 from partwright.atomic_io import write_bytes
+from partwright.export.formats import Format, Holds
 
 if TYPE_CHECKING:
     from partwright.assembly import Assembly
@@ -21,3 +22,6 @@ def write(assembly: Assembly, path: str | Path, by_part: bool = False, resolutio
     from trimesh.exchange.stl import export_stl
 
     write_bytes(path, export_stl(one_surface(assembly, by_part, resolution)))
+
+
+FORMAT = Format("STL", write, frozenset({Holds.BLENDS, Holds.LEARNED}))

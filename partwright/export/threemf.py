@@ -19,8 +19,8 @@ from partwright import __version__
 from partwright.approximation.pieces import piece_meshes, whole_surface
 from partwright.assembly import Assembly
 from partwright.atomic_io import write_bytes
-from partwright.errors import UnitError
 from partwright.export.axes import to_metres_z_up
+from partwright.export.formats import Format, Holds
 from partwright.shapes import canonical_unit
 
 if TYPE_CHECKING:
@@ -48,15 +48,8 @@ def write(assembly: Assembly, path: str | Path, by_part: bool = False, resolutio
 
     by_part: an object a part, each closed by itself, instead of one for the blended surface.
     resolution: cells along the longest side, 128 if not given; with by_part along each part, 32.
-
-    Raises:
-        UnitError: 3MF has no kilometres.
     """
     unit = canonical_unit(assembly.unit) if assembly.unit else "mm"
-    if unit not in UNITS:
-        raise UnitError(
-            f"3MF cannot say {assembly.unit}, only {', '.join(UNITS)}: scale the assembly to one of them"
-        )
     turn = dataclasses.replace(to_metres_z_up(assembly), scale=1.0)
     objects = _objects(assembly.transformed(turn), by_part, resolution)
     model = _model(assembly, UNITS[unit], objects)
@@ -109,3 +102,6 @@ def _add_mesh(parent: xml.Element, mesh: trimesh.Trimesh) -> None:
         group = xml.SubElement(element, kind)
         for row in np.asarray(rows).tolist():
             xml.SubElement(group, single, dict(zip(keys, map(repr, row), strict=True)))
+
+
+FORMAT = Format("3MF", write, frozenset({Holds.BLENDS, Holds.LEARNED}), up="z", units=tuple(UNITS))

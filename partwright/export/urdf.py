@@ -18,6 +18,7 @@ from partwright.approximation.collision import TOLERANCE, Geometry
 from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import rotation_matrix
 from partwright.atomic_io import write_bytes
+from partwright.export.formats import Format, Holds
 from partwright.export.rigid_body import DENSITY, Body, numbers
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.mass import MassProperties
@@ -128,3 +129,6 @@ def _add_free_joint(root: xml.Element, name: str) -> None:
     joint = xml.SubElement(root, "joint", name="free", type="floating")
     xml.SubElement(joint, "parent", link="world")
     xml.SubElement(joint, "child", link=name)
+
+
+FORMAT = Format("URDF", write, frozenset({Holds.NAMES, Holds.EXACT, Holds.LEARNED}), lengths="metres", up="z")

@@ -1,8 +1,8 @@
 """USD: an Xform and a Mesh a part under its own name, coloured, its parameters as custom data.
 
 The numbers are the assembly's own; `metersPerUnit` and `upAxis` say what they mean. USD knows Y and Z up
-only: an assembly of another up axis is turned to Z. Subtracted parts are there with the purpose "guide",
-which renderers leave out.
+only: an assembly of another up axis is turned to Z. Of a difference each part is shown as what is left of it;
+subtracted parts are there with the purpose "guide", which renderers leave out. An intersection is one mesh.
 """
 
 from __future__ import annotations
@@ -15,36 +15,40 @@ from typing import Any
 import numpy as np
 
 from partwright import __version__
+from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic, is_operation
+from partwright.approximation.decomposition import separated
+from partwright.approximation.pieces import nothing_to_export
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.palette import palette
 from partwright.atomic_io import write_bytes
-from partwright.errors import MissingDependencyError, NoSurfaceError
+from partwright.errors import NoSurfaceError
 from partwright.export.axes import to_metres_z_up
+from partwright.export.formats import Format, Holds
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
 
 _AXES = {"y": "Y", "z": "Z"}
+_NO_SURFACE = "no surface of its own at this resolution"
+_UNKNOWN_UNIT = "the length unit is unknown: metersPerUnit is USD's way of saying nothing, 1"
 
 
 def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
     """Write .usda as text, .usdc and .usd in binary; resolution: cells along each part.
 
     Raises:
-        MissingDependencyError: usd-core is not installed.
+        NothingToExportError: no part has a surface.
     """
-    try:
-        from pxr import Usd, UsdGeom
-    except ImportError as error:
-        raise MissingDependencyError(
-            "USD needs the package usd-core; install it with: pip install 'partwright[usd]'"
-        ) from error
+    from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.CreateInMemory()
     up = canonical_up(assembly.up) if assembly.up else "z"
     UsdGeom.SetStageUpAxis(stage, _AXES.get(up, "Z"))
     UsdGeom.SetStageMetersPerUnit(stage, METRES[canonical_unit(assembly.unit)] if assembly.unit else 1.0)
     stage.SetMetadata("comment", f"Partwright {__version__}")
-    _Writer(stage, assembly, resolution).add(assembly, "", subtracted=False)
+    writer = _Writer(stage, assembly, resolution)
+    writer.add(assembly, "", subtracted=False)
+    if not writer.meshes:
+        raise nothing_to_export(assembly)
     root = stage.GetPrimAtPath("/").GetAllChildren()[0]
     stage.SetDefaultPrim(root)
     if up not in _AXES:
@@ -61,30 +65,58 @@ class _Writer:
 
     def __init__(self, stage: Any, assembly: Assembly, resolution: int) -> None:
         self.stage, self.assembly, self.resolution = stage, assembly, resolution
+        self.meshes = 0  # that are shown
         srgb = palette(len(assembly)) / 255.0  # USD's colours are linear
         linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
         self.colours = dict(zip((p.name for p in assembly.parts), linear, strict=True))
 
     def add(self, node: Node, parent: str, *, subtracted: bool) -> None:
+        """A node below another. A difference shows what is left of it; what it subtracts is a guide."""
+        if is_atomic(node) or is_operation(node, "intersection"):
+            self._add_whole(node, parent, subtracted)
+            return
         prim = self._xform(parent, node.name or "assembly")
         if isinstance(node, Part):
             self._add_part(prim, node, parent, subtracted)
             return
         about: dict[str, Any] = {"operation": node.operation, "blend": node.blend, **dict(node.metadata)}
         if node is self.assembly and node.unit is None:
-            about["note"] = "the length unit is unknown: metersPerUnit is USD's way of saying nothing, 1"
+            about["note"] = _UNKNOWN_UNIT
         prim.SetCustomData({"partwright": _plain(about)})
-        for i, child in enumerate(node.children):
-            taken_away = subtracted or (node.operation == "difference" and i > 0)
-            self.add(child, str(prim.GetPath()), subtracted=taken_away)
+        below = str(prim.GetPath())
+        if not is_operation(node, "difference"):
+            for child in node.children:
+                self.add(child, below, subtracted=subtracted)
+            return
+        for piece in separated(node):
+            if is_operation(piece, "difference"):
+                self._add_whole(piece, below, subtracted)
+            else:
+                self.add(piece, below, subtracted=subtracted)
+        for cutter in node.children[1:]:
+            self.add(cutter, below, subtracted=True)
+
+    def _add_whole(self, node: Node, parent: str, subtracted: bool) -> None:
+        """One mesh in the assembly's own frame, in the colour of what is left of it or comes first."""
+        parts = (node,) if isinstance(node, Part) else node.parts
+        prim = self._xform(parent, node.name or ("convex" if is_atomic(node) else "cut"))
+        about: dict[str, Any] = {} if isinstance(node, Part) else {"operation": node.operation}
+        about["parts"] = {part.name: _about(part) for part in parts}
+        try:
+            mesh = atomic_mesh(node, self.assembly)
+        except NoSurfaceError:
+            about["note"] = _NO_SURFACE
+        else:
+            self._add_mesh(f"{prim.GetPath()}/mesh", mesh, self.colours[parts[0].name], subtracted)
+        prim.SetCustomData({"partwright": _plain(about)})
 
     def _add_part(self, prim: Any, part: Part, parent: str, subtracted: bool) -> None:
-        about = {"field": part.field.to_dict(), "blend": part.blend, "metadata": dict(part.metadata)}
+        about = _about(part)
         pose = Similarity(1.0, part.rotation, part.translation)
         try:
             mesh = mesh_part(Part(part.field), self.resolution)
         except NoSurfaceError:
-            mesh, about["note"] = None, "no surface of its own at this resolution"
+            mesh, about["note"] = None, _NO_SURFACE
         prim.SetCustomData({"partwright": _plain(about)})
         _place(prim, pose)
         if mesh is None:
@@ -114,6 +146,7 @@ class _Writer:
     def _add_mesh(self, path: str, mesh: Any, colour: np.ndarray, subtracted: bool) -> None:
         from pxr import UsdGeom, Vt
 
+        self.meshes += not subtracted
         points, faces = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
         prim = UsdGeom.Mesh.Define(self.stage, path)
         prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
@@ -124,6 +157,10 @@ class _Writer:
         prim.CreateDisplayColorAttr(Vt.Vec3fArray.FromNumpy(colour[None].astype(np.float32)))
         if subtracted:
             prim.CreatePurposeAttr(UsdGeom.Tokens.guide)
+
+
+def _about(part: Part) -> dict[str, Any]:
+    return {"field": part.field.to_dict(), "blend": part.blend, "metadata": dict(part.metadata)}
 
 
 def _place(prim: Any, pose: Similarity) -> None:
@@ -145,3 +182,11 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
         return Vt.DoubleArray(value) if isinstance(value, list) else value
 
     return {key.replace(":", "_"): one(value) for key, value in values.items() if value != {}}
+
+
+FORMAT = Format(
+    "USD",
+    write,
+    frozenset({Holds.NAMES, Holds.GROUPS, Holds.COPIES, Holds.PARAMETERS, Holds.LEARNED}),
+    needs=("pxr", "usd"),
+)

@@ -11,8 +11,8 @@ import pytest
 from partwright.assembly import Assembly, Part
 from partwright.cli.main import main
 from partwright.errors import ParameterError
-from partwright.export import WRITERS
-from partwright.fields import Box, Quadric, SuperFrustum
+from partwright.export.formats import FORMATS
+from partwright.fields import Box, Quadric, Sphere, SuperFrustum
 
 CUBE = Assembly((Part(Box((1, 1, 1)), name="box"),), unit="mm", up="z")
 SHEET = Assembly((Part(SuperFrustum((1, 1, 1), onion=1.0), name="sheet"),), unit="mm", up="z")
@@ -62,7 +62,7 @@ def test_nothing_to_export(capsys: Any, folder: Path, suffix: str) -> None:
     assert "nothing to export" in line
 
 
-@pytest.mark.parametrize("suffix", [suffix for suffix in WRITERS if suffix not in (".stp", ".mjcf", ".usd")])
+@pytest.mark.parametrize("suffix", [s for s in FORMATS.own if s not in (".stp", ".mjcf", ".usd")])
 def test_a_place_that_cannot_be_written(capsys: Any, folder: Path, suffix: str) -> None:
     skip_without(suffix)
     assert "nowhere" in error(capsys, CUBE, folder, f"nowhere/a{suffix}")
@@ -128,3 +128,14 @@ def test_a_value_of_a_megabyte_is_not_quoted(capsys: Any) -> None:
         main(["export", "a.json", "-o", "a.glb", "--resolution", "x" * 1_000_000])
     assert ended.value.code == 2
     assert len(capsys.readouterr().err.splitlines()[-1]) < 1100
+
+
+def test_one_line_says_what_was_written(capsys: Any, folder: Path) -> None:
+    ball = Part(Sphere(0.6), (0.7, 0, 0), blend=0.1, name="ball")
+    source, target = folder / "source.json", folder / "a.scad"
+    Assembly((*CUBE.children, ball), unit="mm", up="z").save(source)
+    assert main(["export", str(source), "-o", str(target)]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == 1
+    assert said[0].startswith(f"wrote {target}: OpenSCAD, ")
+    assert said[0].endswith(f"1 of 2 parts approximated, {target}.report.json says how far off")

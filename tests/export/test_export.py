@@ -14,7 +14,8 @@ import trimesh
 from partwright.assembly import Assembly, Part, Similarity, load_assembly
 from partwright.assembly.palette import palette
 from partwright.errors import OutputError, SettingError, UnsupportedFormatError
-from partwright.export import WRITERS, export
+from partwright.export import export
+from partwright.export.formats import FORMATS
 from partwright.export.glb import to_gltf
 from partwright.fields import Box, Cylinder, Sphere, SuperFrustum
 
@@ -148,7 +149,7 @@ def test_json_is_the_assembly_file(tmp_path: Path) -> None:
     assert load_assembly(tmp_path / "a.json") == pair(unit="mm")
 
 
-@pytest.mark.parametrize("suffix", list(WRITERS))
+@pytest.mark.parametrize("suffix", list(FORMATS.own))
 def test_same_assembly_same_bytes_and_nothing_left_behind(tmp_path: Path, suffix: str) -> None:
     paths = [tmp_path / folder / f"a{suffix}" for folder in ("first", "second")]
     for path in paths:
@@ -158,7 +159,7 @@ def test_same_assembly_same_bytes_and_nothing_left_behind(tmp_path: Path, suffix
     assert all(list(path.parent.iterdir()) == [path] for path in paths)
 
 
-@pytest.mark.parametrize("suffix", list(WRITERS))
+@pytest.mark.parametrize("suffix", list(FORMATS.own))
 def test_a_missing_folder_is_named(tmp_path: Path, suffix: str) -> None:
     with pytest.raises(OutputError, match="nowhere"):
         export(pair(), tmp_path / "nowhere" / f"a{suffix}")
@@ -167,6 +168,6 @@ def test_a_missing_folder_is_named(tmp_path: Path, suffix: str) -> None:
 def test_unknown_suffixes_and_options(tmp_path: Path) -> None:
     with pytest.raises(UnsupportedFormatError, match=r"'.dwg' .*\.json, \.glb, \.ply, \.stl, \.obj"):
         export(pair(), tmp_path / "a.dwg")
-    with pytest.raises(SettingError, match=r"\.json has no option 'resolution'; it has none"):
+    with pytest.raises(SettingError, match=r"Assembly file has no option 'resolution'; it has none"):
         export(pair(), tmp_path / "a.json", resolution=3)
     assert not list(tmp_path.iterdir())

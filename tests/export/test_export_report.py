@@ -8,11 +8,12 @@ from pathlib import Path
 from partwright.approximation.change import Change
 from partwright.assembly import Assembly, Part
 from partwright.atomic_io import report_path
-from partwright.export.export_report import write_report
-from partwright.fields import Box
+from partwright.export import export
+from partwright.export.export_report import approximated_parts, write_report
+from partwright.fields import Box, Sphere
 
 
-def test_the_report_lists_changes_and_goes_when_there_are_none(tmp_path: Path) -> None:
+def test_the_report_lists_changes(tmp_path: Path) -> None:
     assembly = Assembly((Part(Box((1, 1, 1)), name="a"),), unit="mm")
     path = tmp_path / "a.mjcf"
     write_report(assembly, path, [Change(("a",), "box", 0.1, 0.2, 0.3)], ["said"], format="MJCF")
@@ -22,5 +23,13 @@ def test_the_report_lists_changes_and_goes_when_there_are_none(tmp_path: Path) -
         {"parts": ["a"], "to": "box", "volume_error_ratio": 0.1, "max_deviation": 0.2, "blend_dropped": 0.3}
     ]
     assert (report["notes"], report["unit"], report["format"]) == (["said"], "mm", "MJCF")
-    write_report(assembly, path, [])
-    assert not list(tmp_path.iterdir())
+
+
+def test_a_report_goes_when_there_is_nothing_to_tell(tmp_path: Path) -> None:
+    ball, box = Part(Sphere(1), name="ball"), Part(Box((1, 1, 1)), (1, 0, 0), blend=0.1, name="box")
+    path = tmp_path / "a.scad"
+    export(Assembly((ball, box)), path)
+    assert approximated_parts(path) == ["box"]
+    export(Assembly((ball,)), path)
+    assert approximated_parts(path) == []
+    assert list(tmp_path.iterdir()) == [path]
