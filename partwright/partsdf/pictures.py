@@ -11,7 +11,7 @@ import numpy as np
 from partwright.assembly.palette import palette
 from partwright.errors import NoSurfaceError, SettingError, UnsupportedFormatError
 from partwright.partsdf.editing import interpolated
-from partwright.partsdf.meshing import ShareDone, mesh_shape
+from partwright.partsdf.meshing import ShareDone, mesh_shape, resolution_for_wall
 from partwright.partsdf.neural import NeuralShape
 from partwright.render import Camera, render_mesh, sheet, write_png
 from partwright.render.output import write
@@ -19,7 +19,7 @@ from partwright.render.output import write
 if TYPE_CHECKING:
     import trimesh
 
-PICTURE_RESOLUTION = 64  # cells along the unit frame: five pixels each, of which files have more
+_COARSE, _FINE = 64, 96  # cells along the unit frame of a picture, by its thinnest wall; files have more
 _MAX_SHEET_PICTURES = 8  # pictures of a contact sheet
 _FRAME_MILLISECONDS = 60  # milliseconds
 _PAUSE_FRAMES = 8  # frames' time at either end
@@ -40,17 +40,27 @@ def coloured_parts(
 
 def picture(
     shape: NeuralShape,
-    resolution: int = PICTURE_RESOLUTION,
+    resolution: int | None = None,
     size: int = 320,
     camera: Camera | None = None,
     progress: ShareDone | None = None,
 ) -> np.ndarray:
-    """(size, size, 3) uint8, each part in its colour; blank where the shape has no surface."""
+    """(size, size, 3) uint8, each part in its colour; blank where the shape has no surface.
+
+    resolution: cells along the unit frame, a multiple of 8; if not given, 64 to 96 by the thinnest wall.
+    """
+    resolution = resolution or picture_resolution(shape)
     try:
         mesh, colours = coloured_parts(shape, resolution, progress)
     except NoSurfaceError:
         return blank(size)
     return render_mesh(mesh, camera, (size, size), colours)
+
+
+def picture_resolution(*shapes: NeuralShape) -> int:
+    """Cells along the unit frame that show the shapes' thinnest wall, as far as a picture's cost allows."""
+    thinnest = min(float(shape.walls().min(initial=np.inf)) for shape in shapes)
+    return min(_FINE, resolution_for_wall(thinnest, _COARSE))
 
 
 def blank(size: int) -> np.ndarray:
@@ -70,7 +80,7 @@ def film(
     b: NeuralShape,
     path: str | Path,
     steps: int = 24,
-    resolution: int = PICTURE_RESOLUTION,
+    resolution: int | None = None,
     size: int = 320,
     camera: Camera | None = None,
     progress: ShareDone | None = None,
@@ -86,6 +96,7 @@ def film(
     from PIL import Image
 
     check_film(path, steps)
+    resolution = resolution or picture_resolution(a, b)
     frames = []
     for i in range(steps):
 

@@ -12,6 +12,7 @@ from partwright.partsdf import meshing
 from partwright.partsdf.meshing import SparseLattice, mesh_shape, resolution_for_wall
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.pictures import picture_resolution
 
 
 def two_balls(points: np.ndarray) -> np.ndarray:
@@ -145,3 +146,11 @@ def test_distances_do_not_depend_on_the_number_of_cores(model: Model) -> None:
         assert torch.get_num_threads() == 3
     finally:
         torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize(("wall", "cells"), [(0.2, 64), (0.05, 80), (0.001, 96)])
+def test_pictures_are_finer_for_thin_walls(
+    model: Model, monkeypatch: pytest.MonkeyPatch, wall: float, cells: int
+) -> None:
+    monkeypatch.setattr(NeuralShape, "walls", lambda shape: np.array([1.0, wall]))
+    assert picture_resolution(NeuralShape.trained(model, "lamp1")) == cells
