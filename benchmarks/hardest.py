@@ -25,9 +25,9 @@ from PIL import Image
 
 import partwright as pw
 from partwright.atomic_io import write_bytes
+from partwright.fitting import Result
 from partwright.render import preview
 from partwright.render.output import write
-from partwright.results import Result
 from partwright.shapes import Shape
 from partwright.superfrusta import Settings
 

@@ -21,7 +21,7 @@ from fit import OWN_SHAPES, find_shapes, machine
 
 import partwright as pw
 from partwright.atomic_io import write_bytes
-from partwright.results import Result
+from partwright.fitting import Result
 
 RESULTS = Path(__file__).parent / "results"
 HEAD = "| at once | seconds | seconds a shape | shapes an hour | x one at a time | mean IoU | parts |"

@@ -19,7 +19,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     add_output(command, "FILE", "where to write", reads=lambda a: [a.assembly], writes=_writes)
-    option = command.add_argument
+    option = command.add_argument_group("of some formats").add_argument
     option("--density", metavar="D", type=float, help="in kg/m3 (MJCF, URDF; default: water)")
     option(
         "--tolerance", metavar="T", type=float, help="what a native solid may be off before a mesh is written"

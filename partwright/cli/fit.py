@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from partwright.cli.outputs import add_output_folder
+from partwright.cli.lengths import length
+from partwright.cli.outputs import Group, add_output_folder
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -16,9 +17,24 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description="Fits an assembly of parts to a shape. Writes assembly.json, parts.glb, surface.ply, "
         "report.json and preview.png.",
     )
-    option = command.add_argument
-    option("shape", metavar="SHAPE", type=Path, help="mesh, scene, points, grid or STEP file")
-    add_output_folder(command)
+    _add_input(command.add_argument_group("input"))
+    _add_method(command.add_argument_group("method and budget"))
+    lengths = "lengths: 0.5 in the shape's unit, 0.5mm, or 1% of its longest side"
+    _add_bounds(command.add_argument_group("bounds", lengths))
+    _add_start(command.add_argument_group("start"))
+    _add_what_is_written(command.add_argument_group("output"))
+    _add_running(command.add_argument_group("running"))
+    command.set_defaults(run=run)
+
+
+def _add_input(group: Group) -> None:
+    group.add_argument("shape", metavar="SHAPE", type=Path, help="mesh, scene, points, grid or STEP file")
+    group.add_argument("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
+    group.add_argument("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
+
+
+def _add_method(group: Group) -> None:
+    option = group.add_argument
     option(
         "--method",
         metavar="NAME",
@@ -35,28 +51,6 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option("--max-parts", metavar="N", type=int, help="at most N parts")
     option("--min-iou", metavar="X", type=float, help="stop at the fewest parts that reach IoU X")
-    option(
-        "--tolerance",
-        metavar="T",
-        help="the fewest parts whose surface is nowhere further than T from the shape's: 0.5mm, 1%%",
-    )
-    option(
-        "--contain",
-        metavar="SLACK",
-        nargs="?",
-        const="0",
-        help="the parts contain the shape, but for SLACK (0)",
-    )
-    option(
-        "--inside",
-        metavar="SLACK",
-        nargs="?",
-        const="0",
-        help="the parts stay inside the shape, but for SLACK",
-    )
-    option("--curve", action="store_true", help="also write smaller and smaller assemblies, and a picture")
-    option("--start", metavar="ASSEMBLY", type=Path, help="refine and continue this assembly")
-    option("--lock", metavar="NAMES", help="parts of the start that stay as they are, separated by commas")
     option("--per-node", action="store_true", help="fit each node of a scene by itself")
     option(
         "--symmetry",
@@ -78,9 +72,41 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="how much further from the shape cleaning may move any part, on average, in the shape's units "
         "(default: half a thousandth of the longest side)",
     )
-    option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
-    option("--density", metavar="D", type=float, help="in kg/m3: the report then has mass and inertia")
-    option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
+
+
+def _add_bounds(group: Group) -> None:
+    group.add_argument(
+        "--tolerance",
+        metavar="T",
+        type=length,
+        help="the fewest parts whose surface is nowhere further than T from the shape's",
+    )
+    for name, text in (
+        ("--contain", "the parts contain the shape, but for SLACK (0)"),
+        ("--inside", "the parts stay inside the shape, but for SLACK (0)"),
+    ):
+        group.add_argument(name, metavar="SLACK", nargs="?", const="0", type=length, help=text)
+
+
+def _add_start(group: Group) -> None:
+    group.add_argument("--start", metavar="ASSEMBLY", type=Path, help="refine and continue this assembly")
+    group.add_argument(
+        "--lock", metavar="NAMES", help="parts of the start that stay as they are, separated by commas"
+    )
+
+
+def _add_what_is_written(group: Group) -> None:
+    add_output_folder(group)
+    group.add_argument(
+        "--curve", action="store_true", help="also write smaller and smaller assemblies, and a picture"
+    )
+    group.add_argument(
+        "--density", metavar="D", type=float, help="in kg/m3: the report then has mass and inertia"
+    )
+
+
+def _add_running(group: Group) -> None:
+    option = group.add_argument
     option(
         "--device",
         choices=("auto", "cpu", "cuda"),
@@ -95,7 +121,6 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="the same seed makes a run repeat (default: %(default)s)",
     )
     option("--threads", metavar="N", type=int, default=0, help="threads to use (default: one per core)")
-    command.set_defaults(run=run)
 
 
 # Options that are settings of methods; those not given are left to the method.

@@ -7,12 +7,13 @@ import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+Group = argparse._ActionsContainer  # what options can be added to: a parser or a group of its options
 Paths = Callable[[argparse.Namespace], Iterable[Path]]
 _MAX_BYTES = 255  # of one name, on every common file system
 
 
 def add_output(
-    command: argparse.ArgumentParser,
+    command: Group,
     metavar: str,
     text: str,
     *,
@@ -29,7 +30,7 @@ def add_output(
     command.set_defaults(reads=reads, writes=writes, folder=folder)
 
 
-def add_output_folder(command: argparse.ArgumentParser) -> None:
+def add_output_folder(command: Group) -> None:
     """The same for commands that write a fit's files into a folder, which is made if need be."""
     text = "where to write; SHAPE-parts if not given"
     add_output(command, "DIR", text, reads=_fit_reads, writes=_fit_writes, folder=_folder, required=False)

@@ -42,8 +42,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_output(command, "FILE", "assembly (.json)", reads=_reads, writes=_writes)
     command.add_argument("--model", metavar="FILE", help="the model of SHAPE, if it does not ship")
 
+    edits = command.add_argument_group("edits")
+
     def option(name: str, metavar: str, text: str) -> None:
-        command.add_argument(name, metavar=metavar, action=_Edit, dest="edits", default=[], help=text)
+        edits.add_argument(name, metavar=metavar, action=_Edit, dest="edits", default=[], help=text)
 
     option("--swap", "PART=SHAPE", "take the part's form from another shape of the same model")
     option("--resample", "PART=SEED", "give the part a random form")

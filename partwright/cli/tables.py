@@ -80,11 +80,19 @@ def _scores_table(name: str, scores: Scores, unit: str | None) -> Table:
     if scores.emd is not None:
         table.add_row("EMD", f"{scores.emd:.4f}")
     table.add_row("overlap", f"{scores.overlap:.3f}")
-    table.add_row("95 % deviation", f"{scores.deviation_95:.3g}{length}")
-    table.add_row("largest deviation", f"{scores.max_deviation:.3g}{length}, {scores.worst_place}")
+    table.add_row(
+        "95 % deviation", f"{scores.deviation_95:.3g}{length}, {_percent(scores.deviation_95_share)}"
+    )
+    share = _percent(scores.max_deviation_share)
+    table.add_row("largest deviation", f"{scores.max_deviation:.3g}{length}, {share}, {scores.worst_place}")
     if scores.cad is not None:
         _add_cad_rows(table, scores.cad)
     return table
+
+
+def _percent(share: float) -> str:
+    """Of the longest side."""
+    return f"{100 * share:.2f} %"
 
 
 def _add_cad_rows(table: Table, scores: CadScores) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -64,6 +65,8 @@ class Result:
     def save(self, folder: str | Path) -> None:
         """Write assembly.json, parts.glb, surface.ply, report.json and preview.png, all or none.
 
+        The report's seconds then say how long that took, too.
+
         Raises:
             OutputError: they cannot be written there.
         """
@@ -71,14 +74,22 @@ class Result:
         from partwright.export.ply import write_mesh
         from partwright.render import preview
 
+        started = time.perf_counter()
         with finishing(), replacing_files(folder, CURVE_FILES) as staging:
             self.assembly.save(staging / "assembly.json")
             export(self.assembly, staging / "parts.glb")
             write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
-            write_bytes(staging / "report.json", (json.dumps(self.report, indent=2) + "\n").encode())
             preview(self.shape, self.assembly, self.surface, staging / "preview.png", title=self.shape.name)
             if self.curve:
                 self._save_curve(staging)
+            self._count_writing(time.perf_counter() - started)
+            write_bytes(staging / "report.json", (json.dumps(self.report, indent=2) + "\n").encode())
+
+    def _count_writing(self, spent: float) -> None:
+        """Among the seconds, in place of those of an earlier `save`."""
+        seconds: dict[str, float] = self.report["seconds"]
+        before = seconds.pop("all") - seconds.pop("writing", 0.0)
+        seconds |= {"writing": round(spent, 3), "all": round(before + spent, 3)}
 
     def _save_curve(self, folder: Path) -> None:
         """curve_NN.json for sizes that double, and a picture of them."""

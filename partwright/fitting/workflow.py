@@ -187,7 +187,7 @@ class _Task:
                 return self.result(listen=False)
         started = time.perf_counter()
         fitted = self.fitted(self.settings)
-        assembly, seconds = self.assembled(fitted), _seconds(fitted)
+        assembly, seconds = self.assembled(fitted), {"reading": self.shape.reading_seconds} | _seconds(fitted)
         outcome: str = next(o for o in _WORST_FIRST if any(one.outcome == o for one in fitted))
         enforced: Bounded | None = None
         if self.bounds is not None:
@@ -201,7 +201,7 @@ class _Task:
             assembly = cleaned.assembly if cleaned else assembly
         made = fitted[0].surface if len(fitted) == 1 and not (enforced or cleaned) else None
         scores, surface = _scored(self.shape, assembly, self.run.seed, seconds, made)
-        seconds["all"] = time.perf_counter() - started
+        seconds["all"] = self.shape.reading_seconds + time.perf_counter() - started
         told = report(
             self.shape, assembly, surface, scores, how=self.how(outcome), run=self.run, seconds=seconds,
             fitted=fitted, enforced=enforced, cleaned=cleaned,

@@ -14,6 +14,7 @@ from partwright.metrics.chamfer import chamfer_floor
 from partwright.metrics.comparison import Comparison
 from partwright.metrics.deviation import place_name
 from partwright.metrics.table import METRICS
+from partwright.shapes import LONGEST_SIDE
 
 if TYPE_CHECKING:
     import trimesh
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Scores:
     """How good an assembly is. All are numbers of the unit frame, except the deviations and the worst place,
-    which are in the input's own units and place."""
+    which are in the input's own units and place; shares are of its longest side."""
 
     iou: float
     bi_surface_iou: float
@@ -36,6 +37,8 @@ class Scores:
     parts: int
     max_deviation: float
     deviation_95: float
+    max_deviation_share: float
+    deviation_95_share: float
     worst_place: str
     worst_point: tuple[float, float, float]
     cad: CadScores | None = None
@@ -73,7 +76,9 @@ def evaluate(
         return METRICS[name](pair)
 
     worst = pair.deviation.worst_point
+    longest = float(shape.frame.length_from_unit(LONGEST_SIDE))
     size = shape.frame.length_to_unit(np.ptp(shape.vertices, axis=0))
+    largest, most = of("max_deviation"), of("deviation_95")
     return Scores(
         iou=of("iou"),
         bi_surface_iou=of("bi_surface_iou"),
@@ -82,8 +87,10 @@ def evaluate(
         emd=of("emd") if emd else None,
         overlap=of("overlap"),
         parts=len(assembly),
-        max_deviation=of("max_deviation"),
-        deviation_95=of("deviation_95"),
+        max_deviation=largest,
+        deviation_95=most,
+        max_deviation_share=largest / longest,
+        deviation_95_share=most / longest,
         worst_place=place_name(worst, size, shape.up),
         worst_point=tuple(shape.frame.from_unit(worst).tolist()),
         cad=cad_scores(assembly, shape, cad_points, seed, pair.surface) if cad_points else None,

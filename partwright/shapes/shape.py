@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -61,7 +62,8 @@ class Shape:
     ranges of input_faces. frame: to the unit frame and back. unit: "mm", "m" ... or None; up: "x", "y", "z",
     "-z" ... or None. repairs: what was done to the surface, a sentence each. openings: how much of the
     surface the input left out, and where the most of it, own units. confidence: 0 to 1, how sure inside and
-    outside are. Results are cached by their arguments; returned arrays are read-only.
+    outside are. reading_seconds: that `load_shape` took, 0 for a node. Results are cached by their arguments;
+    returned arrays are read-only.
     """
 
     def __init__(self, source: Source) -> None:
@@ -89,6 +91,7 @@ class Shape:
         self.confidence = min(source.confidence, self._surface.confidence)
         self.openings = self._own(self._surface.openings)
         self._source = self._surface.distance()
+        self.reading_seconds = 0.0
         self._cache: dict[tuple[Any, ...], Any] = {}
 
     def __repr__(self) -> str:
@@ -251,13 +254,16 @@ def load_shape(
     Raises UnsupportedFormatError, UnreadableFileError, EmptyShapeError, NeedsSurfaceError, NotFiniteError,
     FlatShapeError, OpenShellError, GridError, or SettingError for an unknown unit or axis.
     """
+    started = time.perf_counter()
     stated_unit = None if unit is None else canonical_unit(unit)
     stated_up = None if up is None else canonical_up(up)
     if isinstance(source, (str, Path)):
         read = replace(read_source(Path(source)), file=Path(source).name)
     else:
         read = source_of(source)
-    return Shape(replace(read, unit=stated_unit or read.unit, up=stated_up or read.up))
+    shape = Shape(replace(read, unit=stated_unit or read.unit, up=stated_up or read.up))
+    shape.reading_seconds = time.perf_counter() - started
+    return shape
 
 
 def _named(name: str, work: Callable[[], _T]) -> _T:

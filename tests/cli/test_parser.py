@@ -58,3 +58,26 @@ def test_the_cad_measures_keep_off_the_assembly() -> None:
 def test_completion_is_printed(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["completion", shell]) == 0
     assert "partwright" in capsys.readouterr().out
+
+
+def test_a_bound_without_a_length_leaves_the_shape_alone() -> None:
+    given = parser().parse_args(["fit", "--contain", "mug.stl", "--inside", "2mm"])
+    assert (given.shape, given.contain, given.inside) == (Path("mug.stl"), "0", "2mm")
+    assert parser().parse_args(["fit", "--inside", "1.stl"]).shape == Path("1.stl")
+
+
+@pytest.mark.parametrize("value", ["mug.stl", "-1", "1.stl", "5parsecs", "nan", ""])
+def test_a_tolerance_that_is_no_length(value: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["fit", "a.stl", "--tolerance", value])
+    assert "argument --tolerance: expected a length such as 0.5, 0.5mm or 1%" in capsys.readouterr().err
+
+
+def test_the_many_options_of_fit_stand_under_headings(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["fit", "--help"])
+    lines = capsys.readouterr().out.splitlines()
+    for heading in ("input", "method and budget", "bounds", "start", "output", "running"):
+        assert f"{heading}:" in lines
+    assert lines[lines.index("options:") + 1].lstrip().startswith("-h")
+    assert not lines[lines.index("options:") + 2]

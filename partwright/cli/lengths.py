@@ -1,0 +1,31 @@
+"""Lengths as they are typed: 0.5, 0.5mm, 1%."""
+
+from __future__ import annotations
+
+import argparse
+import re
+
+
+def length(text: str) -> str:
+    """The text, where it is a length: what it measures is known only beside a shape.
+
+    Raises:
+        argparse.ArgumentTypeError: it is none, as when the name of a file stands in its place.
+    """
+    found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*([A-Za-z]*|%)\s*", text)
+    if found is None or not _is_suffix(found[3]):
+        raise argparse.ArgumentTypeError(f"expected a length such as 0.5, 0.5mm or 1%, got {text!r}")
+    return text
+
+
+def _is_suffix(text: str) -> bool:
+    from partwright.errors import SettingError
+    from partwright.shapes.units import canonical_unit
+
+    if text in ("", "%"):
+        return True
+    try:
+        canonical_unit(text)
+    except SettingError:
+        return False
+    return True
