@@ -27,6 +27,22 @@ class Step:
     iou: float
 
 
+def chosen(steps: Sequence[Step], settings: Settings) -> Step:
+    """The size that is the result, beside a curve of all: the best by the objective, at the settings' price.
+
+    Of sizes within max_parts; with min_iou the smallest that reaches it, or the one that comes nearest.
+    """
+    most = settings.max_parts
+    within = [step for step in steps if most is None or len(step.rows) <= most]
+    within = within or [min(steps, key=lambda step: len(step.rows))]
+    if settings.min_iou is None:
+        return max(within, key=lambda step: step.score - settings.alpha * len(step.rows))
+    reached = [step for step in within if step.iou >= settings.min_iou]
+    if not reached:
+        return max(within, key=lambda step: step.iou)
+    return min(reached, key=lambda step: len(step.rows))
+
+
 def assembly_of(
     shape: Shape,
     rows: Rows,

@@ -21,7 +21,7 @@ from partwright.superfrusta.growing import grow
 from partwright.superfrusta.hull_start import convex_hull_start
 from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
-from partwright.superfrusta.outcome import Step, assembly_of
+from partwright.superfrusta.outcome import Step, assembly_of, chosen
 from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
 from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimise
 from partwright.superfrusta.repeated_parts import repeat
@@ -123,6 +123,8 @@ class ResidualFit:
                 self.best = extend_cuts(self.samples, plain, self.locked)
         if settings.curve:
             self.detail_curve(self.best)
+            self.best = chosen(self.curve, settings).rows
+            self.best_objective = self.objective(self.best)
         if settings.min_iou is not None and volume_iou(self.samples, self.best) >= settings.min_iou:
             return "target_reached"
         if settings.max_parts is not None and len(self.best) >= settings.max_parts:

@@ -15,6 +15,7 @@ from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import iou
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Settings
+from partwright.superfrusta.outcome import Step, chosen
 from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import FitSamples
 from tests.superfrusta.meshes import box, bracket, corner_tie, half_torus, pipe, table, union
@@ -96,6 +97,32 @@ def test_a_target_is_reached_with_fewer_parts_than_a_full_fit() -> None:
     unreachable = draft(shape, min_iou=0.99, max_parts=1)
     assert unreachable.outcome == "budget_reached"
     assert reached(unreachable.assembly, shape) > 0.85
+
+
+@pytest.mark.parametrize(
+    ("changes", "parts"),
+    [
+        ({}, 4),  # not 11, which is worse and larger
+        ({"max_parts": 3}, 2),
+        ({"min_iou": 0.9}, 2),
+        ({"min_iou": 0.99}, 4),
+        ({"min_iou": 0.99, "max_parts": 2}, 2),
+        ({"alpha": 0.3}, 1),
+    ],
+)
+def test_the_result_of_a_curve_is_the_best_of_its_sizes(changes: dict[str, float], parts: int) -> None:
+    sizes = ((1, 0.7), (2, 0.9), (4, 0.983), (11, 0.964))
+    steps = [Step(np.zeros((n, 17), np.float32), reached, reached) for n, reached in sizes]
+    assert len(chosen(steps, Settings(curve=True, **changes)).rows) == parts
+
+
+def test_a_curve_has_its_result_among_its_sizes(table_shape: Shape) -> None:
+    fitted = draft(table_shape, curve=True, symmetry=False)
+    alpha = Settings.for_quality("draft").alpha
+    best = max(fitted.curve, key=lambda point: point.score - alpha * point.parts)
+    assert len(fitted.assembly) == best.parts
+    assert [part.field for part in fitted.assembly.parts] == [part.field for part in best.assembly.parts]
+    assert fitted.curve[-1].parts == 1
 
 
 def test_progress_tells_where_the_fit_is(table_shape: Shape) -> None:
