@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.assembly.palette import palette
 from partwright.meshing import mesh_assembly
 from partwright.render.camera import Camera
 from partwright.render.output import write_png
+from partwright.render.part_colours import part_colours
 from partwright.render.raycast import Scene
 from partwright.render.shading import look
 from partwright.render.sheet import sheet
@@ -40,8 +40,7 @@ def curve_sheet(
     images = []
     for assembly, scene in zip(assemblies, scenes, strict=True):
         seen = look(scene, camera, view, *panel)
-        nearest = assembly.nearest_parts(seen.hits.point)
-        images.append(seen.image(palette(len(assembly))[nearest]))
+        images.append(seen.image(part_colours(assembly, seen.hits.point, seen.hits.normal)))
     page = sheet(images, captions, title=title)
     if path is not None:
         write_png(path, page)

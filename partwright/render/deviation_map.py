@@ -20,8 +20,10 @@ def deviation_colours(deviation: np.ndarray, limit: float) -> np.ndarray:
 
 
 def round_limit(deviation: np.ndarray) -> float:
-    """The end of the scale: 1, 2 or 5 times a power of ten that holds 98 % of the deviations."""
-    most = float(np.quantile(np.abs(deviation), 0.98)) if len(deviation) else 0.0
+    """The end of the scale: 1, 2 or 5 times a power of ten that holds 98 % of the deviations, and a quarter
+    of the largest: else what is hardly off would look as bad as the worst."""
+    sizes = np.abs(deviation)
+    most = max(float(np.quantile(sizes, 0.98)), float(sizes.max()) / 4) if len(sizes) else 0.0
     if most <= 0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(most))

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.assembly.palette import palette
 from partwright.meshing import mesh_assembly
 from partwright.render.camera import Camera
 from partwright.render.deviation_map import add_legend, deviation_colours, round_limit
 from partwright.render.output import write_png
+from partwright.render.part_colours import part_colours
 from partwright.render.raycast import Scene
 from partwright.render.shading import NEUTRAL, look
 from partwright.render.sheet import sheet
@@ -39,7 +39,7 @@ def preview(
 ) -> np.ndarray:
     """Draw input | parts | surface | error as one picture (H, W, 3) uint8, and write it as PNG to `path`.
 
-    The parts' panel colours every point of the surface by the part that is nearest there. The error panel
+    The parts' panel colours every point by the part whose own surface is there. The error panel
     colours the input by the assembly's signed distance there: red where the assembly covers the input's
     surface, blue where it does not reach it, with a legend in the input's unit.
 
@@ -56,14 +56,13 @@ def preview(
         views = pool.map(lambda scene: look(scene, camera, view, width, height), (given, made))
         input_view, result_view = views
 
-    nearest = assembly.nearest_parts(result_view.hits.point)
     deviation = -assembly.distance(input_view.hits.point)
     limit = round_limit(deviation)
     error = input_view.image(deviation_colours(deviation, limit))
     page = sheet(
         [
             input_view.image(np.array(NEUTRAL)),
-            result_view.image(palette(len(assembly))[nearest]),
+            result_view.image(part_colours(assembly, result_view.hits.point, result_view.hits.normal)),
             result_view.image(np.array(NEUTRAL)),
             add_legend(error, limit, shape.unit, float(np.abs(deviation).max(initial=0.0))),
         ],

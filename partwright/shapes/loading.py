@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 import struct
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,13 +59,14 @@ def read_mesh(path: Path) -> Source:
     Raises UnreadableFileError, EmptyShapeError, or what `source_of_points` raises.
     """
     suffix = path.suffix.lower()
+    stem = _in_utf8(path.stem)
     scene = _load_scene(path, suffix)
-    pieces = tuple(_unique_names(_pieces(scene, path.stem)))
+    pieces = tuple(_unique_names(_pieces(scene, stem)))
     if not pieces:
-        return _source_without_faces(path.stem, list(scene.geometry.values()))
+        return _source_without_faces(stem, list(scene.geometry.values()))
     is_gltf = suffix in (".glb", ".gltf")
     unit = "m" if is_gltf else canonical_unit(scene.units) if suffix == ".3mf" and scene.units else None
-    return Source(path.stem, pieces, unit, "y" if is_gltf else None)
+    return Source(stem, pieces, unit, "y" if is_gltf else None)
 
 
 def _source_without_faces(name: str, geometries: list[Any]) -> Source:
@@ -125,14 +128,34 @@ def _load_scene(path: Path, suffix: str) -> trimesh.Scene:
     if suffix == ".obj":
         options |= {"split_objects": True, "group_material": False}
     try:
-        with np.errstate(all="ignore"):
-            scene = trimesh.load_scene(path, **options)
+        with np.errstate(all="ignore"), _named_in_utf8(path) as readable:
+            scene = trimesh.load_scene(readable, **options)
     except _PARSER_ERRORS as error:
         raise UnreadableFileError(
             f"{path}: cannot be read as {suffix[1:].upper()} ({type(error).__name__}: {error}); the file is "
             "truncated or not what its suffix says. Export it again"
         ) from error
     return scene
+
+
+def _in_utf8(name: str) -> str:
+    """The name, where bytes that are no UTF-8 (file systems take any) are written as underscores."""
+    return "".join("_" if "\ud800" <= c <= "\udfff" else c for c in name)
+
+
+@contextmanager
+def _named_in_utf8(path: Path) -> Iterator[Path]:
+    """The file under a name that trimesh can encode: it names nodes after files, and hashes them.
+
+    Of glTF, which names its nodes itself, the file stays beside those that it refers to.
+    """
+    if _in_utf8(path.name) == path.name or path.suffix.lower() in (".glb", ".gltf"):
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        alias = Path(folder) / _in_utf8(path.name)
+        alias.symlink_to(path.absolute())
+        yield alias
 
 
 def _refuse_zip_bomb(path: Path) -> None:

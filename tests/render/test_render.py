@@ -14,12 +14,13 @@ from PIL import Image
 from partwright.assembly import Assembly, Part
 from partwright.assembly.palette import palette
 from partwright.errors import EmptyShapeError, OutputError, SettingError
-from partwright.fields import Box, Sphere
+from partwright.fields import Box, Cylinder, Quadric, Sphere
 from partwright.meshing import mesh_assembly
 from partwright.render import Camera, preview, render_mesh, sheet, turntable, write_png
 from partwright.render.camera import picture_axes
 from partwright.render.deviation_map import add_legend, deviation_colours, round_limit
 from partwright.render.normals import corner_normals
+from partwright.render.part_colours import surface_parts
 from partwright.render.raycast import Scene, cast
 from partwright.render.shading import BACKGROUND
 
@@ -170,6 +171,37 @@ def test_round_limit_is_round_and_holds_the_deviations(scale: float) -> None:
     limit = round_limit(np.linspace(-scale, scale, 101))
     assert 0.97 * scale <= limit <= 5.1 * scale
     assert round(limit / 10 ** np.floor(np.log10(limit) + 1e-9), 6) in (1, 2, 5)
+
+
+def test_the_scale_does_not_end_far_below_the_largest() -> None:
+    mostly_fine = np.append(np.full(999, 0.001), -1.57)
+    assert 1.57 / 4 <= round_limit(mostly_fine) <= 1.57
+
+
+def test_a_flat_face_that_parts_share_has_one_colour() -> None:
+    block, flush = Part(Box((1.0, 1.0, 1.0))), Part(Box((0.5, 0.5, 1.0)), (0.4, 0.4, 0.0))
+    hole = Part(Cylinder(0.2, 2.0), (-0.2, -0.2, 0.0))
+    assembly = Assembly((block, flush)) - hole
+    rng = np.random.default_rng(0)
+    across = rng.uniform(0.16, 0.49, (200, 2))
+    noise = rng.normal(0, 2e-4, 200)  # as of a mesh
+    top = np.column_stack([across, 0.5 + noise])
+    side = np.column_stack([np.full(200, 0.65), across[:, 0], rng.uniform(-0.4, 0.4, 200)])
+    turn = rng.uniform(0, 2 * np.pi, 200)
+    wall = np.column_stack([0.2 * np.cos(turn) - 0.2, 0.2 * np.sin(turn) - 0.2, rng.uniform(-0.4, 0.4, 200)])
+    inward = np.column_stack([-np.cos(turn), -np.sin(turn), np.zeros(200)])
+    points = np.concatenate([top, side, wall])
+    normals = np.concatenate([np.tile([0.0, 0.0, 1.0], (200, 1)), np.tile([1.0, 0.0, 0.0], (200, 1)), inward])
+    assert surface_parts(assembly, points, normals).tolist() == [0] * 200 + [1] * 200 + [2] * 200
+
+
+def test_a_surface_that_only_crosses_a_face_leaves_no_line_on_it() -> None:
+    cut = Assembly((Part(Quadric.plane((1.0, 0.0, 0.0), 0.0)), Part(Box((1.0, 1.0, 1.0)))), "intersection")
+    y = np.linspace(-0.4, 0.4, 100)
+    top = np.column_stack([np.linspace(-1e-3, 0, 100), y, np.full(100, 0.5)])
+    assert set(surface_parts(cut, top, np.tile([0.0, 0.0, 1.0], (100, 1)))) == {1}
+    front = np.column_stack([np.zeros(100), y, np.linspace(-0.4, 0.4, 100)])
+    assert set(surface_parts(cut, front, np.tile([1.0, 0.0, 0.0], (100, 1)))) == {0}
 
 
 def test_palette_is_stable_and_distinct() -> None:

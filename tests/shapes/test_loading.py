@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import struct
 import zipfile
 
@@ -23,6 +24,21 @@ from partwright.errors import (
     UnsupportedFormatError,
 )
 from partwright.shapes import MESH_SUFFIXES, NodeLeftOutWarning, canonical_unit, load_shape
+
+
+@pytest.mark.parametrize("suffix", MESH_SUFFIXES)
+def test_a_name_that_is_not_utf_8(tmp_path, suffix):
+    plain = tmp_path / f"part{suffix}"
+    box().export(plain)
+    odd = tmp_path / os.fsdecode(b"p\xffrt" + suffix.encode())
+    try:
+        plain.rename(odd)
+    except OSError:
+        pytest.skip("this file system takes no such name")
+    shape = load_shape(odd)
+    assert (shape.name, shape.file) == ("p_rt", odd.name)
+    assert shape.volume == pytest.approx(load_shape(box()).volume)
+    assert all(node.name.isascii() for node in shape.nodes)
 
 
 @pytest.mark.parametrize("suffix", MESH_SUFFIXES)
