@@ -9,7 +9,6 @@ from typing import Any
 
 from partwright.assembly import Assembly
 from partwright.capri.csg_tree import CsgTree
-from partwright.capri.overlap import overlapped
 from partwright.capri.repeated_quadrics import with_repeats
 from partwright.capri.settings import Settings
 from partwright.capri.tree_search import TreeSearch
@@ -69,10 +68,8 @@ class Found:
 
     @cached_property
     def tree(self) -> CsgTree:
-        """The cheapest search's, in the unit frame; it ends within the shape's box."""
-        best = self.searches[0]
-        corners = self.shape.frame.to_unit(self.shape.vertices)
-        return overlapped(best.tree(), best.samples).closed(corners.min(axis=0), corners.max(axis=0))
+        """The cheapest search's, in the unit frame."""
+        return self.searches[0].bounded_tree()
 
     @cached_property
     def assembly(self) -> Assembly:

@@ -10,6 +10,7 @@ from importlib import import_module
 from types import ModuleType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
 from partwright.capri import oriented_points, selection
@@ -20,6 +21,7 @@ from partwright.capri.candidates import CandidatePool, candidates
 from partwright.capri.csg_tree import CsgTree
 from partwright.capri.detection import detect
 from partwright.capri.initialisation import start_surface
+from partwright.capri.overlap import overlapped
 from partwright.capri.samples import OccupancySamples
 from partwright.capri.selection import Problem
 from partwright.capri.settings import Settings
@@ -52,6 +54,7 @@ class TreeSearch:
     history: list[dict[str, float | str]] = field(default_factory=list)
     pool: CandidatePool = field(init=False)
     samples: OccupancySamples = field(init=False)
+    box: tuple[NDArray[np.float64], NDArray[np.float64]] = field(init=False)
 
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage)
@@ -59,6 +62,8 @@ class TreeSearch:
     def prepare(self, shape: Shape, start: Assembly | None) -> None:
         """Samples, and the pool of quadrics."""
         s = self.settings
+        corners = shape.frame.to_unit(shape.vertices)
+        self.box = corners.min(axis=0), corners.max(axis=0)
         with self.timed("prepare"):
             self.samples = sampling.draw_samples(shape, s.near, s.uniform, self.run.seed)
             surface = oriented_points.sample_surface(shape, s.surface, self.run.seed)
@@ -166,11 +171,11 @@ class TreeSearch:
         with self.timed("demands"):
             if s.min_iou is not None:
                 return self.meet_target(s.min_iou)
-            if s.max_parts is None or self.tree().primitives <= s.max_parts:
+            if s.max_parts is None or self.bounded_tree().primitives <= s.max_parts:
                 return "converged"
             for i in range(1, _PRICE_STEPS):
                 self.best = selection.polish(self.problem(_PRICE_FACTOR**i), self.best, _MAX_CONVEXES)
-                if self.tree().primitives <= s.max_parts:
+                if self.bounded_tree().primitives <= s.max_parts:
                     return "budget_reached"
             raise SettingError(f"max_parts: no tree of {s.max_parts} primitives encloses anything; give more")
 
@@ -205,6 +210,10 @@ class TreeSearch:
         rest = slice(self.samples.near, self.samples.near + self.samples.uniform)
         occupied, inside = self.problem().occupancy(layers)[rest], self.samples.inside[rest]
         return float((occupied & inside).sum() / max((occupied | inside).sum(), 1))
+
+    def bounded_tree(self) -> CsgTree:
+        """The tree, which ends within the box of the shape, as it becomes the assembly: the unit frame."""
+        return overlapped(self.tree(), self.samples).closed(*self.box)
 
     def tree(self) -> CsgTree:
         if self.tuned is not None:
