@@ -8,6 +8,7 @@ import os
 import random
 import re
 import struct
+import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -158,7 +159,7 @@ def broken_file(files: Files, rng: random.Random) -> tuple[str, bytes, str]:
     elif name.endswith((".glb", ".gltf")) and rng.random() < 0.7:
         data, inner = _broken_gltf(data, name.endswith(".glb"), rng), "tree "
     elif name.endswith(".json") and rng.random() < 0.5:
-        data, inner = json.dumps(_broken_tree(json.loads(data), rng)).encode(), "tree "
+        data, inner = _text(_broken_tree(json.loads(data), rng)), "tree "
     else:
         data = way(data, rng)
     return name, data, inner + ("" if inner == "tree " else way.__name__)
@@ -177,9 +178,9 @@ def _broken_member(data: bytes, way: Break, rng: random.Random) -> tuple[bytes, 
 
 def _broken_gltf(data: bytes, binary: bool, rng: random.Random) -> bytes:
     if not binary:
-        return json.dumps(_broken_tree(json.loads(data), rng)).encode()
+        return _text(_broken_tree(json.loads(data), rng))
     (length,) = struct.unpack("<I", data[12:16])
-    text = json.dumps(_broken_tree(json.loads(data[20 : 20 + length]), rng)).encode()
+    text = _text(_broken_tree(json.loads(data[20 : 20 + length]), rng))
     text += b" " * (-len(text) % 4)
     rest = data[20 + length :]
     head = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A)
@@ -190,6 +191,16 @@ ODD_VALUES = (
     None, True, "", "x" * 100_000, [], {}, -1, 0, 1, 2**31, 2**64, 1e200, -1e200, 1e-300, [[]], [1, 2],
     [float("nan")] * 4, float("nan"), float("inf"), [1e200] * 3, [0, 0, 0], [0, 0, 0, 0], [1e30] * 16,
 )  # fmt: skip
+
+
+def _text(tree: object) -> bytes:
+    """As JSON, however deep: whoever reads it has to do with less."""
+    usual = sys.getrecursionlimit()
+    sys.setrecursionlimit(20_000)
+    try:
+        return json.dumps(tree).encode()
+    finally:
+        sys.setrecursionlimit(usual)
 
 
 def _broken_tree(tree: object, rng: random.Random) -> object:
@@ -222,13 +233,15 @@ def _broken_tree(tree: object, rng: random.Random) -> object:
     return tree
 
 
+SOUND = ("mesh.stl", "mesh.glb", "mesh.obj", "points.xyz", "grid.npz", "text.ply")
 SHAPES = (
-    "mesh.stl", "mesh.glb", "mesh.obj", "points.xyz", "grid.npz", "text.ply", "missing.stl", "drilled.json",
+    *SOUND, "missing.stl", "drilled.json",
     "folder", "pipe", "loop.stl", "empty.stl", "", "/dev/zero", "/dev/null", "no\nname.stl", "x" * 300,
 )  # fmt: skip
 ASSEMBLIES = (
     "drilled.json", "union.json", "quadrics.json", "flat.json", "apart.json", "huge.json", "mesh.stl",
-    "missing.json", "folder", "pipe", "empty.json", "deep.json", "/dev/zero", "/dev/null",
+    "missing.json", "folder", "pipe", "empty.json", "deep.json", "nested.json", "learned.json",
+    "/dev/zero", "/dev/null",
 )  # fmt: skip
 NUMBERS = (
     "0",
@@ -284,6 +297,11 @@ EXPORT = {
     "--facets": NUMBERS,
     "--separate": None,
 }
+# A part of a model that is not here.
+LEARNED = {
+    "kind": "neural", "model": "sheds", "hash": "0" * 64, "part": "door", "latent": [0.0], "unit": 1.0,
+    "half_lengths": [1.0, 1.0, 1.0],
+}  # fmt: skip
 EVERYWHERE = {"--help": None, "--no-such-option": None, "--": None}
 
 
@@ -293,9 +311,12 @@ def random_command(rng: random.Random) -> list[str]:
         ("fit", "fit", "export", "export", "evaluate", "describe", "clean", "segment", "parts", "?")
     )
     if kind == "fit":
-        # A fit that is sound takes seconds: most have an option that cannot be.
+        # A fit that is sound takes seconds, and a CSG tree of more than a box half a minute.
         options = ["--quality", "draft", "--max-parts", "2", *_options(FIT, rng, 3)]
-        return ["fit", rng.choice(SHAPES), "-o", rng.choice(("out", "folder", "empty.stl", "")), *options]
+        shape, output = rng.choice(SHAPES), rng.choice(("out", "folder", "empty.stl", ""))
+        if "capri" in options and shape in SOUND:
+            shape = "box.stl"
+        return ["fit", shape, "-o", output, *options]
     if kind == "export":
         return ["export", rng.choice(ASSEMBLIES), "-o", rng.choice(OUTPUTS), *_options(EXPORT, rng, 2)]
     if kind == "evaluate":
@@ -361,4 +382,12 @@ def odd_files(folder: Path) -> None:
     pw.Assembly(tuple(map(pw.Part, planes)), "intersection").save(folder / "apart.json")
     text = (folder / "union.json").read_text()
     (folder / "huge.json").write_text(text.replace("1.0", "1e200"))
+    nested = pw.Assembly((pw.Part(pw.fields.Box((1, 1, 1))),))
+    for operation in ("union", "difference", "intersection") * 20:
+        nested = pw.Assembly((nested, pw.Part(pw.fields.Sphere(0.4), (0.5, 0.5, 0.5))), operation)
+    nested.save(folder / "nested.json")
+    (folder / "learned.json").write_text(
+        json.dumps(json.loads(text) | {"children": [{"name": "door", "field": LEARNED}]})
+    )
+    trimesh.creation.box((2, 1, 1)).export(folder / "box.stl")
     (folder / "deep.json").write_text('{"children": [' * 5000)

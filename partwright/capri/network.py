@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from partwright.capri.quadric_rows import CROSS
 from partwright.errors import SettingError, UnreadableFileError
+from partwright.input_files import check_file
 
 VOXELS = 64
 UNIT_TO_PAPER = 0.5  # the paper's coordinates, in which a shape is at most 1 long, from the unit frame's
@@ -133,6 +134,7 @@ def load_network(path: Path) -> CapriNet:
 
     from safetensors import SafetensorError, safe_open
 
+    check_file(path)
     try:
         with safe_open(path, "pt") as file:
             sizes = NetworkSizes(**json.loads((file.metadata() or {})["sizes"]))

@@ -53,13 +53,15 @@ class Model:
 
     @classmethod
     def of(cls, assembly: Assembly) -> Model:
-        """Raises UncleanableError where a leaf is neither a SuperFrustum nor a named solid."""
+        """Raises UncleanableError where a leaf is no SuperFrustum or named solid, or has no size."""
         for part in assembly.parts:
             if part.field.superfrustum() is None:
                 raise UncleanableError(
                     f"part {part.name!r} is a {part.field.kind}, whose numbers no relation can bind; only "
                     "SuperFrusta and named solids can be cleaned"
                 )
+            if size_of(part) == 0:
+                raise UncleanableError(f"part {part.name!r} has no size; take it out, or give it one")
         copies = [copy for part in assembly.parts for copy in part.copies]
         return cls(assembly, np.stack([rotation_matrix(copy.rotation) for copy in copies]))
 

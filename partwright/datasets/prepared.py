@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from partwright.atomic_io import write_bytes
 from partwright.datasets.poses import Poses
 from partwright.errors import FamilyError, NewerVersionError, OutputError, UnreadableFileError
+from partwright.input_files import check_file
 from partwright.shapes import UnitFrame
 
 FORMAT, VERSION = "partwright-family", 1
@@ -191,6 +192,7 @@ def read_shape(path: str | Path, name: str, data: bytes | None = None) -> Prepar
 
 def read_about(path: str | Path) -> dict[str, Any]:
     """What a shape's file says beside its tensors, which are not read. Raises UnreadableFileError."""
+    check_file(Path(path))
     try:
         with Path(path).open("rb") as file:
             head = file.read(8)
@@ -312,6 +314,7 @@ def _average(data: dict[str, Any], parts: int) -> Poses:
 
 
 def _read_bytes(path: Path) -> bytes:
+    check_file(path)
     try:
         return path.read_bytes()
     except OSError as error:

@@ -21,6 +21,7 @@ from partwright.assembly import Part
 from partwright.assembly.rows import as_superfrustum
 from partwright.errors import NoSurfaceError
 from partwright.export.brep_bent import bent_solid
+from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
@@ -62,24 +63,23 @@ def solid_of(field: Field) -> TopoDS_Shape:
     Raises:
         NoSurfaceError: OpenCASCADE cannot build it.
     """
-    from OCP.Standard import Standard_Failure
-
     f = as_superfrustum(field)
     longest = max(*f.size, f.dilation)
-    if f.bulge * math.pi / 2 < _STRAIGHT and _turns(f):
-        return revolved(f)
     corner = f.roundness * min(f.size[:2]) / 2
     d = f.dilation if f.dilation > _SHORTEST * longest else 0.0
     half_x, half_y = (_not_tiny(side / 2 - corner, longest) for side in f.size[:2])
     sweep = Sweep(half_x, half_y, _SHORTEST * longest)
     body = _body(f, sweep)
+    failures: tuple[type[Exception], ...] = (*opencascade_errors(), IndexError)  # an outline of no length
     try:
+        if f.bulge * math.pi / 2 < _STRAIGHT and _turns(f):
+            return revolved(f)
         outer = clipped(outer_outline(f, corner, d), -math.inf, sweep.shortest)
         result = body(outer[0])
         if f.hollow:
             inner = clipped(inner_outline(f, corner, d), -min(half_x, half_y), sweep.shortest)
             result = _without(result, [body(run) for run in inner])
-    except (Standard_Failure, IndexError) as error:  # OpenCASCADE's own, and an outline of no length
+    except failures as error:
         raise NoSurfaceError("a part is too thin for a B-rep") from error
     return result
 

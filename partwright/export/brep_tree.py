@@ -18,6 +18,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import NoSurfaceError
 from partwright.export.brep import solid_of, volume_and_area
+from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
 from partwright.meshing import has_exact_mesh, mesh_csg
@@ -128,13 +129,12 @@ def _unified(node: Assembly, solid: TopoDS_Shape) -> TopoDS_Shape:
         NoSurfaceError: nothing is left.
     """
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
-    from OCP.Standard import Standard_Failure
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
 
     if len(node.children) > 1:
         unify = ShapeUpgrade_UnifySameDomain(solid, True, True, False)
-        with suppress(Standard_Failure):  # then the faces stay several
+        with suppress(*opencascade_errors()):  # then the faces stay several
             unify.Build()
             solid = unify.Shape()
     if not TopExp_Explorer(solid, TopAbs_ShapeEnum.TopAbs_SOLID).More():

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from partwright.atomic_io import write_bytes
 from partwright.errors import ModelError, SettingError
+from partwright.input_files import check_file
 from partwright.partsdf.config import Config
 from partwright.partsdf.model import about_file
 
@@ -74,6 +75,7 @@ def load_checkpoint(
     from safetensors import SafetensorError
     from safetensors.torch import load
 
+    check_file(path)
     try:
         data = path.read_bytes()
         tensors, about = load(data), about_file(data)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from partwright.errors import SettingError, UnreadableFileError
+from partwright.input_files import check_file
 
 ARCHITECTURES = ("mlp", "transformer")
 AGGREGATIONS = ("min", "softmin")
@@ -187,11 +188,12 @@ def read_config(path: str | Path) -> Config:
         UnreadableFileError: the file is missing or no TOML.
         SettingError: a key is unknown or missing, or a value cannot be used.
     """
+    check_file(Path(path))
     try:
         data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise UnreadableFileError(f"cannot read {path}: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise UnreadableFileError(f"{path} is no TOML file: {error}") from error
     try:
         return config_from(data)

@@ -16,6 +16,7 @@ from torch import Tensor, nn
 
 from partwright.atomic_io import write_bytes
 from partwright.errors import ModelError, NewerVersionError, SettingError, UnreadableFileError
+from partwright.input_files import check_file
 from partwright.partsdf.config import Config, DecoderSettings, config_from
 from partwright.partsdf.decoder import Conditioned, Decoder
 from partwright.partsdf.losses import aggregate
@@ -127,6 +128,7 @@ def load_model(source: str | Path) -> Model:
     path = Path(source)
     if path.suffix != SUFFIX:
         path = _named(str(source))
+    check_file(path)
     try:
         data = path.read_bytes()
     except OSError as error:

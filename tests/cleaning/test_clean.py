@@ -233,6 +233,13 @@ def test_a_field_of_another_kind_is_refused() -> None:
         clean(Assembly((part,)))
 
 
+@pytest.mark.parametrize("beside", [(), (Part(Box((1, 1, 1)), (2, 0, 0)),)])
+def test_a_part_without_a_size_is_named(beside: tuple[Part, ...]) -> None:
+    flat = Part(SuperFrustum((0, 0, 0)), name="flat")
+    with pytest.raises(UncleanableError, match="'flat' has no size"):
+        clean(Assembly((flat, *beside)))
+
+
 class _Latent(Field):
     kind = "latent"
 

@@ -191,6 +191,12 @@ def test_the_same_assembly_gives_the_same_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "a" / "x.step").read_bytes() == (tmp_path / "b" / "x.step").read_bytes()
 
 
+def test_a_part_too_small_for_opencascade_does_not_end_the_export(tmp_path: Path) -> None:
+    apart = Assembly((Part(Sphere(1e-9)), Part(Box((1e8, 1e8, 1e8)), (1e8, 0, 0))))
+    export(apart, tmp_path / "apart.step")
+    assert (tmp_path / "apart.step").stat().st_size > 1000
+
+
 def test_nothing_to_export_and_bad_places_are_named(tmp_path: Path) -> None:
     with pytest.raises(NoSurfaceError, match="no part of the assembly has a volume"):
         export(Assembly((Part(SuperFrustum((1, 1, 0))),)), tmp_path / "a.step")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict
 from pathlib import Path
 
@@ -118,7 +119,9 @@ def test_interpolate(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
             ["reconstruct", "{}", "none.ply", "--iterations", "0"],
             "iterations: expected a whole number of at least 1",
         ),
-        (["train", "none.toml", "-o", "out"], "cannot read none.toml"),
+        (["train", "none.toml", "-o", "out"], "none.toml: no such file"),
+        (["train", "/dev/zero", "-o", "out"], "/dev/zero: is a pipe, socket or device"),
+        (["edit", "/dev/zero", "-o", "a.json"], "no assembly file"),
     ],
 )
 def test_what_goes_wrong_is_one_line(
@@ -128,7 +131,7 @@ def test_what_goes_wrong_is_one_line(
     assert main(["parts", *(a.format(file) for a in arguments)]) == 2
     error = capsys.readouterr().err
     assert message in error
-    assert error.count("\n") == 1
+    assert error.removeprefix("partwright: reading\n").count("\n") == 1
     assert set(Path().iterdir()) == before
 
 
@@ -159,3 +162,22 @@ def test_configurations_check_themselves(
 @pytest.mark.parametrize("path", sorted((Path(__file__).parents[2] / "configs").glob("*.toml")))
 def test_committed_configurations_are_valid(path: Path) -> None:
     assert read_config(path).name
+
+
+@pytest.mark.parametrize("what", ["config", "model", "family"])
+def test_a_pipe_is_refused_at_once(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nobody writes to it: to open it would wait for ever."""
+    monkeypatch.chdir(tmp_path)
+    Path("family").mkdir()
+    Path("sound.toml").write_text('name = "lamp"\nfamily = "family"\n')
+    pipe = {"config": "pipe.toml", "model": "pipe.safetensors", "family": "family/family.json"}[what]
+    os.mkfifo(pipe)
+    command = {
+        "config": ["train", pipe, "-o", "out"],
+        "model": ["edit", f"{pipe}:0", "--drop", "arm", "-o", "a.json"],
+        "family": ["train", "sound.toml", "-o", "out"],
+    }[what]
+    assert main(["parts", *command]) == 2
+    assert "is a pipe, socket or device" in capsys.readouterr().err
