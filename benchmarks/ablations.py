@@ -69,15 +69,16 @@ def digest(variant: Variant) -> str:
 
 def run(variant: Variant, entry: Entry) -> Run:
     """The fit and its scores; a fit that cannot be done has NaN for them, and says why."""
+    from partwright.methods import FitRequest
+    from partwright.methods import Run as MethodRun
     from partwright.metrics import evaluate
     from partwright.shapes import load_shape
-    from partwright.superfrusta import fit
 
     shape = load_shape(entry.path)
     start = time.process_time()
     try:
         with variant.hook():
-            assembly = fit(shape, variant.settings).assembly
+            assembly = FitRequest(shape, variant.settings, MethodRun(threads=1)).fitted().assembly
         seconds = time.process_time() - start
         surface = None
         if variant.superquadrics:

@@ -18,7 +18,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from statistics import mean, median
 from typing import Any
@@ -30,7 +29,8 @@ from fit import OWN_SHAPES, Entry, find_shapes, machine
 import partwright as pw
 from partwright.atomic_io import write_bytes
 from partwright.errors import PartwrightError
-from partwright.fitting import METHODS
+from partwright.methods import METHODS, FitRequest
+from partwright.methods import Run as MethodRun
 from partwright.metrics.cad import cad_scores
 from partwright.metrics.complexity import convexes, distinct_primitives, primitives
 from partwright.shapes import Shape
@@ -115,11 +115,10 @@ def fit_once(entry: Entry, name: str, seed: int, threads: int) -> Run:
     """Fits one shape one way and scores it."""
     row = ROWS[name]
     shape = pw.load_shape(entry.path)
-    module = import_module(METHODS[row.method])
     wall, cpu = time.perf_counter(), time.process_time()
     try:
-        settings = module.Settings(seed=seed, threads=threads, **row.changes)
-        fitted = module.fit(GIVEN[row.given](shape), settings)
+        settings = METHODS[row.method].settings(**row.changes)
+        fitted = FitRequest(GIVEN[row.given](shape), settings, MethodRun(seed, threads=threads)).fitted()
         cost = {"seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}
         measured = cad_scores(fitted.assembly.expanded(), shape, seed=seed).to_dict()
         measured |= {

@@ -18,9 +18,10 @@ from PIL import Image
 import partwright as pw
 from partwright.assembly import Assembly
 from partwright.assembly.palette import palette
-from partwright.capri import Settings, fit
+from partwright.capri import Settings
 from partwright.datasets.cad_parts import CadPart, cad_part
 from partwright.meshing import mesh_csg
+from partwright.methods import FitRequest, Run
 from partwright.metrics.complexity import convexes
 from partwright.render import Camera, sheet
 from partwright.render.output import write
@@ -39,7 +40,7 @@ def fitted(part: CadPart, shape: Shape, fits: Path | None) -> Assembly:
     saved = fits / part.name / "assembly.json" if fits else None
     if saved and saved.is_file():
         return pw.load_assembly(saved)
-    return fit(shape, Settings(tries=0, threads=1)).assembly
+    return FitRequest(shape, Settings(tries=0), Run(threads=1)).fitted().assembly
 
 
 def panels(part: CadPart, fits: Path | None) -> list[np.ndarray]:

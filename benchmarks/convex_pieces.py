@@ -43,7 +43,7 @@ def regions(samples: FitSamples, rows: Rows, settings: Settings) -> list[Region]
     candidates = np.flatnonzero(unexplained)
     places = samples.grid_points[candidates]
     found = []
-    for piece in convex_pieces(DistanceGrid(grid.origin, grid.spacing, residual), settings):
+    for piece in convex_pieces(DistanceGrid(grid.origin, grid.spacing, residual), samples.seed):
         planes = ConvexHull(piece).equations
         inside = (places @ planes[:, :3].T + planes[:, 3] <= 0.5 * grid.spacing).all(axis=1)
         voxels = np.zeros(residual.size, bool)
@@ -59,7 +59,7 @@ def regions(samples: FitSamples, rows: Rows, settings: Settings) -> list[Region]
     ]
 
 
-def convex_pieces(grid: DistanceGrid, settings: Settings) -> list[NDArray[np.float64]]:
+def convex_pieces(grid: DistanceGrid, seed: int) -> list[NDArray[np.float64]]:
     """Corners (n, 3) of each convex piece of {values < 0}."""
     try:
         import coacd
@@ -71,7 +71,7 @@ def convex_pieces(grid: DistanceGrid, settings: Settings) -> list[NDArray[np.flo
         return []
     coacd.set_log_level("off")
     given = coacd.Mesh(surface.vertices, surface.faces)
-    pieces = coacd.run_coacd(given, threshold=CONCAVITY, preprocess_mode="off", seed=settings.seed, **_SEARCH)
+    pieces = coacd.run_coacd(given, threshold=CONCAVITY, preprocess_mode="off", seed=seed, **_SEARCH)
     return [np.asarray(vertices) for vertices, _ in pieces if len(vertices) > 3]
 
 

@@ -21,10 +21,11 @@ from statistics import median
 import numpy as np
 
 from partwright.atomic_io import write_bytes
+from partwright.methods import FitRequest, Run
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import iou, occupancy_iou
 from partwright.shapes import MESH_SUFFIXES, Shape, load_shape
-from partwright.superfrusta import Settings, fit
+from partwright.superfrusta import Settings
 
 HERE = Path(__file__).parent
 POINTS, RESOLUTION = 30_000, 128
@@ -90,7 +91,8 @@ def _loaded(path: Path) -> tuple[Shape, float]:
 
 def _fitted(shape: Shape, mesh: Shape, seeds: list[int], quality: str) -> tuple[float, float]:
     """Medians over the seeds: IoU of the shape's assembly with the mesh, and parts."""
-    assemblies = [fit(shape, Settings.for_quality(quality, seed=seed)).assembly for seed in seeds]
+    settings = Settings.for_quality(quality)
+    assemblies = [FitRequest(shape, settings, Run(seed)).fitted().assembly for seed in seeds]
     reached = [
         iou(in_unit_frame(a, mesh.frame).distance, mesh.unit_occupancy(RESOLUTION)) for a in assemblies
     ]

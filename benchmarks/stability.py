@@ -152,17 +152,18 @@ def disturbed(check: Check, shape: Shape) -> trimesh.Trimesh:
 
 def measure(entry: Entry, check: Check, quality: str, seed: int) -> Measured:
     """Fits the disturbed shape, and measures its assembly against the original."""
+    from partwright.methods import FitRequest, Run
     from partwright.metrics.frames import in_unit_frame
     from partwright.metrics.iou import RESOLUTION, iou
     from partwright.shapes import load_shape
-    from partwright.superfrusta import Settings, fit
+    from partwright.superfrusta import Settings
 
     original = load_shape(entry.path)
     there = similarity(check)
     plain = check == BASE or not (check.remeshed or check.noisy or check.moved or check.turn is not None)
     shape = original if plain else load_shape(disturbed(check, original))
-    settings = Settings.for_quality(quality, seed=seed, threads=check.threads)
-    assembly = fit(shape, settings).assembly
+    run = Run(seed, threads=check.threads)
+    assembly = FitRequest(shape, Settings.for_quality(quality), run).fitted().assembly
     back = assembly if plain else assembly.transformed(there.inverse())
     occupancy = original.unit_occupancy(RESOLUTION)
 

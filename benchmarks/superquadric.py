@@ -22,7 +22,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 from unittest import mock
 
 import numpy as np
@@ -36,10 +36,8 @@ from partwright.fields import reference
 from partwright.fields.base import LARGEST, Array, Field, normalise, number, scale_lengths, vector
 from partwright.fields.columns import PROPORTIONS, Column
 from partwright.meshing import mesh_field
-from partwright.shapes import Shape
 from partwright.superfrusta import growing, initialisation
 from partwright.superfrusta.samples import FitSamples, Rows
-from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.torch_kernel import TorchKernel
 
 SHARPEST, SOFTEST = 0.1, 2.0
@@ -140,8 +138,8 @@ def fitted_with_superquadrics() -> Iterator[None]:
     """
     original = FitSamples.of
 
-    def of(shape: Shape, settings: Settings) -> FitSamples:
-        return replace(original(shape, settings), kernel=TorchKernel("cpu"))
+    def of(*given: Any) -> FitSamples:
+        return replace(original(*given), kernel=TorchKernel("cpu"))
 
     with (
         mock.patch.object(FitSamples, "of", of),

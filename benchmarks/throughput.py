@@ -20,6 +20,7 @@ from ablations import NAMES
 from fit import OWN_SHAPES, find_shapes, machine
 
 import partwright as pw
+from partwright.assembly.file_text import to_text
 from partwright.atomic_io import write_bytes
 from partwright.fitting import Result
 
@@ -63,7 +64,7 @@ def main() -> int:
     rows, first, before = [], 0.0, None
     for at_once in map(int, given.at_once.split(",")):
         seconds, results = fitted(shapes, at_once, given.device)
-        made = [one.assembly.to_dict() for one in results]
+        made = [to_text(one.assembly) for one in results]
         if before is not None and made != before:
             print(f"assemblies differ with {at_once} at once", file=sys.stderr)
             return 1

@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from partwright.fields.columns import Column
 from partwright.fields.kernel import Rows, Target
-from partwright.shapes import Shape
 from partwright.superfrusta import growing, initialisation
 from partwright.superfrusta.backend import Kernel
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 
 # Smaller than the default, so that all of it runs in minutes; no round or cycle less.
-BASE = Settings(near=8_000, uniform=8_000, resolution=64, threads=1)
+BASE = Settings(near=8_000, uniform=8_000, resolution=64)
 # For what runs in PyTorch.
 SMALL = replace(BASE, near=4_000, uniform=4_000, rounds=4, cycles=1)
 SHORT = replace(BASE, rounds=3, cycles=1)
@@ -72,8 +71,8 @@ def with_samples(change: Callable[[FitSamples], FitSamples]) -> Iterator[None]:
     """Fits see changed samples."""
     original = FitSamples.of
 
-    def of(shape: Shape, settings: Settings) -> FitSamples:
-        return change(original(shape, settings))
+    def of(*given: Any) -> FitSamples:
+        return change(original(*given))
 
     with mock.patch.object(FitSamples, "of", of):
         yield

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.atomic_io import report_path
 from partwright.cli.outputs import add_output, given
 
 
@@ -27,7 +28,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="how much further from the shape any part may come to lie, on average, in the assembly's units "
         "(default: half a thousandth of the longest side)",
     )
-    command.set_defaults(run=run)
+    command.set_defaults(run="clean")
 
 
 def _reads(arguments: argparse.Namespace) -> list[Path]:
@@ -35,24 +36,4 @@ def _reads(arguments: argparse.Namespace) -> list[Path]:
 
 
 def _writes(arguments: argparse.Namespace) -> list[Path]:
-    from partwright.atomic_io import report_path
-
     return [arguments.output, report_path(arguments.output)]
-
-
-def run(arguments: argparse.Namespace) -> int:
-    from partwright.assembly import load_assembly
-    from partwright.cleaning import clean
-    from partwright.cleaning.cleaned_file import check_suffix, write_cleaned
-    from partwright.cli.tables import print_cleaned
-    from partwright.shapes import load_shape
-
-    check_suffix(arguments.output)
-    assembly = load_assembly(arguments.assembly)
-    shape = None
-    if arguments.shape is not None:
-        shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
-    cleaned = clean(assembly, shape, arguments.clean_tolerance)
-    write_cleaned(cleaned, arguments.output)
-    print_cleaned(cleaned, arguments.output)
-    return 0

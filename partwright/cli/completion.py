@@ -15,11 +15,4 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         'partwright completion bash)"; for every new one, the same line in ~/.bashrc.',
     )
     command.add_argument("shell", choices=SHELLS, metavar="SHELL", help=", ".join(SHELLS))
-    command.set_defaults(run=run)
-
-
-def run(arguments: argparse.Namespace) -> int:
-    import argcomplete
-
-    print(argcomplete.shellcode(["partwright"], shell=arguments.shell))
-    return 0
+    command.set_defaults(run="completion")

@@ -14,13 +14,4 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     command.add_argument("--digits", metavar="N", type=int, default=4, help="of each number (default: 4)")
-    command.set_defaults(run=run)
-
-
-def run(arguments: argparse.Namespace) -> int:
-    from partwright.assembly import load_assembly
-    from partwright.cli.terminal import say
-
-    for line in load_assembly(arguments.assembly).describe(max(1, min(arguments.digits, 17))).split("\n"):
-        say(line)
-    return 0
+    command.set_defaults(run="describe")

@@ -24,25 +24,4 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="also normal consistency, edge Chamfer, light field distance, primitives and convexes, "
         "from this many points (default: 30000; CAPRI-Net's tables have 8000)",
     )
-    command.set_defaults(run=run)
-
-
-def run(arguments: argparse.Namespace) -> int:
-    import json
-
-    from partwright.assembly import load_assembly
-    from partwright.cli.tables import print_scores
-    from partwright.errors import SettingError
-    from partwright.metrics import evaluate
-    from partwright.shapes import load_shape
-
-    if arguments.cad is not None and not 100 <= arguments.cad <= 1_000_000:
-        raise SettingError(f"--cad {arguments.cad}: expected 100 to 1000000 points")
-    assembly = load_assembly(arguments.assembly)
-    shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
-    scores = evaluate(assembly, shape, cad_points=arguments.cad)
-    if arguments.json:
-        print(json.dumps(scores.to_dict(), indent=2))
-    else:
-        print_scores(arguments.assembly.name, scores, shape.unit)
-    return 0
+    command.set_defaults(run="evaluate")

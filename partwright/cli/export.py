@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.atomic_io import report_path
 from partwright.cli.outputs import add_output
 from partwright.export.formats import FORMATS
-
-OPTIONS = ("density", "tolerance", "free_joint", "by_part", "resolution", "facets", "separate")
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -29,36 +28,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option("--resolution", metavar="N", type=int, help="cells along the longest side of what is meshed")
     option("--facets", metavar="N", type=int, help="facets of a full circle (OpenSCAD; default: 96)")
     option("--separate", action="store_true", default=None, help="each part a product of its own (STEP)")
-    command.set_defaults(run=run)
+    command.set_defaults(run="export")
 
 
 def _writes(arguments: argparse.Namespace) -> list[Path]:
-    from partwright.atomic_io import report_path
-
     return [arguments.output, report_path(arguments.output)]
-
-
-def run(arguments: argparse.Namespace) -> int:
-    from partwright.assembly import load_assembly
-    from partwright.cli.terminal import say
-    from partwright.export import export
-
-    given = {name: getattr(arguments, name) for name in OPTIONS}
-    options = {name: value for name, value in given.items() if value is not None}
-    assembly = load_assembly(arguments.assembly)
-    export(assembly, arguments.output, **options)
-    say(_what_was_written(arguments.output, len(assembly)))
-    return 0
-
-
-def _what_was_written(path: Path, parts: int) -> str:
-    """One line: the file, its format and size, and what of the assembly it could not hold."""
-    from partwright.atomic_io import report_path
-    from partwright.export.export_report import approximated_parts
-    from partwright.export.formats import format_of
-
-    line = f"wrote {path}: {format_of(path).name}, {path.stat().st_size / 1000:.3g} kB"
-    changed = approximated_parts(path)
-    if not changed:
-        return line
-    return f"{line}; {len(changed)} of {parts} parts approximated, {report_path(path)} says how far off"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 import warnings
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 from partwright import __version__
@@ -39,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
             outputs.check(arguments)
-            return arguments.run(arguments)
+            return _run(arguments)
     except (CancelledError, KeyboardInterrupt):
         note("interrupted; nothing was written")
         return INTERRUPTED
@@ -49,6 +51,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone; so has what Python would flush at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    """Runs the command, whose module in `commands/` is imported only now, with all that it needs."""
+    command = import_module(f"partwright.cli.commands.{arguments.run}")
+    return int(command.run(arguments))
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

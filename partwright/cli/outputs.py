@@ -7,6 +7,9 @@ import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from partwright.atomic_io import check_files, check_folder, check_unread
+from partwright.errors import OutputError
+
 Group = argparse._ActionsContainer  # what options can be added to: a parser or a group of its options
 Paths = Callable[[argparse.Namespace], Iterable[Path]]
 _MAX_BYTES = 255  # of one name, on every common file system
@@ -42,9 +45,6 @@ def check(arguments: argparse.Namespace) -> None:
     Raises:
         OutputError: it will not.
     """
-    from partwright.atomic_io import check_files, check_folder, check_unread
-    from partwright.errors import OutputError
-
     if "writes" not in arguments:
         return
     if arguments.folder:

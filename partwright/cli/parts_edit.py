@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from partwright.cli.outputs import add_output, given
-
-if TYPE_CHECKING:
-    from partwright.partsdf.neural import NeuralShape
 
 _EPILOG = """\
 SHAPE is an assembly of neural parts (.json), as `parts reconstruct` writes them, or MODEL:NAME for a shape
@@ -53,7 +49,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option("--turn", "PART=X,Y,Z,DEGREES", "turn the part about its centre, around an axis")
     option("--scale", "PART=X,Y,Z", "stretch the part along its own axes")
     option("--drop", "PART", "leave the part out, as if the shape had never had it")
-    command.set_defaults(run=run)
+    command.set_defaults(run="parts_edit")
 
 
 def _reads(arguments: argparse.Namespace) -> list[Path]:
@@ -63,59 +59,3 @@ def _reads(arguments: argparse.Namespace) -> list[Path]:
 
 def _writes(arguments: argparse.Namespace) -> list[Path]:
     return [arguments.output, arguments.output.with_suffix(".png")]
-
-
-def run(arguments: argparse.Namespace) -> int:
-    from partwright.cli.progress import Work
-    from partwright.cli.terminal import say
-    from partwright.errors import UnsupportedFormatError
-    from partwright.partsdf.pictures import picture
-    from partwright.partsdf.sources import open_source
-    from partwright.render import Camera, write_png
-
-    if arguments.output.suffix != ".json":
-        raise UnsupportedFormatError(f"{arguments.output}: an assembly is written as .json")
-    still = arguments.output.with_suffix(".png")
-    with Work("reading") as work:
-        source = open_source(arguments.shape, arguments.model)
-        shape = source.shape
-        for name, text in arguments.edits:
-            shape = _edited(shape, name, text)
-        source.assembly(shape).save(arguments.output)
-        work.stage("drawing")
-        camera = Camera(up=source.up or "z")
-        write_png(still, picture(shape, camera=camera, size=480, progress=work.show))
-    say(f"{', '.join(shape.names())}: written to {arguments.output}, drawn in {still}")
-    return 0
-
-
-def _edited(shape: NeuralShape, name: str, text: str) -> NeuralShape:
-    from partwright.partsdf import editing
-    from partwright.partsdf.sources import open_source
-
-    part, _, value = text.partition("=")
-    if name == "drop":
-        return editing.without(shape, text)
-    if name == "swap":
-        return editing.swapped(shape, part, open_source(value).shape)
-    if name == "resample":
-        (seed,) = _numbers(name, text, 1)
-        return editing.resampled(shape, part, int(seed))
-    if name == "turn":
-        *axis, degrees = _numbers(name, text, 4)
-        return editing.turned(shape, part, axis, degrees)
-    change: Callable[[NeuralShape, str, Sequence[float]], NeuralShape]
-    change = {"move": editing.moved, "scale": editing.scaled}[name]
-    return change(shape, part, _numbers(name, text, 3))
-
-
-def _numbers(name: str, text: str, count: int) -> list[float]:
-    from partwright.errors import SettingError
-
-    try:
-        values = [float(v) for v in text.partition("=")[2].split(",")]
-    except ValueError:
-        values = []
-    if len(values) != count:
-        raise SettingError(f"--{name} {text}: expected PART= and {count} numbers, separated by commas")
-    return values

@@ -28,7 +28,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         type=int,
         help="cells along the unit frame, a multiple of 8 (default: 64 to 96, by the thinnest wall)",
     )
-    command.set_defaults(run=run)
+    command.set_defaults(run="parts_interpolate")
 
 
 def _reads(arguments: argparse.Namespace) -> list[Path]:
@@ -37,29 +37,3 @@ def _reads(arguments: argparse.Namespace) -> list[Path]:
 
 def _writes(arguments: argparse.Namespace) -> list[Path]:
     return [arguments.output, arguments.output.with_suffix(".png")]
-
-
-def run(arguments: argparse.Namespace) -> int:
-    from partwright.cli.progress import Work
-    from partwright.cli.terminal import say
-    from partwright.partsdf.pictures import check_film, film
-    from partwright.partsdf.sources import open_source
-    from partwright.render import Camera
-
-    check_film(arguments.output, arguments.steps)
-    with Work("reading") as work:
-        first = open_source(arguments.first, arguments.model)
-        second = open_source(arguments.second)
-        work.stage("drawing")
-        still = film(
-            first.shape,
-            second.shape,
-            arguments.output,
-            arguments.steps,
-            arguments.resolution,
-            arguments.size,
-            Camera(up=first.up or "z"),
-            work.show,
-        )
-    say(f"written to {arguments.output}, sheet in {still}")
-    return 0

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from partwright.datasets import Preparation
 
 _EPILOG = """\
 FOLDER holds one shape an entry: a scene whose named nodes are its parts, a folder with a mesh a part (and
@@ -40,45 +36,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option("--workers", metavar="N", type=int, help="processes (default: one a processor)")
     option("--seed", metavar="S", type=int, default=0, help="of shapes, samples and the split (default: 0)")
-    command.set_defaults(run=run)
-
-
-def run(arguments: argparse.Namespace) -> int:
-    from partwright.cli.interrupts import raising
-    from partwright.cli.progress import Count
-    from partwright.cli.terminal import note
-    from partwright.datasets import prepare
-
-    with raising(), Count("preparing") as count:
-        try:
-            made = prepare(
-                arguments.source,
-                arguments.output,
-                count=arguments.count,
-                samples=arguments.samples,
-                parts=arguments.parts,
-                held_out=arguments.test,
-                seed=arguments.seed,
-                workers=arguments.workers,
-                progress=lambda step: count.show(step.done, step.total, step.shape),
-            )
-        except KeyboardInterrupt:
-            note(
-                f"interrupted; shapes that are done are kept in {arguments.output}, and the same command "
-                "goes on from there"
-            )
-            return 130
-    _report(made, arguments.output)
-    return 0
-
-
-def _report(made: Preparation, folder: Path) -> None:
-    from partwright.cli.terminal import say, warn
-
-    warn(f"{shape.name} is left out: {shape.reason}" for shape in made.refused)
-    family = made.family
-    counts = ", ".join(f"{len(family.split(name))} {name}" for name in ("train", "validation", "test"))
-    say(f"{len(family)} shapes of {len(family.parts)} parts ({counts}): {folder}")
+    command.set_defaults(run="parts_prepare")
 
 
 def _names(text: str) -> tuple[str, ...]:

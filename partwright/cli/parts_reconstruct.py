@@ -37,30 +37,4 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
     option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
     option("--seed", metavar="S", type=int, default=0, help="of the samples (default: %(default)s)")
-    command.set_defaults(run=run)
-
-
-def run(arguments: argparse.Namespace) -> int:
-    from partwright.cli.interrupts import stopping
-    from partwright.cli.progress import Display
-    from partwright.cli.tables import finish_fit
-    from partwright.fitting import fit
-    from partwright.methods import Cancellation
-    from partwright.partsdf.settings import Settings
-    from partwright.shapes import load_shape
-
-    settings = Settings(
-        arguments.model,
-        arguments.resolution,
-        iterations=arguments.iterations,
-        points=arguments.points,
-        start=arguments.start,
-    )
-    cancel = Cancellation()
-    with Display() as display:
-        shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
-        with stopping(cancel.request):
-            result = fit(shape, settings, seed=arguments.seed, progress=display.show, cancel=cancel)
-        display.stage("writing")
-        result.save(arguments.output)
-    return finish_fit(result, arguments.output)
+    command.set_defaults(run="parts_reconstruct")

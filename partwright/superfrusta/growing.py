@@ -13,8 +13,9 @@ from partwright.fields.columns import Column
 from partwright.superfrusta import solid_starts
 from partwright.superfrusta.families import locked_values, with_locked_values
 from partwright.superfrusta.initialisation import starts
+from partwright.superfrusta.limits import LIMITS
 from partwright.superfrusta.objective import occupancy_score
-from partwright.superfrusta.refining import LIMITS, freedom, sharpened, ties
+from partwright.superfrusta.refining import freedom, sharpened, ties
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.solid_kinds import plainness

@@ -28,7 +28,7 @@ from partwright.fields.columns import (
 )
 from partwright.fields.kernel import Rows, Target, _rows, like
 from partwright.fields.superfrustum import tightest_bulge
-from partwright.superfrusta.refining import LIMITS
+from partwright.superfrusta.limits import LIMITS
 
 BLOCKS = (3, 4, 3, 1, 1, 3, 1)  # columns that share a learning rate, in the order of `PaperConfig.rates`
 

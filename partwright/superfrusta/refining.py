@@ -8,17 +8,11 @@ from numpy.typing import NDArray
 from partwright.fields import kernel
 from partwright.fields.columns import STEP_WIDTH, Tangent
 from partwright.superfrusta.families import locked_values
+from partwright.superfrusta.limits import LIMITS
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.solid_kinds import kind_freedom, round_parts
 
-# A side shorter than this is thinner than any wall that the samples can see.
-_SHORTEST = 0.004
-LIMITS = kernel.Limits(
-    lower=(-2.0,) * 3 + (-9.0,) * 3 + (_SHORTEST,) * 3 + (0.0, 0.0, 0.0, 0.0, 0.0, 1e-3),
-    upper=(2.0,) * 3 + (9.0,) * 3 + (2.5,) * 3 + (1.0, 1.0, 2.0, 1.0, 1.0, 0.3),
-    step=(0.1,) * 3 + (0.3,) * 3 + (0.2,) * 3 + (0.3, 0.1, 0.3, 0.3, 0.3, 0.05),
-)
 START_BLEND = 0.02
 
 # Sharpness of the occupancy sigmoid and iterations, for solids of ordinary thickness.
@@ -62,7 +56,7 @@ def optimise(samples: FitSamples, rows: Rows, stages: Stages, settings: Settings
     The paper's own may return fewer parts: those whose existence it gave up.
     """
     if settings.optimiser == "adam":
-        from partwright.superfrusta import paper
+        from partwright.superfrusta import paper  # which imports torch: an extra
 
         index = samples.optimised_indices
         config = paper.PaperConfig()

@@ -25,7 +25,8 @@ from partwright.fields.columns import (
 )
 from partwright.fields.superfrustum import tightest_bulge
 from partwright.least_squares import Damping, minimise
-from partwright.superfrusta.refining import LIMITS, Stages, freedom, penalties, sharpened, ties
+from partwright.superfrusta.limits import LIMITS
+from partwright.superfrusta.refining import Stages, freedom, penalties, sharpened, ties
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetry import Isometry

@@ -44,7 +44,7 @@ def test_every_option_is_passed_on(method: BoxMethod, block: Path, tmp_path: Pat
         seen.update(options, method=method, unit=shape.unit, up=shape.up)
         return fit(shape, method, **options)
 
-    monkeypatch.setattr("partwright.fitting.fit", spy)
+    monkeypatch.setattr("partwright.cli.commands.fit.fit", spy)
     options = "--quality draft --max-parts 5 --min-iou 0.9 --unit mm --up x --device cpu --seed 7 --threads 2"
     assert main(["fit", str(block), "-o", str(tmp_path / "out"), *options.split()]) == 0
     expected = {"quality": "draft", "max_parts": 5, "min_iou": 0.9, "unit": "mm", "up": "x", "device": "cpu"}

@@ -89,7 +89,7 @@ def test_what_is_in_the_way_is_found_before_the_work(
     def work(*_: object, **__: object) -> None:
         raise AssertionError("worked before it looked")
 
-    monkeypatch.setattr("partwright.shapes.load_shape", work)
+    monkeypatch.setattr("partwright.cli.commands.segment.load_shape", work)
     (tmp_path / "out.ply.labels.json").mkdir()
     assert main(["segment", str(block), str(assembly), "-o", str(tmp_path / "out.ply")]) == 2
     assert "a folder of that name is in the way" in capsys.readouterr().err

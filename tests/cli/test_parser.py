@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -81,3 +84,18 @@ def test_the_many_options_of_fit_stand_under_headings(capsys: pytest.CaptureFixt
         assert f"{heading}:" in lines
     assert lines[lines.index("options:") + 1].lstrip().startswith("-h")
     assert not lines[lines.index("options:") + 2]
+
+
+def test_every_command_has_a_module_that_runs_it() -> None:
+    for command in leaves(parser()):
+        module = import_module(f"partwright.cli.commands.{command.get_default('run')}")
+        assert callable(module.run), command.prog
+
+
+def leaves(parent: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    below = [action for action in parent._actions if isinstance(action, argparse._SubParsersAction)]
+    if not below:
+        yield parent
+    for action in below:
+        for child in action.choices.values():
+            yield from leaves(child)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from partwright.fields.columns import ROTATION, SHAPE, SIZE, TRANSLATION, WIDTH, Column
 from partwright.superfrusta.initialisation import starts, thinned
-from partwright.superfrusta.refining import LIMITS
+from partwright.superfrusta.limits import LIMITS
 
 SPACING = 0.03
 

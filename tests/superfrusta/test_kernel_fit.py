@@ -21,7 +21,7 @@ from partwright.fields.columns import (
     Column,
     Tangent,
 )
-from partwright.superfrusta.refining import LIMITS
+from partwright.superfrusta.limits import LIMITS
 from tests.superfrusta.rows import (
     TURNED,
     disturbed,

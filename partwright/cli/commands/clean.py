@@ -1,0 +1,23 @@
+"""What `partwright clean` does."""
+
+from __future__ import annotations
+
+import argparse
+
+from partwright.assembly import load_assembly
+from partwright.cleaning import clean
+from partwright.cleaning.cleaned_file import check_suffix, write_cleaned
+from partwright.cli.tables import print_cleaned
+from partwright.shapes import load_shape
+
+
+def run(arguments: argparse.Namespace) -> int:
+    check_suffix(arguments.output)
+    assembly = load_assembly(arguments.assembly)
+    shape = None
+    if arguments.shape is not None:
+        shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
+    cleaned = clean(assembly, shape, arguments.clean_tolerance)
+    write_cleaned(cleaned, arguments.output)
+    print_cleaned(cleaned, arguments.output)
+    return 0

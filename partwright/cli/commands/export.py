@@ -1,0 +1,34 @@
+"""What `partwright export` does."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from partwright.assembly import load_assembly
+from partwright.atomic_io import report_path
+from partwright.cli.terminal import say
+from partwright.export import export
+from partwright.export.export_report import approximated_parts
+from partwright.export.formats import format_of
+
+# Options of formats; those not given are left to the format.
+_OPTIONS = ("density", "tolerance", "free_joint", "by_part", "resolution", "facets", "separate")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    given = {name: getattr(arguments, name) for name in _OPTIONS}
+    options = {name: value for name, value in given.items() if value is not None}
+    assembly = load_assembly(arguments.assembly)
+    export(assembly, arguments.output, **options)
+    say(_what_was_written(arguments.output, len(assembly)))
+    return 0
+
+
+def _what_was_written(path: Path, parts: int) -> str:
+    """One line: the file, its format and size, and what of the assembly it could not hold."""
+    line = f"wrote {path}: {format_of(path).name}, {path.stat().st_size / 1000:.3g} kB"
+    changed = approximated_parts(path)
+    if not changed:
+        return line
+    return f"{line}; {len(changed)} of {parts} parts approximated, {report_path(path)} says how far off"

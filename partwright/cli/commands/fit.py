@@ -1,0 +1,52 @@
+"""What `partwright fit` does."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from partwright.assembly import load_assembly
+from partwright.cli.interrupts import stopping
+from partwright.cli.progress import Display
+from partwright.cli.tables import finish_fit
+from partwright.errors import SettingError
+from partwright.fitting import Clean, Start, Tolerance, fit, fit_nodes
+from partwright.fitting.report import check_density_of
+from partwright.methods import Cancellation
+from partwright.shapes import load_shape
+
+# Options that are settings of methods; those not given are left to the method.
+_SETTINGS = ("max_parts", "min_iou", "curve", "symmetry", "subtract", "model")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    cancel = Cancellation()
+    settings = {name: getattr(arguments, name) for name in _SETTINGS}
+    options: dict[str, Any] = {
+        "quality": arguments.quality,
+        "seed": arguments.seed,
+        "device": arguments.device,
+        "threads": arguments.threads,
+        "tolerance": Tolerance(arguments.tolerance, arguments.contain, arguments.inside),
+        "cancel": cancel,
+        "clean": Clean.keeping(arguments.clean, arguments.clean_tolerance),
+        **{name: value for name, value in settings.items() if value is not None and value is not False},
+        **{name: False for name in ("symmetry", "subtract") if settings[name] is False},
+    }
+    with Display() as display:
+        shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
+        check_density_of(arguments.density, shape.unit)
+        begun = load_assembly(arguments.start) if arguments.start else None
+        start = Start.locking(begun, [name for name in (arguments.lock or "").split(",") if name])
+        if arguments.per_node and start is not None:
+            raise SettingError("--per-node fits every node anew, so it takes no --start")
+        with stopping(cancel.request):
+            if arguments.per_node:
+                result = fit_nodes(shape, arguments.method, progress=display.show, **options)
+            else:
+                result = fit(shape, arguments.method, start=start, progress=display.show, **options)
+        if arguments.density is not None:
+            result = result.with_density(arguments.density)
+        display.stage("writing")
+        result.save(arguments.output)
+    return finish_fit(result, arguments.output)
