@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 
 from partwright.assembly import load_assembly
-from partwright.cleaning.label_files import check_suffix, write_segments
 from partwright.cleaning.segmentation import check_within, node_labels, segment_faces
 from partwright.cleaning.splitting import split_at_borders
 from partwright.cli.segment import NODES
 from partwright.cli.terminal import say
+from partwright.export.label_files import check_suffix, write_segments
 from partwright.shapes import load_shape
 from partwright.shapes.labels import read_labels
 

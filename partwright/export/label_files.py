@@ -1,4 +1,4 @@
-"""Face labels out: a segmented mesh with its labels beside it."""
+"""Face labels out: a segmented mesh with its labels beside it (`partwright segment`)."""
 
 from __future__ import annotations
 
