@@ -10,7 +10,7 @@ DEMO_SHAPE := examples/shapes/watering_can.ply
 
 LOWEST_TESTS := tests/shapes tests/assembly tests/meshing tests/render tests/cli
 
-.PHONY: setup demo test test-lowest lint types bench clean
+.PHONY: setup demo test test-lowest lint types docs bench clean
 setup: $(INSTALLED)
 
 $(BIN)/python:
@@ -52,6 +52,10 @@ lint: setup
 
 types: setup
 	$(BIN)/mypy
+
+# The pages and the reference into build/site; a broken link is an error. Fetches nothing.
+docs: setup
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 bench: setup
 	$(BIN)/python benchmarks/fit.py

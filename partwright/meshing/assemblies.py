@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.assembly.rows import as_superfrustum
 from partwright.errors import NoSurfaceError
+from partwright.fields import SuperFrustum
 from partwright.fields.base import LIPSCHITZ
 from partwright.meshing.csg import has_exact_mesh, mesh_csg
 from partwright.meshing.marching import mesh_field
@@ -73,13 +73,14 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     if mesh is not None:
         mesh.vertices = Similarity(1.0, part.rotation, part.translation)(mesh.vertices)
         return _repeated(mesh, part.instances)
-    field = as_superfrustum(part.field)
+    field = part.field.superfrustum() or part.field
     lower, upper = field.bounds()
     frame = _frame(lower, upper)
     local = field.scaled(frame.scale)
     centre = np.asarray(frame.translation)
     extent = (upper - lower) * frame.scale + 2 * _ROOM
-    thin = np.maximum(local.walls(), 1e-9)
+    walls = local.walls() if isinstance(local, SuperFrustum) else np.full(3, local.wall)
+    thin = np.maximum(walls, 1e-9)
     counts = np.maximum(resolution * extent / extent.max(), _ACROSS_PART * extent / thin)
     surface = 4 * (counts * np.roll(counts, 1)).sum()
     counts = np.clip(counts * min(1.0, float(np.sqrt(_PART_CELLS / surface))), 4.0, _MOST)
