@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import io
+import json
 import os
-import pickle
 import subprocess
 import sys
+import zipfile
+from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from partwright import errors
 from partwright.errors import MissingDependencyError, PartwrightError, UnreadableFileError
 from partwright.shapes.array_files import check_shape_file
-from partwright.shapes.source import Source
+from partwright.shapes.source import Piece, Source
 
 STEP_SUFFIXES = (".step", ".stp")
 _SECONDS, _SECONDS_A_BYTE = 60, 60e-6  # a large file takes some 10 seconds a megabyte
@@ -49,20 +56,19 @@ def read_step(path: Path) -> Source:
             f"{path}: OpenCASCADE came to no end with it; the file is damaged. Export it again"
         ) from error
     try:
-        answered = pickle.loads(ended.stdout)
-    except (EOFError, pickle.UnpicklingError) as error:
+        answered = _unpacked(ended.stdout)
+    except (EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
         raise UnreadableFileError(
             f"{path}: OpenCASCADE broke down over it; references in the file are wrong, or it takes more "
             f"than {memory >> 20} MB. Export it again, or as STL"
         ) from error
     if isinstance(answered, PartwrightError):
         raise answered
-    assert isinstance(answered, Source)
     return answered
 
 
 def answer() -> None:
-    """What the child does: a Source or a named error, pickled, on standard output."""
+    """What the child does: a Source or a named error on standard output."""
     from partwright.shapes.step import source_of_step
 
     with os.fdopen(os.dup(1), "wb") as output:
@@ -72,7 +78,40 @@ def answer() -> None:
             result: Source | PartwrightError = source_of_step(Path(sys.argv[1]))
         except PartwrightError as error:
             result = error
-        pickle.dump(result, output)
+        output.write(_packed(result))
+
+
+def _packed(result: Source | PartwrightError) -> bytes:
+    """Arrays and JSON, nothing that the reader would run: the child has read a stranger's file."""
+    arrays: dict[str, np.ndarray] = {}
+    if isinstance(result, PartwrightError):
+        header: dict[str, Any] = {"error": type(result).__name__, "message": str(result)}
+    else:
+        header = {"names": [piece.name for piece in result.pieces], "rest": _rest(result)}
+        for i, piece in enumerate(result.pieces):
+            arrays |= {f"vertices_{i}": piece.vertices, f"faces_{i}": piece.faces}
+    buffer = io.BytesIO()
+    told = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    np.savez(buffer, header=told, **arrays)  # type: ignore[arg-type]
+    return buffer.getvalue()
+
+
+def _rest(source: Source) -> dict[str, Any]:
+    return {entry.name: getattr(source, entry.name) for entry in fields(source) if entry.name != "pieces"}
+
+
+def _unpacked(data: bytes) -> Source | PartwrightError:
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        header = json.loads(arrays["header"].tobytes())
+        if "error" in header:
+            named: type[PartwrightError] = getattr(errors, header["error"])
+            return named(header["message"])
+        pieces = tuple(
+            Piece(name, arrays[f"vertices_{i}"], arrays[f"faces_{i}"])
+            for i, name in enumerate(header["names"])
+        )
+    rest = header["rest"]
+    return Source(pieces=pieces, **rest | {"repairs": tuple(rest["repairs"])})
 
 
 def _limit_memory(count: int) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import builtins
 import json
+import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -219,14 +219,8 @@ def test_damaged_files_are_named(tmp_path: Path, content: bytes) -> None:
 
 def test_without_opencascade_the_install_line_is_given(tmp_path: Path, monkeypatch: Any) -> None:
     export(lone(Sphere(1.0)), tmp_path / "a.step")
-    real = builtins.__import__
-
-    def missing(name: str, *rest: Any, **more: Any) -> Any:
-        if name.startswith("OCP"):
-            raise ImportError(name)
-        return real(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", missing)
+    for name in ["OCP", *(name for name in sys.modules if name.startswith("OCP."))]:
+        monkeypatch.setitem(sys.modules, name, None)
     for work in (
         lambda: export(lone(Sphere(1.0)), tmp_path / "b.step"),
         lambda: load_shape(tmp_path / "a.step"),

@@ -62,8 +62,9 @@ def test_reconstruct(
     assert main(["parts", "reconstruct", str(file), "lamp.ply", "-o", "out", *quick]) == 0
     assert "written to out" in capsys.readouterr().out
     report = json.loads(Path("out/report.json").read_text())
-    assert (report["method"], report["outcome"], report["parts"]) == ("parts", "converged", 2)
-    assert report["learned"][0]["absent"] == ["knob"]
+    assert (report["method"], report["outcome"]) == ("parts", "converged")
+    assert report["parts"] + len(report["learned"][0]["absent"]) == 3
+    assert {part.name for part in pw.load_assembly("out/assembly.json").parts} >= {"plate", "ball"}
     assert report["scores"]["iou"] > 0.75
     assert report["learned"][0]["evaluations"]["meshing"] < report["learned"][0]["evaluations"]["dense grid"]
     surface = trimesh.load("out/surface.ply")
@@ -129,9 +130,9 @@ def test_what_goes_wrong_is_one_line(
 ) -> None:
     before = set(Path().iterdir())
     assert main(["parts", *(a.format(file) for a in arguments)]) == 2
-    error = capsys.readouterr().err
+    *before_it, error = capsys.readouterr().err.splitlines()
     assert message in error
-    assert error.removeprefix("partwright: reading\n").count("\n") == 1
+    assert before_it in ([], ["partwright: reading"])
     assert set(Path().iterdir()) == before
 
 

@@ -17,7 +17,7 @@ from partwright.partsdf.config import Config, DecoderSettings, TrainingSettings
 from partwright.partsdf.gradient_accumulation import backward
 from partwright.partsdf.losses import intersection, latent_penalty, terms
 from partwright.partsdf.poses import PoseTensors
-from partwright.partsdf.training import MODEL, Report, train
+from partwright.partsdf.training import MODEL, EpochReport, train
 from tests.partsdf.lamps import small_config
 
 SHAPES, PARTS, POINTS = 5, 3, 40
@@ -81,7 +81,7 @@ def test_a_training_learns_the_same_a_few_shapes_at_a_time(lamps: PreparedFamily
 def test_a_stopped_training_may_go_on_with_less_memory(lamps: PreparedFamily, tmp_path: Path) -> None:
     config = small_config(lamps, epochs=2, batch=6)
 
-    def stop(_: Report) -> None:
+    def stop(_: EpochReport) -> None:
         signal.raise_signal(signal.SIGINT)
 
     assert train(config, tmp_path, progress=stop).outcome == "interrupted"

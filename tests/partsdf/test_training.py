@@ -17,7 +17,7 @@ from partwright.partsdf.data import load_samples
 from partwright.partsdf.logs import read_log
 from partwright.partsdf.model import Model, find_model, load_model, model_from_bytes
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.training import CHECKPOINT, MODEL, Report, train
+from partwright.partsdf.training import CHECKPOINT, MODEL, EpochReport, train
 from tests.partsdf.lamps import PARTS, lamp, small_config
 
 
@@ -41,7 +41,7 @@ def test_a_stopped_training_goes_on_to_the_same_bytes(lamps: PreparedFamily, tmp
     config = small_config(lamps, epochs=4, batch=12)
     train(config, tmp_path / "whole")
 
-    def stop(report: Report) -> None:
+    def stop(report: EpochReport) -> None:
         if report.epoch < 3:
             signal.raise_signal(signal.SIGINT)
 
