@@ -23,58 +23,60 @@ CHOICES = {
 
 @dataclass(frozen=True)
 class Settings:
-    """How a shape becomes a CSG tree of quadrics. Lengths are in the unit frame (longest side 1.8).
-
-    schedule: "search", ours: quadrics detected on the surface, the tree by discrete search; seconds, not
-        hours. "paper": the network of sections 3.1-3.3, fine-tuned by gradient descent in three stages.
-    start: where the quadrics come from. "seeds": surfaces detected on the shape; in the paper's schedule, the
-        tree that a search among them finds. "weights": the pre-trained network. "auto": both, the cheaper
-        tree is kept; the report says which.
-
-    The tree (section 3.2):
-        kinds: quadrics that are looked for; the paper's abc >= 0 leaves out cones.
-        oriented: quadrics may have cross terms, so that a tilted cylinder is one primitive (ours).
-        subtract: a second union is subtracted (eq. 5).
-        nested: a convex may have convex quadrics subtracted within it, where that shortens the tree; each
-            counts as a convex of its own.
-        price, convex_price: what a primitive and a convex cost, as shares of the shape's volume on the wrong
-            side (the description length; the paper has none).
-        max_parts: at most so many primitives. min_iou: the cheapest tree that reaches it.
-
-    Ours:
-        surface, least: points on which quadrics are detected, and how many of them make one.
-        near, uniform: samples near the surface and in the box (the paper: 32,768 voxel centres in all).
-        tries: convexes are taken out and replaced so many times.
-
-    schedule "paper" (section 4.1 and the supplement; stages and thresholds: `partwright.capri.stages`):
-        iterations: of each of the three stages (paper: 12,000). supervision: "voxels" or "points", as in the
-        paper, or "samples" of the surface itself, whose detail is not lost between voxels. weights: file of a
-        pre-trained network (`python -m partwright.capri`), in place of the one that ships.
-
-    symmetry: holes of one size and direction become one leaf with copies.
-    """
+    """How a shape becomes a CSG tree of quadrics. Lengths are in the unit frame (longest side 1.8)."""
 
     method: ClassVar[str] = "capri"
 
     schedule: Schedule = "search"
+    """"search", ours: quadrics detected on the surface, the tree by discrete search; seconds, not hours.
+    "paper": the network of sections 3.1-3.3, fine-tuned by gradient descent in three stages."""
     start: Start = "seeds"
+    """Where the quadrics come from. "seeds": surfaces detected on the shape; in the paper's schedule, the
+    tree that a search among them finds. "weights": the pre-trained network. "auto": both, and the cheaper
+    tree is kept; the report says which."""
+
+    # The tree (section 3.2)
     kinds: tuple[str, ...] = KINDS
+    """Quadrics that are looked for; the paper's abc >= 0 leaves out cones."""
     oriented: bool = True
+    """Quadrics may have cross terms, so that a tilted cylinder is one primitive (ours)."""
     subtract: bool = True
+    """A second union is subtracted (eq. 5)."""
     nested: bool = True
+    """A convex may have convex quadrics subtracted within it, where that shortens the tree; each counts as a
+    convex of its own."""
     price: float = 6e-4
+    """What a primitive costs, as a share of the shape's volume on the wrong side (the description length; the
+    paper has none)."""
     convex_price: float = 3e-3
+    """What a convex costs, likewise."""
     max_parts: int | None = None
+    """At most so many primitives."""
     min_iou: float | None = None
+    """The cheapest tree that reaches this IoU."""
+
+    # Ours
     surface: int = 20_000
+    """Points on which quadrics are detected."""
     least: int = 25
+    """How many of them make a quadric."""
     near: int = 30_000
+    """Samples near the surface (the paper: 32,768 voxel centres in all)."""
     uniform: int = 20_000
+    """Samples in the box."""
     tries: int = 20
+    """Convexes are taken out and replaced so many times."""
+
+    # Schedule "paper" (section 4.1 and the supplement; stages and thresholds: `partwright.capri.stages`)
     iterations: int = 12_000
+    """Of each of the three stages (paper: 12,000)."""
     supervision: str = "samples"
+    """"voxels" or "points", as in the paper, or "samples" of the surface itself, whose detail is not lost
+    between voxels."""
     weights: str | None = None
+    """File of a pre-trained network (`python -m partwright.capri`), in place of the one that ships."""
     symmetry: bool = True
+    """Holes of one size and direction become one leaf with copies."""
 
     def __post_init__(self) -> None:
         for name in ("surface", "near", "uniform"):

@@ -16,61 +16,61 @@ Optimiser = Literal["newton", "adam"]
 
 @dataclass(frozen=True)
 class Settings:
-    """How a shape is fitted. Lengths are in the unit frame (longest side 1.8).
-
-    Residual Primitive Fitting (sections 3.1, 3.3, 3.4, 4):
-        rounds: at most so many rounds of growing (paper: 10).
-        regions: regions of the decomposition a round (paper: 7 iterations of MSD).
-        kappa: share of the remaining volume that a core must hold (eq. 5; the paper gives no value).
-        alpha: price of a part in the objective (eq. 2). At the paper's 1e-3 the last third of the parts buys
-            about one point of IoU.
-        optimiser: "newton", Levenberg-Marquardt on the occupancy residuals with analytic derivatives, or
-            "adam", the paper's three losses by gradient descent.
-        overlap, blending: weights of the quality terms of eq. 8 beside the reconstruction (paper: 1e-2 in a
-            mean that is not squared). More of them costs parts and surface rather than buying less overlap.
-        subtract: parts may also be taken away from what came before them, where too much is covered.
-        smooth: parts blend into each other (eq. 4); otherwise unions are plain.
-        family: "superfrustum", or less of it: "superprimitive" (no taper, no bulge), "cuboid" (Table 2), or
-            "solid": each part one of the named kinds (solid_kinds.py). Parts of a start keep what
-            they have of the rest.
-
-    Ours:
-        merging: replace touching pairs of parts by one where it explains as much.
-        attempts: times that the shape is fitted from the start, each with other regions; the best is kept.
-        cycles: times that the grown assembly is thinned out, refitted and grown again.
-        trials: removals that are tried with a refit before the cheapest is taken.
-        patience: rounds without progress before growing stops.
-        max_parts: at most so many parts (None: as many as pay for themselves).
-        min_iou: stop removing parts where the IoU would fall below, and keep removing above (None: by alpha).
-        symmetry: where the shape has a mirror plane or a rotation, parts come as repeats (docs/repeats.md).
-        curve: thin out down to one part and keep the assembly of every size on the way.
-        near, uniform: sample points near the surface and in the box. resolution: grid of the decomposition.
-    """
+    """How a shape is fitted. Lengths are in the unit frame (longest side 1.8)."""
 
     method: ClassVar[str] = "superfrusta"
 
+    # Residual Primitive Fitting (sections 3.1, 3.3, 3.4, 4)
     rounds: int = 10
+    """At most so many rounds of growing (paper: 10)."""
     regions: int = 7
+    """Regions of the decomposition a round (paper: 7 iterations of MSD)."""
     kappa: float = 0.02
+    """Share of the remaining volume that a core must hold (eq. 5; the paper gives no value)."""
     alpha: float = 3.55e-3
+    """Price of a part in the objective (eq. 2). At the paper's 1e-3 the last third of the parts buys about
+    one point of IoU."""
     optimiser: Optimiser = "newton"
+    """"newton": Levenberg-Marquardt on the occupancy residuals with analytic derivatives. "adam": the paper's
+    three losses by gradient descent."""
     overlap: float = 0.02
+    """Weight of the overlap loss (eq. 8) beside the reconstruction (paper: 1e-2 in a mean that is not
+    squared). More of it costs parts and surface rather than buying less overlap."""
     blending: float = 0.02
+    """Weight of the union loss (eq. 8), likewise."""
     subtract: bool = False
+    """Parts may also be taken away from what came before them, where too much is covered."""
     smooth: bool = True
+    """Parts blend into each other (eq. 4); otherwise unions are plain."""
     family: Family = "superfrustum"
+    """"superfrustum", or less of it: "superprimitive" (no taper, no bulge), "cuboid" (Table 2), or "solid":
+    each part one of the named kinds (solid_kinds.py). Parts of a start keep what they have of the rest."""
+
+    # Ours
     merging: bool = True
+    """Replace touching pairs of parts by one where it explains as much."""
     attempts: int = 1
+    """Times that the shape is fitted from the start, each with other regions; the best is kept."""
     cycles: int = 2
+    """Times that the grown assembly is thinned out, refitted and grown again."""
     trials: int = 3
+    """Removals that are tried with a refit before the cheapest is taken."""
     patience: int = 2
+    """Rounds without progress before growing stops."""
     max_parts: int | None = None
+    """At most so many parts (None: as many as pay for themselves)."""
     min_iou: float | None = None
+    """Stop removing parts where the IoU would fall below, and keep removing above (None: by alpha)."""
     near: int = 30_000
+    """Sample points near the surface."""
     uniform: int = 30_000
+    """Sample points in the box."""
     resolution: int = 96
+    """Voxels along the longest side of the grid of the decomposition."""
     curve: bool = False
+    """Thin out down to one part and keep the assembly of every size on the way."""
     symmetry: bool = True
+    """Where the shape has a mirror plane or a rotation, parts come as repeats (docs/repeats.md)."""
 
     def __post_init__(self) -> None:
         for name in ("rounds", "regions", "attempts", "trials", "patience", "near", "uniform"):

@@ -18,18 +18,18 @@ from partwright.superfrusta.method import SuperFrusta
 
 @dataclass(frozen=True)
 class Settings(settings.Settings):
-    """The settings of a SuperFrusta fit with other defaults.
-
-    family, smooth: named solids that do not blend. subtract: on. alpha: a hole is a part and moves R by less
-    than a part of the body does.
-    """
+    """The settings of a SuperFrusta fit with other defaults."""
 
     method: ClassVar[str] = "solids"
 
     family: Family = "solid"
+    """Named solids, and nothing else."""
     smooth: bool = False
+    """They do not blend."""
     subtract: bool = True
+    """Holes, slots and pockets are parts of their own."""
     alpha: float = 2e-3
+    """Less than for SuperFrusta: a hole is a part and moves R by less than a part of the body does."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
