@@ -204,5 +204,6 @@ def test_other_files_are_no_network(tmp_path, content: bytes | None) -> None:
     path = tmp_path / "n.safetensors"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(UnreadableFileError, match="is no CAPRI network"):
+    message = "no such file; check the path" if content is None else "is no CAPRI network"
+    with pytest.raises(UnreadableFileError, match=message):
         load_network(path)

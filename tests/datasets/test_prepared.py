@@ -126,7 +126,7 @@ def test_manifests_that_break_the_format(
 
 
 def test_a_folder_without_manifest(tmp_path: Path) -> None:
-    with pytest.raises(UnreadableFileError, match=r"family.json: cannot be read"):
+    with pytest.raises(UnreadableFileError, match=r"family.json: no such file; check the path"):
         PreparedFamily(tmp_path)
 
 
