@@ -41,12 +41,20 @@ class View:
 
     def rays(self, width: int, height: int) -> np.ndarray:
         """(height * width, 3) float32 unit directions through the pixels' centres, by rows from the top."""
-        x = ((np.arange(width) + 0.5) / width * 2 - 1) * self.half[0]
-        y = (1 - (np.arange(height) + 0.5) / height * 2) * self.half[1]
-        across = x[:, None] * self.right - self.back
-        rays = (across[None] + y[:, None, None] * self.up).astype(np.float32)
-        rays /= np.sqrt(1 + x[None, :] ** 2 + y[:, None] ** 2)[..., None].astype(np.float32)
-        return rays.reshape(-1, 3)
+        x, y = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
+        return self.through(np.tile(x, height), np.repeat(y, width))
+
+    def through(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """(N, 3) float32 unit directions through places (N,) of the picture, 0 to 1 from its left and top."""
+        right, up = (
+            ((2 * x - 1) * self.half[0]).astype(np.float32),
+            ((1 - 2 * y) * self.half[1]).astype(np.float32),
+        )
+        rays = np.empty((len(x), 3), np.float32)
+        for i in range(3):
+            rays[:, i] = right * self.right[i] + up * self.up[i] - self.back[i]
+        rays /= np.sqrt(1 + right * right + up * up)[:, None]
+        return rays
 
 
 @dataclass(frozen=True)

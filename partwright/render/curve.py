@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.assembly.palette import palette
 from partwright.meshing import mesh_assembly
 from partwright.render.camera import Camera
 from partwright.render.output import write_png
-from partwright.render.part_colours import part_colours
+from partwright.render.part_colours import hit_parts
 from partwright.render.raycast import Scene
 from partwright.render.shading import look
 from partwright.render.sheet import sheet
@@ -39,8 +41,8 @@ def curve_sheet(
     view = camera.fitted(np.concatenate([scene.vertices for scene in scenes]), *panel)
     images = []
     for assembly, scene in zip(assemblies, scenes, strict=True):
-        seen = look(scene, camera, view, *panel)
-        images.append(seen.image(part_colours(assembly, seen.hits.point, seen.hits.normal)))
+        seen = look(scene, camera, view, *panel, label=partial(hit_parts, assembly))
+        images.append(seen.image(palette(len(assembly))[seen.labels]))
     page = sheet(images, captions, title=title)
     if path is not None:
         write_png(path, page)

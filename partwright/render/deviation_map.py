@@ -12,6 +12,8 @@ from partwright.render.sheet import SOFT_INK, draw_text
 _STOPS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 _COLOURS = np.array([(38, 84, 165), (125, 170, 222), (226, 226, 224), (240, 150, 110), (186, 42, 50)])
 
+_ROUND = (1, 1.5, 2, 3, 4, 5, 6, 8, 10)  # times a power of ten
+
 
 def deviation_colours(deviation: np.ndarray, limit: float) -> np.ndarray:
     """(N, 3) sRGB 0..255 for signed deviations (N,), full colour at +-limit."""
@@ -20,14 +22,19 @@ def deviation_colours(deviation: np.ndarray, limit: float) -> np.ndarray:
 
 
 def round_limit(deviation: np.ndarray) -> float:
-    """The end of the scale: 1, 2 or 5 times a power of ten that holds 98 % of the deviations, and a quarter
-    of the largest: else what is hardly off would look as bad as the worst."""
+    """The end of the scale, a round number: the largest deviation, as a rule.
+
+    Where that is more than twice what 98 % of the deviations stay under, the scale ends there, or at a
+    quarter of the largest: else a single far place would leave no colour for all others, and what is hardly
+    off would look as bad as the worst.
+    """
     sizes = np.abs(deviation)
-    most = max(float(np.quantile(sizes, 0.98)), float(sizes.max()) / 4) if len(sizes) else 0.0
-    if most <= 0:
+    if not len(sizes) or not sizes.max() > 0:
         return 1.0
+    largest = float(sizes.max())
+    most = max(min(largest, 2 * float(np.quantile(sizes, 0.98))), largest / 4)
     power = 10.0 ** math.floor(math.log10(most))
-    return next(step * power for step in (1, 2, 5, 10) if step * power >= most * (1 - 1e-9))
+    return next(step * power for step in _ROUND if step * power >= most * (1 - 1e-9))
 
 
 def add_legend(image: np.ndarray, limit: float, unit: str | None, most: float = 0.0) -> np.ndarray:

@@ -6,19 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.assembly.palette import palette
-
 if TYPE_CHECKING:
     from partwright.assembly import Assembly
+    from partwright.render.raycast import Hits
 
 _TIE = 2e-3  # of the longest side of what is seen: surfaces nearer to each other than this are one to the eye
 _ASIDE = 5.0  # ties away: where surfaces that only cross at a point are apart again
 _AT_ONCE = 1 << 16  # points, so that distances to hundreds of parts fit
 
 
-def part_colours(assembly: Assembly, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(N, 3) uint8 sRGB colours at points (N, 3) of the assembly's surface, in its own units."""
-    return palette(len(assembly))[surface_parts(assembly, points, normals)]
+def hit_parts(assembly: Assembly, hits: Hits) -> np.ndarray:
+    """`surface_parts` at what rays hit: labels for `look`, by which `palette` gives the colours."""
+    return surface_parts(assembly, hits.point, hits.normal)
 
 
 def surface_parts(assembly: Assembly, points: np.ndarray, normals: np.ndarray) -> np.ndarray:

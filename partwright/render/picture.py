@@ -35,9 +35,9 @@ def render_mesh(
     camera = camera or Camera()
     scene = Scene(mesh.vertices, mesh.faces)
     width, height = size
-    buffer = look(scene, camera, camera.fitted(scene.vertices, width, height), width, height, ground)
-    colours = np.asarray(colours)
-    return buffer.image(colours[buffer.hits.face] if colours.ndim == 2 else colours)
+    view, palette, number = camera.fitted(scene.vertices, width, height), *_palette(colours, len(scene.faces))
+    buffer = look(scene, camera, view, width, height, ground, label=lambda hits: number[hits.face])
+    return buffer.image(palette[buffer.labels])
 
 
 def turntable(
@@ -57,14 +57,14 @@ def turntable(
     camera = camera or Camera()
     scene = Scene(mesh.vertices, mesh.faces)
     width, height = size
-    colours = np.asarray(colours)
+    palette, number = _palette(colours, len(scene.faces))
     swept = _swept(scene, camera)
     pictures = []
     for frame in range(frames):
         turned = replace(camera, azimuth=camera.azimuth + 360.0 * frame / frames)
-        buffer = look(scene, turned, turned.fitted(swept, width, height), width, height)
-        shown = colours[buffer.hits.face] if colours.ndim == 2 else colours
-        pictures.append(Image.fromarray(buffer.image(shown)))
+        view = turned.fitted(swept, width, height)
+        buffer = look(scene, turned, view, width, height, label=lambda hits: number[hits.face])
+        pictures.append(Image.fromarray(buffer.image(palette[buffer.labels])))
     first, *rest = [picture.quantize(128, dither=Image.Dither.NONE) for picture in pictures]
     write(
         path,
@@ -72,6 +72,13 @@ def turntable(
             name, format="GIF", save_all=True, append_images=rest, duration=1000 * seconds / frames, loop=0
         ),
     )
+
+
+def _palette(colours: np.ndarray | tuple[int, int, int], faces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Different colours (P, 3) of the faces, and which (F,) of them each has."""
+    each = np.broadcast_to(np.asarray(colours), (faces, 3))
+    palette, number = np.unique(each, axis=0, return_inverse=True)
+    return palette, number.reshape(-1)
 
 
 def _swept(scene: Scene, camera: Camera) -> np.ndarray:

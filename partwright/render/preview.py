@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.assembly.palette import palette
 from partwright.meshing import mesh_assembly
 from partwright.render.camera import Camera
 from partwright.render.deviation_map import add_legend, deviation_colours, round_limit
 from partwright.render.output import write_png
-from partwright.render.part_colours import part_colours
+from partwright.render.part_colours import hit_parts
 from partwright.render.raycast import Scene
 from partwright.render.shading import NEUTRAL, look
 from partwright.render.sheet import sheet
@@ -53,8 +55,9 @@ def preview(
     width, height = panel or camera.framed(both, _SIDE, _LEAST_SIDE)
     view = camera.fitted(both, width, height)
     with ThreadPoolExecutor(2) as pool:
-        views = pool.map(lambda scene: look(scene, camera, view, width, height), (given, made))
-        input_view, result_view = views
+        first = pool.submit(look, given, camera, view, width, height)
+        second = pool.submit(look, made, camera, view, width, height, label=partial(hit_parts, assembly))
+        input_view, result_view = first.result(), second.result()
 
     deviation = -assembly.distance(input_view.hits.point)
     limit = round_limit(deviation)
@@ -62,7 +65,7 @@ def preview(
     page = sheet(
         [
             input_view.image(np.array(NEUTRAL)),
-            result_view.image(part_colours(assembly, result_view.hits.point, result_view.hits.normal)),
+            result_view.image(palette(len(assembly))[result_view.labels]),
             result_view.image(np.array(NEUTRAL)),
             add_legend(error, limit, shape.unit, float(np.abs(deviation).max(initial=0.0))),
         ],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -25,9 +25,8 @@ class Scene:
         # Embree works in float32: bring the mesh to a size and place where that is enough.
         self._centre = (self.lower + self.upper) / 2
         self._scale = 2.0 / max(float((self.upper - self.lower).max()), np.finfo(float).tiny)
-        triangles = (self.vertices[self.faces] - self._centre) * self._scale
         self._embree = EmbreeScene()
-        self._mesh = TriangleMesh(self._embree, np.ascontiguousarray(triangles, dtype=np.float32))
+        self._mesh = TriangleMesh(self._embree, self._local(self.vertices), self.faces.astype(np.int32))
         self.corner_normals = corner_normals(self.vertices, self.faces)
         flat = face_normals(self.vertices, self.faces)
         length = np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -68,9 +67,22 @@ class Hits:
     normal: np.ndarray
     face: np.ndarray
 
+    def at(self, chosen: np.ndarray) -> Hits:
+        """Those of these numbers (K,), or flags (N,)."""
+        return Hits(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+    def moved_to(self, pixel: np.ndarray) -> Hits:
+        """Hits of rays of which ray i goes through `pixel[i]`."""
+        return replace(self, pixel=pixel[self.pixel])
+
+    def and_also(self, others: Hits) -> Hits:
+        """These, and then the others."""
+        pairs = ((getattr(self, field.name), getattr(others, field.name)) for field in fields(self))
+        return Hits(*(np.concatenate(pair) for pair in pairs))
+
 
 def cast(scene: Scene, view: View, rays: np.ndarray) -> Hits:
-    """What the rays (N, 3) from the view's eye, one a pixel, meet."""
+    """What the rays (N, 3) from the view's eye meet; they count as pixels 0 to N - 1."""
     face, distance, weights = scene.first_hit(np.broadcast_to(view.eye, rays.shape), rays)
     pixel = np.flatnonzero(face != _MISS)
     face, rays = face[pixel], rays[pixel]

@@ -119,6 +119,32 @@ def test_ground_shadow_darkens_only_the_ground() -> None:
     np.testing.assert_array_equal(with_shadow[30:40, 35:45], without[30:40, 35:45])
 
 
+def test_rays_for_edges_alone_draw_nearly_what_rays_for_all_pixels_draw(monkeypatch) -> None:
+    """The slow reference casts as many rays through every pixel as through one on an edge."""
+    pole, turned = trimesh.creation.cylinder(0.5, 2.0, sections=48), trimesh.creation.box((2.5, 0.4, 0.9))
+    turned.apply_transform(trimesh.transformations.rotation_matrix(0.7, (0.2, 1, 0.1)))
+    mesh = trimesh.util.concatenate([pole, turned])
+    colours = np.where(np.arange(len(mesh.faces))[:, None] % 7 < 3, (220, 60, 40), (60, 90, 210))
+
+    def drawn(refined: np.ndarray | None) -> np.ndarray:
+        if refined is not None:
+            monkeypatch.setattr("partwright.render.shading.edge_pixels", lambda *_: refined)
+        return render_mesh(mesh, size=(160, 120), colours=colours).astype(int)
+
+    fast, slow, none = drawn(None), drawn(np.arange(160 * 120)), drawn(np.arange(0))
+    off, jagged = (np.abs(image - slow).max(axis=-1) for image in (fast, none))
+    assert off.mean() < 1.5
+    assert (off > 40).mean() < min(0.005, 0.2 * (jagged > 40).mean())
+
+
+def test_rays_through_places_of_a_picture_are_those_of_its_pixels() -> None:
+    view = Camera().fitted(np.random.default_rng(0).normal(size=(20, 3)), 6, 4)
+    rays = view.rays(6, 4)
+    np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1, atol=1e-6)
+    np.testing.assert_array_equal(view.through(np.array([2.5 / 6]), np.array([1.5 / 4]))[0], rays[1 * 6 + 2])
+    np.testing.assert_allclose(view.through(np.array([0.5]), np.array([0.5]))[0], -view.back, atol=1e-6)
+
+
 def test_tiny_and_far_meshes_look_the_same() -> None:
     box = trimesh.creation.box()
     reference = render_mesh(box, size=(60, 60)).astype(int)
@@ -167,15 +193,19 @@ def test_deviation_colours_diverge() -> None:
 
 
 @given(scale=st.floats(1e-9, 1e9))
-def test_round_limit_is_round_and_holds_the_deviations(scale: float) -> None:
-    limit = round_limit(np.linspace(-scale, scale, 101))
-    assert 0.97 * scale <= limit <= 5.1 * scale
-    assert round(limit / 10 ** np.floor(np.log10(limit) + 1e-9), 6) in (1, 2, 5)
+def test_the_scale_ends_at_a_round_number_that_holds_all_deviations(scale: float) -> None:
+    limit = round_limit(np.linspace(-scale, 0.9 * scale, 101))
+    assert (1 - 1e-6) * scale <= limit <= 1.51 * scale
+    assert round(limit / 10 ** np.floor(np.log10(limit) + 1e-9), 6) in (1, 1.5, 2, 3, 4, 5, 6, 8)
 
 
-def test_the_scale_does_not_end_far_below_the_largest() -> None:
+def test_a_scale_ends_before_a_single_far_place_but_not_far_below() -> None:
     mostly_fine = np.append(np.full(999, 0.001), -1.57)
     assert 1.57 / 4 <= round_limit(mostly_fine) <= 1.57
+
+
+def test_a_scale_without_deviations_has_a_length() -> None:
+    assert round_limit(np.zeros(5)) == round_limit(np.zeros(0)) == 1.0
 
 
 def test_a_flat_face_that_parts_share_has_one_colour() -> None:
