@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 
 _UNIT_SIDE = 1.8
 _KERNEL = "kernel"
+_ALIKE = (
+    0.9,
+    3.6,
+)  # longest sides, and up to here coordinates, that float32 holds as well as those of a unit frame
 _ROUNDING = 1e-14  # of the place: what is smaller has no size
 _FOLD = {"union": smooth_union, "intersection": smooth_intersection, "difference": smooth_difference}
 
@@ -32,7 +36,8 @@ _FOLD = {"union": smooth_union, "intersection": smooth_intersection, "difference
 def unit_similarity(node: Node) -> Similarity:
     """The map that centres the box around all leaves at 0 and makes its longest side 1.8.
 
-    Leaves without end do not count; where all are, the node's own box does, if it ends.
+    Leaves without end do not count; where all are, the node's own box does, if it ends. Nodes that are nearly
+    there, as all are that a method works on, stay as they are: that saves to move all points.
     """
     boxes = np.array([part.bounds() for part in node.parts])
     boxes = boxes[np.isfinite(boxes).all(axis=(1, 2))]
@@ -43,6 +48,8 @@ def unit_similarity(node: Node) -> Similarity:
         return Similarity()
     lower, upper = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     longest = float((upper - lower).max())
+    if _ALIKE[0] <= longest <= _ALIKE[1] and max(-lower.min(), upper.max()) <= _ALIKE[1]:
+        return Similarity()
     scale = _UNIT_SIDE / longest if longest > _ROUNDING * float(np.abs(boxes).max()) else 1.0
     return Similarity(scale, translation=tuple(-scale * (lower + upper) / 2))
 
@@ -54,7 +61,7 @@ def distance(node: Node, points: Any) -> Any:
         move = points.new_tensor(frame.translation)
         return _reference(unit_node, points * frame.scale + move) / frame.scale
     points = _checked(points)
-    return _back(_evaluate(unit_node, frame(points).astype(np.float32)), frame, points)
+    return _back(_evaluate(unit_node, _local(frame, points)), frame, points)
 
 
 def part_distances(assembly: Assembly, points: np.ndarray) -> np.ndarray:
@@ -73,7 +80,7 @@ def _leaves(assembly: Assembly, points: np.ndarray) -> np.ndarray:
     frame, unit_assembly = assembly._normalised
     copies = [part.copies for part in unit_assembly.parts]
     flat = tuple(chain.from_iterable(copies))
-    values = np.stack([d for d, _ in _children(flat, frame(points).astype(np.float32))])
+    values = np.stack([d for d, _ in _children(flat, _local(frame, points))])
     if len(values) == len(copies):
         return values
     return np.asarray(np.minimum.reduceat(values, np.cumsum([0, *map(len, copies[:-1])]), axis=0))
@@ -86,10 +93,21 @@ def _checked(points: Any) -> np.ndarray:
     return points
 
 
+def _local(frame: Similarity, points: np.ndarray) -> np.ndarray:
+    """Points (N, 3) in the frame, float32, by way of float64."""
+    if frame == Similarity():
+        return np.asarray(points, np.float32)
+    result = np.empty(points.shape, np.float32)
+    for i, offset in enumerate(frame.translation):  # by columns: rows of three are slow to loop over
+        result[:, i] = frame.scale * points[:, i].astype(np.float64) + offset
+    return result
+
+
 def _back(values: np.ndarray, frame: Similarity, points: np.ndarray) -> np.ndarray:
     """To own units: in float64, which holds lengths that float32 would flush to zero."""
-    own = values.astype(np.float64) / frame.scale
-    return own.astype(np.result_type(points.dtype, np.float32))
+    kind = np.result_type(points.dtype, np.float32)
+    own = values if frame.scale == 1.0 else values.astype(np.float64) / frame.scale
+    return own.astype(kind, copy=False)
 
 
 def _evaluate(node: Node, points: np.ndarray) -> np.ndarray:

@@ -15,7 +15,6 @@ Distance = Callable[[np.ndarray], np.ndarray]
 BLOCK = 4  # cells along a block
 COARSEST = 16  # cells along a block of the first level
 
-_CORNERS = np.stack(np.meshgrid(*[np.arange(BLOCK + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _CHILDREN = np.stack(np.meshgrid(*[np.arange(2)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
@@ -37,7 +36,11 @@ class Grid:
 
     def points(self, corners: np.ndarray) -> np.ndarray:
         """Places of lattice corners (..., 3) as (N, 3) float32."""
-        return (self.origin + corners.reshape(-1, 3) * self.cell).astype(np.float32)
+        rows = corners.reshape(-1, 3)
+        points = np.empty(rows.shape, np.float32)
+        for i in range(3):  # by columns: rows of three are slow to loop over
+            points[:, i] = self.origin[i] + rows[:, i] * self.cell[i]
+        return points
 
 
 def evaluate(distance: Distance, points: np.ndarray) -> np.ndarray:
@@ -77,8 +80,13 @@ def subdivided(blocks: np.ndarray) -> np.ndarray:
 
 def block_values(distance: Distance, grid: Grid, blocks: np.ndarray) -> np.ndarray:
     """Values (K, B + 1, B + 1, B + 1) at the corners of each block's cells."""
-    corners = blocks[:, None, :] * BLOCK + _CORNERS
-    return evaluate(distance, grid.points(corners)).reshape(-1, *[BLOCK + 1] * 3)
+    lattice = blocks[:, :, None] * BLOCK + np.arange(BLOCK + 1)
+    along = (grid.origin[:, None] + lattice * grid.cell[:, None]).astype(np.float32)  # (K, 3, B + 1)
+    points = np.empty((len(blocks), *[BLOCK + 1] * 3, 3), np.float32)
+    points[..., 0] = along[:, 0, :, None, None]
+    points[..., 1] = along[:, 1, None, :, None]
+    points[..., 2] = along[:, 2, None, None, :]
+    return evaluate(distance, points.reshape(-1, 3)).reshape(points.shape[:-1])
 
 
 def block_keys(blocks: np.ndarray) -> np.ndarray:

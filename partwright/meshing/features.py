@@ -13,6 +13,7 @@ from partwright.meshing.blocks import Distance, Grid, evaluate
 from partwright.meshing.polygons import Polygons
 
 _SHARP = 0.85  # cosine between two normals under which a polygon holds a feature (about 32 degrees)
+_HALF_SHARP = ((1 + _SHARP) / 2) ** 0.5 + 1e-6  # of half that angle, and rounding
 _FLAT = 0.06  # directions with a smaller share of the largest eigenvalue are left to the mean
 _PROJECTIONS = 4  # between the cell and the line or point where the planes meet
 _BETTER = 0.5  # of the distance that the polygon's middle has, what a feature may have
@@ -43,11 +44,18 @@ def field_normals(distance: Distance, points: np.ndarray, step: float) -> np.nda
 
 def _with_features(polygons: Polygons, normals: np.ndarray) -> np.ndarray:
     """Polygons two of whose corners' normals differ by more than the sharp angle."""
-    around = normals[polygons.index]
+    # Where none differs from the first by half that angle, no two do: so for most, one comparison a corner.
+    first = normals[polygons.index[:, 0]]
+    least = np.ones(len(polygons))
+    for place in range(1, polygons.index.shape[1]):
+        there = np.flatnonzero(polygons.length > place)
+        cosine = np.einsum("pd,pd->p", first[there], normals[polygons.index[there, place]])
+        least[there] = np.minimum(least[there], cosine)
+    doubtful = np.flatnonzero(least < _HALF_SHARP)
+    around, used = normals[polygons.index[doubtful]], polygons.used[doubtful]
     cosine = np.einsum("pid,pjd->pij", around, around)
-    used = polygons.used
     cosine[~(used[:, :, None] & used[:, None, :])] = 1.0
-    return np.flatnonzero(cosine.min(axis=(1, 2)) < _SHARP)
+    return doubtful[cosine.min(axis=(1, 2)) < _SHARP]
 
 
 def _feature_points(

@@ -7,7 +7,7 @@ import numpy as np
 from partwright.render.camera import View
 from partwright.render.raycast import Hits
 
-RAYS = 3  # along a side of a pixel that lies on an edge
+RAYS = 2  # along a side of a pixel that lies on an edge
 _CREASE = 0.95  # cosine between the normals of two neighbours, under which an edge runs between them
 _JUMP = 0.35  # of the way from one neighbour to the other: further off its tangent plane is another surface
 

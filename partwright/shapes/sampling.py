@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,17 @@ _ENLARGED = 0.05  # unit lengths that the box of the uniform samples reaches bey
 
 @dataclass(frozen=True)
 class SurfaceSamples:
-    """Area-weighted points (N, 3), outward normals (N, 3), |principal curvature| (N,) in 1/unit length."""
+    """Area-weighted points (N, 3) and outward normals (N, 3)."""
 
     points: NDArray[np.float32]
     normals: NDArray[np.float32]
-    curvature: NDArray[np.float32]
+    measure: Callable[[], NDArray[np.float32]] = field(repr=False, compare=False)
+    """The curvature, which takes longer than all the rest and is rarely asked for."""
+
+    @cached_property
+    def curvature(self) -> NDArray[np.float32]:
+        """|principal curvature| (N,) in 1/unit length."""
+        return self.measure()
 
 
 @dataclass(frozen=True)

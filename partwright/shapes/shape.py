@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     import trimesh
 
 _T = TypeVar("_T")
+_D = TypeVar("_D", bound=np.generic)
 _CURVATURE_POINTS = 40_000
 
 
@@ -212,10 +213,11 @@ class Shape:
         corners = vertices[faces[face]]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-        curvature = self._cached(("curvature",), self._curvature)(points)
-        return SurfaceSamples(
-            points.astype(np.float32), normal.astype(np.float32), curvature.astype(np.float32)
-        )
+
+        def curvature() -> NDArray[np.float32]:
+            return _read_only(self._cached(("curvature",), self._curvature)(points).astype(np.float32))
+
+        return SurfaceSamples(points.astype(np.float32), normal.astype(np.float32), curvature)
 
     def _curvature(self) -> CurvatureField:
         vertices, faces = self._surface.vertices, self._surface.faces
@@ -237,7 +239,7 @@ class Shape:
             made = make()
             for value in [made, *vars(made).values()] if hasattr(made, "__dict__") else [made]:
                 if isinstance(value, np.ndarray):
-                    value.setflags(write=False)
+                    _read_only(value)
             self._cache[key] = made
         return self._cache[key]
 
@@ -264,6 +266,11 @@ def load_shape(
     shape = Shape(replace(read, unit=stated_unit or read.unit, up=stated_up or read.up))
     shape.reading_seconds = time.perf_counter() - started
     return shape
+
+
+def _read_only(array: NDArray[_D]) -> NDArray[_D]:
+    array.setflags(write=False)
+    return array
 
 
 def _named(name: str, work: Callable[[], _T]) -> _T:

@@ -54,6 +54,16 @@ def test_kernel_and_reference_agree(assembly: Assembly) -> None:
     assert np.abs(assembly.distance(POINTS) - reference).max() < 2e-5 * max(size, 4.0)
 
 
+def test_an_assembly_of_unit_size_answers_as_it_does_elsewhere() -> None:
+    """It is evaluated where it is; all others are first brought to the unit frame."""
+    assembly = Assembly(
+        (Part(Box((1.6, 0.3, 0.2)), (0.4, 0.1, 0.0)), Part(Sphere(0.4), (-0.5, 0, 0.2), blend=0.1))
+    )
+    direct = assembly.distance(POINTS)
+    move = Similarity(50.0, translation=(300.0, -20.0, 7.0))
+    np.testing.assert_allclose(assembly.transformed(move).distance(move(POINTS)) / 50, direct, atol=2e-6)
+
+
 def test_torch_points_get_gradients() -> None:
     points = torch.tensor([[0.9, 0.0, 0.0], [0.0, 2.0, 0.0]], dtype=torch.float64, requires_grad=True)
     (Part(Sphere(1.0)) | Part(Box((1, 1, 1)), (5, 0, 0))).distance(points).sum().backward()

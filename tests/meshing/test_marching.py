@@ -10,6 +10,9 @@ from hypothesis import strategies as st
 
 from partwright.errors import NoSurfaceError, NotFiniteError, SettingError
 from partwright.meshing import mesh_field
+from partwright.meshing.blocks import BLOCK, Grid, block_values
+from partwright.meshing.features import _SHARP, _with_features
+from partwright.meshing.polygons import Polygons
 
 LOW, HIGH = [-1.0] * 3, [1.0] * 3
 
@@ -182,3 +185,29 @@ def test_not_finite_is_named() -> None:
 def test_bad_boxes_are_named(low: list[float], high: list[float], resolution: int) -> None:
     with pytest.raises(SettingError):
         mesh_field(sphere, low, high, resolution)
+
+
+def test_corners_of_blocks_are_where_the_lattice_is_bit_for_bit() -> None:
+    """Else two blocks could disagree about the face that they share."""
+    grid = Grid(np.array([-1.037, 0.011, 7.3]), np.array([0.0131, 0.027, 0.0093]), np.full(3, 40))
+    blocks = np.random.default_rng(0).integers(-3, 12, (20, 3))
+    corners = np.stack(np.meshgrid(*[np.arange(BLOCK + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+
+    def distance(points: np.ndarray) -> np.ndarray:
+        return points @ np.float32([1.0, 0.37, -0.83])
+
+    slow = distance((grid.origin + (blocks[:, None] * BLOCK + corners) * grid.cell).astype(np.float32))
+    np.testing.assert_array_equal(block_values(distance, grid, blocks).reshape(slow.shape), slow)
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 2**31), spread=st.floats(0.05, 2.0))
+def test_features_are_found_as_by_comparing_all_corners_with_each_other(seed: int, spread: float) -> None:
+    rng = np.random.default_rng(seed)
+    length = rng.integers(3, 7, 200)
+    normals = rng.normal(size=(500, 3)) * spread + [0, 0, 1]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    index = rng.integers(0, 500, (200, 6))
+    polygons = Polygons(normals, index, length, np.zeros((200, 4, 3), np.int64), np.zeros((200, 3), np.int64))
+    slow = [i for i in range(200) if (around := normals[index[i, : length[i]]]).dot(around.T).min() < _SHARP]
+    assert _with_features(polygons, normals).tolist() == slow
