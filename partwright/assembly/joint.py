@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from partwright.assembly.similarity import Similarity
 from partwright.fields.joint import JointField, Member
@@ -29,8 +29,9 @@ def joined(children: tuple[Node, ...]) -> tuple[Node, ...]:
     result = list(children)
     for shape in shapes:
         parts = [part for i in shape.values() if is_joint(part := children[i])]
+        shared: dict[Any, Any] = {}
         for i, part in zip(shape.values(), parts, strict=True):
-            result[i] = _among(part, parts)
+            result[i] = _among(part, parts, shared)
     return tuple(result)
 
 
@@ -39,11 +40,11 @@ def is_joint(node: Node) -> TypeGuard[JointPart]:
     return node.is_part and isinstance(node.field, JointField)
 
 
-def _among(part: JointPart, parts: list[JointPart]) -> Part:
+def _among(part: JointPart, parts: list[JointPart], shared: dict[Any, Any]) -> Part:
     back = _pose(part).inverse()
     seen = [(other.field, back @ _pose(other)) for other in parts]
     members = [Member(field, pose.translation, pose.rotation) for field, pose in seen]
-    return dataclasses.replace(part, field=part.field.among(members))
+    return dataclasses.replace(part, field=part.field.among(members, shared))
 
 
 def _pose(part: Part) -> Similarity:

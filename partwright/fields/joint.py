@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -39,8 +39,11 @@ class JointField(Field):
         """Which part it is; a shape has each role at most once."""
 
     @abstractmethod
-    def among(self, members: Sequence[Member]) -> Self:
-        """This field as it is beside others (in the order of the assembly, itself among them)."""
+    def among(self, members: Sequence[Member], shared: dict[Any, Any]) -> Self:
+        """This field as it is beside others (in the order of the assembly, itself among them).
+
+        shared: one dictionary for them all, for what is made of the whole shape once.
+        """
 
     @abstractmethod
     def together(self, points: np.ndarray, fields: Sequence[JointField]) -> list[np.ndarray]:

@@ -71,10 +71,10 @@ def surface_deviation(
     feet, on_it = projected(distance, on_shape[far])
     there = np.linalg.norm(feet - on_shape[far], axis=1)
     to_result[far] = np.where(on_it, np.minimum(there, to_result[far]), to_result[far])
-    to_shape = shape.unit_distance(result)
-    result, far = result.copy(), np.abs(to_shape) >= np.quantile(np.abs(to_shape), _NEARLY_ALL)
+    to_shape = shape.unit_unsigned(result)
+    result, far = result.copy(), to_shape >= np.quantile(to_shape, _NEARLY_ALL)
     result[far], _ = projected(distance, result[far])
-    to_shape[far] = shape.unit_distance(result[far])
+    to_shape[far] = shape.unit_unsigned(result[far])
     return deviation(result, to_shape, on_shape, to_result)
 
 

@@ -17,7 +17,7 @@ from partwright.errors import NoSurfaceError, ParameterError, SettingError
 from partwright.fields.base import LARGEST, number, scale_lengths, vector
 from partwright.fields.joint import JointField, Member
 from partwright.fields.operations import is_tensor
-from partwright.partsdf.meshing import SparseLattice, resolution_for_wall
+from partwright.partsdf.meshing import mesh_shape, resolution_for_wall
 from partwright.partsdf.model import Model, find_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors
@@ -30,7 +30,7 @@ Quaternion = tuple[float, float, float, float]
 
 # The box around a part is looked for in so many cells an axis, twice, within its cuboid times _BOX_REACH.
 _BOX_CELLS, _BOX_REACH = 12, 1.5
-_MESHED_SIDE = 1.8  # of the box around a part that is meshed
+_FINER = 3  # times the cells along one part are those along the whole shape
 
 
 @dataclass(frozen=True)
@@ -93,28 +93,49 @@ class NeuralField(JointField):
         return self.network.lipschitz
 
     @cached_property
+    def _shared(self) -> dict[int, tuple[str, dict[str, Any]]]:
+        """The members' meshes of a resolution, and in whose frame they are."""
+        return {}
+
+    @cached_property
     def wall(self) -> float:
         return min(self.shape.wall(self.part) * self.unit, LARGEST)
 
     def surface(self, resolution: int) -> trimesh.Trimesh:
-        lower, upper = self.bounds()
-        centre, scale = (lower + upper) / 2, _MESHED_SIDE / max(float((upper - lower).max()), LARGEST**-1)
-
-        def distances(points: np.ndarray) -> np.ndarray:
-            return self((centre + points / scale).astype(np.float32))[None] * np.float32(scale)
-
-        cells = resolution_for_wall(self.wall * scale, round(resolution * 2 / _MESHED_SIDE))
-        lattice = SparseLattice(distances, 1.0, cells, self.lipschitz)
-        mesh = lattice.meshes()[0]
-        if mesh is None:
+        """All members are meshed in one pass when the first is asked for, since each point that is decoded
+        tells of them all. The cells are those of the whole shape: three times as many along [-1, 1] as are
+        asked for along one part, or more where one is thin.
+        """
+        if resolution not in self._shared:
+            self._shared[resolution] = self.part, self._surfaces(resolution)
+        maker, meshes = self._shared[resolution]
+        if self.part not in meshes:
             raise NoSurfaceError(
                 f"the part {self.part} of {self.model} has no surface, or it is thinner than a cell"
             )
-        mesh.vertices = centre + mesh.vertices / scale
+        mesh: trimesh.Trimesh = meshes[self.part].copy()
+        seen = next((m for m in self.members if m.field.role == maker), None)
+        if seen is not None:
+            mesh.vertices = Similarity(1.0, seen.rotation, seen.translation)(mesh.vertices)
         return mesh
 
-    def among(self, members: Sequence[Member]) -> Self:
-        return dataclasses.replace(self, members=tuple(members))
+    def _surfaces(self, resolution: int) -> dict[str, trimesh.Trimesh]:
+        """The members' meshes in this part's own frame, without those that have none."""
+        frame = Similarity(1.0, self.frame_rotation, self.frame_translation)
+        shape = _seen_from(self.shape, frame, self.unit)
+        cells = resolution_for_wall(float(shape.walls().min(initial=np.inf)), _FINER * resolution)
+        try:
+            meshes = mesh_shape(shape, cells).parts
+        except NoSurfaceError:
+            return {}
+        for mesh in meshes.values():
+            mesh.vertices = frame(self.unit * mesh.vertices)
+        return meshes
+
+    def among(self, members: Sequence[Member], shared: dict[Any, Any]) -> Self:
+        told = dataclasses.replace(self, members=tuple(members))
+        told.__dict__["_shared"] = shared
+        return told
 
     @cached_property
     def shape(self) -> NeuralShape:
@@ -195,7 +216,7 @@ class NeuralField(JointField):
             )
             for m in self.members
         ]
-        return alone.among(members)
+        return alone.among(members, {})
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
@@ -205,6 +226,20 @@ class NeuralField(JointField):
 
     def to_dict(self) -> dict[str, Any]:
         return {name: value for name, value in super().to_dict().items() if name != "members"}
+
+
+def _seen_from(shape: NeuralShape, frame: Similarity, unit: float) -> NeuralShape:
+    """A shape whose poses, in lengths of `unit`, are seen from a frame in which the unit frame lies there."""
+    back = frame.inverse()
+    places = back(unit * shape.poses.translation.numpy()) / unit
+    turns = [
+        (back @ Similarity(1.0, tuple(q))).rotation  # type: ignore[arg-type]
+        for q in shape.poses.rotation.tolist()
+    ]
+    poses = PoseTensors(
+        torch.tensor(places, dtype=torch.float32), torch.tensor(turns, dtype=torch.float32), shape.poses.scale
+    )
+    return dataclasses.replace(shape, poses=poses)
 
 
 def _alone(field: JointField) -> JointField:

@@ -17,7 +17,7 @@ from partwright.partsdf.losses import aggregate
 from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, local_points
 
-_WALL_PLACES, _CUBOID_MARGIN = 4000, 1.05  # where walls are looked for, in and around a part's cuboid
+_WALL_PLACES, _CUBOID_MARGIN = 1000, 1.05  # where walls are looked for, in and around a part's cuboid
 _WALL_QUANTILE = 0.95  # of the depths inside, which is half a wall
 CHUNK = 1 << 11  # pairs of point and part that are decoded at once, so that they stay in the cache
 _threads_lock = threading.Lock()
@@ -73,21 +73,25 @@ class NeuralShape:
         return torch.cat(_one_core_each(decode, chunks), dim=1).numpy()
 
     def walls(self) -> np.ndarray:
-        """(Q,) about how thin each part that is there is."""
-        return np.array([self.wall(name) for name in self.names()])
+        """(Q,) about how thin each part that is there is, unit frame: twice a depth that few places inside
+        exceed, and so at most about twice the depth at which training clamps. Infinite where no place inside
+        is found."""
+        names = self.names()
+        places = np.concatenate([self._places(name) for name in names] or [np.zeros((0, 3), np.float32)])
+        depths = -self.part_distances(places).reshape(len(names), len(names), _WALL_PLACES)
+        return np.array([_wall(depths[i, i]) for i in range(len(names))])
 
     def wall(self, name: str) -> float:
-        """About how thin a part is, unit frame: twice a depth that few places inside exceed, and so at most
-        about twice the depth at which training clamps. Infinite where no place inside is found."""
-        within = (
-            np.random.default_rng(0)
-            .uniform(-_CUBOID_MARGIN, _CUBOID_MARGIN, (_WALL_PLACES, 3))
-            .astype(np.float32)
-        )
+        """About how thin one part is, as in `walls`."""
+        return _wall(-self.part_distances(self._places(name))[self.names().index(name)])
+
+    def _places(self, name: str) -> np.ndarray:
+        """(W, 3) float32 in and around the part's cuboid."""
+        rng = np.random.default_rng(0)
+        within = rng.uniform(-_CUBOID_MARGIN, _CUBOID_MARGIN, (_WALL_PLACES, 3)).astype(np.float32)
         pose = self.poses.map(lambda t: t[self.model.index(name)]).numpy()
         turned = Similarity(1.0, tuple(pose.rotation.tolist()), tuple(pose.translation.tolist()))
-        depth = -self.part_distances(turned(within * pose.scale))[self.names().index(name)]
-        return float(2 * np.quantile(depth[depth > 0], _WALL_QUANTILE)) if (depth > 0).any() else np.inf
+        return turned(within * pose.scale).astype(np.float32)
 
     def whole(self, distances: np.ndarray) -> np.ndarray:
         """(N,) distance of the whole shape, of its parts' (Q, N)."""
@@ -96,6 +100,12 @@ class NeuralShape:
     def distances(self, points: np.ndarray) -> np.ndarray:
         """(N,) float32 of the whole shape at points (N, 3) of the unit frame."""
         return self.whole(self.part_distances(points))
+
+
+def _wall(depth: np.ndarray) -> float:
+    """Of the depths (W,) of one part at its places, positive inside."""
+    inside = depth[depth > 0]
+    return float(2 * np.quantile(inside, _WALL_QUANTILE)) if len(inside) else np.inf
 
 
 def _one_core_each(decode: Callable[[Tensor], Tensor], chunks: Sequence[Tensor]) -> list[Tensor]:

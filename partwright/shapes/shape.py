@@ -146,17 +146,20 @@ class Shape:
         """
         return self.unit_nearest(points)[0]
 
+    def unit_unsigned(self, points: ArrayLike) -> NDArray[np.float32]:
+        """Distance (N,) to the surface at points (N, 3), both in the unit frame: `unit_distance` without the
+        sign, for less.
+
+        Raises as `unit_distance` does.
+        """
+        return self._source.unsigned(_checked(points))
+
     def unit_nearest(self, points: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Signed distance (N,) at points (N, 3), unit frame, and the row (N,) of `faces` that is nearest.
 
         Raises as `unit_distance` does.
         """
-        array = np.asarray(points)
-        if array.ndim != 2 or array.shape[1] != 3:
-            raise SettingError(f"points of shape {array.shape} were given; expected (N, 3)")
-        if not np.isfinite(array).all():
-            raise NotFiniteError("points hold NaN or infinite coordinates; all must be finite")
-        return self._source.signed_nearest(array)
+        return self._source.signed_nearest(_checked(points))
 
     def unit_surface(self, count: int, seed: int = 0) -> SurfaceSamples:
         """`count` area-weighted points of the surface with normals and curvature, unit frame."""
@@ -266,6 +269,15 @@ def load_shape(
     shape = Shape(replace(read, unit=stated_unit or read.unit, up=stated_up or read.up))
     shape.reading_seconds = time.perf_counter() - started
     return shape
+
+
+def _checked(points: ArrayLike) -> NDArray[Any]:
+    array = np.asarray(points)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise SettingError(f"points of shape {array.shape} were given; expected (N, 3)")
+    if not np.isfinite(array).all():
+        raise NotFiniteError("points hold NaN or infinite coordinates; all must be finite")
+    return array
 
 
 def _read_only(array: NDArray[_D]) -> NDArray[_D]:

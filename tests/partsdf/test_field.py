@@ -47,6 +47,36 @@ def test_distances_are_the_shapes_in_own_units(lamp: NeuralShape, assembly: pw.A
     np.testing.assert_allclose(assembly.distance(tensor).detach(), expected.min(axis=0), atol=2e-5)
 
 
+def test_all_parts_are_meshed_in_one_pass_each_in_its_own_frame(
+    lamp: NeuralShape, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fresh = to_assembly(lamp, FRAME, unit="mm", source="lamp1")
+    asked = []
+    decode = NeuralShape.part_distances
+
+    def counted(shape: NeuralShape, points: np.ndarray) -> np.ndarray:
+        asked.append(len(points))
+        return decode(shape, points)
+
+    monkeypatch.setattr(NeuralShape, "part_distances", counted)
+    meshes, counts = [], []
+    for part in fresh.parts:
+        asked.clear()
+        meshes.append(mesh_part(part, 16))
+        counts.append(sum(asked))
+    assert counts[0] > 1000
+    assert counts[1:] == [0] * (len(meshes) - 1)
+    for part, mesh in zip(fresh.parts, meshes, strict=True):
+        assert mesh.is_watertight
+        cell = 2 * part.field.unit / 48
+        assert np.abs(part.distance(np.asarray(mesh.vertices))).max() < cell
+    first = fresh.parts[0]
+    moved = fresh.replace_part(first.name, dataclasses.replace(first, translation=(0.0, 0.0, 0.0)))
+    asked.clear()
+    mesh_part(moved.parts[0], 16)
+    assert sum(asked) > 1000  # another shape: nothing of the first is taken for it
+
+
 def test_all_parts_are_decoded_in_one_pass(assembly: pw.Assembly, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
     decode = NeuralShape.part_distances

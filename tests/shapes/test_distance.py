@@ -28,6 +28,7 @@ def test_unit_distance_of_a_box_is_exact(brick):
     points = np.random.default_rng(0).uniform(-1, 1, (5000, 3)).astype(np.float32)
     np.testing.assert_allclose(brick.unit_distance(points), box_distance(points, HALF), atol=1e-6)
     assert brick.unit_distance(points).dtype == np.float32
+    np.testing.assert_array_equal(brick.unit_unsigned(points), np.abs(brick.unit_distance(points)))
     few = brick.unit_distance(points[:50])  # the path without the lattice of signs
     np.testing.assert_array_equal(few, brick.unit_distance(points)[:50])
 
