@@ -232,10 +232,7 @@ def _seen_from(shape: NeuralShape, frame: Similarity, unit: float) -> NeuralShap
     """A shape whose poses, in lengths of `unit`, are seen from a frame in which the unit frame lies there."""
     back = frame.inverse()
     places = back(unit * shape.poses.translation.numpy()) / unit
-    turns = [
-        (back @ Similarity(1.0, tuple(q))).rotation  # type: ignore[arg-type]
-        for q in shape.poses.rotation.tolist()
-    ]
+    turns = [(back @ Similarity(1.0, tuple(q))).rotation for q in shape.poses.rotation.tolist()]
     poses = PoseTensors(
         torch.tensor(places, dtype=torch.float32), torch.tensor(turns, dtype=torch.float32), shape.poses.scale
     )

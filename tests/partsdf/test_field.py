@@ -62,18 +62,20 @@ def test_all_parts_are_meshed_in_one_pass_each_in_its_own_frame(
     meshes, counts = [], []
     for part in fresh.parts:
         asked.clear()
-        meshes.append(mesh_part(part, 16))
+        meshes.append(mesh_part(part, 24))
         counts.append(sum(asked))
     assert counts[0] > 1000
     assert counts[1:] == [0] * (len(meshes) - 1)
     for part, mesh in zip(fresh.parts, meshes, strict=True):
         assert mesh.is_watertight
-        cell = 2 * part.field.unit / 48
-        assert np.abs(part.distance(np.asarray(mesh.vertices))).max() < cell
+        cell, vertices = 2 * part.field.unit / 72, np.asarray(mesh.vertices)
+        within = (np.abs(FRAME.to_unit(vertices)) < 1).all(axis=1)  # the lattice's end cuts what goes on
+        assert within.mean() > 0.3
+        assert np.abs(part.distance(vertices[within])).max() < cell
     first = fresh.parts[0]
-    moved = fresh.replace_part(first.name, dataclasses.replace(first, translation=(0.0, 0.0, 0.0)))
+    moved = fresh.replace_part(first.name, dataclasses.replace(first, blend=0.1))
     asked.clear()
-    mesh_part(moved.parts[0], 16)
+    mesh_part(moved.parts[0], 24)
     assert sum(asked) > 1000  # another shape: nothing of the first is taken for it
 
 
