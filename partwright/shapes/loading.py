@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import struct
 import tempfile
-import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,19 +18,14 @@ from partwright.errors import EmptyShapeError, NotFiniteError, UnreadableFileErr
 from partwright.shapes.array_files import check_shape_file
 from partwright.shapes.gltf_tree import check_gltf
 from partwright.shapes.point_cloud import source_of_points
-from partwright.shapes.source import Piece, Source
-from partwright.shapes.units import canonical_unit
+from partwright.shapes.source import Piece, Source, in_utf8, unique_names
 
 if TYPE_CHECKING:
     import trimesh
 
-MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf", ".3mf")
-# A 3MF is a zip archive, and a small one can claim terabytes; what is read takes thirty times its bytes.
-_LARGEST_UNPACKED = 1 << 29  # bytes
-_SURELY_FINE = 1 << 26  # bytes
-_TIGHTEST = 25  # times smaller; the XML of real meshes packs to a fifth or a tenth
+READ_BY_TRIMESH = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 
-# What trimesh, numpy, json, lxml and zipfile raise on bytes that are not what the suffix says. A parser fails
+# What trimesh, numpy and json raise on bytes that are not what the suffix says. A parser fails
 # wherever the bytes first stop making sense, so the families are wide; none of them can come from our own
 # code here, because nothing but the parser runs inside the try.
 _PARSER_ERRORS = (
@@ -45,11 +39,9 @@ _PARSER_ERRORS = (
     AssertionError,
     MemoryError,  # a header that claims more elements than memory holds
     RuntimeError,  # includes RecursionError and NotImplementedError
-    SyntaxError,  # lxml.etree.XMLSyntaxError
     ImportError,  # a compressed glTF extension whose decoder is not installed
     struct.error,
     zlib.error,
-    zipfile.BadZipFile,
 )
 
 
@@ -59,14 +51,13 @@ def read_mesh(path: Path) -> Source:
     Raises UnreadableFileError, EmptyShapeError, or what `source_of_points` raises.
     """
     suffix = path.suffix.lower()
-    stem = _in_utf8(path.stem)
+    stem = in_utf8(path.stem)
     scene = _load_scene(path, suffix)
-    pieces = tuple(_unique_names(_pieces(scene, stem)))
+    pieces = tuple(unique_names(_pieces(scene, stem)))
     if not pieces:
         return _source_without_faces(stem, list(scene.geometry.values()))
     is_gltf = suffix in (".glb", ".gltf")
-    unit = "m" if is_gltf else canonical_unit(scene.units) if suffix == ".3mf" and scene.units else None
-    return Source(stem, pieces, unit, "y" if is_gltf else None)
+    return Source(stem, pieces, "m" if is_gltf else None, "y" if is_gltf else None)
 
 
 def _source_without_faces(name: str, geometries: list[Any]) -> Source:
@@ -115,8 +106,6 @@ def _load_scene(path: Path, suffix: str) -> trimesh.Scene:
     import trimesh
 
     check_shape_file(path)
-    if suffix == ".3mf":
-        _refuse_zip_bomb(path)
     if suffix == ".stl":
         _refuse_cut_stl(path)
     if suffix in (".glb", ".gltf"):
@@ -138,38 +127,19 @@ def _load_scene(path: Path, suffix: str) -> trimesh.Scene:
     return scene
 
 
-def _in_utf8(name: str) -> str:
-    """The name, where bytes that are no UTF-8 (file systems take any) are written as underscores."""
-    return "".join("_" if "\ud800" <= c <= "\udfff" else c for c in name)
-
-
 @contextmanager
 def _named_in_utf8(path: Path) -> Iterator[Path]:
     """The file under a name that trimesh can encode: it names nodes after files, and hashes them.
 
     Of glTF, which names its nodes itself, the file stays beside those that it refers to.
     """
-    if _in_utf8(path.name) == path.name or path.suffix.lower() in (".glb", ".gltf"):
+    if in_utf8(path.name) == path.name or path.suffix.lower() in (".glb", ".gltf"):
         yield path
         return
     with tempfile.TemporaryDirectory() as folder:
-        alias = Path(folder) / _in_utf8(path.name)
+        alias = Path(folder) / in_utf8(path.name)
         alias.symlink_to(path.absolute())
         yield alias
-
-
-def _refuse_zip_bomb(path: Path) -> None:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            unpacked = sum(entry.file_size for entry in archive.infolist())
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
-        raise UnreadableFileError(f"{path}: is not a 3MF archive ({error}); export it again") from error
-    most = min(_LARGEST_UNPACKED, max(_SURELY_FINE, _TIGHTEST * path.stat().st_size))
-    if unpacked > most:
-        raise UnreadableFileError(
-            f"{path}: would unpack to {unpacked >> 20} MiB; at most {most >> 20} are accepted of a file of "
-            "this size. Export it as GLB, STL or PLY"
-        )
 
 
 def _refuse_cut_stl(path: Path) -> None:
@@ -247,15 +217,3 @@ def _valid(faces: NDArray[np.int64], vertex_count: int, where: str) -> NDArray[n
             "the face indices must lie within the vertices. Export the shape again"
         )
     return faces
-
-
-def _unique_names(pieces: Iterator[Piece]) -> Iterator[Piece]:
-    """A name that comes again gets a number: wheel, wheel_2, wheel_3."""
-    taken: set[str] = set()
-    for piece in pieces:
-        name, count = piece.name or "node", 1
-        while name in taken:
-            count += 1
-            name = f"{piece.name or 'node'}_{count}"
-        taken.add(name)
-        yield Piece(name, piece.vertices, piece.faces)

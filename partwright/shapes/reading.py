@@ -12,15 +12,17 @@ from numpy.typing import NDArray
 
 from partwright.errors import GridError, NeedsSurfaceError, UnsupportedFormatError
 from partwright.shapes.array_files import read_binvox, read_npy, read_npz, read_xyz
-from partwright.shapes.loading import MESH_SUFFIXES, read_mesh, source_of_mesh
+from partwright.shapes.loading import READ_BY_TRIMESH, read_mesh, source_of_mesh
 from partwright.shapes.point_cloud import source_of_points
 from partwright.shapes.source import Source
 from partwright.shapes.step_process import STEP_SUFFIXES, read_step
+from partwright.shapes.threemf import read_threemf
 from partwright.shapes.voxels import source_of_grid
 
 if TYPE_CHECKING:
     import trimesh
 
+MESH_SUFFIXES = (*READ_BY_TRIMESH, ".3mf")
 _UNIT_NORMAL = (0.9, 1.1)  # lengths between which the columns behind the coordinates are normals, not colours
 
 
@@ -115,7 +117,8 @@ def _three_columns(name: str, points: NDArray[Any]) -> NDArray[Any]:
 
 
 _READERS: dict[str, Callable[[Path], Source]] = {
-    **dict.fromkeys(MESH_SUFFIXES, read_mesh),
+    **dict.fromkeys(READ_BY_TRIMESH, read_mesh),
+    ".3mf": read_threemf,
     **dict.fromkeys(STEP_SUFFIXES, read_step),
     ".xyz": _read_xyz,
     ".npy": _read_npy,

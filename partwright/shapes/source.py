@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,3 +33,22 @@ class Source:
     repairs: tuple[str, ...] = ()
     confidence: float = 1.0
     file: str | None = None
+
+
+def in_utf8(name: str) -> str:
+    """The name, where bytes that are no UTF-8 (file systems take any) are written as underscores."""
+    return "".join("_" if "\ud800" <= c <= "\udfff" else c for c in name)
+
+
+def unique_names(pieces: Iterator[Piece]) -> Iterator[Piece]:
+    """A name that comes again gets a number: wheel, wheel_2, wheel_3."""
+    taken: set[str] = set()
+    counts: dict[str, int] = {}
+    for piece in pieces:
+        stem = piece.name or "node"
+        name = stem
+        while name in taken:
+            counts[stem] = counts.get(stem, 1) + 1
+            name = f"{stem}_{counts[stem]}"
+        taken.add(name)
+        yield Piece(name, piece.vertices, piece.faces)

@@ -216,7 +216,7 @@ def test_claims_of_huge_counts_are_refused(tmp_path):
 
 
 def test_zip_bomb_is_refused_before_it_unpacks(tmp_path, monkeypatch):
-    monkeypatch.setattr("partwright.shapes.loading._LARGEST_UNPACKED", 1000)
+    monkeypatch.setattr("partwright.shapes.threemf._LARGEST_UNPACKED", 1000)
     path = tmp_path / "bomb.3mf"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("3D/3dmodel.model", b"0" * 100_000)
