@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import importlib
-from typing import Any
 
 # Not lazy: the function has the name of the package it lives in, and whichever is bound last stays.
 from partwright.export import export
+
+TYPE_CHECKING = False  # as of typing, which takes longer to import than all that is here
+if TYPE_CHECKING:
+    from typing import Any
 
 __version__ = "0.1.0"
 

@@ -1,13 +1,21 @@
 """The command line as a process: `partwright`, or `python -m partwright`."""
 
+import os
 import sys
-
-from partwright.cli.interrupts import listen
 
 
 def main() -> int:
-    """Hear Ctrl-C before anything heavy is imported, then run the command line; returns the exit code."""
-    listen()
+    """Hear Ctrl-C before anything else is imported, then run the command line; returns the exit code.
+
+    What comes before that is Python's own start, some hundredths of a second: a Ctrl-C there ends the
+    process as it ends any that Python runs, with its traceback, and nothing has been done yet.
+    """
+    try:
+        from partwright.cli.interrupts import listen
+
+        listen()
+    except KeyboardInterrupt:
+        os._exit(130)
     from partwright.cli.main import main as run
 
     return run()

@@ -174,10 +174,16 @@ class TreeSearch:
             if s.max_parts is None or self.bounded_tree().primitives <= s.max_parts:
                 return "converged"
             for i in range(1, _PRICE_STEPS):
+                fewest = self.bounded_tree().primitives
                 self.best = selection.polish(self.problem(_PRICE_FACTOR**i), self.best, _MAX_CONVEXES)
+                if not any(self.best):
+                    break
                 if self.bounded_tree().primitives <= s.max_parts:
                     return "budget_reached"
-            raise SettingError(f"max_parts: no tree of {s.max_parts} primitives encloses anything; give more")
+            raise SettingError(
+                f"max_parts: {s.max_parts} quadrics enclose nothing of it; the smallest tree that was found "
+                f"has {fewest}, so give more"
+            )
 
     def meet_target(self, target: float) -> Outcome:
         """The dearest prices at which the IoU of the samples reaches the target."""

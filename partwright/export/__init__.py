@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # `import partwright` imports this room: nothing that is not needed at once
 if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import Any
+
     from partwright.assembly import Assembly
 
 __all__ = ["export"]
@@ -27,7 +28,9 @@ def export(assembly: Assembly, path: str | Path, **options: Any) -> None:
         UnitError: the format cannot say the assembly's unit.
         OutputError: the file cannot be written.
     """
-    from partwright.export.formats import format_of  # `import partwright` imports this room
+    from pathlib import Path
+
+    from partwright.export.formats import format_of
 
     chosen = format_of(path)
     chosen.check(assembly, options)

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from partwright.assembly import Assembly
 from partwright.errors import SettingError
 from partwright.methods import METHODS, Ability, Method
+
+if TYPE_CHECKING:
+    from partwright.shapes import Shape
 
 # What a method that lacks an ability cannot do, after its name.
 _LACKS = {
@@ -25,6 +30,7 @@ _LACKS = {
     Ability.CUDA: "does not compute on an accelerator",
 }
 _SETTINGS = (Ability.BUDGET, Ability.TARGET, Ability.CURVE, Ability.SYMMETRY, Ability.SUBTRACT)
+_FARTHEST = 1000  # longest sides of the shape from its middle
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,20 @@ class Start:
         if isinstance(self.locked, str):
             raise SettingError(f"locked: expected names of parts in a list, got {self.locked!r}")
         object.__setattr__(self, "locked", tuple(self.locked))
+
+    def check_size(self, shape: Shape) -> None:
+        """Raise SettingError where a locked part is so large or so far from the shape that no numbers hold
+        both, as where the two are in other units."""
+        side = float(np.ptp(shape.vertices, axis=0).max())
+        middle = (shape.vertices.min(axis=0) + shape.vertices.max(axis=0)) / 2
+        for part in self.assembly.parts:
+            box = part.bounds()
+            ends = np.abs(np.asarray(box) - middle).max() / side
+            if part.name in self.locked and np.isfinite(ends) and ends > _FARTHEST:
+                raise SettingError(
+                    f"the locked part {part.name} reaches {ends:.2g} times the shape's longest side away; at "
+                    f"most {_FARTHEST} can be held beside it. Check that both are in the same units"
+                )
 
     @classmethod
     def of(cls, given: Assembly | Start | None) -> Start | None:

@@ -178,6 +178,8 @@ class _Task:
             check_alone(limits.within, min_iou=target, curve=curve, per_node=pieces is not None)
             bounds = DistanceBounds.of(shape, limits.within, limits.contain, limits.inside)
         _check_cleaning(cleaning, shape, begin, bounds)
+        if begin is not None:
+            begin.check_size(shape)
         return cls(shape, pieces, found, own, quality, run, begin, bounds, cleaning)
 
     def result(self, listen: bool) -> Result:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -14,6 +15,7 @@ from partwright.input_files import check_file
 _DEEPEST = 500  # nodes below one another; a robot's chain has tens
 _LARGEST_CLAIM = 1 << 26  # numbers that accessors without data may make up
 _MOST_DRAWN = 1 << 28  # corners of triangles of all nodes together
+_DRACO = "KHR_draco_mesh_compression"  # read where DracoPy is; else trimesh takes zeros for all vertices
 _JSON_CHUNK = 0x4E4F534A
 _WIDEST = 16  # numbers of one element of an accessor: a matrix
 
@@ -34,6 +36,11 @@ def check_gltf(path: Path) -> None:
     if compressed:
         raise UnreadableFileError(
             f"{path}: its buffers are compressed ({compressed.pop()}), which is not read; export it without"
+        )
+    if _DRACO in _list(tree, "extensionsRequired", str) and find_spec("DracoPy") is None:
+        raise UnreadableFileError(
+            f"{path}: its meshes are compressed ({_DRACO}), which takes another package to read: pip install "
+            "DracoPy, or export it without"
         )
     nodes, accessors = _list(tree, "nodes", dict), _list(tree, "accessors", dict)
     _check_nodes(path, nodes)

@@ -122,6 +122,11 @@ def test_a_budget_of_primitives(plate: Shape) -> None:
     assert solid(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.15)
 
 
+def test_a_budget_that_holds_nothing_says_how_many_do() -> None:
+    with pytest.raises(SettingError, match=r"max_parts: 2 quadrics enclose nothing.* has [4-7]"):
+        quick(load_shape(trimesh.creation.box((1, 2, 3))), max_parts=2)
+
+
 def test_a_target_takes_the_cheapest_tree_that_reaches_it(plate: Shape) -> None:
     fitted = quick(plate, min_iou=0.85)
     assert fitted.outcome == "target_reached"

@@ -138,4 +138,4 @@ def test_one_line_says_what_was_written(capsys: Any, folder: Path) -> None:
     said = capsys.readouterr().out.splitlines()
     assert len(said) == 1
     assert said[0].startswith(f"wrote {target}: OpenSCAD, ")
-    assert said[0].endswith(f"1 of 2 parts approximated, {target}.report.json says how far off")
+    assert said[0].endswith(f"1 of 2 parts is approximated, see {target}.report.json for how far off")

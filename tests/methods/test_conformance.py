@@ -173,6 +173,16 @@ def test_a_budget_is_kept(case: Case, told: tuple[Fitted, list[Progress]]) -> No
     assert len(fitted.assembly) <= most
 
 
+def test_a_locked_part_of_other_units_is_refused_before_the_work() -> None:
+    shape = pw.load_shape(trimesh.creation.box())
+    for far in (
+        pw.Part(pw.fields.Box((1e12, 1e12, 1e12)), name="far"),
+        pw.Part(pw.fields.Box((1.0, 1.0, 1.0)), (0, 1e6, 0), name="far"),
+    ):
+        with pytest.raises(SettingError, match=r"locked part far reaches .* the same units"):
+            pw.fit(shape, start=pw.Start(pw.Assembly((far,)), locked=["far"]))
+
+
 def test_locked_parts_stay_bit_for_bit(case: Case, told: tuple[Fitted, list[Progress]]) -> None:
     if Ability.LOCK not in case.method.can:
         return

@@ -28,7 +28,15 @@ def run(arguments: argparse.Namespace) -> int:
 def _what_was_written(path: Path, parts: int) -> str:
     """One line: the file, its format and size, and what of the assembly it could not hold."""
     line = f"wrote {path}: {format_of(path).name}, {path.stat().st_size / 1000:.3g} kB"
-    changed = approximated_parts(path)
+    changed = len(approximated_parts(path))
     if not changed:
         return line
-    return f"{line}; {len(changed)} of {parts} parts approximated, {report_path(path)} says how far off"
+    which = (
+        "the part"
+        if parts == 1
+        else f"all {parts} parts"
+        if changed == parts
+        else f"{changed} of {parts} parts"
+    )
+    verb = "is" if changed == 1 else "are"
+    return f"{line}; {which} {verb} approximated, see {report_path(path)} for how far off"
