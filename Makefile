@@ -10,7 +10,14 @@ DEMO_SHAPE := examples/shapes/watering_can.ply
 
 LOWEST_TESTS := tests/shapes tests/assembly tests/meshing tests/render tests/cli
 
-.PHONY: setup demo test test-lowest lint types docs bench clean
+# The page of the studio, from its sources in studio/. Where there is no Node the built one is taken as it is: a test
+# compares the sources' hash that it records.
+page:
+	if command -v npm >/dev/null && (cd studio && npm ci --no-audit --no-fund --silent); then \
+		cd studio && npm run --silent build && git diff --exit-code --stat -- ../partwright/export/page.html; \
+	else echo "no Node or no registry: the page is not built again"; fi
+
+.PHONY: setup demo test test-lowest lint types docs page bench clean
 setup: $(INSTALLED)
 
 $(BIN)/python:

@@ -158,6 +158,7 @@ FORMATS: Registry[Format] = Registry(
         ".stl": "partwright.export.stl:FORMAT",
         ".obj": "partwright.export.obj:FORMAT",
         ".glsl": "partwright.export.glsl:FORMAT",
+        ".html": "partwright.export.html:FORMAT",
         ".step": "partwright.export.step:FORMAT",
         ".stp": "partwright.export.step:FORMAT",
         ".scad": "partwright.export.openscad:FORMAT",

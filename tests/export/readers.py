@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from partwright.assembly import load_assembly
+from partwright.assembly import Assembly, load_assembly
+from partwright.assembly.files import from_text
 from partwright.export.threemf import UNITS
 from partwright.meshing import mesh_assembly
 from partwright.shapes import METRES
@@ -52,8 +53,17 @@ def _scene(path: Path) -> list[trimesh.Trimesh]:
     return list(trimesh.load_scene(path).dump())
 
 
+def _html(path: Path) -> Read:
+    """The assembly that stands in the page; what is drawn of it is tested in a browser."""
+    start = '<script type="application/json" id="assembly">'
+    return _solid(from_text(path.read_text("utf-8").partition(start)[2].partition("</script>")[0]))
+
+
 def _json(path: Path) -> Read:
-    assembly = load_assembly(path)
+    return _solid(load_assembly(path))
+
+
+def _solid(assembly: Assembly) -> Read:
     mesh = mesh_assembly(assembly)
     return _of_meshes([mesh], METRES[assembly.unit] if assembly.unit else None)
 
@@ -140,6 +150,7 @@ def _usd(path: Path) -> Read:
 # suffix -> the module that it takes, and the reader
 READERS: dict[str, tuple[str, Callable[[Path], Read]]] = {
     ".json": ("", _json),
+    ".html": ("", _html),
     ".glb": ("", lambda path: _of_meshes(_scene(path), 1.0)),
     ".ply": ("", _mesh),
     ".stl": ("", _mesh),

@@ -1,0 +1,28 @@
+/** Starts the page with the assembly that stands in it. */
+
+import "./style.css";
+import { Store } from "./model/store";
+import { readAssembly } from "./model/tree";
+import { App } from "./ui/app";
+import { remember } from "./ui/remember";
+
+const data = document.getElementById("assembly")?.textContent;
+
+function complain(text: string): void {
+  const message = document.createElement("p");
+  message.className = "fatal";
+  message.textContent = text;
+  document.body.append(message);
+}
+
+try {
+  if (!data) throw new Error("This page holds no assembly. Write one with: partwright export ASSEMBLY -o FILE.html");
+  const store = new Store(readAssembly(data));
+  const app = new App(store);
+  remember(store, data);
+  // For scripts and tests: what the page holds.
+  Object.assign(window, { partwright: app });
+} catch (error) {
+  complain((error as Error).message);
+  throw error;
+}

@@ -1,0 +1,69 @@
+/** One self-contained `float sdf(vec3 p)`, as `partwright export -o FILE.glsl` writes it. */
+
+import quadricFormula from "../../../partwright/export/quadric.glsl?raw";
+import superfrustumFormula from "../../../partwright/export/superfrustum.glsl?raw";
+import { quadric, superfrustum } from "../model/fields";
+import { type Group, type Node, type Part, isGroup, leaves, poses } from "../model/tree";
+
+const literal = (value: number): string => {
+  const text = String(Math.fround(value)).length < 12 ? String(Math.fround(value)) : Math.fround(value).toPrecision(9);
+  return /[.e]/.test(text) ? text : `${text}.0`;
+};
+const numbers = (values: number[]): string => values.map(literal).join(", ");
+
+export function toGlsl(root: Group): string {
+  const rows: string[] = [];
+  const functions: string[] = [];
+  let groups = 0;
+  const constant = (part: Part, copy: number): string => {
+    const name = `PART_${rows.length}`;
+    const pose = poses(part)[copy];
+    const [w, x, y, z] = pose.rotation;
+    const place = `vec3(${numbers(pose.translation)}), vec4(${numbers([x, y, z, w])})`;
+    const surface = quadric(part.field);
+    if (surface) {
+      const s = surface.square;
+      const rest = `mat3(${numbers(s.flat())}), vec3(${numbers(surface.linear)}), ${numbers([surface.constant, surface.fall, surface.rise, part.blend])}`;
+      rows.push(`const Quadric ${name} = Quadric(${place}, ${rest});  // ${comment(part.name)}`);
+      return `quadric_sdf(p, ${name})`;
+    }
+    const [sx, sy, sz, ...own] = superfrustum(part.field)!;
+    rows.push(`const Part ${name} = Part(${place}, vec3(${numbers([sx, sy, sz])}), ${numbers([...own, part.blend])});  // ${comment(part.name)}`);
+    return `part_sdf(p, ${name})`;
+  };
+  const call = (node: Node): string => {
+    if (!isGroup(node) && !node.instances.length) return constant(node, 0);
+    const name = `group_${++groups}`;
+    write(node, name);
+    return `${name}(p)`;
+  };
+  const write = (node: Node, name: string): void => {
+    const terms: [string, number][] = [];
+    if (!isGroup(node)) for (let i = 0; i <= node.instances.length; i++) terms.push([constant(node, i), node.blend]);
+    else
+      for (const child of node.children) {
+        if (!isGroup(child) && node.operation === "union")
+          for (let i = 0; i <= child.instances.length; i++) terms.push([constant(child, i), child.blend]);
+        else terms.push([call(child), child.blend]);
+      }
+    const operation = isGroup(node) ? node.operation : "union";
+    const [first, ...others] = terms;
+    const lines = others.map(([term, blend]) => `    d = smooth_${operation}(d, ${term}, ${literal(blend)});`);
+    functions.push([`float ${name}(vec3 p) {`, `    float d = ${first[0]};`, ...lines, "    return d;", "}", ""].join("\n"));
+  };
+  write(root, "sdf");
+  const parts = [...leaves(root)];
+  return [
+    `// ${comment(root.name) || "Assembly"}: ${parts.length} parts. Lengths in ${root.unit ?? "an unknown unit"}.`,
+    "// float sdf(vec3 p) is the signed distance, negative inside. Put it after `#version 330` or later,",
+    "// or after `#version 300 es` and `precision highp float;`.",
+    "",
+    superfrustumFormula,
+    ...(parts.some((part) => part.field.kind === "quadric") ? [quadricFormula] : []),
+    ...rows,
+    "",
+    ...functions,
+  ].join("\n");
+}
+
+const comment = (name: string): string => name.replace(/[^\x20-\x7e]|\\/g, "_");

@@ -1,0 +1,451 @@
+/** The picture and what is done in it: orbit, pan, zoom, select, drag handles, measure. */
+
+import { drawGizmo, type Handle } from "../edit/gizmo";
+import { type Measurement, type Measuring, measure, POINTS } from "../edit/measure";
+import { type Axis, type Mode, Transform } from "../edit/transform";
+import { fromUnit, toUnit } from "../model/program";
+import { rgb } from "../model/palette";
+import type { Store } from "../model/store";
+import { type Box, type Vec3, add, dot, EMPTY, isFinite3, joinBoxes, mul, sub } from "../model/vectors";
+import { partBox } from "../model/program";
+import { roundDown } from "../model/lengths";
+import { Camera, project, rayThrough, type View } from "../view/camera";
+import { type Hit, pick, through } from "../view/picking";
+import { NoWebGL, Renderer } from "../view/renderer";
+import { h, svg } from "./dom";
+
+export type Tool = "select" | Mode | "measure";
+
+const DRAG = 4; // pixels that a click may wander
+
+export class Viewport {
+  readonly element: HTMLElement;
+  readonly canvas = h("canvas", { class: "picture", tabindex: "0", "aria-label": "The assembly" });
+  readonly camera: Camera;
+  renderer: Renderer | null = null;
+  tool: Tool = "select";
+  measuring: Measuring = "distance";
+  readonly measurements: Measurement[] = [];
+  transform: Transform | null = null;
+  onStatus: (text: string) => void = () => {};
+  onTool: () => void = () => {};
+  private points: Vec3[] = [];
+  private overlay = svg("svg", { class: "overlay" });
+  private gizmoLayer = svg("g");
+  private measureLayer = svg("g", { class: "measures" });
+  private regionLayer = svg("g");
+  private pointers = new Map<number, { x: number; y: number }>();
+  private gesture: { x: number; y: number; moved: boolean; button: number; pan: boolean } | null = null;
+  private last = { x: 0, y: 0 };
+  private start = { x: 0, y: 0 };
+  private dragging = false;
+
+  constructor(private store: Store) {
+    this.camera = new Camera(store.root.up);
+    this.overlay.append(this.measureLayer, this.regionLayer, this.gizmoLayer);
+    this.element = h("div", { class: "viewport" }, this.canvas, this.overlay);
+    try {
+      this.renderer = new Renderer(this.canvas, {
+        show: "parts",
+        wipe: 0.5,
+        heat: false,
+        most: 0.03,
+        paper: [1, 1, 1],
+        ink: [0, 0, 0],
+        accent: [0.2, 0.4, 1],
+        ground: [0, 0, 1, -0.9],
+        grid: 0.1,
+      });
+      this.renderer.onPicture = () => this.drawOverlay();
+    } catch (error) {
+      if (!(error instanceof NoWebGL)) throw error;
+      const text = `${error.message} The list of parts, their numbers and the downloads work all the same; to see the shape, use a browser with WebGL 2, or turn on hardware acceleration in this one.`;
+      this.element.append(h("div", { class: "no-webgl", role: "alert" }, text));
+    }
+    store.on(["document", "view"], () => this.upload());
+    store.on(["selection", "hover"], () => this.mark());
+    new ResizeObserver(() => this.resize()).observe(this.element);
+    this.listen();
+  }
+
+  begin(): void {
+    this.resize();
+    this.frameAll();
+    this.upload();
+    this.ground();
+  }
+
+  private get size(): [number, number] {
+    const half = this.renderer?.look.show === "beside" ? 0.5 : 1;
+    return [this.element.clientWidth * half, this.element.clientHeight];
+  }
+
+  get view(): View {
+    const [width, height] = this.size;
+    return this.camera.view(width / Math.max(height, 1));
+  }
+
+  private resize(): void {
+    this.renderer?.resize();
+    this.overlay.setAttribute("viewBox", `0 0 ${this.element.clientWidth} ${this.element.clientHeight}`);
+    this.look();
+  }
+
+  look(): void {
+    this.renderer?.setView(this.view);
+    this.drawOverlay();
+  }
+
+  upload(): void {
+    this.renderer?.setColours(this.store.program.parts.map((part) => rgb(this.store.colourOf(part))));
+    this.renderer?.setProgram(this.store.program);
+    this.mark();
+    this.drawOverlay();
+  }
+
+  mark(): void {
+    const chosen = new Set(this.store.selectedParts.map((part) => part.id));
+    const marks = this.store.program.parts.map(
+      (part) => (chosen.has(part.id) ? 1 : 0) + (part.id === this.store.hovered ? 2 : 0),
+    );
+    this.renderer?.setMarks(Uint8Array.from(marks));
+    this.drawOverlay();
+  }
+
+  private ground(): void {
+    const { above } = this.camera;
+    const { box } = this.store.program;
+    const low = Math.min(...[box[0], box[1]].map((corner) => dot(corner, above)));
+    this.renderer?.setLook({ ground: [...above, low - 0.002], grid: roundDown(this.store.size / 8) * this.store.frame.scale });
+  }
+
+  frameAll(): void {
+    const chosen = this.store.selectedParts.map(partBox).filter(isFinite3);
+    let box: Box = this.store.program.box;
+    if (chosen.length) {
+      const own = chosen.reduce(joinBoxes, EMPTY);
+      box = [toUnit(this.store.frame, own[0]), toUnit(this.store.frame, own[1])];
+    }
+    const [width, height] = this.size;
+    this.camera.frame(box, width / Math.max(height, 1));
+    this.look();
+  }
+
+  lookFrom(azimuth: number, elevation: number): void {
+    [this.camera.azimuth, this.camera.elevation] = [azimuth, elevation];
+    this.look();
+  }
+
+  setTool(tool: Tool): void {
+    this.cancelTransform();
+    this.tool = tool;
+    this.points = [];
+    this.onTool();
+    this.drawOverlay();
+  }
+
+  // What the pointer does
+
+  private listen(): void {
+    const { element } = this;
+    element.addEventListener("pointerdown", (event) => this.down(event));
+    element.addEventListener("pointermove", (event) => this.move(event));
+    element.addEventListener("pointerup", (event) => this.up(event));
+    element.addEventListener("pointercancel", (event) => this.up(event, true));
+    element.addEventListener("pointerleave", () => this.store.hover(null));
+    element.addEventListener("contextmenu", (event) => event.preventDefault());
+    element.addEventListener(
+      "wheel",
+      (event) => {
+        event.preventDefault();
+        const { x, y } = this.place(event);
+        this.zoomAt(x, y, Math.exp(event.deltaY * (event.ctrlKey ? 0.01 : 0.0012)));
+      },
+      { passive: false },
+    );
+  }
+
+  private place(event: { clientX: number; clientY: number }): { x: number; y: number } {
+    const box = this.element.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  }
+
+  /** What is under the pointer stays there. */
+  private zoomAt(x: number, y: number, factor: number): void {
+    const [width, height] = this.size;
+    const across = this.renderer?.look.show === "beside" ? x % width : x;
+    const ray = rayThrough(this.view, across, y, width, height);
+    const before = this.camera.distance;
+    this.camera.zoom(factor);
+    const share = 1 - this.camera.distance / before;
+    const along = before / Math.max(-dot(ray, this.view.back), 0.1);
+    const under = add(add(this.camera.target, mul(this.view.back, before)), mul(ray, along));
+    this.camera.target = add(this.camera.target, mul(sub(under, this.camera.target), share));
+    this.look();
+  }
+
+  private down(event: PointerEvent): void {
+    if ((event.target as Element).closest("button, .float")) return;
+    this.canvas.focus({ preventScroll: true });
+    const at = this.place(event);
+    this.last = at;
+    if (this.transform && !this.dragging) {
+      if (event.button === 2) this.cancelTransform();
+      else this.finishTransform();
+      return;
+    }
+    this.pointers.set(event.pointerId, at);
+    this.element.setPointerCapture(event.pointerId);
+    const pan = event.button === 1 || event.button === 2 || event.shiftKey;
+    if (this.pointers.size === 1) this.gesture = { ...at, moved: false, button: event.button, pan };
+  }
+
+  private move(event: PointerEvent): void {
+    const at = this.place(event);
+    const previous = this.pointers.get(event.pointerId);
+    const [dx, dy] = [at.x - (previous ?? this.last).x, at.y - (previous ?? this.last).y];
+    this.last = at;
+    if (this.transform) {
+      this.drag(at, event.ctrlKey !== this.store.snapping);
+      return;
+    }
+    if (!previous) {
+      if (event.pointerType === "mouse" && event.buttons === 0) this.hoverAt(at);
+      return;
+    }
+    if (this.pointers.size === 2) {
+      const [a, b] = [...this.pointers.values()];
+      const before = Math.hypot(a.x - b.x, a.y - b.y);
+      this.pointers.set(event.pointerId, at);
+      const [c, d] = [...this.pointers.values()];
+      const now = Math.hypot(c.x - d.x, c.y - d.y);
+      if (now > 1) this.camera.zoom(before / now);
+      this.camera.pan((c.x + d.x - a.x - b.x) / 2, (c.y + d.y - a.y - b.y) / 2, this.size[1]);
+      if (this.gesture) this.gesture.moved = true;
+      this.look();
+      return;
+    }
+    this.pointers.set(event.pointerId, at);
+    const { gesture } = this;
+    if (!gesture) return;
+    if (!gesture.moved && Math.hypot(at.x - gesture.x, at.y - gesture.y) < DRAG) return;
+    gesture.moved = true;
+    if (gesture.pan) this.camera.pan(dx, dy, this.size[1]);
+    else this.camera.orbit(dx * 0.45, dy * 0.45);
+    this.look();
+  }
+
+  private up(event: PointerEvent, cancelled = false): void {
+    this.pointers.delete(event.pointerId);
+    if (this.dragging) {
+      this.dragging = false;
+      if (cancelled) this.cancelTransform();
+      else this.finishTransform();
+      return;
+    }
+    const { gesture } = this;
+    if (this.pointers.size) return;
+    this.gesture = null;
+    if (!gesture || gesture.moved || cancelled || gesture.button !== 0) return;
+    this.click(this.place(event), event.shiftKey || event.metaKey);
+  }
+
+  hitAt(at: { x: number; y: number }): Hit | null {
+    const [width, height] = this.size;
+    let x = at.x;
+    if (this.renderer?.look.show === "beside") {
+      if (x < width) return null;
+      x -= width;
+    }
+    const { view } = this;
+    return pick(this.store.program, view.eye, rayThrough(view, x, at.y, width, height));
+  }
+
+  private hoverAt(at: { x: number; y: number }): void {
+    const hit = this.hitAt(at);
+    this.store.hover(hit ? (this.store.program.parts[hit.part]?.id ?? null) : null);
+  }
+
+  private click(at: { x: number; y: number }, more: boolean): void {
+    const hit = this.hitAt(at);
+    if (this.tool === "measure") {
+      if (hit) this.measureAt(hit);
+      return;
+    }
+    const part = hit && this.store.program.parts[hit.part];
+    if (part) this.store.select([part.id], more);
+    else if (!more) this.store.select([]);
+  }
+
+  // Measuring
+
+  private measureAt(hit: Hit): void {
+    const { store } = this;
+    this.points.push(fromUnit(store.frame, hit.point));
+    if (this.points.length < POINTS[this.measuring]) {
+      this.drawOverlay();
+      return;
+    }
+    let { points } = this;
+    this.points = [];
+    if (this.measuring === "thickness") {
+      const other = through(store.program, hit);
+      if (!other) {
+        this.onStatus("There is no other side straight through from here.");
+        return;
+      }
+      points = [points[0], fromUnit(store.frame, other.point)];
+    }
+    const made = measure(this.measuring, points, store.size, store.root.unit);
+    this.measurements.push(made);
+    this.onStatus(`${{ distance: "Distance", thickness: "Through", angle: "Angle" }[made.kind]}: ${made.label}`);
+    this.drawOverlay();
+  }
+
+  clearMeasurements(): void {
+    this.measurements.length = 0;
+    this.points = [];
+    this.drawOverlay();
+  }
+
+  // Moving, turning, scaling
+
+  /** By the keyboard: follows the pointer until it is confirmed. */
+  beginTransform(mode: Mode, axis: Axis | null = null): void {
+    this.cancelTransform();
+    const transform = new Transform(this.store, mode, axis, mode === "scale");
+    if (!transform.possible) {
+      this.onStatus(this.store.selection.size ? "What is selected is locked." : "Select a part first: click it.");
+      return;
+    }
+    this.transform = transform;
+    this.start = { ...this.last };
+    this.onStatus(transform.status);
+    this.onTool();
+  }
+
+  private beginDrag(handle: Handle, event: PointerEvent): void {
+    event.stopPropagation();
+    event.preventDefault();
+    this.cancelTransform();
+    const transform = new Transform(this.store, handle.mode, handle.plane ? null : handle.axis, handle.local);
+    if (handle.plane && handle.axis !== null) transform.constrain(handle.axis, true);
+    if (!transform.possible) return;
+    this.transform = transform;
+    this.dragging = true;
+    this.start = this.last = this.place(event);
+    this.element.setPointerCapture(event.pointerId);
+  }
+
+  private drag(at: { x: number; y: number }, snap: boolean): void {
+    const transform = this.transform!;
+    if (transform.typed) return;
+    const { view } = this;
+    const [width, height] = this.size;
+    const centre = toUnit(this.store.frame, transform.pivot);
+    const middle = project(view, centre, width, height);
+    const pixel = (2 * view.half[1] * Math.max(middle.depth, 0.01)) / height / this.store.frame.scale;
+    const [dx, dy] = [at.x - this.start.x, at.y - this.start.y];
+    if (transform.mode === "move") {
+      let offset = add(mul(view.right, dx * pixel), mul(view.up, -dy * pixel));
+      if (transform.axis !== null) {
+        // As far along the axis as its picture moves with the pointer.
+        const along = transform.direction(transform.axis);
+        const [ax, ay] = [dot(along, view.right), -dot(along, view.up)];
+        const seen = Math.max(ax * ax + ay * ay, 0.02);
+        offset = mul(along, ((dx * ax + dy * ay) / seen) * pixel);
+      } else if (transform.plane !== null) {
+        offset = this.onPlane(transform.direction(transform.plane), centre, at) ?? offset;
+      }
+      transform.by(offset, view.back, snap);
+    } else if (transform.mode === "rotate") {
+      const angle = (p: { x: number; y: number }) => Math.atan2(-(p.y - middle.y), p.x - middle.x);
+      let turn = angle(at) - angle(this.start);
+      turn = Math.atan2(Math.sin(turn), Math.cos(turn));
+      const axis = transform.axis === null ? view.back : transform.direction(transform.axis);
+      const facing = dot(axis, view.back);
+      // A ring seen from its edge turns as the pointer goes along it.
+      if (Math.abs(facing) < 0.2) {
+        const along = [dot(axis, view.up), dot(axis, view.right)];
+        turn = (dx * along[0] + dy * along[1]) / 90;
+      } else if (facing < 0) turn = -turn;
+      transform.by([turn, 0, 0], view.back, snap);
+    } else {
+      const from = Math.max(Math.hypot(this.start.x - middle.x, this.start.y - middle.y), 12);
+      transform.by([Math.max(0.02, Math.hypot(at.x - middle.x, at.y - middle.y) / from), 0, 0], view.back, snap);
+    }
+    this.onStatus(transform.status);
+  }
+
+  /** How far the pointer has gone on the plane through `centre` (of the unit frame), in own units. */
+  private onPlane(normal: Vec3, centre: Vec3, at: { x: number; y: number }): Vec3 | null {
+    const [width, height] = this.size;
+    const { view } = this;
+    const meet = (p: { x: number; y: number }): Vec3 | null => {
+      const ray = rayThrough(view, p.x, p.y, width, height);
+      const t = dot(sub(centre, view.eye), normal) / dot(ray, normal);
+      return t > 0 && t < 60 ? add(view.eye, mul(ray, t)) : null;
+    };
+    const [a, b] = [meet(this.start), meet(at)];
+    return a && b ? mul(sub(b, a), 1 / this.store.frame.scale) : null;
+  }
+
+  /** A key while something is moved; whether it was taken. */
+  transformKey(event: KeyboardEvent): boolean {
+    const { transform } = this;
+    if (!transform) return false;
+    const axis = "xyz".indexOf(event.key.toLowerCase());
+    if (event.key === "Escape") this.cancelTransform();
+    else if (event.key === "Enter") this.finishTransform();
+    else if (axis >= 0 && event.key.length === 1) transform.constrain(axis as Axis, event.shiftKey && transform.mode === "move");
+    else if (!transform.type(event.key)) return ["g", "r", "s"].includes(event.key.toLowerCase());
+    if (this.transform) this.onStatus(transform.status);
+    return true;
+  }
+
+  private finishTransform(): void {
+    const { transform } = this;
+    this.transform = null;
+    this.dragging = false;
+    transform?.commit();
+    this.onStatus("");
+    this.onTool();
+  }
+
+  cancelTransform(): void {
+    if (!this.transform) return;
+    this.transform.cancel();
+    this.transform = null;
+    this.dragging = false;
+    this.onStatus("");
+    this.onTool();
+  }
+
+  // Over the picture
+
+  drawOverlay(): void {
+    if (!this.renderer) return;
+    const [width, height] = this.size;
+    const { view, store } = this;
+    const shift = this.renderer.look.show === "beside" ? width : 0;
+    for (const layer of [this.gizmoLayer, this.measureLayer, this.regionLayer]) layer.setAttribute("transform", `translate(${shift} 0)`);
+    if (this.tool === "move" || this.tool === "rotate" || this.tool === "scale")
+      drawGizmo(this.gizmoLayer, store, this.tool, view, width, height, (handle, event) => this.beginDrag(handle, event));
+    else this.gizmoLayer.replaceChildren();
+    this.measureLayer.replaceChildren();
+    const on = (p: Vec3) => project(view, toUnit(store.frame, p), width, height);
+    for (const { points, label, kind } of this.measurements) {
+      const at = points.map(on);
+      if (at.some((p) => p.depth <= 0)) continue;
+      this.measureLayer.append(svg("polyline", { points: at.map((p) => `${p.x},${p.y}`).join(" ") }));
+      for (const p of at) this.measureLayer.append(svg("circle", { cx: p.x, cy: p.y, r: 3 }));
+      const where = kind === "angle" ? at[1] : { x: (at[0].x + at[1].x) / 2, y: (at[0].y + at[1].y) / 2 };
+      const wide = label.length * 7.2 + 14;
+      this.measureLayer.append(
+        svg("rect", { x: where.x - wide / 2, y: where.y - 26, width: wide, height: 20, rx: 4 }),
+        svg("text", { x: where.x, y: where.y - 12 }, label),
+      );
+    }
+    for (const p of this.points.map(on)) this.measureLayer.append(svg("circle", { cx: p.x, cy: p.y, r: 4, class: "pending" }));
+  }
+}

@@ -1,0 +1,117 @@
+// Normal, colour and part where the rays have met the surface.
+uniform highp sampler2D uColours; // of parts, 256 a row
+
+mat4 shades;  // rgb in 24 bits, pushed beside the distances
+mat4 owners;
+
+void pushShade(float shade, float owner) {
+    shades[3] = vec4(shades[2].w, shades[3].xyz);
+    shades[2] = vec4(shades[1].w, shades[2].xyz);
+    shades[1] = vec4(shades[0].w, shades[1].xyz);
+    shades[0] = vec4(shade, shades[0].xyz);
+    owners[3] = vec4(owners[2].w, owners[3].xyz);
+    owners[2] = vec4(owners[1].w, owners[2].xyz);
+    owners[1] = vec4(owners[0].w, owners[1].xyz);
+    owners[0] = vec4(owner, owners[0].xyz);
+}
+
+vec2 popShade() {
+    vec2 value = vec2(shades[0].x, owners[0].x);
+    shades[0] = vec4(shades[0].yzw, shades[1].x);
+    shades[1] = vec4(shades[1].yzw, shades[2].x);
+    shades[2] = vec4(shades[2].yzw, shades[3].x);
+    owners[0] = vec4(owners[0].yzw, owners[1].x);
+    owners[1] = vec4(owners[1].yzw, owners[2].x);
+    owners[2] = vec4(owners[2].yzw, owners[3].x);
+    return value;
+}
+
+float packed(vec3 c) { return dot(floor(c * 255.0 + 0.5), vec3(1.0, 256.0, 65536.0)); }
+vec3 unpacked(float c) { return vec3(mod(c, 256.0), mod(floor(c / 256.0), 256.0), floor(c / 65536.0)) / 255.0; }
+
+// Colour of the surface at p, and in `part` the index of the part whose own surface is there.
+vec3 colourAt(vec3 p, int start, int count, out int part) {
+    float result = FAR, owner = -1.0;
+    vec3 colour = vec3(0.5);
+    int end = start + count;
+    for (int n = start; n < end; n++) {
+        int i = listed(n);
+        vec4 head = row(i, 0);
+        int code = int(head.x), action = code >> 4, operation = (code >> 2) & 3;
+        if (action == PUSH) {
+            int length_ = listed(++n);
+            if (beyond(p, i, int(head.z), result, head.y)) {
+                n += length_;
+                continue;
+            }
+            push(result);
+            pushShade(packed(colour), owner);
+            result = operation == INTERSECTION ? -FAR : FAR;
+            owner = -1.0;
+            continue;
+        }
+        float next = result, nextOwner = owner;
+        vec3 nextColour = colour;
+        if (action == POP) {
+            result = pop();
+            vec2 before = popShade();
+            colour = unpacked(before.x);
+            owner = before.y;
+        } else {
+            if (beyond(p, i, operation, result, head.y)) continue;
+            int index = int(head.z);
+            nextColour = texelFetch(uColours, ivec2(index & 255, index >> 8), 0).rgb;
+            next = leaf(p, i, (code & 2) != 0);
+            nextOwner = head.z;
+        }
+        // Positive where the next one's surface is the nearer to what is seen.
+        float lead = operation == UNION ? result - next : operation == SUBTRACT ? -next - result : next - result;
+        float weight = head.y > 1e-9 ? clamp(0.5 + 0.5 * lead / head.y, 0.0, 1.0) : (lead > 0.0 ? 1.0 : 0.0);
+        colour = mix(colour, nextColour, weight);
+        result = fold(operation, result, next, head.y);
+        if (weight > 0.5) owner = nextOwner;
+    }
+    part = int(owner);
+    return colour;
+}
+
+uniform highp usampler2D uTiles;
+uniform highp usampler2D uMarched;  // distances along the rays; 0 where nothing was met
+uniform vec3 uEye;
+uniform mat3 uAxes;
+uniform vec4 uPlane;
+uniform vec2 uSize;
+uniform vec2 uJitter;
+uniform vec2 uTileCount;
+
+layout(location = 0) out uvec4 result;  // distance along the ray, normal, colour, part + 1
+
+vec2 octahedral(vec3 n) {
+    n /= abs(n.x) + abs(n.y) + abs(n.z);
+    vec2 folded = (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0);
+    return n.z < 0.0 ? folded : n.xy;
+}
+
+void main() {
+    result = uvec4(0u);
+    float t = uintBitsToFloat(texelFetch(uMarched, ivec2(gl_FragCoord.xy), 0).x);
+    if (t == 0.0) return;
+    vec2 at = (gl_FragCoord.xy + uJitter) / uSize;
+    uvec4 tile = texelFetch(uTiles, ivec2(min(gl_FragCoord.xy / uSize * uTileCount, uTileCount - 1.0)), 0);
+    int start = int(tile.x), count = int(tile.y & 0xffffu);
+    vec3 ray = normalize(uAxes * vec3((at * 2.0 - 1.0) * uPlane.xy, -1.0));
+    float size = 2.0 * uPlane.y / uSize.y;
+    vec3 p = uEye + t * ray;
+    float e = max(0.5 * size * t, 2e-5);
+    // One loop, so that the field is in the shader once.
+    vec3 normal = vec3(0.0);
+    for (int i = 0; i < 4; i++) {
+        vec3 k = vec3(i == 0 || i == 3 ? 1.0 : -1.0, i == 2 || i == 3 ? 1.0 : -1.0, i == 1 || i == 3 ? 1.0 : -1.0);
+        normal += k * field(p + e * k, start, count, false);
+    }
+    normal = normalize(normal);
+    int part;
+    vec3 colour = colourAt(p, start, count, part);
+    uvec3 c = uvec3(colour * 255.0 + 0.5);
+    result = uvec4(floatBitsToUint(t), packSnorm2x16(octahedral(normal)), c.x | c.y << 8 | c.z << 16, uint(part + 1));
+}

@@ -1,0 +1,99 @@
+"""One browser for all tests of the page. Without Debian's chromium they are skipped."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from partwright.assembly import Assembly
+from partwright.export import export
+
+# Drawn by the processor, and with no network but what a test allows.
+ARGUMENTS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+]
+PATIENCE = 60.0  # seconds
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip(
+        "playwright.sync_api", reason="playwright is not installed: pip install playwright"
+    )
+    path = os.environ.get("PARTWRIGHT_CHROMIUM") or shutil.which("chromium")
+    if path is None:
+        pytest.skip("chromium is not installed (Debian: apt-get install chromium)")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+class Page:
+    """A page of the studio, and the errors that it met."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("request", lambda request: self.requests.append(request.url))
+
+    def open(self, url: str) -> Page:
+        self.page.goto(url)
+        self.wait("() => !!window.partwright && (partwright.viewport.renderer?.ready ?? false)")
+        return self
+
+    def ask(self, script: str, argument: Any = None) -> Any:
+        return self.page.evaluate(script, argument)
+
+    def wait(self, script: str, argument: Any = None) -> None:
+        """Until the script gives true. The page allows no code from strings, so this asks from outside."""
+        end = time.monotonic() + PATIENCE
+        while not self.page.evaluate(script, argument):
+            assert not self.errors, self.errors
+            assert time.monotonic() < end, f"the page never said yes to {script}"
+            time.sleep(0.02)
+
+    def settle(self) -> None:
+        self.wait("() => partwright.viewport.renderer.settled")
+
+    def assembly(self) -> str:
+        """The text of the file that the page would save."""
+        return str(self.ask("() => partwright.text()"))
+
+
+@pytest.fixture
+def new_page(browser: Any) -> Iterator[Callable[..., Page]]:
+    contexts = []
+
+    def make(width: int = 900, height: int = 400, **options: Any) -> Page:
+        context = browser.new_context(viewport={"width": width, "height": height}, **options)
+        contexts.append(context)
+        return Page(context.new_page())
+
+    yield make
+    for context in contexts:
+        context.close()
+
+
+@pytest.fixture
+def shared(new_page: Callable[..., Page], tmp_path: Path) -> Callable[..., Page]:
+    """Opens an assembly as a file that has everything in it."""
+
+    def make(assembly: Assembly, **options: Any) -> Page:
+        path = tmp_path / "shared.html"
+        export(assembly, path)
+        return new_page(**options).open(path.as_uri())
+
+    return make
