@@ -185,20 +185,42 @@ def _remembered(model: Model) -> Model:
 
 def _model(about: dict[str, Any], tensors: dict[str, Tensor]) -> Model:
     config = config_from(about["config"])
-    parts = tuple(about["parts"])
-    decoder = make_decoder(len(parts), config.decoder)
+    parts, shapes = tuple(about["parts"]), tuple(about["shapes"])
+    latents, present = tensors["latents"].float(), tensors["present"].bool()
+    poses, average = (
+        PoseTensors(*(tensors[f"{key}.{k}"] for k in PoseTensors._fields))
+        for key in ("poses", "average_pose")
+    )
+    decoded = (len(shapes), len(parts))
+    _check_shape("latents", latents, (*decoded, config.decoder.latent))
+    _check_shape("present", present, decoded)
+    for name, width in zip(PoseTensors._fields, (3, 4, 3), strict=True):
+        _check_shape(f"poses.{name}", getattr(poses, name), (*decoded, width))
+        _check_shape(f"average_pose.{name}", getattr(average, name), (len(parts), width))
     prefix = "decoder."
-    decoder.load_state_dict({k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)})
-    decoder.requires_grad_(False).eval()
-    latents = tensors["latents"].float()
-    if latents.shape[1:] != (len(parts), config.decoder.latent):
-        raise ValueError(f"latents of shape {tuple(latents.shape)}")
-    stored = (PoseTensors(*(tensors[f"{key}.{k}"] for k in PoseTensors._fields))
-              for key in ("poses", "average_pose"))  # fmt: skip
-    poses, average = stored
-    shapes, lipschitz = tuple(about["shapes"]), float(about["slope"])
-    present = tensors["present"].bool()
-    return Model(config, parts, decoder, latents, poses, present, average, shapes, lipschitz)
+    weights = {k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)}
+    decoder = _decoder_of(len(parts), config.decoder, weights)
+    return Model(config, parts, decoder, latents, poses, present, average, shapes, float(about["slope"]))
+
+
+def _decoder_of(parts: int, settings: DecoderSettings, weights: dict[str, Tensor]) -> nn.Module:
+    """The decoder with these weights. What its settings claim is compared with them before it is made."""
+    if settings.layers > len(weights):
+        raise ValueError(f"{settings.layers} layers are said, and {len(weights)} tensors are there")
+    with torch.device("meta"):  # shapes without memory
+        claimed = make_decoder(parts, settings).state_dict()
+    for name in claimed.keys() & weights.keys():
+        _check_shape(name, weights[name], tuple(claimed[name].shape))
+    if claimed.keys() != weights.keys():
+        raise ValueError(f"tensors are missing or too many: {sorted(claimed.keys() ^ weights.keys())!s:.80}")
+    decoder = make_decoder(parts, settings)
+    decoder.load_state_dict(weights)
+    return decoder.requires_grad_(False).eval()
+
+
+def _check_shape(name: str, tensor: Tensor, shape: tuple[int, ...]) -> None:
+    if tuple(tensor.shape) != shape:
+        raise ValueError(f"{name} is of shape {tuple(tensor.shape)}; the model's settings say {shape}")
 
 
 def about_file(data: bytes) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import torch
 
 from partwright.datasets.prepared import PreparedFamily, write_family
 from partwright.errors import FamilyError, ModelError, SettingError
+from partwright.partsdf import model as models
 from partwright.partsdf.config import config_from
 from partwright.partsdf.data import load_samples
 from partwright.partsdf.logs import read_log
@@ -158,6 +160,27 @@ def test_families_that_teach_nothing_are_refused_by_name(lamps: PreparedFamily, 
     hollow = replace(lamp("hollow", 3), sdf=np.abs(lamp("hollow", 3).sdf))
     with pytest.raises(FamilyError, match="hollow: no sample lies inside"):
         trained("hollow", [(lamp("a", 1), "train"), (hollow, "train")])
+
+
+@pytest.mark.parametrize(
+    ("claim", "value"), [("layers", 1 << 20), ("width", 1 << 30), ("latent", 1 << 30), ("octaves", 1 << 26)]
+)
+def test_a_model_that_claims_to_be_huge_is_refused_before_there_is_room_for_it(
+    model: Model, claim: str, value: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = model.to_bytes()
+    size = int.from_bytes(data[:8], "little")
+    header = json.loads(data[8 : 8 + size])
+    about = json.loads(header["__metadata__"]["partwright"])
+    about["config"]["decoder"][claim] = value
+    header["__metadata__"]["partwright"] = json.dumps(about)
+    text = json.dumps(header).encode()
+    made = []
+    make = models.make_decoder
+    monkeypatch.setattr(models, "make_decoder", lambda *given: made.append(make(*given)) or made[-1])
+    with pytest.raises(ModelError, match=r"the model's settings say|layers are said"):
+        model_from_bytes(len(text).to_bytes(8, "little") + text + data[8 + size :], "x")
+    assert all(tensor.is_meta for decoder in made for tensor in decoder.state_dict().values())
 
 
 def test_models_are_found_by_name_and_hash(
