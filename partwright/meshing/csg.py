@@ -18,6 +18,7 @@ from partwright.errors import NoSurfaceError, ParameterError
 from partwright.fields import Field, Solid, normal_form
 from partwright.meshing.named_solids import named_solid
 from partwright.meshing.quadric_solids import half_space, quadric_solid
+from partwright.meshing.small_components import components
 
 if TYPE_CHECKING:
     import trimesh
@@ -146,7 +147,10 @@ def _height(node: Node) -> int:
 
 
 def _topology(solid: Manifold) -> tuple[int, int]:
-    return solid.genus(), len(solid.decompose())
+    if solid.is_empty():
+        return 0, 0
+    mesh = solid.to_mesh()  # `decompose` would tell, in time that grows with the square of the answer
+    return solid.genus(), components(np.asarray(mesh.tri_verts), len(mesh.vert_properties))[0]
 
 
 def _larger(solid: Manifold, nudge: float) -> Manifold:

@@ -7,6 +7,17 @@ import numpy as np
 _SMALLEST = 3.0  # cells; a component that is shorter along each axis is small
 
 
+def components(faces: np.ndarray, count: int) -> tuple[int, np.ndarray]:
+    """How many components faces (F, 3) between `count` vertices V make, and which each vertex (V,) is of."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    links = coo_array((np.ones(len(start), dtype=bool), (start, end)), shape=(count, count))
+    pieces, piece = connected_components(links, directed=False)
+    return int(pieces), piece
+
+
 def without_small_components(
     vertices: np.ndarray, faces: np.ndarray, cell: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -14,12 +25,7 @@ def without_small_components(
 
     Where all are that small, nothing is dropped.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    links = coo_array((np.ones(len(start), dtype=bool), (start, end)), shape=(len(vertices),) * 2)
-    pieces, piece = connected_components(links, directed=False)
+    pieces, piece = components(faces, len(vertices))
     order = np.argsort(piece, kind="stable")
     first = np.searchsorted(piece[order], np.arange(pieces))
     size = np.maximum.reduceat(vertices[order], first) - np.minimum.reduceat(vertices[order], first)

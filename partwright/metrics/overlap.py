@@ -10,6 +10,7 @@ from partwright.metrics.frames import in_own_frame
 from partwright.metrics.metric import Metric
 
 RESOLUTION = 128
+_AT_ONCE = 1 << 25  # distances of one part at one point
 
 
 def overlap(assembly: Assembly, resolution: int = RESOLUTION) -> float:
@@ -31,7 +32,12 @@ def overlap(assembly: Assembly, resolution: int = RESOLUTION) -> float:
     centres = ((np.argwhere(inside) + 0.5) * (2.0 / resolution) - 1.0).astype(np.float32)
     if not len(centres):
         return 0.0
-    return float(np.mean((each(centres) < 0).sum(axis=0) >= 2))
+    at_once = max(1, _AT_ONCE // max(1, len(added.children)))  # thousands of parts would fill the memory
+    twice = sum(
+        int(((each(centres[i : i + at_once]) < 0).sum(axis=0) >= 2).sum())
+        for i in range(0, len(centres), at_once)
+    )
+    return twice / len(centres)
 
 
 def added_parts(node: Assembly | Part) -> list[Assembly | Part]:

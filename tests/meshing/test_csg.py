@@ -26,6 +26,7 @@ from partwright.meshing import mesh_assembly, mesh_csg, mesh_part
 from partwright.meshing.csg import solid_of
 from partwright.meshing.named_solids import named_solid
 from partwright.meshing.quadric_solids import quadric_solid
+from partwright.meshing.small_components import components
 
 PI = math.pi
 TURN = Similarity(2.0, (0.9, 0.1, -0.3, 0.2), (4.0, -1.0, 2.0))
@@ -193,3 +194,13 @@ def test_what_touches_has_no_slit_nor_skin_however_it_is_turned(name: str) -> No
         assert solid.volume() == pytest.approx(volume, rel=2e-3)
         mesh = mesh_csg(whole.transformed(pose))
         assert mesh.is_watertight
+
+
+def test_components_are_counted_as_by_taking_the_solid_apart() -> None:
+    rng = np.random.default_rng(0)
+    cubes = [Manifold.cube((0.2, 0.2, 0.2)).translate(tuple(rng.uniform(0, 1, 3))) for _ in range(40)]
+    for some in (cubes[:1], cubes[:12], cubes):
+        solid = Manifold.batch_boolean(some, OpType.Add)
+        mesh = solid.to_mesh()
+        count, piece = components(np.asarray(mesh.tri_verts), len(mesh.vert_properties))
+        assert count == len(solid.decompose()) == len(np.unique(piece))
