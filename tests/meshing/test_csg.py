@@ -197,6 +197,8 @@ def test_what_touches_has_no_slit_nor_skin_however_it_is_turned(name: str) -> No
 
 
 def test_components_are_counted_as_by_taking_the_solid_apart() -> None:
+    from manifold3d import Manifold, OpType
+
     rng = np.random.default_rng(0)
     cubes = [Manifold.cube((0.2, 0.2, 0.2)).translate(tuple(rng.uniform(0, 1, 3))) for _ in range(40)]
     for some in (cubes[:1], cubes[:12], cubes):
