@@ -117,6 +117,10 @@ class NothingToCleanError(PartwrightError):
     """Every number of an assembly is plain already, and every relation between them holds."""
 
 
+class MessageError(PartwrightError):
+    """What a page sent to the studio's server is none of the messages that they share."""
+
+
 class CancelledError(PartwrightError):
     """A run was cancelled before there was anything to keep."""
 

@@ -4,6 +4,7 @@ import "./style.css";
 import { Store } from "./model/store";
 import { readAssembly } from "./model/tree";
 import { App } from "./ui/app";
+import { empty, Live } from "./ui/live";
 import { remember } from "./ui/remember";
 
 const data = document.getElementById("assembly")?.textContent;
@@ -16,10 +17,13 @@ function complain(text: string): void {
 }
 
 try {
-  if (!data) throw new Error("This page holds no assembly. Write one with: partwright export ASSEMBLY -o FILE.html");
-  const store = new Store(readAssembly(data));
+  const server = document.getElementById("studio")?.textContent;
+  if (!data && !server)
+    throw new Error("This page holds no assembly. Write one with: partwright export ASSEMBLY -o FILE.html");
+  const store = new Store(data ? readAssembly(data) : empty({ unit: "", up: "", input: "" }));
   const app = new App(store);
-  remember(store, data);
+  if (server) Object.assign(window, { live: new Live(store, app, (JSON.parse(server) as { socket: string }).socket) });
+  else remember(store, data!);
   // For scripts and tests: what the page holds.
   Object.assign(window, { partwright: app });
 } catch (error) {

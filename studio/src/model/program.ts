@@ -109,10 +109,12 @@ export function partBox(part: Part): Box {
 }
 
 /** A frame in which all that ends is centred, with a longest side of 1.8. */
-export function unitFrame(root: Group): Frame {
+/** extra: what is to lie in the frame as well. */
+export function unitFrame(root: Group, extra: Box | null = null): Frame {
   const boxes = [...leaves(root)].map(partBox).filter(isFinite3);
   let box = boxes.reduce(joinBoxes, EMPTY);
-  if (boxes.length < [...leaves(root)].length) {
+  if (extra) box = extra;
+  else if (boxes.length < [...leaves(root)].length) {
     const rough = roughBox(root);
     if (rough) box = boxes.length ? sharedBoxOr(joinBoxes(box, rough), rough) : rough;
   }
@@ -337,7 +339,13 @@ function setHulls(program: Program, scope: Scope, infinite: boolean): void {
   scope.hull = box && corners(grownBox(isEmpty(box) ? [middle(box), middle(box)] : box, blends / 4));
 }
 
+const UNIT: Box = [
+  [-0.9, -0.9, -0.9],
+  [0.9, 0.9, 0.9],
+];
+
 function boxOf(scope: Scope): Box {
+  if (!scope.children.length && scope.first !== scope.last) return UNIT; // nothing is there yet
   if (scope.hull) return scope.hull.reduce<Box>((b, p) => joinBoxes(b, [p, p]), EMPTY);
   return [
     [-4, -4, -4],

@@ -3,13 +3,14 @@
 import { paletteColour } from "./palette";
 import { type Frame, type Program, compile, unitFrame } from "./program";
 import { type Group, type Node, type Part, edited, find, isGroup, leaves } from "./tree";
+import type { Box } from "./vectors";
 
 /** As many groups as the shader can keep open. */
 const DEEPEST = 16;
 
 export type Event = "document" | "selection" | "hover" | "view" | "history";
 
-interface Step {
+export interface Step {
   label: string;
   root: Group;
 }
@@ -24,6 +25,10 @@ export class Store {
   hovered: number | null = null;
   snapping = false;
   /** Where the document stands that was saved last. */
+  /** What the picture has to hold besides the parts, in own units. */
+  frameBox: Box | null = null;
+  /** Told of each step of the history, for whoever keeps it. */
+  onStep: (action: "commit" | "undo" | "redo", label: string) => void = () => {};
   private past: Step[] = [];
   private future: Step[] = [];
   private before: Group | null = null;
@@ -46,9 +51,26 @@ export class Store {
     for (const event of events) for (const listener of this.listeners.get(event) ?? []) listener();
   }
 
+  /** The tree with the ids of the present one's parts of the same names: they stay selected, hidden and locked. */
+  named(root: Group): Group {
+    const ids = new Map([...leaves(this.before ?? this.root)].map((part) => [part.name, part.id]));
+    return edited(root, (node) => (isGroup(node) ? node : { ...node, id: ids.get(node.name) ?? node.id })) ?? root;
+  }
+
+  /** What somebody else holds: in place of all that is here, the history too. */
+  adopt(root: Group, past: Step[], future: Step[]): void {
+    this.before = null;
+    const named = this.named(root);
+    this.past = past;
+    this.future = future;
+    this.frame = unitFrame(named, this.frameBox);
+    this.show(named);
+    this.tell("document", "history", "selection", "view");
+  }
+
   /** Another assembly in place of this one: the history stays, so that it can be taken back. */
   open(root: Group, label: string): void {
-    const frame = unitFrame(root);
+    const frame = unitFrame(root, this.frameBox);
     this.commit(root, label);
     this.frame = frame;
     this.show(this.root);
@@ -97,6 +119,7 @@ export class Store {
     }
     this.past.push({ label, root: from });
     this.future = [];
+    this.onStep("commit", label);
     this.tell("document", "history", "selection");
   }
 
@@ -134,6 +157,7 @@ export class Store {
     if (!step) return;
     to.push({ label: step.label, root: this.root });
     this.show(step.root);
+    this.onStep(from === this.past ? "undo" : "redo", step.label);
     this.tell("document", "history", "selection");
   }
 
@@ -208,7 +232,16 @@ export class Store {
   }
 
   private colourAll(): void {
-    for (const part of leaves(this.root)) if (!this.colours.has(part.id)) this.colours.set(part.id, this.colours.size);
+    // A new part takes the first colour that none of the others has; those keep theirs.
+    const parts = [...leaves(this.root)];
+    const taken = new Set(parts.map((part) => this.colours.get(part.id)));
+    let next = 0;
+    for (const part of parts) {
+      if (this.colours.has(part.id)) continue;
+      while (taken.has(next)) next++;
+      taken.add(next);
+      this.colours.set(part.id, next);
+    }
   }
 
   colourOf(part: Part): string {

@@ -73,9 +73,12 @@ function numbers(value: Value | undefined, count: number, otherwise: number[], p
 function readMove(data: Json, place: string): Move {
   return {
     translation: numbers(data.translation, 3, [0, 0, 0], `${place}.translation`) as Vec3,
-    rotation: normalised(numbers(data.rotation, 4, NO_ROTATION, `${place}.rotation`) as Quat),
+    rotation: unitQuaternion(numbers(data.rotation, 4, NO_ROTATION, `${place}.rotation`) as Quat),
   };
 }
+
+/** One that is of unit length already is kept to the bit, as the package does. */
+const unitQuaternion = (q: Quat): Quat => (Math.abs(Math.hypot(...q) - 1) < 1e-12 ? q : normalised(q));
 
 function readPart(data: Json, place: string): Part {
   const field = data.field as FieldData | undefined;

@@ -27,6 +27,10 @@ export class App {
   readonly side = h("aside", { class: "panel left", "data-tab": "parts" });
   /** What else the top bar offers to download. */
   moreDownloads: () => (Button | null)[] = () => [];
+  /** Where the top bar takes further buttons. */
+  readonly actions = h("div", { class: "group" });
+  private tabs = h("nav", { class: "tabs", role: "tablist" });
+  private main = h("main", { "data-tab": "parts" });
   private measureBar = h("div", { class: "measure-bar float", hidden: true });
   private bar = h("header", { class: "top" });
 
@@ -65,6 +69,7 @@ export class App {
       h("span", { class: "space" }),
       menu("View", "frame", () => this.views()),
       menu("Download", "download", () => this.downloads()),
+      this.actions,
       button({ icon: "theme", label: "Light or dark", run: () => this.theme(this.dark ? "light" : "dark") }),
       button({ icon: "help", label: "Help", key: "?", run: () => this.help() }),
     );
@@ -97,20 +102,26 @@ export class App {
     viewport.element.append(tools, this.measureBar, this.status);
 
     // On a narrow screen the panels share the place below the picture.
-    const tabs = h("nav", { class: "tabs", role: "tablist" });
-    const main = h("main", { "data-tab": "parts" }, this.side, viewport.element, right);
-    for (const [tab, label] of [
-      ["parts", "Parts"],
-      ["numbers", "Numbers"],
-    ]) {
-      const one = h("button", { type: "button", role: "tab", "aria-selected": String(tab === "parts"), "data-for": tab }, label);
-      one.addEventListener("click", () => {
-        main.dataset.tab = tab;
-        for (const other of tabs.children) other.setAttribute("aria-selected", String(other === one));
-      });
-      tabs.append(one);
-    }
-    document.body.append(this.bar, main, tabs);
+    this.main.append(this.side, viewport.element, right);
+    this.addTab("parts", "Parts");
+    this.addTab("numbers", "Numbers");
+    document.body.append(this.bar, this.main, this.tabs);
+  }
+
+  /** On a narrow screen; on a wide one all panels are there. */
+  addTab(tab: string, label: string, content?: HTMLElement): void {
+    content?.setAttribute("data-part", tab);
+    const one = h("button", { type: "button", role: "tab", "aria-selected": String(tab === this.main.dataset.tab) }, label);
+    one.addEventListener("click", () => {
+      this.main.dataset.tab = tab;
+      for (const other of this.tabs.children) other.setAttribute("aria-selected", String(other === one));
+    });
+    this.tabs.append(one);
+  }
+
+  /** The whole assembly in the picture, after another one has come. */
+  begin(): void {
+    this.viewport.begin();
   }
 
   private fillMeasureBar(): void {

@@ -51,6 +51,8 @@ export class Inspector {
 
   private whole(): HTMLElement[] {
     const { store } = this;
+    if (!store.program.parts.length)
+      return [h("h2", {}, store.root.name || "Nothing yet"), h("p", { class: "hint" }, "Fit the shape, or add a part by hand.")];
     const box = [...leaves(store.root)].map(partBox).filter(isFinite3).reduce(joinBoxes, EMPTY);
     const all: [Vec3, Vec3] = isFinite3(box) ? box : [fromUnit(store.frame, store.program.box[0]), fromUnit(store.frame, store.program.box[1])];
     const unit = store.root.unit ?? "";

@@ -69,10 +69,25 @@ export class Viewport {
   }
 
   begin(): void {
+    this.camera.stand(this.store.root.up);
     this.resize();
     this.frameAll();
     this.upload();
     this.ground();
+    if (this.renderer && !this.renderer.ready) void this.standIn();
+  }
+
+  /** A coarse mesh, until the shader is compiled. */
+  private async standIn(): Promise<void> {
+    const { store, renderer } = this;
+    if (!store.program.parts.length) return;
+    const { mesh } = await import("../mesh/mesher");
+    const surface = await mesh(store, 48).catch(() => null);
+    if (!surface || !renderer || renderer.ready) return;
+    const { places, normals, triangles } = surface;
+    const colours = new Uint8Array((places.length / 3) * 4);
+    for (let i = 0; i < places.length / 3; i++) colours.set([...surface.colours.subarray(3 * i, 3 * i + 3), surface.owners[i] + 1], 4 * i);
+    renderer.setMesh("standIn", { places, normals, colours, triangles });
   }
 
   private get size(): [number, number] {
@@ -300,6 +315,33 @@ export class Viewport {
     this.measurements.push(made);
     this.onStatus(`${{ distance: "Distance", thickness: "Through", angle: "Angle" }[made.kind]}: ${made.label}`);
     this.drawOverlay();
+  }
+
+  private wipe: HTMLElement | null = null;
+
+  /** A line across the picture that is dragged: the input on its left, the parts on its right. */
+  wipeHandle(on: boolean): void {
+    this.wipe?.remove();
+    this.wipe = null;
+    if (!on || !this.renderer) return;
+    const handle = h("div", { class: "wipe float", role: "slider", "aria-label": "Wipe between input and parts", tabindex: "0" });
+    const place = (share: number) => {
+      const at = Math.max(0.02, Math.min(0.98, share));
+      handle.style.left = `${at * 100}%`;
+      handle.setAttribute("aria-valuenow", String(Math.round(at * 100)));
+      this.renderer!.setLook({ wipe: at });
+    };
+    handle.addEventListener("pointerdown", (event) => handle.setPointerCapture(event.pointerId));
+    handle.addEventListener("pointermove", (event) => {
+      if (event.buttons) place(this.place(event).x / this.element.clientWidth);
+    });
+    handle.addEventListener("keydown", (event) => {
+      const by = { ArrowLeft: -0.05, ArrowRight: 0.05 }[event.key];
+      if (by) place(this.renderer!.look.wipe + by);
+    });
+    place(this.renderer.look.wipe);
+    this.wipe = handle;
+    this.element.append(handle);
   }
 
   clearMeasurements(): void {

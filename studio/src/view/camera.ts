@@ -21,11 +21,16 @@ export class Camera {
   elevation = 24;
   target: Vec3 = [0, 0, 0];
   distance = 5;
-  readonly above: Vec3;
-  private readonly front: Vec3;
-  private readonly side: Vec3;
+  above: Vec3 = [0, 0, 1];
+  private front: Vec3 = FRONTS.z;
+  private side: Vec3 = [1, 0, 0];
 
   constructor(up: string | null) {
+    this.stand(up);
+  }
+
+  /** With this axis up. */
+  stand(up: string | null): void {
     const axis = up?.replace("-", "") ?? "z";
     this.above = [0, 0, 0];
     this.above["xyz".indexOf(axis in FRONTS ? axis : "z")] = up?.startsWith("-") ? -1 : 1;

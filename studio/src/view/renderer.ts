@@ -24,6 +24,7 @@ const JITTERS: [number, number][] = [
   [0.375, -0.125],
 ];
 const MOVING_MS = 40; // what a frame may take while something moves
+const BLOCKS = 2; // a side of a tile: rays of one block start together
 const BAND_MS = 60; // what is marched before the page gets its turn
 const MOST_PIXELS = 2_000_000; // of pictures that are smoothed
 
@@ -104,6 +105,7 @@ export class Renderer {
   private textures = new Map<string, WebGLTexture>();
   private program: Program | null = null;
   private view: View | null = null;
+  private cones: Target | null = null;
   private tileCount: [number, number] = [1, 1];
   private meshes: { input: Uploaded | null; standIn: Uploaded | null } = { input: null, standIn: null };
   private quick: Target | null = null;
@@ -111,6 +113,7 @@ export class Renderer {
   private complete = 0; // of `full`
   private meshTarget: Target | null = null;
   private meshDirty = true;
+  private meshStands = false; // whether what was drawn last stands in for the parts
   private tilesDirty = true;
   private dirty = true; // what the rays find has changed
   private marked = false; // whether anything is selected or hovered
@@ -139,7 +142,7 @@ export class Renderer {
     this.shaders.clear();
     this.textures.clear();
     this.meshes = { input: null, standIn: null };
-    this.quick = this.meshTarget = this.nothing = null;
+    this.quick = this.meshTarget = this.nothing = this.cones = null;
     this.marched = { quick: null, full: null };
     this.full = [];
     this.complete = 0;
@@ -392,10 +395,35 @@ export class Renderer {
     });
   }
 
+  /** How far blocks of pixels can go at once: what the rays then begin with. */
+  private marchCones(): void {
+    const { gl } = this;
+    const [width, height] = this.tileCount.map((n) => n * BLOCKS);
+    this.cones = this.target(this.cones, width, height, gl.R32UI);
+    const unused = this.empty();
+    const shader = this.use("march");
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.cones.frame);
+    gl.disable(gl.SCISSOR_TEST);
+    gl.viewport(0, 0, width, height);
+    this.field(shader);
+    this.texture(shader, "uTiles", 3);
+    this.bind(shader, "uBegin", 4, unused.texture);
+    this.camera(shader);
+    gl.uniform2f(shader.at("uSize"), width, height);
+    gl.uniform2f(shader.at("uJitter"), 0, 0);
+    gl.uniform2f(shader.at("uTileCount"), ...this.tileCount);
+    // Half a block's diagonal, and a pixel for those that are smoothed.
+    const { half } = this.view!;
+    const radius = Math.hypot(half[0] / width, half[1] / height) + (2 * half[1]) / this.canvas.height;
+    gl.uniform1f(shader.at("uCone"), radius);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
   private marchRows(target: Target, jitter: [number, number], from: number, to: number, pass: "quick" | "full"): void {
     const { gl } = this;
     const marched = this.target(this.marched[pass], target.width, target.height, gl.R32UI);
     this.marched[pass] = marched;
+    if (from === 0) this.marchCones();
     gl.viewport(0, 0, target.width, target.height);
     gl.enable(gl.SCISSOR_TEST);
     gl.scissor(0, from, target.width, to - from);
@@ -412,6 +440,8 @@ export class Renderer {
       gl.uniform2f(shader.at("uJitter"), ...jitter);
       gl.uniform2f(shader.at("uTileCount"), ...this.tileCount);
       if (name === "shade") this.bind(shader, "uMarched", 4, marched.texture);
+      else this.bind(shader, "uBegin", 4, this.cones!.texture);
+      if (name === "march") gl.uniform1f(shader.at("uCone"), 0);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     }
     gl.disable(gl.SCISSOR_TEST);
@@ -437,6 +467,21 @@ export class Renderer {
     this.marchRows(target, [0, 0], 0, target.height, "quick");
     this.tilesDirty = true;
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
+  }
+
+  /** A whole picture from numbers to pixels, at once; milliseconds. For measuring. */
+  frameNow(): number {
+    const began = performance.now();
+    this.setProgram(this.program!);
+    const target = this.target(null, this.marchWidth, this.canvas.height);
+    this.updateTiles();
+    this.marchRows(target, [0, 0], 0, target.height, "quick");
+    this.gl.bindFramebuffer(this.gl.FRAMEBUFFER, null);
+    this.compose([target], 0, 0, this.canvas.width);
+    const pixel = new Uint8Array(4);
+    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, pixel);
+    this.drop(target);
+    return performance.now() - began;
   }
 
   private finish(job: Job): void {
@@ -488,17 +533,17 @@ export class Renderer {
     const known = this.complete ? this.full.slice(0, this.complete) : this.quick ? [this.quick] : [];
     const standing = !this.ready || !known.length;
     const { show } = this.look;
-    if ((standing || show !== "parts") && this.meshDirty) this.drawMesh(standing);
+    if ((standing || show !== "parts") && (this.meshDirty || this.meshStands !== standing)) this.drawMesh(standing);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     const { width, height } = this.canvas;
     gl.viewport(0, 0, width, height);
     if (show === "beside") {
       const half = Math.floor(width / 2);
-      this.compose(this.meshes.input ? [this.meshTarget!] : [], 1, 0, half);
+      this.compose([], 1, 0, half);
       this.compose(known, standing ? 1 : 0, half, half);
     } else {
       const code = standing ? 1 : { parts: 0, input: 1, both: 2, wipe: 3 }[show];
-      this.compose(standing ? [this.meshTarget!] : known, code, 0, width);
+      this.compose(known, code, 0, width);
     }
     this.pictures++;
     this.onPicture();
@@ -530,7 +575,7 @@ export class Renderer {
       gl.blendColor(0, 0, 0, 1 / (i + 1));
       gl.uniform2f(shader.at("uJitter"), ...JITTERS[i]);
       this.bind(shader, "uField", 0, target.texture);
-      this.bind(shader, "uMesh", 1, show === 1 ? target.texture : (this.meshTarget ?? target).texture);
+      this.bind(shader, "uMesh", 1, (this.meshTarget ?? this.empty()).texture);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     });
     gl.disable(gl.BLEND);
@@ -546,6 +591,7 @@ export class Renderer {
   private drawMesh(standIn: boolean): void {
     const { gl } = this;
     this.meshDirty = false;
+    this.meshStands = standIn;
     this.meshTarget = this.target(this.meshTarget, this.marchWidth, this.canvas.height, gl.RGBA32UI, true);
     const mesh = standIn ? this.meshes.standIn : this.meshes.input;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.meshTarget.frame);

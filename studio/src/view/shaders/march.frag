@@ -5,6 +5,8 @@ uniform vec4 uPlane;              // half-width and half-height of the picture a
 uniform vec2 uSize;               // of the picture, in pixels
 uniform vec2 uJitter;
 uniform vec2 uTileCount;
+uniform highp usampler2D uBegin;  // how far the cones around blocks of pixels have come
+uniform float uCone;              // radius of a block's cone at distance 1; 0 marches rays, from where their cones ended
 
 layout(location = 0) out uint result;  // distance along the ray, 0 where it meets nothing
 
@@ -20,21 +22,34 @@ void main() {
     vec2 across = (at * 2.0 - 1.0) * uPlane.xy;
     vec3 ray = normalize(uAxes * vec3(across, -1.0));
     float size = 2.0 * uPlane.y / uSize.y;  // of a pixel at distance 1
-    vec3 p;
+    if (uCone == 0.0) {
+        uint begun = texelFetch(uBegin, ivec2(gl_FragCoord.xy / uSize * vec2(textureSize(uBegin, 0))), 0).x;
+        if (begun == 0u) return;
+        t = max(t, uintBitsToFloat(begun));
+    }
     bool hit = false;
     float before = FAR;
     for (int i = 0; i < 160; i++) {
-        p = uEye + t * ray;
-        float d = field(p, start, count, false);
-        if (d < 0.25 * size * t) {
-            // Steps may have gone in a little: back to the surface.
-            t += max(d, -0.5 * before);
-            hit = true;
-            break;
+        float d = field(uEye + t * ray, start, count, false);
+        if (uCone > 0.0) {
+            // As far as no ray of the block can have met anything.
+            float room = d * relax - uCone * t;
+            if (room < 0.02 * uCone * t) {
+                hit = true;
+                break;
+            }
+            t += room / (1.0 + uCone);
+        } else {
+            if (d < 0.25 * size * t) {
+                // Steps may have gone in a little: back to the surface.
+                t += max(d, -0.5 * before);
+                hit = true;
+                break;
+            }
+            before = d;
+            t += d * relax;
         }
-        before = d;
-        t += d * relax;
         if (t > last) break;
     }
-    if (hit) result = floatBitsToUint(t);
+    if (hit || (uCone > 0.0 && t <= last)) result = floatBitsToUint(t);
 }

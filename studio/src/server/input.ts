@@ -1,0 +1,29 @@
+/** The shape that is fitted, as triangles for the picture. */
+
+import type { Store } from "../model/store";
+import type { Mesh } from "../view/renderer";
+
+export interface Triangles {
+  places: Float32Array; // own units
+  triangles: Uint32Array;
+}
+
+export async function loadInput(url: string): Promise<Triangles> {
+  const answer = await fetch(url);
+  if (!answer.ok) throw new Error(`the server answers ${answer.status}`);
+  const buffer = await answer.arrayBuffer();
+  const [vertices, faces] = new Uint32Array(buffer, 0, 2);
+  return {
+    places: new Float32Array(buffer, 8, vertices * 3),
+    triangles: new Uint32Array(buffer, 8 + vertices * 12, faces * 3),
+  };
+}
+
+/** In the unit frame, with flat normals left to the shader, which finds them where there are none. */
+export function asMesh(input: Triangles, store: Store): Mesh {
+  const { scale, offset } = store.frame;
+  const places = Float32Array.from(input.places, (v, i) => v * scale + offset[i % 3]);
+  const colours = new Uint8Array((places.length / 3) * 4);
+  for (let i = 0; i < colours.length; i += 4) colours.set([176, 180, 188, 0], i);
+  return { places, normals: new Float32Array(places.length), colours, triangles: input.triangles };
+}

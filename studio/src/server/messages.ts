@@ -1,0 +1,102 @@
+/** Made by `python -m partwright.studio.messages`: change them there. */
+
+export interface Step {
+  label: string;
+  text: string;
+}
+
+export interface Commit {
+  type: "commit";
+  base: number;
+  label: string;
+  text: string;
+}
+
+export interface Undo {
+  type: "undo";
+  base: number;
+}
+
+export interface Redo {
+  type: "redo";
+  base: number;
+}
+
+export interface Fit {
+  type: "fit";
+  mode: "new" | "only" | "except";
+  names: string[];
+  method: string;
+  quality: "draft" | "normal" | "high";
+  max_parts?: number | null;
+}
+
+export interface Stop {
+  type: "stop";
+}
+
+export interface Save {
+  type: "save";
+}
+
+export interface State {
+  type: "state";
+  revision: number;
+  text: string;
+  past: Step[];
+  future: Step[];
+  file: string;
+  saved: boolean;
+  input: string;
+  box: number[];
+  unit: string;
+  up: string;
+  methods: string[];
+  formats: string[];
+  fitting: boolean;
+  note: string;
+}
+
+export interface Accepted {
+  type: "accepted";
+  revision: number;
+}
+
+export interface Fitting {
+  type: "fitting";
+  stage: string;
+  fraction: number;
+  parts: number;
+  iou: number;
+  text: string;
+}
+
+export interface Fitted {
+  type: "fitted";
+  outcome: string;
+  parts: number;
+  iou: number;
+}
+
+export interface Scored {
+  type: "scored";
+  revision: number;
+  iou: number;
+  chamfer: number;
+  max_deviation: number;
+  deviation_95: number;
+  overlap: number;
+}
+
+export interface Saved {
+  type: "saved";
+  file: string;
+}
+
+export interface Failed {
+  type: "failed";
+  message: string;
+}
+
+export type FromPage = Commit | Undo | Redo | Fit | Stop | Save;
+export type FromServer = State | Accepted | Fitting | Fitted | Scored | Saved | Failed;

@@ -1,0 +1,214 @@
+/** The page when there is a server behind it: edits go to its journal, fits and exports come from it. */
+
+import type { Step, Store } from "../model/store";
+import { type Group, newGroup, readAssembly, writeAssembly } from "../model/tree";
+import { asMesh, loadInput, type Triangles } from "../server/input";
+import { Link } from "../server/link";
+import type { State, Step as SavedStep } from "../server/messages";
+import type { Look } from "../view/renderer";
+import type { App } from "./app";
+import { type Button, button, save, toast } from "./controls";
+import { h } from "./dom";
+import { FitPanel } from "./fit";
+
+const UNSENT = "partwright-unsent";
+
+export class Live {
+  readonly link: Link;
+  readonly fit: FitPanel;
+  private input: Triangles | null = null;
+  private inputName = "";
+  private state: State | null = null;
+  private adopting = false;
+  private banner = h("div", { class: "banner", role: "alert", hidden: true });
+  private saveButton = button({ label: "Save", key: "Ctrl S", run: () => this.save() }, true);
+
+  constructor(
+    private store: Store,
+    private app: App,
+    socket: string,
+  ) {
+    this.fit = new FitPanel(store);
+    app.side.prepend(this.fit.element);
+    app.addTab("fit", "Fit", this.fit.element);
+    document.body.prepend(this.banner);
+    app.actions.append(this.saveButton);
+    document.addEventListener("keydown", (event) => {
+      if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "s") {
+        event.preventDefault();
+        this.save();
+      }
+    });
+    const url = new URL(socket, location.href);
+    url.protocol = url.protocol.replace("http", "ws");
+    this.link = new Link(url.href);
+    this.link.onState = (state) => this.adopt(state);
+    this.link.onConnection = (there) => this.connection(there);
+    this.link.onMessage = (message) => {
+      this.fit.hear(message);
+      if (message.type === "fitting" && message.text) this.preview(message.text);
+      if (message.type === "fitted") this.store.cancel();
+      if (message.type === "failed") {
+        this.store.cancel();
+        toast(message.message, undefined, true);
+      }
+      if (message.type === "saved") toast(`Saved to ${message.file}`);
+    };
+    this.fit.onFit = (fit) => this.link.send(fit) || toast("The server is gone, so nothing can be fitted now.", undefined, true);
+    this.fit.onStop = () => this.link.send({ type: "stop" });
+    store.onStep = (action, label) => {
+      if (this.adopting) return;
+      if (action === "commit") this.link.edit({ type: "commit", label, text: writeAssembly(store.root) });
+      else this.link.edit({ type: action });
+      this.keepUnsent();
+    };
+    app.moreViews = () => this.views();
+    app.moreDownloads = () => this.downloads();
+    app.onDrop = (file) => void this.drop(file);
+    window.addEventListener("beforeunload", (event) => {
+      this.keepUnsent();
+      if (this.link.waiting.length) event.preventDefault();
+    });
+  }
+
+  private connection(there: boolean): void {
+    this.banner.hidden = there;
+    this.banner.textContent =
+      "The server is gone. Go on editing: your changes are kept in this page and sent when it is there again. Start it with the same command as before.";
+    if (!there) this.fit.offline();
+    else setTimeout(() => this.keepUnsent(), 1000);
+  }
+
+  /** Should the tab be closed before the server is back, the browser keeps what it has not got. */
+  private keepUnsent(): void {
+    try {
+      const key = `${UNSENT}-${location.pathname}`;
+      if (this.link.there || !this.link.waiting.length) localStorage.removeItem(key);
+      else localStorage.setItem(key, writeAssembly(this.store.root));
+    } catch {
+      // Private windows keep nothing; the tab itself still does.
+    }
+  }
+
+  private adopt(state: State): void {
+    const { store } = this;
+    const own = this.link.waiting.length ? writeAssembly(store.root) : this.unsent();
+    this.link.waiting.length = 0;
+    this.state = state;
+    this.adopting = true;
+    try {
+      const read = (text: string): Group => (text ? readAssembly(text) : empty(state));
+      const steps = (given: SavedStep[]): Step[] => given.map(({ label, text }) => ({ label, root: read(text) }));
+      const { box } = state;
+      const first = !store.frameBox && !store.program.parts.length;
+      store.frameBox = box.length ? [[box[0], box[1], box[2]], [box[3], box[4], box[5]]] : null;
+      store.adopt(read(state.text), steps(state.past), steps(state.future));
+      if (first || state.input !== this.inputName) this.app.begin();
+    } catch (error) {
+      toast(`The server's assembly cannot be shown: ${(error as Error).message}`, undefined, true);
+    } finally {
+      this.adopting = false;
+    }
+    if (state.note) toast(state.note);
+    if (own && own !== writeAssembly(store.root)) store.commit(readAssembly(own), "Edits of this page");
+    this.fit.show(state);
+    this.saveButton.title = `Save to ${state.file} (Ctrl S)`;
+    if (state.input !== this.inputName) void this.showInput(state);
+  }
+
+  private unsent(): string | null {
+    try {
+      const key = `${UNSENT}-${location.pathname}`;
+      const text = localStorage.getItem(key);
+      localStorage.removeItem(key);
+      return text;
+    } catch {
+      return null;
+    }
+  }
+
+  private preview(text: string): void {
+    try {
+      this.store.preview(this.store.named(readAssembly(text)));
+    } catch {
+      // A method may pass through what the page cannot show; the result is what counts.
+    }
+  }
+
+  private async showInput(state: State): Promise<void> {
+    this.inputName = state.input;
+    const { renderer } = this.app.viewport;
+    this.input = null;
+    if (state.input)
+      try {
+        this.input = await loadInput("input");
+      } catch (error) {
+        toast(`The input cannot be shown: ${(error as Error).message}`, undefined, true);
+      }
+    renderer?.setMesh("input", this.input && asMesh(this.input, this.store));
+    if (this.input && !this.store.program.parts.length) this.show("input");
+    if (!this.input) this.show("parts");
+  }
+
+  /** What stands in the picture: the parts, the input, or both. */
+  show(show: Look["show"], heat = false): void {
+    const { viewport } = this.app;
+    viewport.renderer?.setLook({ show, heat });
+    viewport.frameAll();
+    viewport.wipeHandle(show === "wipe");
+    document.body.dataset.show = show;
+  }
+
+  private views(): (Button | null)[] {
+    if (!this.input) return [];
+    return [
+      null,
+      { label: "The parts", run: () => this.show("parts") },
+      { label: "The input", run: () => this.show("input") },
+      { label: "One over the other", run: () => this.show("both") },
+      { label: "Beside one another", run: () => this.show("beside") },
+      { label: "A wipe", run: () => this.show("wipe") },
+      { label: "Error on the input", run: () => this.show("input", true) },
+    ];
+  }
+
+  private downloads(): (Button | null)[] {
+    const formats = (this.state?.formats ?? []).filter((format) => ![".json", ".glsl"].includes(format));
+    return [null, ...formats.map((format) => ({ label: "From the server", key: format, run: () => void this.download(format) }))];
+  }
+
+  private async download(format: string): Promise<void> {
+    try {
+      const answer = await fetch(`export?format=${encodeURIComponent(format)}`);
+      if (!answer.ok) throw new Error(((await answer.json()) as { message: string }).message);
+      const name = /filename\*=UTF-8''(.*)$/.exec(answer.headers.get("content-disposition") ?? "")?.[1] ?? `assembly${format}`;
+      save(await answer.arrayBuffer(), "application/octet-stream", decodeURIComponent(name));
+      const changed = Number(answer.headers.get("x-approximated"));
+      if (changed) toast(`${changed} ${changed === 1 ? "part is" : "parts are"} approximated: the format cannot hold ${changed === 1 ? "it" : "them"} exactly.`);
+    } catch (error) {
+      toast(`${format}: ${(error as Error).message}`, undefined, true);
+    }
+  }
+
+  private async drop(file: File): Promise<void> {
+    this.app.status.value = `Reading ${file.name} …`;
+    try {
+      const answer = await fetch(`drop?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+      if (!answer.ok) throw new Error(((await answer.json()) as { message: string }).message);
+    } catch (error) {
+      toast(`${file.name}: ${(error as Error).message}`, undefined, true);
+    } finally {
+      this.app.status.value = "";
+    }
+  }
+
+  private save(): void {
+    if (!this.link.send({ type: "save" })) toast("The server is gone; Download gives you the file meanwhile.", undefined, true);
+  }
+}
+
+/** Before the first fit there is nothing yet. */
+export function empty(state: { unit: string; up: string; input: string }): Group {
+  return { ...newGroup("union", [], state.input.replace(/\.[^.]*$/, "")), unit: state.unit || null, up: state.up || null };
+}
+
