@@ -22,6 +22,7 @@ from partwright.assembly.checks import (
     vector,
 )
 from partwright.assembly.description import describe
+from partwright.assembly.display import DISPLAYS
 from partwright.assembly.distance import distance, nearest_parts, part_distances, unit_similarity
 from partwright.assembly.file_text import save
 from partwright.assembly.joint import joined
@@ -288,6 +289,10 @@ class Assembly(_Common):
             OutputError: the file cannot be written.
         """
         save(self, path)
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
+        """What notebooks show: the page of the studio, and a still picture where they strip HTML."""
+        return DISPLAYS["notebook"](self)
 
     def _require(self, name: str) -> None:
         names = [part.name for part in self.parts]

@@ -231,7 +231,10 @@ def test_a_hole_is_drilled_and_measured(shared: Callable[..., Page]) -> None:
         }"""
     )
     page.page.mouse.click(*at)
-    assert page.ask("() => partwright.viewport.measurements.map((m) => m.label)") == ["⌀ 34 mm"]
+    page.page.get_by_role("button", name="Thickness").click()
+    page.page.mouse.click(*at)
+    labels = page.ask("() => partwright.viewport.measurements.map((m) => m.label)")
+    assert labels == ["⌀ 34 mm", "34 mm"]
 
 
 def test_what_is_downloaded_is_read_by_the_package(shared: Callable[..., Page], tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 import { formatLength, formatNumber } from "../model/lengths";
 import { type Vec3, distance, dot, sub, unit } from "../model/vectors";
 
-export type Measuring = "distance" | "thickness" | "angle";
+export type Measuring = "distance" | "diameter" | "thickness" | "angle";
 
 export interface Measurement {
   kind: Measuring;
@@ -12,15 +12,16 @@ export interface Measurement {
   label: string;
 }
 
-export const POINTS: Record<Measuring, number> = { distance: 2, thickness: 1, angle: 3 };
+export const POINTS: Record<Measuring, number> = { distance: 2, diameter: 1, thickness: 1, angle: 3 };
 
 export const HINTS: Record<Measuring, string> = {
   distance: "Click two points of the surface.",
-  thickness: "Click a point: the length straight through from there, which is the diameter of what is round.",
+  diameter: "Click a part: straight across it from there, hollow or not; of a hole, across the hole.",
+  thickness: "Click a point: the material straight through from there, to where it ends.",
   angle: "Click three points; the angle is at the second.",
 };
 
-/** points: as many as the kind asks for; of a thickness the point and where it comes out. */
+/** points: as many as the kind asks for; of a diameter or thickness the point and where it comes out. */
 export function measure(kind: Measuring, points: Vec3[], size: number, unitName: string | null): Measurement {
   if (kind === "angle") {
     const [a, b] = [unit(sub(points[0], points[1])), unit(sub(points[2], points[1]))];
@@ -28,5 +29,5 @@ export function measure(kind: Measuring, points: Vec3[], size: number, unitName:
     return { kind, points, label: `${formatNumber(angle, 1)}°` };
   }
   const length = formatLength(distance(points[0], points[1]), size);
-  return { kind, points, label: `${kind === "thickness" ? "⌀ " : ""}${length}${unitName ? ` ${unitName}` : ""}` };
+  return { kind, points, label: `${kind === "diameter" ? "⌀ " : ""}${length}${unitName ? ` ${unitName}` : ""}` };
 }

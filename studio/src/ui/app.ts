@@ -128,7 +128,8 @@ export class App {
     const { viewport } = this;
     const kinds: [Measuring, string][] = [
       ["distance", "Distance"],
-      ["thickness", "Diameter"],
+      ["diameter", "Diameter"],
+      ["thickness", "Thickness"],
       ["angle", "Angle"],
     ];
     const buttons = kinds.map(([kind, label]) => {

@@ -10,7 +10,7 @@ import { type Box, type Vec3, add, dot, EMPTY, isFinite3, joinBoxes, mul, sub } 
 import { partBox } from "../model/program";
 import { roundDown } from "../model/lengths";
 import { Camera, project, rayThrough, type View } from "../view/camera";
-import { type Hit, pick, through } from "../view/picking";
+import { across, type Hit, pick, through } from "../view/picking";
 import { NoWebGL, Renderer } from "../view/renderer";
 import { h, svg } from "./dom";
 
@@ -303,8 +303,8 @@ export class Viewport {
     }
     let { points } = this;
     this.points = [];
-    if (this.measuring === "thickness") {
-      const other = through(store.program, hit);
+    if (this.measuring === "thickness" || this.measuring === "diameter") {
+      const other = this.measuring === "thickness" ? through(store.program, hit) : across(store.program, hit);
       if (!other) {
         this.onStatus("There is no other side straight through from here.");
         return;
@@ -313,7 +313,7 @@ export class Viewport {
     }
     const made = measure(this.measuring, points, store.size, store.root.unit);
     this.measurements.push(made);
-    this.onStatus(`${{ distance: "Distance", thickness: "Through", angle: "Angle" }[made.kind]}: ${made.label}`);
+    this.onStatus(`${{ distance: "Distance", diameter: "Across", thickness: "Through", angle: "Angle" }[made.kind]}: ${made.label}`);
     this.drawOverlay();
   }
 

@@ -43,6 +43,24 @@ export function through(program: Program, hit: Hit): Hit | null {
   return null;
 }
 
+/** The far side of the clicked part alone, walls and holes passed over: the diameter of what is round. */
+export function across(program: Program, hit: Hit): Hit | null {
+  const own = program.instructions.flatMap(({ action, part }, i) => (action === LEAF && part === hit.part ? [i] : []));
+  const cut = own.some((i) => program.instructions[i].operation === SUBTRACT);
+  // Of what is taken away the wall is seen from inside.
+  const way = mul(hit.normal, cut ? 1 : -1);
+  const distance = (p: Vec3) => Math.min(...own.map((i) => leafDistance(program, i, ...p)));
+  const relax = own.some((i) => program.bent[i]) ? 0.7 : 1;
+  let t = 4;
+  for (let i = 0; i < 400 && t > 2e-3; i++) {
+    const p = add(hit.point, mul(way, t));
+    const d = distance(p);
+    if (d < 1e-6) return { ...hit, point: p, distance: t };
+    t -= d * relax;
+  }
+  return null;
+}
+
 /** The part whose own surface is nearest. */
 export function ownerAt(program: Program, p: Vec3): number {
   let [best, owner] = [Infinity, 0];

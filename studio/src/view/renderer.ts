@@ -530,6 +530,7 @@ export class Renderer {
   private draw(): void {
     this.stale = false;
     const { gl } = this;
+    this.empty(); // made before anything is bound
     const known = this.complete ? this.full.slice(0, this.complete) : this.quick ? [this.quick] : [];
     const standing = !this.ready || !known.length;
     const { show } = this.look;
