@@ -45,7 +45,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Run:
-    """One fit. deviation: the largest, in % of the longest side. Scores are None where the fit failed."""
+    """One fit. deviation: the largest, protrusion: that of the assembly alone, in % of the longest side.
+
+    Scores are None where the fit failed.
+    """
 
     set: str
     name: str
@@ -59,6 +62,7 @@ class Run:
     instances: float | None = None
     overlap: float | None = None
     deviation: float | None = None
+    protrusion: float | None = None
     seconds: float = 0.0
     peak_mb: float = 0.0
 
@@ -76,6 +80,7 @@ COLUMNS: dict[str, Callable[[Run], str]] = {
     "instances": lambda r: _number(r.instances, 1).removesuffix(".0"),
     "overlap": lambda r: _number(r.overlap, 3),
     "max deviation %": lambda r: _number(r.deviation, 2),
+    "sticks out %": lambda r: _number(r.protrusion, 2),
     "seconds": lambda r: _number(r.seconds, 1),
     "peak MB": lambda r: _number(r.peak_mb, 0),
     "outcome": lambda r: r.outcome,
@@ -130,19 +135,10 @@ def fit_once(entry: Entry, seed: int, options: list[str], keep: Path | None = No
             return Run(entry.set, entry.name, seed, failure, **cost)
         report = json.loads((out / "report.json").read_text(encoding="utf-8"))
     scores = report["scores"]
-    measured = {name: scores[name] for name in SCORES if name not in ("parts", "instances", "deviation")}
-    deviation = 100 * scores["max_deviation"] / longest_side(entry.path)
-    return Run(
-        entry.set, entry.name, seed, report["outcome"],
-        **measured, parts=report["parts"], instances=report["instances"], deviation=deviation, **cost,
-    )  # fmt: skip
-
-
-def longest_side(path: Path) -> float:
-    """Of the bounding box, in the file's units."""
-    import trimesh
-
-    return float(trimesh.load_scene(path).extents.max())
+    measured = {name: scores[name] for name in SCORES if name in scores}
+    measured |= {name: report[name] for name in ("parts", "instances")}
+    measured |= {name: 100 * scores[f"max_{name}_share"] for name in ("deviation", "protrusion")}
+    return Run(entry.set, entry.name, seed, report["outcome"], **measured, **cost)
 
 
 def over_seeds(runs: list[Run]) -> Run:

@@ -85,6 +85,8 @@ def _scores_table(name: str, scores: Scores, unit: str | None) -> Table:
     )
     share = _percent(scores.max_deviation_share)
     table.add_row("largest deviation", f"{scores.max_deviation:.3g}{length}, {share}, {scores.worst_place}")
+    beyond = _percent(scores.max_protrusion_share)
+    table.add_row("sticks out by", f"{scores.max_protrusion:.3g}{length}, {beyond}")
     if scores.cad is not None:
         _add_cad_rows(table, scores.cad)
     return table

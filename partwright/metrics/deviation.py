@@ -21,14 +21,19 @@ _STEP = 5e-4  # unit lengths: half of what a field's slope is measured over
 _STEPS = 3
 _NEARLY_ALL = 0.98
 _ON = 1e-4  # a point whose distance is less lies on the surface
+_APART = 0.005  # unit lengths: surfaces that are nearer need no second look
+_BESIDE = 0.01  # unit lengths from a face at which open space is looked for
+_NARROW = 0.5  # of that: a distance that is less is no open space
 _MIDDLE = 1 / 3  # of a half extent: nearer to the middle than this a direction is not named
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """maximum and quantile_95: lengths; worst_point: (3,) where the maximum is."""
+    """maximum, quantile_95: lengths, both ways. protrusion: the largest from the first surface to the second.
+    worst_point: (3,) where the maximum is."""
 
     maximum: float
+    protrusion: float
     quantile_95: float
     worst_point: np.ndarray
 
@@ -46,7 +51,8 @@ def deviation(
     points, distances = (on_first, there) if there.max() >= back.max() else (on_second, back)
     worst = int(distances.argmax())
     quantile = max(float(np.quantile(there, 0.95)), float(np.quantile(back, 0.95)))
-    return Deviation(float(distances[worst]), quantile, np.asarray(points[worst], dtype=np.float64))
+    at = np.asarray(points[worst], dtype=np.float64)
+    return Deviation(float(distances[worst]), float(there.max()), quantile, at)
 
 
 def surface_deviation(
@@ -60,22 +66,43 @@ def surface_deviation(
     """Between a shape's surface and that of a field `distance` with this mesh, all in the unit frame.
 
     result: (N, 3) points of the mesh; target: (M, 3) points of the shape's surface. The input's corners count
-    too. Where the surfaces are furthest apart the field has the word: its mesh cuts corners off.
+    too, but nothing that is `buried`. Where the surfaces are furthest apart the field has the word: its mesh
+    cuts corners off.
     """
     corners = shape.frame.to_unit(shape.vertices)
     if len(corners) > COUNT:
         corners = corners[:: -(-len(corners) // COUNT)]
     on_shape = np.concatenate([target, corners])
     to_result = MeshDistance(vertices, np.asarray(faces), np.asarray(faces), True).unsigned(on_shape)
+    apart = np.flatnonzero(to_result > _APART)
+    shown = np.delete(np.arange(len(on_shape)), apart[buried(shape.unit_distance, on_shape[apart])])
+    on_shape, to_result = on_shape[shown], to_result[shown]
     far = to_result >= np.quantile(to_result, _NEARLY_ALL)
     feet, on_it = projected(distance, on_shape[far])
     there = np.linalg.norm(feet - on_shape[far], axis=1)
     to_result[far] = np.where(on_it, np.minimum(there, to_result[far]), to_result[far])
     to_shape = shape.unit_unsigned(result)
-    result, far = result.copy(), to_shape >= np.quantile(to_shape, _NEARLY_ALL)
+    apart = np.flatnonzero(to_shape > _APART)
+    shown = np.delete(np.arange(len(result)), apart[buried(distance, result[apart])])
+    result, to_shape = result[shown], to_shape[shown]
+    far = to_shape >= np.quantile(to_shape, _NEARLY_ALL)
     result[far], _ = projected(distance, result[far])
     to_shape[far] = shape.unit_unsigned(result[far])
     return deviation(result, to_shape, on_shape, to_result)
+
+
+def buried(distance: Callable[[np.ndarray], np.ndarray], points: np.ndarray) -> np.ndarray:
+    """Which (N,) of the points (N, 3) of a solid's faces have no open space beside them, unit frame.
+
+    They lie inside, as those of shells that overlap, or in a crack narrower than 0.5 % of the longest side.
+    distance: signed, of points (n, 3).
+    """
+    if not len(points):
+        return np.zeros(0, bool)
+    corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3) / 3**0.5
+    beside = _BESIDE * np.concatenate([np.eye(3), -np.eye(3), corners])[:, None]
+    around = np.asarray(distance((points + beside).reshape(-1, 3))).reshape(len(beside), -1)
+    return np.asarray(around.max(axis=0) < _NARROW * _BESIDE)
 
 
 def projected(
@@ -115,4 +142,5 @@ def _in_input_units(pair: Comparison, length: float) -> float:
 
 
 MAX_DEVIATION = Metric(lambda pair: _in_input_units(pair, pair.deviation.maximum), "lower")
+MAX_PROTRUSION = Metric(lambda pair: _in_input_units(pair, pair.deviation.protrusion), "lower")
 DEVIATION_95 = Metric(lambda pair: _in_input_units(pair, pair.deviation.quantile_95), "lower")

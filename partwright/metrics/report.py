@@ -36,8 +36,10 @@ class Scores:
     overlap: float
     parts: int
     max_deviation: float
+    max_protrusion: float
     deviation_95: float
     max_deviation_share: float
+    max_protrusion_share: float
     deviation_95_share: float
     worst_place: str
     worst_point: tuple[float, float, float]
@@ -78,7 +80,7 @@ def evaluate(
     worst = pair.deviation.worst_point
     longest = float(shape.frame.length_from_unit(LONGEST_SIDE))
     size = shape.frame.length_to_unit(np.ptp(shape.vertices, axis=0))
-    largest, most = of("max_deviation"), of("deviation_95")
+    largest, beyond, most = (of(name) for name in ("max_deviation", "max_protrusion", "deviation_95"))
     return Scores(
         iou=of("iou"),
         bi_surface_iou=of("bi_surface_iou"),
@@ -88,8 +90,10 @@ def evaluate(
         overlap=of("overlap"),
         parts=len(assembly),
         max_deviation=largest,
+        max_protrusion=beyond,
         deviation_95=most,
         max_deviation_share=largest / longest,
+        max_protrusion_share=beyond / longest,
         deviation_95_share=most / longest,
         worst_place=place_name(worst, size, shape.up),
         worst_point=tuple(shape.frame.from_unit(worst).tolist()),

@@ -15,6 +15,7 @@ METRICS: Registry[Metric] = Registry(
         "emd": "partwright.metrics.emd:EMD",
         "overlap": "partwright.metrics.overlap:OVERLAP",
         "max_deviation": "partwright.metrics.deviation:MAX_DEVIATION",
+        "max_protrusion": "partwright.metrics.deviation:MAX_PROTRUSION",
         "deviation_95": "partwright.metrics.deviation:DEVIATION_95",
         "primitives": "partwright.metrics.complexity:PRIMITIVES",
         "convexes": "partwright.metrics.complexity:CONVEXES",

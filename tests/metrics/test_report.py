@@ -53,8 +53,37 @@ def test_the_worst_place_is_where_a_part_sticks_out() -> None:
     assert scores.worst_place == "right"
     assert scores.worst_point[0] == pytest.approx(1.3, abs=0.02)
     assert scores.max_deviation == pytest.approx(np.sqrt(1.3**2 + 2 * 0.1**2) - 1, abs=0.02)
+    assert scores.max_protrusion == scores.max_deviation
     missing = evaluate(ball(1.0) - Part(Box((1.0, 1.0, 1.0)), (0.0, 0.0, 1.0)), ball_shape(), emd=False)
     assert missing.worst_place == "upper"
+
+
+def test_what_is_left_out_does_not_stick_out() -> None:
+    two = load_shape(trimesh.util.concatenate([_block(0.0), _block(2.0)]))
+    scores = evaluate(Assembly((Part(Box((1.0, 1.0, 1.0))),)), two, emd=False)
+    assert scores.max_deviation == pytest.approx(2.0, abs=0.01)
+    assert scores.max_protrusion < 0.01
+
+
+def test_buried_faces_and_hairline_cracks_do_not_count() -> None:
+    """Blocks that run into each other by a half, and blocks with a crack between them, as one block."""
+    overlapping = load_shape(trimesh.util.concatenate([_block(0.0), _block(0.5)]))
+    scores = evaluate(Assembly((Part(Box((1.5, 1.0, 1.0)), (0.25, 0.0, 0.0)),)), overlapping, emd=False)
+    assert scores.max_deviation < 0.01
+    for gap, seen in ((0.004, False), (0.06, True)):
+        cracked = load_shape(trimesh.util.concatenate([_block(0.0), _block(1.0 + gap)]))
+        whole = Part(Box((2.0 + gap, 1.0, 1.0)), ((1.0 + gap) / 2, 0.0, 0.0))
+        scores = evaluate(Assembly((whole,)), cracked, emd=False)
+        assert (scores.max_deviation > 0.3) == seen
+        # And the other way round: the crack in the assembly.
+        halves = Assembly((Part(Box((1.0, 1.0, 1.0))), Part(Box((1.0, 1.0, 1.0)), (1.0 + gap, 0.0, 0.0))))
+        solid = load_shape(trimesh.creation.box((2.0 + gap, 1.0, 1.0)).apply_translation(whole.translation))
+        scores = evaluate(halves, solid, emd=False)
+        assert (scores.max_deviation > 0.3) == seen
+
+
+def _block(x: float) -> trimesh.Trimesh:
+    return trimesh.creation.box((1.0, 1.0, 1.0)).apply_translation((x, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
