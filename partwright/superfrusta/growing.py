@@ -161,7 +161,10 @@ def finalists(
     the other parts. Growth asks none: a new part that may not cross what is there gets stuck in its region.
     """
     views = [_view(samples, region) for region in wanted]
-    guesses = [_guesses(samples, region, settings) for region in wanted]
+    # Regions of the same voxels, which differ in what they count around them, start alike.
+    of_voxels = {id(region.voxels): region for region in wanted}
+    starting = {key: _guesses(samples, region, settings) for key, region in of_voxels.items()}
+    guesses = [starting[id(region.voxels)] for region in wanted]
     owner = np.repeat(np.arange(len(wanted)), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))
     screened, losses = _run(

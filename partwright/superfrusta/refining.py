@@ -21,6 +21,9 @@ FINE = ((40.0, 10), (100.0, 8))
 TOUCH_UP = ((40.0, 4), (100.0, 4))
 POLISH = ((40.0, 6), (100.0, 12), (200.0, 10))
 
+_FELT = 0.15  # unit lengths from a part within which its samples lie
+_FAR_EVERY = 8
+
 Stages = tuple[tuple[float, int], ...]
 
 
@@ -79,14 +82,18 @@ def refine(
     stages: Stages,
     settings: Settings,
     moving: NDArray[np.bool_] | None = None,
+    target: kernel.Target | None = None,
 ) -> Rows:
     """Minimises the reconstruction and quality losses (eq. 7-8) over the parts marked in `moving` (M,)."""
     moving = np.ones(len(rows), bool) if moving is None else moving
     if not moving.any():
         return rows
+    target = samples.target(samples.optimised_indices) if target is None else target
+    if not moving.all():
+        target = _about(samples, rows[moving], target)
     refined, _, _ = samples.kernel.levenberg_marquardt(
         rows,
-        samples.target(samples.optimised_indices),
+        target,
         sharpened(stages, samples.thickness),
         LIMITS,
         free=freedom(rows, moving, settings),
@@ -95,3 +102,13 @@ def refine(
         threads=samples.threads,
     )
     return refined
+
+
+def _about(samples: FitSamples, moving: Rows, target: kernel.Target) -> kernel.Target:
+    """The samples that moving parts can feel; a few of the others, at more weight, stand for all of them."""
+    near = (samples.parts_of(moving, target.points) < _FELT).any(axis=0)
+    far = np.flatnonzero(~near)[::_FAR_EVERY]
+    index = np.concatenate([np.flatnonzero(near), far])
+    weight = target.weight[index].copy()
+    weight[len(index) - len(far) :] *= _FAR_EVERY
+    return kernel.Target(target.points[index], target.distance[index], weight)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.fields.columns import Column
+from partwright.superfrusta.deviations import deviations
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
@@ -21,8 +22,8 @@ _COVERED = 0.6  # share of a part within the images of another from which they r
 _TRIED = 24  # repeats that are scored
 _UNREFITTED_SCORE_LOSS = 0.01  # of R: a repeat that costs more before a refit is not tried
 _GRID_EVERY = 3
-_TOLERANCE = np.array([2e-3, 1e-3])  # of R and of IoU, that all repeats together may cost
-_REFIT = ((100.0, 12),)
+_TOLERANCE = np.array([2e-3, 1e-3, 4e-3])  # of R, IoU and deviations, that all repeats together may cost
+_REFIT = ((100.0, 6),)
 
 
 @dataclass(frozen=True)
@@ -39,10 +40,10 @@ def repeat(
 ) -> list[RepeatedPart]:
     """The assembly as leaves, of which those that repeat under the symmetries are one each.
 
-    Repeats that replace the most parts come first. Together they cost at most 2e-3 of R and 1e-3 of IoU:
-    where they cost more, the copies of each leaf are refitted as one, and if that is not enough the costliest
-    repeats are given up. An IoU that the settings ask for is kept. The first `locked` rows stay leaves of
-    their own.
+    Repeats that replace the most parts come first. Together they cost at most 2e-3 of R, 1e-3 of IoU and
+    4e-3 unit lengths of the deviations: where they cost more, the copies of each leaf are refitted as one,
+    and if that is not enough the costliest repeats are given up. An IoU that the settings ask for is kept.
+    The first `locked` rows stay leaves of their own.
     """
     reached = _measures(samples, rows)
     least = reached - _TOLERANCE
@@ -68,11 +69,11 @@ def repeat(
 
 
 def _measures(samples: FitSamples, rows: Rows) -> NDArray[np.float64]:
-    """R, and IoU on the grid: a refit leans towards the samples that it saw."""
+    """R, IoU on the grid (a refit leans towards the samples that it saw), and the deviations, negative."""
     occupied = samples.distance_of(rows, samples.grid_points[::_GRID_EVERY]) < 0
     inside = samples.grid.values.ravel()[::_GRID_EVERY] < 0
     both, either = np.count_nonzero(occupied & inside), np.count_nonzero(occupied | inside)
-    return np.array([score(samples, rows), both / np.maximum(either, 1)])
+    return np.array([score(samples, rows), both / np.maximum(either, 1), -deviations(samples, rows).norm])
 
 
 def candidates(

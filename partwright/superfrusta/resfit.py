@@ -19,6 +19,7 @@ from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outco
 from partwright.shapes import Shape
 from partwright.superfrusta.growing import grow
 from partwright.superfrusta.hull_start import convex_hull_start
+from partwright.superfrusta.mending import Mending
 from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
 from partwright.superfrusta.outcome import Step, assembly_of, chosen
@@ -36,6 +37,7 @@ from partwright.superfrusta.symmetry import symmetries
 GROWTH_ALPHA = 1e-3
 PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
 _OPENING = 4  # rounds
+_MENDED = 0.9  # of the work is done when mending begins
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
 
 
@@ -117,6 +119,8 @@ class ResidualFit:
             self.choose()
         if self.best is None:
             return "converged"
+        if self.mending:
+            self.mend(self.best)
         if settings.family == "solid":
             with self.timed("settle"):
                 plain = simplify_kinds(self.samples, self.best, settings, self.locked)
@@ -252,6 +256,21 @@ class ResidualFit:
         )
         return merged[0] if merged is not None and merged[1] > kept else thinned
 
+    @property
+    def mending(self) -> bool:
+        settings = self.settings
+        return bool(settings.mends) and not settings.subtract and settings.family != "solid"
+
+    def mend(self, rows: Rows) -> None:
+        def improved(better: Rows) -> None:
+            self.best = better
+            reached, iou = score(self.samples, better), volume_iou(self.samples, better)
+            self.report_progress("mend", self.settings.rounds, len(better), reached, iou, _MENDED)
+
+        with self.timed("mend"):
+            self.best = Mending(self.samples, self.settings, self.locked, improved)(rows)
+            self.best_objective = self.objective(self.best)
+
     def detail_curve(self, rows: Rows) -> None:
         """The curve: one part less at a time, each size polished; from few parts to many."""
         with self.timed("curve"):
@@ -291,7 +310,8 @@ class ResidualFit:
         total = settings.rounds + settings.cycles
         done = min(1.0, (settings.rounds + round_ if stage == "thin" else round_) / total)
         reached, iou = score(self.samples, rows), volume_iou(self.samples, rows)
-        self.report_progress(stage, round_, len(rows), reached, iou, (self.number + done) / settings.attempts)
+        fraction = (self.number + done) / settings.attempts * (_MENDED if self.mending else 1.0)
+        self.report_progress(stage, round_, len(rows), reached, iou, fraction)
         return progressed
 
     def sampled_strays(self, rows: Rows) -> bool:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from partwright.fields.columns import WIDTH
 from partwright.fields.kernel import Target
@@ -24,6 +25,7 @@ NOTHING: Rows = np.empty((0, WIDTH), np.float32)
 _HALF_SIDE = 1.2  # unit lengths: half the side of the cube that padding and probes fill
 _MOST_PADDING_WEIGHT = 3.0  # of one point, where the weight of a sample in the box is 1
 _PROBES = 48  # along a side of that cube
+_SURFACE = 8000  # points of the shape's surface
 _STRAY = 0.05  # unit lengths: what an assembly covers further than this from the shape is astray
 _FAR = 0.1  # unit lengths from the shape
 _FAR_COUNT = 400  # about so many samples stand for all that are far
@@ -54,6 +56,8 @@ class FitSamples:
     """Of the samples in the box, per unit volume."""
     probes: NDArray[np.float32]
     """(n, 3) points that are no samples yet, where a part that goes astray is looked for."""
+    surface: NDArray[np.float32]
+    """(n, 3) points of the shape's surface, as many to each unit of area."""
 
     @classmethod
     def of(
@@ -77,6 +81,7 @@ class FitSamples:
             shape.unit_distance,
             settings.uniform / float(np.prod(grid.spacing * np.array(grid.values.shape))),
             _probes(grid),
+            shape.unit_surface(_SURFACE, run.seed).points.astype(np.float32),
         )
 
     def with_stray_samples(self, rows: Rows) -> FitSamples:
@@ -154,6 +159,14 @@ class FitSamples:
     def grid_field(self, rows: Rows) -> NDArray[np.float32]:
         """Distance (X, Y, Z) of the assembly on the grid."""
         return self.distance_of(rows, self.grid_points).reshape(self.grid.values.shape)
+
+    def near_distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Signed distance (n,) of the shape at points (n, 3), read off the grid."""
+        grid = self.grid
+        place = (points - grid.origin) / grid.spacing
+        within = np.clip(place, 0, np.array(grid.values.shape) - 1)
+        read = ndimage.map_coordinates(grid.values, within.T, order=1, mode="nearest")
+        return np.asarray(read + grid.spacing * np.linalg.norm(place - within, axis=1), np.float32)
 
     def distance_of(self, rows: Rows, points: NDArray[np.float32]) -> NDArray[np.float32]:
         """Distance (N,) of the assembly at points; far outside where there are no parts yet."""

@@ -27,7 +27,7 @@ class Settings:
     """Regions of the decomposition a round (paper: 7 iterations of MSD)."""
     kappa: float = 0.02
     """Share of the remaining volume that a core must hold (eq. 5; the paper gives no value)."""
-    alpha: float = 3.55e-3
+    alpha: float = 3.7e-3
     """Price of a part in the objective (eq. 2). At the paper's 1e-3 the last third of the parts buys about
     one point of IoU."""
     optimiser: Optimiser = "newton"
@@ -51,8 +51,12 @@ class Settings:
     """Replace touching pairs of parts by one where it explains as much."""
     attempts: int = 1
     """Times that the shape is fitted from the start, each with other regions; the best is kept."""
-    cycles: int = 2
+    cycles: int = 1
     """Times that the grown assembly is thinned out, refitted and grown again."""
+    firmness: float = 0.6
+    """Price in the objective, for each unit length that parts are off, while mending."""
+    mends: int = 16
+    """Tries to mend parts that stick out of the shape or leave places of it out."""
     trials: int = 3
     """Removals that are tried with a refit before the cheapest is taken."""
     patience: int = 2
@@ -75,10 +79,11 @@ class Settings:
     def __post_init__(self) -> None:
         for name in ("rounds", "regions", "attempts", "trials", "patience", "near", "uniform"):
             check_number(name, getattr(self, name), low=1)
-        check_number("cycles", self.cycles, low=0)
+        for name in ("cycles", "mends"):
+            check_number(name, getattr(self, name), low=0)
         check_number("resolution", self.resolution, low=24, high=512)
         check_number("kappa", self.kappa, low=1e-4, high=1.0)
-        for name in ("alpha", "overlap", "blending"):
+        for name in ("alpha", "overlap", "blending", "firmness"):
             check_number(name, getattr(self, name), low=0.0)
         if self.max_parts is not None:
             check_number("max_parts", self.max_parts, low=1)
@@ -116,7 +121,7 @@ class Settings:
 
 
 PRESETS: dict[str, Settings] = {
-    "draft": Settings(rounds=2, regions=14, cycles=1, trials=1, near=10_000, uniform=10_000, resolution=64),
+    "draft": Settings(rounds=2, regions=14, trials=1, mends=3, near=10_000, uniform=10_000, resolution=64),
     "normal": Settings(),
-    "high": Settings(attempts=3, cycles=3, alpha=2e-3, near=45_000, uniform=45_000),
+    "high": Settings(attempts=3, cycles=2, mends=40, alpha=2e-3, near=45_000, uniform=45_000),
 }

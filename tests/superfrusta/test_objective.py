@@ -33,6 +33,7 @@ def samples(points: np.ndarray, inside: np.ndarray, weight: np.ndarray, near: in
         measure=lambda points: np.ones(len(points), np.float32),
         density=1.0,
         probes=np.empty((0, 3), np.float32),
+        surface=np.empty((0, 3), np.float32),
     )
 
 

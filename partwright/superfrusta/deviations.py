@@ -1,0 +1,96 @@
+"""How far each part of an assembly sticks out of the shape, and how far it leaves the surface uncovered.
+
+An overlap hardly feels either: a tab as thin as a sheet holds no volume, and is what is seen first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.fields.columns import Column
+from partwright.superfrusta.part_surfaces import surface_points
+from partwright.superfrusta.samples import FitSamples, Rows
+
+Floats = NDArray[np.float32]
+
+_ON = 0.004  # unit lengths: points this near to a surface are on it
+_CLOSE = 0.009  # unit lengths, half a hundredth of the longest side: what is nearer is not off
+_BESIDE = 0.005  # unit lengths from a surface at which a gap is looked for
+_DEEPEST_BLEND = 0.08  # unit lengths: a quarter of the largest blend
+_POWER = 4.0  # of the norm over parts: near the largest, but with a word for the others
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Where the surfaces of a shape and of an assembly are apart, further than the grid can be wrong.
+
+    points: (n, 3), unit frame. distance: (n,) of the shape, signed. off: (n,) from the other surface, unit
+    lengths. part: (n,) that the point lies on, or that is the nearest to it. parts: of the assembly.
+    """
+
+    points: Floats
+    distance: Floats
+    off: Floats
+    part: NDArray[np.int64]
+    parts: int
+
+    @property
+    def by_part(self) -> NDArray[np.float64]:
+        """(M,) the largest of each part; 0 where it is nowhere off."""
+        result = np.zeros(self.parts)
+        np.maximum.at(result, self.part, self.off)
+        return result
+
+    @property
+    def norm(self) -> float:
+        """One length for all parts."""
+        return float((self.by_part**_POWER).sum() ** (1 / _POWER))
+
+    def worst(self, part: int) -> int:
+        """The point at which a part is furthest off."""
+        mine = np.flatnonzero(self.part == part)
+        return int(mine[self.off[mine].argmax()])
+
+
+def deviations(samples: FitSamples, rows: Rows) -> Deviations:
+    """Of an assembly, over points of its parts' surfaces and of the shape's."""
+    added = np.flatnonzero(rows[:, Column.SIGN] > 0)
+    found = zip(_of_parts(samples, rows, added), _of_shape(samples, rows, added), strict=True)
+    points, distance, off, part = (np.concatenate(pair) for pair in found)
+    # At an edge, what is read off the grid may be wrong by half a voxel.
+    kept = off > max(_CLOSE, samples.grid.spacing / 2)
+    return Deviations(points[kept], distance[kept], off[kept], part[kept].astype(np.int64), len(rows))
+
+
+def _of_parts(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
+    """Points on the assembly's surface that stick out of the shape, or enclose a gap inside it."""
+    points = surface_points(rows).astype(np.float32)
+    part = np.repeat(np.arange(len(rows)), points.shape[1])
+    points = points.reshape(-1, 3)
+    field = samples.distance_of(rows, points)
+    shown = np.abs(field) < _ON
+    # Under a blend the surface is further out than that of any part.
+    under = np.flatnonzero((field <= -_ON) & (field > -_DEEPEST_BLEND))
+    shown[under] = (samples.parts_of(rows[added], points[under]) > -_ON).all(axis=0)
+    points, field, part = points[shown], field[shown], part[shown]
+    distance = samples.near_distance(points)
+    off = np.where(distance > 0, distance - field, 0)
+    # Deep inside, parts that touch leave no gap between them although the surfaces of both are met there.
+    deep = np.flatnonzero(distance < -_CLOSE)
+    beside = _BESIDE * np.concatenate([np.eye(3), -np.eye(3)])[:, None].astype(np.float32)
+    around = samples.distance_of(rows, (points[deep] + beside).reshape(-1, 3)).reshape(len(beside), -1)
+    gap = deep[around.max(axis=0) > _BESIDE / 2]
+    off[gap] = -distance[gap]
+    return points, distance, off, part
+
+
+def _of_shape(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
+    """Points on the shape's surface that no part covers."""
+    gap = samples.distance_of(rows, samples.surface)
+    points, gap = samples.surface[gap > _CLOSE], gap[gap > _CLOSE]
+    part = added[samples.parts_of(rows[added], points).argmin(axis=0)]
+    return points, np.zeros_like(gap), gap, part

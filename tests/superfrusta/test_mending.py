@@ -1,0 +1,136 @@
+"""Deviations that no overlap feels: found on the part that they are of, and mended."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from partwright.fields import kernel
+from partwright.fields.columns import WIDTH
+from partwright.shapes import load_shape
+from partwright.superfrusta import Settings
+from partwright.superfrusta.deviations import deviations
+from partwright.superfrusta.mending import Mending
+from partwright.superfrusta.objective import score
+from partwright.superfrusta.part_surfaces import surface_points
+from partwright.superfrusta.samples import FitSamples
+from tests.superfrusta.meshes import box, union
+from tests.superfrusta.rows import box as box_row
+from tests.superfrusta.rows import random_rows, row
+
+SETTINGS = dataclasses.replace(Settings.for_quality("draft"), mends=6)
+
+# In the unit frame already: 1.8 long.
+BODY = ((1.2, 0.8, 0.5), (-0.3, 0.0, 0.0))
+ARM = ((0.6, 0.2, 0.5), (0.6, 0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def samples() -> FitSamples:
+    return FitSamples.of(load_shape(union(box(*BODY), box(*ARM))), SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def exact() -> np.ndarray:
+    return np.array([box_row(*BODY), box_row(*ARM)])
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {},
+        {"roundness": 0.7},
+        {"taper": 0.4, "roundness": 1.0},
+        {"taper": 1.6},
+        {"bulge": 0.6, "roundness": 0.5},
+        {"onion": 0.6, "taper": 0.8},
+        {"bulge": 0.3, "onion": 0.5, "dilation": 0.02},
+    ],
+)
+def test_points_of_a_part_lie_on_its_surface(shape: dict[str, float]) -> None:
+    one = row((0.1, -0.2, 0.3), (1.0, 0.3, -0.2, 0.5), (0.4, 0.5, 0.9), **shape)[None]
+    points = surface_points(one)[0].astype(np.float32)
+    on_it = np.abs(kernel.evaluate(one, points)) < 1e-4
+    # A solid part's inner edge is its axis; a dilated one's corners are cut.
+    assert on_it.mean() > 0.6
+    # They go all around it: what the field says of its extents is met from within.
+    around = points[on_it]
+    lattice = np.random.default_rng(0).uniform(-1.2, 1.2, (60_000, 3)).astype(np.float32)
+    inside = lattice[kernel.evaluate(one, lattice) < 0]
+    assert (around.max(axis=0) > inside.max(axis=0) - 0.03).all()
+    assert (around.min(axis=0) < inside.min(axis=0) + 0.03).all()
+
+
+def test_points_of_many_parts_are_those_of_each() -> None:
+    rows = random_rows(5, seed=3)
+    alone = np.concatenate([surface_points(one[None]) for one in rows])
+    assert np.allclose(surface_points(rows), alone)
+
+
+def test_an_exact_assembly_is_nowhere_off(samples: FitSamples, exact: np.ndarray) -> None:
+    off = deviations(samples, exact)
+    assert len(off.points) == 0
+    assert off.norm == 0
+
+
+def test_a_thin_tab_is_off_by_its_length(samples: FitSamples, exact: np.ndarray) -> None:
+    tab = box_row((0.3, 0.3, 0.006), (-0.3, 0.55, 0.1))
+    off = deviations(samples, np.vstack([exact, tab]))
+    assert off.by_part == pytest.approx([0.0, 0.0, 0.3], abs=0.02)
+    assert off.distance[off.worst(2)] == pytest.approx(0.3, abs=0.02)
+    assert off.points[off.worst(2), 1] == pytest.approx(0.7, abs=0.01)
+    # It has next to no volume.
+    assert score(samples, exact) - score(samples, np.vstack([exact, tab])) < 0.01
+
+
+def test_a_place_that_is_left_out_belongs_to_the_part_beside_it(
+    samples: FitSamples, exact: np.ndarray
+) -> None:
+    short = exact.copy()
+    short[1] = box_row((0.4, 0.2, 0.5), (0.5, 0.0, 0.0))
+    assert deviations(samples, short).by_part == pytest.approx([0.0, 0.2], abs=0.02)
+
+
+def test_a_gap_inside_is_off_and_a_seam_is_not(samples: FitSamples, exact: np.ndarray) -> None:
+    halves = [box_row((0.6, 0.8, 0.5), (x, 0.0, 0.0)) for x in (-0.6, 0.0)]
+    seam = np.array([*halves, exact[1]])
+    assert deviations(samples, seam).norm == 0
+    apart = seam.copy()
+    apart[0] = box_row((0.56, 0.8, 0.5), (-0.62, 0.0, 0.0))
+    off = deviations(samples, apart)
+    assert off.by_part.max() == pytest.approx(0.25, abs=0.02)  # its depth
+
+
+def test_mending_draws_a_part_back(samples: FitSamples, exact: np.ndarray) -> None:
+    stretched = exact.copy()
+    stretched[1] = box_row((0.6, 0.2, 0.62), (0.6, 0.0, 0.06))
+    mended = Mending(samples, SETTINGS)(stretched)
+    assert deviations(samples, stretched).norm > 0.1
+    assert deviations(samples, mended).norm < 0.02
+    assert len(mended) == 2
+
+
+def test_mending_adds_the_part_that_is_missing(samples: FitSamples, exact: np.ndarray) -> None:
+    mended = Mending(samples, SETTINGS)(exact[:1])
+    assert len(mended) == 2
+    assert deviations(samples, mended).norm < 0.03
+    assert score(samples, mended) > 0.97
+
+
+def test_mending_takes_away_what_only_sticks_out(samples: FitSamples, exact: np.ndarray) -> None:
+    tab = box_row((0.3, 0.3, 0.01), (-0.3, 0.55, 0.1))
+    mended = Mending(samples, SETTINGS)(np.vstack([exact, tab]))
+    assert len(mended) == 2
+    assert deviations(samples, mended).norm < 0.02
+
+
+def test_mending_keeps_locked_parts_and_budgets(samples: FitSamples, exact: np.ndarray) -> None:
+    tab = box_row((0.3, 0.3, 0.01), (-0.3, 0.55, 0.1))
+    rows = np.vstack([tab, exact])
+    mended = Mending(samples, SETTINGS, locked=1)(rows)
+    assert np.array_equal(mended[0], tab)
+    assert mended.shape[1] == WIDTH
+    one = Mending(samples, dataclasses.replace(SETTINGS, max_parts=1))(exact[:1])
+    assert len(one) == 1
