@@ -14,7 +14,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, Any, ClassVar, Self
 
 import numpy as np
 import pytest
@@ -92,7 +92,7 @@ class Learned(JointField):
     def surface(self, resolution: int) -> trimesh.Trimesh:
         return trimesh.creation.icosphere(subdivisions=3, radius=self.radius)
 
-    def among(self, members: Sequence[Member]) -> Self:
+    def among(self, members: Sequence[Member], shared: dict[Any, Any]) -> Self:
         return self
 
     def together(self, points: np.ndarray, fields: Sequence[JointField]) -> list[np.ndarray]:
