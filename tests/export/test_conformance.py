@@ -14,7 +14,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import pytest
