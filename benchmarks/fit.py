@@ -63,7 +63,7 @@ class Run:
     overlap: float | None = None
     deviation: float | None = None
     protrusion: float | None = None
-    seconds: float = 0.0
+    seconds: float | None = None
     peak_mb: float = 0.0
 
 
@@ -147,7 +147,10 @@ def over_seeds(runs: list[Run]) -> Run:
     if failed:
         return failed[0]
     outcomes = ", ".join(dict.fromkeys(run.outcome for run in runs))
-    medians = {name: median(getattr(run, name) for run in runs) for name in NUMBERS}
+    timed = all(run.seconds is not None for run in runs)
+    medians = {
+        name: median(getattr(run, name) for run in runs) for name in NUMBERS if timed or name != "seconds"
+    }
     return Run(runs[0].set, runs[0].name, "median", outcomes, **medians)
 
 
@@ -159,8 +162,12 @@ def summary(rows: list[Run]) -> Run:
     if not good:
         return total
     means = {name: mean(getattr(row, name) for row in good) for name in SCORES}
+    seconds = [row.seconds for row in good if row.seconds is not None]
     return replace(
-        total, **means, seconds=median(r.seconds for r in good), peak_mb=max(r.peak_mb for r in good)
+        total,
+        **means,
+        seconds=median(seconds) if seconds else None,
+        peak_mb=max(row.peak_mb for row in good),
     )
 
 
@@ -242,7 +249,7 @@ def main() -> int:
     interrupted = False
     try:
         for count, (entry, run) in enumerate(measure(entries, seeds, passed, options.jobs), 1):
-            runs[entry].append(run)
+            runs[entry].append(replace(run, seconds=None) if options.untimed else run)
             print(f"{count}/{len(entries) * len(seeds)} {_line(run)}", flush=True)
             finished = [over_seeds(of) for of in runs.values() if len(of) == len(seeds)]
             text = document(finished, _command(options), seeds, len(entries))
@@ -270,8 +277,9 @@ def _command(options: argparse.Namespace) -> str:
     given = {"--shapes": options.shapes.name if options.shapes != OWN_SHAPES else ""}
     given |= {"--sets": options.sets, "--names": options.names, "--quality": options.quality}
     given |= {"--max-parts": options.max_parts, "--jobs": options.jobs if options.jobs > 1 else ""}
+    given |= {"--untimed": " " if options.untimed else ""}
     given |= {"--seeds": options.seeds if options.seeds != "0" else ""}
-    return " ".join(["python benchmarks/fit.py", *(f"{k} {v}" for k, v in given.items() if v)])
+    return " ".join(["python benchmarks/fit.py", *(f"{k} {v}".rstrip() for k, v in given.items() if v)])
 
 
 def parser() -> argparse.ArgumentParser:
@@ -286,6 +294,7 @@ def parser() -> argparse.ArgumentParser:
     option("--quality", choices=("draft", "normal", "high"), help="passed on to partwright fit")
     option("--max-parts", type=int, metavar="N", help="passed on to partwright fit")
     option("--tag", default="", help="writes fit-TAG.md")
+    option("--untimed", action="store_true", help="leaves out the seconds: for a machine that is busy")
     option(
         "--jobs", type=int, default=1, metavar="N", help="fits at a time: more are faster but time nothing"
     )
