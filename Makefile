@@ -10,13 +10,6 @@ DEMO_SHAPE := examples/shapes/watering_can.ply
 
 LOWEST_TESTS := tests/shapes tests/assembly tests/meshing tests/render tests/cli
 
-# The page of the studio, from its sources in studio/. Where there is no Node the built one is taken as it is: a test
-# compares the sources' hash that it records.
-page:
-	if command -v npm >/dev/null && (cd studio && npm ci --no-audit --no-fund --silent); then \
-		cd studio && npm run --silent build && git diff --exit-code --stat -- ../partwright/export/page.html; \
-	else echo "no Node or no registry: the page is not built again"; fi
-
 .PHONY: setup demo test test-lowest lint types docs page bench clean
 setup: $(INSTALLED)
 
@@ -63,6 +56,13 @@ types: setup
 # The pages and the reference into build/site; a broken link is an error. Fetches nothing.
 docs: setup
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+# The page of the studio, from its sources in studio/. Where there is no Node the built one is taken as it is: a test
+# compares the sources' hash that it records.
+page:
+	if command -v npm >/dev/null && (cd studio && npm ci --no-audit --no-fund --silent); then \
+		cd studio && npm run --silent build && git diff --exit-code --stat -- ../partwright/export/page.html; \
+	else echo "no Node or no registry: the page is not built again"; fi
 
 bench: setup
 	$(BIN)/python benchmarks/fit.py
