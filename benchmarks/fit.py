@@ -277,9 +277,9 @@ def _command(options: argparse.Namespace) -> str:
     given = {"--shapes": options.shapes.name if options.shapes != OWN_SHAPES else ""}
     given |= {"--sets": options.sets, "--names": options.names, "--quality": options.quality}
     given |= {"--max-parts": options.max_parts, "--jobs": options.jobs if options.jobs > 1 else ""}
-    given |= {"--untimed": " " if options.untimed else ""}
     given |= {"--seeds": options.seeds if options.seeds != "0" else ""}
-    return " ".join(["python benchmarks/fit.py", *(f"{k} {v}".rstrip() for k, v in given.items() if v)])
+    flags = ["--untimed"] if options.untimed else []
+    return " ".join(["python benchmarks/fit.py", *(f"{k} {v}" for k, v in given.items() if v), *flags])
 
 
 def parser() -> argparse.ArgumentParser:

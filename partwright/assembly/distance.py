@@ -25,10 +25,8 @@ if TYPE_CHECKING:
 
 _UNIT_SIDE = 1.8
 _KERNEL = "kernel"
-_ALIKE = (
-    0.9,
-    3.6,
-)  # longest sides, and up to here coordinates, that float32 holds as well as those of a unit frame
+# Longest sides, and up to here coordinates, that float32 holds as well as those of a unit frame.
+_ALIKE = (0.9, 3.6)
 _ROUNDING = 1e-14  # of the place: what is smaller has no size
 _FOLD = {"union": smooth_union, "intersection": smooth_intersection, "difference": smooth_difference}
 

@@ -67,8 +67,7 @@ def read_npz(path: Path) -> dict[str, NDArray[Any]]:
     except (
         *_READ_ERRORS,
         RuntimeError,
-        NotImplementedError,
-    ) as error:  # encrypted, or an unknown compression
+    ) as error:  # encrypted, or (NotImplementedError) packed in a way unknown
         raise _unreadable(path, "NPZ", error) from error
     return arrays
 

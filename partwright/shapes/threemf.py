@@ -40,8 +40,7 @@ _ERRORS = (
     ValueError,
     KeyError,
     OverflowError,
-    RuntimeError,
-    NotImplementedError,
+    RuntimeError,  # includes NotImplementedError
     struct.error,
     zlib.error,
     zipfile.BadZipFile,

@@ -25,7 +25,6 @@ from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 
 Mask = NDArray[np.bool_]
-Valued = tuple[float, Rows]  # an assembly and its objective
 
 _ENOUGH = 0.018  # unit lengths, a hundredth of the longest side: what is nearer is not mended
 _FAR = 0.045  # unit lengths off from which on a part makes room for several
@@ -38,6 +37,15 @@ _HOPELESS = 0.02  # of the objective: what is so much worse after a refit goes n
 _REFITTED = 2  # of the ways to change a part
 _BEST_STARTS = 2  # parts for one region that are tried
 _LEAST_HALVED = 100  # voxels
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An assembly (M, 17), where it is off, and its value: eq. 2 with a price on how far off parts are."""
+
+    rows: Rows
+    off: Deviations
+    value: float
 
 
 @dataclass(frozen=True)
@@ -54,35 +62,34 @@ class Mending:
 
     def __call__(self, rows: Rows) -> Rows:
         """Rows (M, 17) after at most `settings.mends` tries, without parts that no longer pay."""
-        best, off = rows, deviations(self.samples, rows)
-        reached = self.objective(rows, off)
+        best = self.trial(rows)
         given_up: list[NDArray[np.float32]] = []
         part: int | None = None
         for _ in range(self.settings.mends + 1):
-            if part is None:
-                trials = self.moved(best, np.ones(len(best), bool), reached)
-            else:
-                trials = self.ways(best, part, off, reached)
-            allowed = ((now, trial) for now, trial in trials if self.allowed(trial, rows))
-            now, trial = max(allowed, key=lambda one: one[0], default=(-np.inf, best))
-            if now > reached:
-                best, reached, off = trial, now, deviations(self.samples, trial)
+            trials = self.moved(best, _all(best.rows), best) if part is None else self.ways(best, part)
+            allowed = (trial for trial in trials if self.allowed(trial.rows, rows))
+            found = max(allowed, key=lambda trial: trial.value, default=best)
+            if found.value > best.value:
+                best = found
                 if self.told is not None:
-                    self.told(best)
+                    self.told(best.rows)
             elif part is not None:
-                given_up.append(off.points[off.worst(part)])
-            part = _next(off, given_up)
+                given_up.append(best.off.points[best.off.worst(part)])
+            part = _next(best.off, given_up)
             if part is None:
                 break
-        slim = self.slimmed(best, reached)
-        polished = refine(self.samples, slim, POLISH, self.settings, np.arange(len(slim)) >= self.locked)
-        better = self.objective(polished) > self.objective(slim) and self.allowed(polished, slim)
-        return polished if better else slim
+        slim = self.slimmed(best)
+        polished = self.trial(refine(self.samples, slim.rows, POLISH, self.settings, self.free(slim.rows)))
+        better = polished.value > slim.value and self.allowed(polished.rows, slim.rows)
+        return polished.rows if better else slim.rows
 
-    def objective(self, rows: Rows, off: Deviations | None = None) -> float:
-        """Eq. 2 with a price on how far off the parts are."""
-        off = off or deviations(self.samples, rows)
-        return score(self.samples, rows) - self.settings.alpha * len(rows) - self.settings.firmness * off.norm
+    def trial(self, rows: Rows) -> Trial:
+        off = deviations(self.samples, rows)
+        price = self.settings.alpha * len(rows) + self.settings.firmness * off.norm
+        return Trial(rows, off, score(self.samples, rows) - price)
+
+    def free(self, rows: Rows) -> Mask:
+        return np.arange(len(rows)) >= self.locked
 
     def allowed(self, trial: Rows, given: Rows) -> bool:
         """Whether a part budget or a target, which thinning has met, still holds."""
@@ -94,48 +101,46 @@ class Mending:
         least = min(settings.min_iou, volume_iou(self.samples, given))
         return len(trial) <= len(given) and volume_iou(self.samples, trial) >= least
 
-    def slimmed(self, rows: Rows, reached: float) -> Rows:
+    def slimmed(self, best: Trial) -> Trial:
         """Without the parts that do not pay for themselves any more."""
-        while len(rows) > max(1, self.locked):
-            thinned, now, _ = cheapest_removal(
-                self.samples, rows, self.settings, self.locked, lambda _, trial: self.objective(trial)
+        while len(best.rows) > max(1, self.locked):
+            thinned, value, _ = cheapest_removal(
+                self.samples, best.rows, self.settings, self.locked, lambda _, rows: self.trial(rows).value
             )
-            if now < reached or not self.allowed(thinned, rows):
+            if value < best.value or not self.allowed(thinned, best.rows):
                 break
-            rows, reached = thinned, now
-        return rows
+            best = self.trial(thinned)
+        return best
 
-    def ways(self, rows: Rows, part: int, off: Deviations, reached: float) -> Iterator[Valued]:
+    def ways(self, best: Trial, part: int) -> Iterator[Trial]:
         """Assemblies that may be better: part and neighbours moved, the most promising changes refitted."""
-        moving = neighbours(self.samples, rows, part)
+        moving = neighbours(self.samples, best.rows, part)
         moving[part] = True
-        yield from self.moved(rows, moving, reached)
+        yield from self.moved(best, moving, best)
         if part < self.locked:
             return
-        changes = [(self.objective(trial), trial, new) for trial, new in self.changes(rows, part, off)]
-        for value, trial, new in sorted(changes, key=lambda one: -one[0])[:_REFITTED]:
-            yield value, trial
-            yield from self.moved(trial, np.append(np.delete(moving, part), np.ones(new, bool)), reached)
+        changes = [(self.trial(rows), new) for rows, new in self.changes(best, part)]
+        for changed, new in sorted(changes, key=lambda one: -one[0].value)[:_REFITTED]:
+            yield changed
+            yield from self.moved(changed, np.append(np.delete(moving, part), np.ones(new, bool)), best)
 
-    def moved(self, rows: Rows, moving: Mask, reached: float) -> Iterator[Valued]:
+    def moved(self, given: Trial, moving: Mask, best: Trial) -> Iterator[Trial]:
         """The parts moved to where they explain the most, and on to where they are nowhere far off."""
-        moving = moving & (np.arange(len(rows)) >= self.locked)
-        plain = refine(self.samples, rows, TOUCH_UP, self.settings, moving)
-        value = self.objective(plain)
-        yield value, plain
-        if value > reached - _HOPELESS:
-            near = refine(self.samples, plain, _STAGES, self.settings, moving, self.target(plain, moving))
-            yield self.objective(near), near
+        moving = moving & self.free(given.rows)
+        plain = self.trial(refine(self.samples, given.rows, TOUCH_UP, self.settings, moving))
+        yield plain
+        if plain.value > best.value - _HOPELESS:
+            target = self.target(plain, moving)
+            yield self.trial(refine(self.samples, plain.rows, _STAGES, self.settings, moving, target))
 
-    def target(self, rows: Rows, moving: Mask) -> Target:
+    def target(self, given: Trial, moving: Mask) -> Target:
         """Samples that weigh by how far off they are, and the points where moving parts are off."""
-        samples = self.samples
+        samples, apart = self.samples, given.off
         index = samples.optimised_indices
-        distance, field = samples.distance[index], samples.distance_of(rows, samples.points[index])
+        distance, field = samples.distance[index], samples.distance_of(given.rows, samples.points[index])
         off = np.where(
             (field < 0) & (distance > 0), distance, np.where(distance < 0, np.maximum(field, 0), 0)
         )
-        apart = deviations(samples, rows)
         mine = moving[apart.part]
         weight = np.concatenate([samples.weight[index] * (1 + _emphasis(off)), _emphasis(apart.off[mine])])
         return Target(
@@ -144,9 +149,10 @@ class Mending:
             (weight / weight.sum()).astype(np.float32),
         )
 
-    def changes(self, rows: Rows, part: int, off: Deviations) -> Iterator[tuple[Rows, int]]:
+    def changes(self, best: Trial, part: int) -> Iterator[tuple[Rows, int]]:
         """Assemblies before any refit, and how many of their last parts are new."""
-        samples, worst = self.samples, off.worst(part)
+        samples, rows, off = self.samples, best.rows, best.off
+        worst = off.worst(part)
         others = np.delete(rows, part, axis=0)
         if len(others):
             yield others, 0
@@ -194,6 +200,10 @@ def _next(off: Deviations, given_up: list[NDArray[np.float32]]) -> int | None:
         if all(np.linalg.norm(place - other) > _SAME_PLACE for other in given_up):
             return int(part)
     return None
+
+
+def _all(rows: Rows) -> Mask:
+    return np.ones(len(rows), bool)
 
 
 def _emphasis(off: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -84,7 +84,10 @@ def refine(
     moving: NDArray[np.bool_] | None = None,
     target: kernel.Target | None = None,
 ) -> Rows:
-    """Minimises the reconstruction and quality losses (eq. 7-8) over the parts marked in `moving` (M,)."""
+    """Minimises the reconstruction and quality losses (eq. 7-8) over the parts marked in `moving` (M,).
+
+    target: other samples, or other weights, than those that all optimisation runs on.
+    """
     moving = np.ones(len(rows), bool) if moving is None else moving
     if not moving.any():
         return rows

@@ -31,12 +31,8 @@ def _what_was_written(path: Path, parts: int) -> str:
     changed = len(approximated_parts(path))
     if not changed:
         return line
-    which = (
-        "the part"
-        if parts == 1
-        else f"all {parts} parts"
-        if changed == parts
-        else f"{changed} of {parts} parts"
-    )
+    which = f"{changed} of {parts} parts"
+    if changed == parts:
+        which = "the part" if parts == 1 else f"all {parts} parts"
     verb = "is" if changed == 1 else "are"
     return f"{line}; {which} {verb} approximated, see {report_path(path)} for how far off"
