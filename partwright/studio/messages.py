@@ -6,7 +6,7 @@ A message is a JSON object with a "type". `python -m partwright.studio.messages`
 from __future__ import annotations
 
 import json
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -18,6 +18,15 @@ class Step:
     """A state of the assembly file's text, and what was done to it next."""
 
     label: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Size:
+    """An assembly of a curve."""
+
+    parts: int
+    iou: float
     text: str
 
 
@@ -52,6 +61,20 @@ class Fit:
     method: str
     quality: Literal["draft", "normal", "high"]
     max_parts: int | None = None
+    curve: bool = False
+    """Also an assembly of every size, of a new one."""
+
+
+@dataclass(frozen=True)
+class Reshape:
+    """One part split in two, several merged into one, or one more for what is missing within a box (lowest,
+    then highest corner, own units)."""
+
+    action: Literal["split", "merge", "box"]
+    names: list[str]
+    method: str
+    quality: Literal["draft", "normal", "high"]
+    box: list[float] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -112,9 +135,19 @@ class Fitting:
 
 @dataclass(frozen=True)
 class Fitted:
+    """iou: 0 where it was not measured."""
+
     outcome: str
     parts: int
     iou: float
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Assemblies of falling size that the last fit went through. of: what was fitted, and by which method."""
+
+    sizes: list[Size]
+    of: str
 
 
 @dataclass(frozen=True)
@@ -141,8 +174,8 @@ class Failed:
     message: str
 
 
-FROM_PAGE: tuple[type, ...] = (Commit, Undo, Redo, Fit, Stop, Save)
-FROM_SERVER: tuple[type, ...] = (State, Accepted, Fitting, Fitted, Scored, Saved, Failed)
+FROM_PAGE: tuple[type, ...] = (Commit, Undo, Redo, Fit, Reshape, Stop, Save)
+FROM_SERVER: tuple[type, ...] = (State, Accepted, Fitting, Fitted, Curve, Scored, Saved, Failed)
 
 
 def name_of(kind: type) -> str:
@@ -169,7 +202,7 @@ def read(text: str) -> Any:
         raise MessageError(f"a message's type is unknown; expected one of {', '.join(kinds)}")
     kind = kinds[data.pop("type")]
     hints = get_type_hints(kind)
-    required = {entry.name for entry in fields(kind) if entry.default is MISSING}
+    required = {entry.name for entry in fields(kind) if not _optional(entry)}
     if not required <= set(data) <= set(hints):
         raise MessageError(
             f"{name_of(kind)}: expected {', '.join(hints) or 'nothing'}, got {', '.join(data)}"
@@ -178,6 +211,10 @@ def read(text: str) -> Any:
         if not _fits(value, hints[name]):
             raise MessageError(f"{name_of(kind)}: {name} is {value!r:.60}")
     return kind(**data)
+
+
+def _optional(entry: Any) -> bool:
+    return entry.default is not MISSING or entry.default_factory is not MISSING
 
 
 def _fits(value: Any, hint: Any) -> bool:
@@ -195,10 +232,11 @@ def _fits(value: Any, hint: Any) -> bool:
 def typescript() -> str:
     """The types of all messages, for studio/src/server/messages.ts."""
     lines = ["/** Made by `python -m partwright.studio.messages`: change them there. */", ""]
-    for kind in (Step, *FROM_PAGE, *FROM_SERVER):
+    inner = (Step, Size)
+    for kind in (*inner, *FROM_PAGE, *FROM_SERVER):
         hints = get_type_hints(kind)
-        own = [] if kind is Step else [f'  type: "{name_of(kind)}";']
-        given = {entry.name: entry.default is not MISSING for entry in fields(kind)}
+        own = [] if kind in inner else [f'  type: "{name_of(kind)}";']
+        given = {entry.name: _optional(entry) for entry in fields(kind)}
         # What the server sends is always whole; the page may leave out what has a default.
         optional = {name for name, default in given.items() if default and kind in FROM_PAGE}
         own += [f"  {name}{'?' if name in optional else ''}: {_type(hints[name])};" for name in given]

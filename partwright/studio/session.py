@@ -17,11 +17,10 @@ from partwright.assembly.files import from_text
 from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError, PartwrightError, SettingError
 from partwright.export.formats import FORMATS
-from partwright.fitting import Start, fit
 from partwright.methods import METHODS, Cancellation, Progress
 from partwright.metrics import evaluate
 from partwright.shapes import Shape
-from partwright.studio import messages
+from partwright.studio import fits, messages
 from partwright.studio.journal import Journal
 
 Send = Callable[[Any], None]
@@ -31,11 +30,13 @@ _QUIET = 0.4  # seconds without an edit before scores are taken
 
 
 class Session:
-    """All methods but `_work...` run in the server's event loop."""
+    """All methods but `_work...` run in the server's event loop, which the first page that joins tells of."""
 
     def __init__(self, journal: Journal, file: Path, shape: Shape | None) -> None:
         self.journal, self.file, self.shape = journal, file, shape
+        self.curve: messages.Curve | None = None
         self._pages: set[Send] = set()
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._cancel: Cancellation | None = None
         self._scoring: asyncio.Task[None] | None = None
         self._busy = threading.Lock()
@@ -43,8 +44,11 @@ class Session:
     # Pages
 
     def join(self, send: Send) -> None:
+        self._loop = asyncio.get_running_loop()
         self._pages.add(send)
         send(self.state(self.journal.note))
+        if self.curve is not None:
+            send(self.curve)
         self.score_soon()
 
     def leave(self, send: Send) -> None:
@@ -89,8 +93,8 @@ class Session:
         """Raises PartwrightError for what cannot be done."""
         if isinstance(message, messages.Commit | messages.Undo | messages.Redo):
             self._edit(message, send)
-        elif isinstance(message, messages.Fit):
-            self._fit(message)
+        elif isinstance(message, messages.Fit | messages.Reshape):
+            self._begin(message)
         elif isinstance(message, messages.Stop):
             if self._cancel is not None:
                 self._cancel.request()
@@ -120,7 +124,7 @@ class Session:
 
     def replace_shape(self, shape: Shape) -> None:
         """Another input beside the assembly."""
-        self.shape = shape
+        self.shape, self.curve = shape, None
         self.tell(self.state())
         self.score_soon()
 
@@ -132,69 +136,61 @@ class Session:
 
     # Fitting
 
-    def _fit(self, message: messages.Fit) -> None:
+    def _begin(self, message: messages.Fit | messages.Reshape) -> None:
         if self.shape is None:
             raise SettingError(
                 "there is no shape to fit to: drop one into the page, or name it on the command line"
             )
         if self._cancel is not None:
             raise SettingError("a fit is running already; stop it first")
-        start, label = None, "Fit"
-        settings: dict[str, Any] = {}
-        if message.mode != "new":
-            assembly = self.assembly()
-            names = {part.name for part in assembly.parts}
-            chosen = [name for name in message.names if name in names]
-            locked = chosen if message.mode == "except" else sorted(names - set(chosen))
-            if len(locked) == len(names):
-                raise SettingError("every part is locked, so there is nothing to refit")
-            start = Start(assembly, tuple(locked))
-            free = sorted(names - set(locked))
-            label = f"Refit {free[0] if len(free) == 1 else f'{len(free)} parts'}"
-            settings["max_parts"] = len(assembly)
-        elif message.max_parts is not None:
-            settings["max_parts"] = message.max_parts
+        if isinstance(message, messages.Fit):
+            task = fits.fitting(self.shape, message, self.assembly)
+        else:
+            task = fits.reshaping(self.shape, message, self.assembly())
         self._cancel = Cancellation()
-        loop = asyncio.get_running_loop()
-        shape, cancel = self.shape, self._cancel
-
-        def on_loop(function: Callable[..., None], *arguments: Any) -> None:
-            loop.call_soon_threadsafe(function, *arguments)
-
-        last = [0.0]
-
-        def progress(step: Progress) -> None:
-            text = ""
-            if time.monotonic() - last[0] > _SHOWN_EVERY:
-                best = step.assembly()
-                text = to_text(best) if best is not None else ""
-                last[0] = time.monotonic()
-            told = messages.Fitting(step.stage, step.fraction, step.parts, float(step.iou), text)
-            on_loop(self.tell, told)
-
-        def work() -> None:
-            try:
-                result = fit(
-                    shape, message.method, quality=message.quality, start=start,
-                    progress=progress, cancel=cancel, **settings,
-                )  # fmt: skip
-            except PartwrightError as error:
-                on_loop(self._fit_ended, None, label, messages.Failed(str(error)))
-            except Exception as error:
-                on_loop(self._fit_ended, None, label, messages.Failed(f"the fit failed: {error!r}"))
-                raise
-            else:
-                done = messages.Fitted(result.outcome, len(result.assembly), float(result.scores.iou))
-                on_loop(self._fit_ended, _with_locked(result.assembly, start), label, done)
-
-        threading.Thread(target=work, name="fit", daemon=True).start()
+        threading.Thread(target=self._work_on, args=(task, self._cancel), name="fit", daemon=True).start()
         self.tell(messages.Fitting("starting", 0.0, 0, 0.0))
 
-    def _fit_ended(self, assembly: Assembly | None, label: str, told: Any) -> None:
+    def _work_on(self, task: fits.Task, cancel: Cancellation) -> None:
+        last = time.monotonic()
+
+        def progress(step: Progress) -> None:
+            nonlocal last
+            text = ""
+            if time.monotonic() - last > _SHOWN_EVERY:
+                best = step.assembly()
+                text = to_text(best) if best is not None else ""
+                last = time.monotonic()
+            told = messages.Fitting(step.stage, step.fraction, step.parts, float(step.iou), text)
+            self._on_loop(self.tell, told)
+
+        try:
+            done = task.work(progress, cancel)
+        except PartwrightError as error:
+            self._on_loop(self._fit_failed, str(error))
+        except Exception as error:
+            self._on_loop(self._fit_failed, f"the fit failed: {error!r}")
+            raise
+        else:
+            self._on_loop(self._fit_ended, task.label, done)
+
+    def _fit_ended(self, label: str, done: fits.Done) -> None:
+        try:
+            self.journal.commit(label, to_text(done.assembly))
+        except PartwrightError as error:  # the disk is full
+            self._fit_failed(str(error))
+            return
         self._cancel = None
-        if assembly is not None:
-            self.journal.commit(label, to_text(assembly))
-        self.tell(told)
+        if done.curve is not None:
+            self.curve = done.curve
+            self.tell(done.curve)
+        self.tell(done.told)
+        self.tell(self.state())
+        self.score_soon()
+
+    def _fit_failed(self, why: str) -> None:
+        self._cancel = None
+        self.tell(messages.Failed(why))
         self.tell(self.state())
         self.score_soon()
 
@@ -233,16 +229,12 @@ class Session:
         with self._busy:  # one at a time; what was cancelled while it waited is not missed
             return evaluate(from_text(text), shape, emd=False)
 
+    def _on_loop(self, function: Callable[..., None], *arguments: Any) -> None:
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(function, *arguments)
+
     def stop(self) -> None:
         if self._cancel is not None:
             self._cancel.request()
         if self._scoring is not None:
             self._scoring.cancel()
-
-
-def _with_locked(assembly: Assembly, start: Start | None) -> Assembly:
-    """Locked solids under their own names: a fit of SuperFrusta gives them back as what they also are."""
-    for name in start.locked if start else ():
-        if any(part.name == name for part in assembly.parts):
-            assembly = assembly.replace_part(name, start.assembly[name])  # type: ignore[union-attr]
-    return assembly

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
+import socket
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -97,3 +101,53 @@ def shared(new_page: Callable[..., Page], tmp_path: Path) -> Callable[..., Page]
         return new_page(**options).open(path.as_uri())
 
     return make
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Server:
+    """`partwright studio` as a process of its own."""
+
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        self.folder = folder
+        port = free_port()
+        self.command = [
+            sys.executable,
+            "-m",
+            "partwright",
+            "studio",
+            *arguments,
+            f"--port={port}",
+            "--no-browser",
+        ]
+        self.process = self.start()
+
+    def start(self) -> subprocess.Popen[str]:
+        environment = {**os.environ, "XDG_STATE_HOME": str(self.folder / "state")}
+        self.process = subprocess.Popen(
+            self.command, cwd=self.folder, env=environment, stdout=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout is not None
+        self.url = self.process.stdout.readline().split()[-1]
+        return self.process
+
+    def kill(self) -> None:
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+
+
+@pytest.fixture
+def serve(tmp_path: Path, browser: object) -> Iterator[Callable[..., Server]]:
+    servers = []
+
+    def make(*arguments: str) -> Server:
+        servers.append(Server(tmp_path, *arguments))
+        return servers[-1]
+
+    yield make
+    for server in servers:
+        server.kill()

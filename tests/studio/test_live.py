@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import socket
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,63 +11,13 @@ from partwright.assembly import Assembly, Part, load_assembly
 from partwright.assembly.files import from_text
 from partwright.fields import Box, Cylinder
 from partwright.meshing import mesh_assembly
-from tests.studio.conftest import Page
+from tests.studio.conftest import Page, Server
 
 pytest.importorskip("uvicorn", reason="the studio's server needs uvicorn")
 
 TABLE = Assembly(
     (Part(Box((60, 40, 10)), (0, 0, 20), name="top"), Part(Cylinder(8, 50), name="foot")), unit="mm"
 )
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
-class Server:
-    """`partwright studio` as a process of its own."""
-
-    def __init__(self, folder: Path, *arguments: str) -> None:
-        self.folder = folder
-        port = free_port()
-        self.command = [
-            sys.executable,
-            "-m",
-            "partwright",
-            "studio",
-            *arguments,
-            f"--port={port}",
-            "--no-browser",
-        ]
-        self.process = self.start()
-
-    def start(self) -> subprocess.Popen[str]:
-        environment = {**os.environ, "XDG_STATE_HOME": str(self.folder / "state")}
-        self.process = subprocess.Popen(
-            self.command, cwd=self.folder, env=environment, stdout=subprocess.PIPE, text=True
-        )
-        assert self.process.stdout is not None
-        self.url = self.process.stdout.readline().split()[-1]
-        return self.process
-
-    def kill(self) -> None:
-        self.process.send_signal(signal.SIGKILL)
-        self.process.wait()
-
-
-@pytest.fixture
-def serve(tmp_path: Path, browser: object) -> Iterator[Callable[..., Server]]:
-    servers = []
-
-    def make(*arguments: str) -> Server:
-        servers.append(Server(tmp_path, *arguments))
-        return servers[-1]
-
-    yield make
-    for server in servers:
-        server.kill()
 
 
 def test_refit_edits_and_a_server_that_is_killed(

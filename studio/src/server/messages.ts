@@ -5,6 +5,12 @@ export interface Step {
   text: string;
 }
 
+export interface Size {
+  parts: number;
+  iou: number;
+  text: string;
+}
+
 export interface Commit {
   type: "commit";
   base: number;
@@ -29,6 +35,16 @@ export interface Fit {
   method: string;
   quality: "draft" | "normal" | "high";
   max_parts?: number | null;
+  curve?: boolean;
+}
+
+export interface Reshape {
+  type: "reshape";
+  action: "split" | "merge" | "box";
+  names: string[];
+  method: string;
+  quality: "draft" | "normal" | "high";
+  box?: number[];
 }
 
 export interface Stop {
@@ -78,6 +94,12 @@ export interface Fitted {
   iou: number;
 }
 
+export interface Curve {
+  type: "curve";
+  sizes: Size[];
+  of: string;
+}
+
 export interface Scored {
   type: "scored";
   revision: number;
@@ -98,5 +120,5 @@ export interface Failed {
   message: string;
 }
 
-export type FromPage = Commit | Undo | Redo | Fit | Stop | Save;
-export type FromServer = State | Accepted | Fitting | Fitted | Scored | Saved | Failed;
+export type FromPage = Commit | Undo | Redo | Fit | Reshape | Stop | Save;
+export type FromServer = State | Accepted | Fitting | Fitted | Curve | Scored | Saved | Failed;

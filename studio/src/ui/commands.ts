@@ -92,7 +92,8 @@ export class Commands {
   }
 
   private escape(): void {
-    if (this.viewport.tool === "measure" && this.viewport.measurements.length) this.viewport.clearMeasurements();
+    if (this.viewport.region.active) this.viewport.region.end();
+    else if (this.viewport.tool === "measure" && this.viewport.measurements.length) this.viewport.clearMeasurements();
     else if (this.viewport.tool === "measure") this.viewport.setTool("select");
     else this.store.select([]);
   }

@@ -2,8 +2,9 @@
 
 import { formatLength, formatNumber } from "../model/lengths";
 import type { Store } from "../model/store";
-import type { Fit, FromServer, Scored, State } from "../server/messages";
+import type { Fit, FromServer, Reshape, Scored, State } from "../server/messages";
 import { button } from "./controls";
+import { CurveSlider } from "./curve";
 import { h, icon } from "./dom";
 
 const METHODS: Record<string, string> = {
@@ -17,9 +18,14 @@ export class FitPanel {
   private method = h("select", { "aria-label": "Method" });
   private quality = h("select", { "aria-label": "Quality" });
   private most = h("input", { type: "number", min: 1, max: 500, placeholder: "any", "aria-label": "Most parts" });
+  private curve = h("input", { type: "checkbox" });
+  private slider: CurveSlider;
   private start = button({ icon: "fit", label: "Fit", run: () => this.ask("new") }, true);
   private only = button({ label: "Refit selected", run: () => this.ask("only") }, true);
   private rest = button({ label: "Refit all but locked", run: () => this.ask("except") }, true);
+  private split = button({ label: "Split in two", run: () => this.reshape("split") }, true);
+  private merge = button({ label: "Merge into one", run: () => this.reshape("merge") }, true);
+  private box = button({ label: "A part is missing", run: () => this.onBox() }, true);
   private stop = button({ icon: "stop", label: "Stop, keep the best", run: () => this.onStop() }, true);
   private bar = h("progress", { max: 1, value: 0, "aria-label": "Progress" });
   private told = h("p", { class: "hint", "aria-live": "polite" });
@@ -27,23 +33,30 @@ export class FitPanel {
   private running = false;
   private state: State | null = null;
   onFit: (fit: Fit) => void = () => {};
+  onReshape: (reshape: Reshape) => void = () => {};
+  onBox: () => void = () => {};
   onStop: () => void = () => {};
 
   constructor(private store: Store) {
     for (const quality of ["draft", "normal", "high"]) this.quality.append(h("option", { value: quality, selected: quality === "normal" }, quality));
     this.start.classList.add("primary");
+    this.slider = new CurveSlider(store);
+    this.box.title = "Draw a box around it, and a part is fitted within";
     this.element.append(
       h("h2", {}, "Fit"),
-      h("div", { class: "form" }, h("label", {}, "Method", this.method), h("label", {}, "Quality", this.quality), h("label", {}, "Most parts", this.most)),
-      h("div", { class: "buttons" }, this.start, this.only, this.rest, this.stop),
+      h("div", { class: "form" }, h("label", {}, "Method", this.method), h("label", {}, "Quality", this.quality), h("label", {}, "Most parts", this.most), h("label", { class: "check", title: "Takes longer: an assembly of every size, and a slider along them" }, this.curve, "Every size, from few parts to many")),
+      h("div", { class: "buttons" }, this.start, this.only, this.rest, this.split, this.merge, this.box, this.stop),
+      this.slider.element,
       this.bar,
       this.told,
       this.scores,
     );
     store.on(["selection", "document", "view"], () => this.enable());
+    store.on(["history"], () => this.slider.follow());
   }
 
   show(state: State): void {
+    if (this.state && this.state.input !== state.input) this.slider.clear();
     this.state = state;
     if (!this.method.options.length)
       for (const name of state.methods) this.method.append(h("option", { value: name }, METHODS[name] ?? name));
@@ -55,7 +68,8 @@ export class FitPanel {
   private run(on: boolean): void {
     this.running = on;
     this.bar.hidden = this.stop.hidden = !on;
-    this.start.hidden = this.only.hidden = this.rest.hidden = on;
+    for (const one of [this.start, this.only, this.rest, this.split, this.merge, this.box]) one.hidden = on;
+    this.slider.enable(!on);
     this.enable();
   }
 
@@ -65,6 +79,13 @@ export class FitPanel {
     this.start.disabled = !there;
     this.only.disabled = !there || !this.store.editable.length;
     this.rest.disabled = !there || !parts;
+    const chosen = this.store.selectedParts;
+    const free = chosen.every((part) => !this.store.locked.has(part.id));
+    this.split.disabled = !there || chosen.length !== 1 || !free;
+    this.split.title = this.split.disabled ? "Select one part" : "Two parts in its place, fitted to what it stands for";
+    this.merge.disabled = !there || chosen.length < 2 || !free;
+    this.merge.title = this.merge.disabled ? "Select two parts or more" : "One part in their place";
+    this.box.disabled = !there || !parts;
     this.only.title = this.only.disabled ? "Select the parts that may change" : "Only the selected parts change";
   }
 
@@ -82,7 +103,17 @@ export class FitPanel {
       method: this.method.value,
       quality: this.quality.value as Fit["quality"],
       max_parts: most > 0 ? most : null,
+      curve: mode === "new" && this.curve.checked,
     });
+  }
+
+  private reshape(action: "split" | "merge"): void {
+    this.askFor({ action, names: this.store.selectedParts.map((part) => part.name) });
+  }
+
+  /** By the method that is chosen. */
+  askFor(what: Pick<Reshape, "action" | "names" | "box">): void {
+    this.onReshape({ type: "reshape", ...what, method: this.method.value, quality: this.quality.value as Fit["quality"] });
   }
 
   hear(message: FromServer): void {
@@ -94,8 +125,12 @@ export class FitPanel {
     } else if (message.type === "fitted") {
       this.run(false);
       const word = message.outcome.replaceAll("_", " ");
-      this.told.textContent = `${word[0].toUpperCase()}${word.slice(1)}: ${message.parts} parts, IoU ${formatNumber(message.iou)}`;
-    } else if (message.type === "scored") this.score(message);
+      const iou = message.iou > 0 ? `, IoU ${formatNumber(message.iou)}` : "";
+      this.told.textContent = `${word[0].toUpperCase()}${word.slice(1)}: ${message.parts} parts${iou}`;
+    } else if (message.type === "failed") {
+      if (this.running) this.told.textContent = message.message;
+    } else if (message.type === "curve") this.slider.set(message);
+    else if (message.type === "scored") this.score(message);
   }
 
   private score(scored: Scored): void {

@@ -1,5 +1,6 @@
 /** The page when there is a server behind it: edits go to its journal, fits and exports come from it. */
 
+import { surfacePlaces } from "../edit/region";
 import type { Step, Store } from "../model/store";
 import { type Group, newGroup, readAssembly, writeAssembly } from "../model/tree";
 import { asMesh, loadInput, type Triangles } from "../server/input";
@@ -55,6 +56,8 @@ export class Live {
       if (message.type === "saved") toast(`Saved to ${message.file}`);
     };
     this.fit.onFit = (fit) => this.link.send(fit) || toast("The server is gone, so nothing can be fitted now.", undefined, true);
+    this.fit.onReshape = (reshape) => this.link.send(reshape) || toast("The server is gone, so nothing can be fitted now.", undefined, true);
+    this.fit.onBox = () => this.drawBox();
     this.fit.onStop = () => this.link.send({ type: "stop" });
     store.onStep = (action, label) => {
       if (this.adopting) return;
@@ -69,6 +72,15 @@ export class Live {
       this.keepUnsent();
       if (this.link.waiting.length) event.preventDefault();
     });
+  }
+
+  /** A box in the picture, over which the input is shown, for a part that is missing. */
+  private drawBox(): void {
+    const { region } = this.app.viewport;
+    if (this.app.viewport.renderer?.look.show === "parts") this.show("both", false, false);
+    region.surface ??= this.input && surfacePlaces(this.input.places, this.input.triangles, 20_000);
+    region.onFit = ([low, high]) => this.fit.askFor({ action: "box", names: [], box: [...low, ...high] });
+    region.begin();
   }
 
   private connection(there: boolean): void {
@@ -137,8 +149,8 @@ export class Live {
 
   private async showInput(state: State): Promise<void> {
     this.inputName = state.input;
-    const { renderer } = this.app.viewport;
-    this.input = null;
+    const { renderer, region } = this.app.viewport;
+    this.input = region.surface = null;
     if (state.input)
       try {
         this.input = await loadInput("input");
@@ -151,10 +163,10 @@ export class Live {
   }
 
   /** What stands in the picture: the parts, the input, or both. */
-  show(show: Look["show"], heat = false): void {
+  show(show: Look["show"], heat = false, frame = true): void {
     const { viewport } = this.app;
     viewport.renderer?.setLook({ show, heat });
-    viewport.frameAll();
+    if (frame) viewport.frameAll();
     viewport.wipeHandle(show === "wipe");
     document.body.dataset.show = show;
   }

@@ -2,6 +2,7 @@
 
 import { drawGizmo, type Handle } from "../edit/gizmo";
 import { type Measurement, type Measuring, measure, POINTS } from "../edit/measure";
+import { Region } from "../edit/region";
 import { type Axis, type Mode, Transform } from "../edit/transform";
 import { fromUnit, toUnit } from "../model/program";
 import { rgb } from "../model/palette";
@@ -33,7 +34,7 @@ export class Viewport {
   private overlay = svg("svg", { class: "overlay" });
   private gizmoLayer = svg("g");
   private measureLayer = svg("g", { class: "measures" });
-  private regionLayer = svg("g");
+  readonly region: Region;
   private pointers = new Map<number, { x: number; y: number }>();
   private gesture: { x: number; y: number; moved: boolean; button: number; pan: boolean } | null = null;
   private last = { x: 0, y: 0 };
@@ -42,8 +43,11 @@ export class Viewport {
 
   constructor(private store: Store) {
     this.camera = new Camera(store.root.up);
-    this.overlay.append(this.measureLayer, this.regionLayer, this.gizmoLayer);
-    this.element = h("div", { class: "viewport" }, this.canvas, this.overlay);
+    this.region = new Region(store);
+    this.region.redraw = () => this.drawOverlay();
+    this.region.onStatus = (text) => this.onStatus(text);
+    this.overlay.append(this.measureLayer, this.region.layer, this.gizmoLayer);
+    this.element = h("div", { class: "viewport" }, this.canvas, this.overlay, this.region.bar);
     try {
       this.renderer = new Renderer(this.canvas, {
         show: "parts",
@@ -185,6 +189,12 @@ export class Viewport {
     return { x: event.clientX - box.left, y: event.clientY - box.top };
   }
 
+  /** Of the parts' picture, which is the right half where the input stands beside it. */
+  private inView(at: { x: number; y: number }): { x: number; y: number } {
+    const shift = this.renderer?.look.show === "beside" ? this.size[0] : 0;
+    return { x: at.x - shift, y: at.y };
+  }
+
   /** What is under the pointer stays there. */
   private zoomAt(x: number, y: number, factor: number): void {
     const [width, height] = this.size;
@@ -209,6 +219,10 @@ export class Viewport {
       else this.finishTransform();
       return;
     }
+    if (event.button === 0 && this.region.down(this.inView(at))) {
+      this.element.setPointerCapture(event.pointerId);
+      return;
+    }
     this.pointers.set(event.pointerId, at);
     this.element.setPointerCapture(event.pointerId);
     const pan = event.button === 1 || event.button === 2 || event.shiftKey;
@@ -220,6 +234,7 @@ export class Viewport {
     const previous = this.pointers.get(event.pointerId);
     const [dx, dy] = [at.x - (previous ?? this.last).x, at.y - (previous ?? this.last).y];
     this.last = at;
+    if (this.region.move(this.inView(at))) return;
     if (this.transform) {
       this.drag(at, event.ctrlKey !== this.store.snapping);
       return;
@@ -251,6 +266,7 @@ export class Viewport {
   }
 
   private up(event: PointerEvent, cancelled = false): void {
+    if (this.region.up(this.view, ...this.size)) return;
     this.pointers.delete(event.pointerId);
     if (this.dragging) {
       this.dragging = false;
@@ -470,10 +486,11 @@ export class Viewport {
     const [width, height] = this.size;
     const { view, store } = this;
     const shift = this.renderer.look.show === "beside" ? width : 0;
-    for (const layer of [this.gizmoLayer, this.measureLayer, this.regionLayer]) layer.setAttribute("transform", `translate(${shift} 0)`);
+    for (const layer of [this.gizmoLayer, this.measureLayer, this.region.layer]) layer.setAttribute("transform", `translate(${shift} 0)`);
     if (this.tool === "move" || this.tool === "rotate" || this.tool === "scale")
       drawGizmo(this.gizmoLayer, store, this.tool, view, width, height, (handle, event) => this.beginDrag(handle, event));
     else this.gizmoLayer.replaceChildren();
+    this.region.draw(view, width, height);
     this.measureLayer.replaceChildren();
     const on = (p: Vec3) => project(view, toUnit(store.frame, p), width, height);
     for (const { points, label, kind } of this.measurements) {

@@ -1,0 +1,110 @@
+"""What a page asks to be fitted, as work for a thread of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from partwright.assembly import Assembly
+from partwright.assembly.file_text import to_text
+from partwright.errors import SettingError
+from partwright.fitting import Start, fit
+from partwright.fitting.options import check_able
+from partwright.methods import METHODS, Ability, Cancellation, Progress, Run
+from partwright.shapes import Shape
+from partwright.studio import messages
+from partwright.superfrusta.local_fits import LocalFit
+
+
+@dataclass(frozen=True)
+class Done:
+    """What came of it; curve: assemblies of falling size, where one was asked for."""
+
+    assembly: Assembly
+    told: messages.Fitted
+    curve: messages.Curve | None = None
+
+
+@dataclass(frozen=True)
+class Task:
+    """label: what the step of the history is called."""
+
+    label: str
+    work: Callable[[Callable[[Progress], None], Cancellation], Done]
+
+
+def fitting(shape: Shape, message: messages.Fit, present: Callable[[], Assembly]) -> Task:
+    """A fit from nothing, or a refit of some parts of the present assembly.
+
+    Raises:
+        SettingError: every part is locked.
+    """
+    settings: dict[str, Any] = {}
+    start, label = None, "Fit"
+    if message.mode != "new":
+        assembly = present()
+        start = _start(assembly, message)
+        free = sorted({part.name for part in assembly.parts} - set(start.locked))
+        label = f"Refit {free[0] if len(free) == 1 else f'{len(free)} parts'}"
+        settings["max_parts"] = len(assembly)
+    elif message.max_parts is not None:
+        settings["max_parts"] = message.max_parts
+    if message.curve and start is None:
+        settings["curve"] = True
+
+    def work(progress: Callable[[Progress], None], cancel: Cancellation) -> Done:
+        result = fit(
+            shape, message.method, quality=message.quality, start=start, progress=progress, cancel=cancel,
+            **settings,
+        )  # fmt: skip
+        told = messages.Fitted(result.outcome, len(result.assembly), float(result.scores.iou))
+        sizes = [messages.Size(p.parts, float(p.iou), to_text(p.assembly)) for p in result.curve]
+        curve = messages.Curve(sizes, f"{shape.name} by {message.method}") if sizes else None
+        return Done(_with_locked(result.assembly, start), told, curve)
+
+    return Task(label, work)
+
+
+def reshaping(shape: Shape, message: messages.Reshape, assembly: Assembly) -> Task:
+    """One part in two, several in one, or one more within a box.
+
+    Raises:
+        SettingError: the method has no such fits.
+    """
+    method = METHODS[message.method]
+    check_able(method, Ability.LOCK)
+    settings = method.settings(message.quality)
+    names = list(message.names)
+    if message.action == "split" and len(names) != 1:
+        raise SettingError("one part at a time can be split; select one")
+    label = {"split": f"Split {names[0] if names else ''}", "merge": f"Merge {len(names)} parts"}
+
+    def work(progress: Callable[[Progress], None], cancel: Cancellation) -> Done:
+        local = LocalFit(shape, assembly, settings, Run(progress=progress, cancel=cancel))
+        if message.action == "split":
+            result = local.split(names[0])
+        elif message.action == "merge":
+            result = local.merge(names)
+        else:
+            result = local.fill(message.box)
+        return Done(result, messages.Fitted("converged", len(result), 0.0))
+
+    return Task(label.get(message.action, "Part in a box"), work)
+
+
+def _start(assembly: Assembly, message: messages.Fit) -> Start:
+    names = {part.name for part in assembly.parts}
+    chosen = [name for name in message.names if name in names]
+    locked = chosen if message.mode == "except" else sorted(names - set(chosen))
+    if len(locked) == len(names):
+        raise SettingError("every part is locked, so there is nothing to refit")
+    return Start(assembly, tuple(locked))
+
+
+def _with_locked(assembly: Assembly, start: Start | None) -> Assembly:
+    """Locked solids under their own names: a fit of SuperFrusta gives them back as what they also are."""
+    for name in start.locked if start else ():
+        if any(part.name == name for part in assembly.parts):
+            assembly = assembly.replace_part(name, start.assembly[name])  # type: ignore[union-attr]
+    return assembly
