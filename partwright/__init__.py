@@ -37,7 +37,18 @@ _PUBLIC = {
     "clean": "partwright.cleaning",
 }
 _METHODS = ("capri", "partsdf")
-_MODULES = ("fields", "shapes", "assembly", "meshing", "render", "metrics", "errors", "datasets", *_METHODS)
+_MODULES = (
+    "fields",
+    "shapes",
+    "assembly",
+    "meshing",
+    "render",
+    "metrics",
+    "errors",
+    "datasets",
+    "textures",
+    *_METHODS,
+)
 
 __all__ = ["__version__", "export", *_PUBLIC, *_MODULES]
 

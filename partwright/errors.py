@@ -93,6 +93,10 @@ class NothingToExportError(PartwrightError):
     """No part of the assembly can be written in the format."""
 
 
+class NoColoursError(PartwrightError):
+    """A file has no colours that could be given to parts."""
+
+
 class UnitError(PartwrightError):
     """The format cannot say the assembly's length unit."""
 

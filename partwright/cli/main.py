@@ -11,13 +11,25 @@ from importlib import import_module
 from typing import Any
 
 from partwright import __version__
-from partwright.cli import clean, completion, describe, evaluate, export, fit, outputs, parts, segment, studio
+from partwright.cli import (
+    clean,
+    completion,
+    describe,
+    evaluate,
+    export,
+    fit,
+    outputs,
+    parts,
+    segment,
+    studio,
+    texture,
+)
 from partwright.cli.interrupts import INTERRUPTED
 from partwright.cli.parser import Parser
 from partwright.cli.terminal import note
 from partwright.errors import CancelledError, PartwrightError
 
-COMMANDS = (fit, clean, evaluate, describe, export, segment, parts, studio, completion)
+COMMANDS = (fit, clean, evaluate, describe, export, segment, parts, texture, studio, completion)
 
 
 def parser() -> Parser:

@@ -12,6 +12,7 @@ there without a mesh, for its parameters.
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,9 @@ from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import free_name
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
+from partwright.textures import part_map
+from partwright.textures.maps import KEY
+from partwright.textures.unwrapping import unwrapped
 
 if TYPE_CHECKING:
     import trimesh
@@ -130,7 +134,7 @@ class _Scene:
         except NoSurfaceError:  # it only shows where it blends
             self._add_bare(part.name, parent, pose @ own.matrix(), about)
             return
-        mesh = coloured(mesh, self.colours[part.name])
+        mesh = self._looking(mesh, part)
         self.scene.add_geometry(mesh, part.name, part.name, parent, pose @ own.matrix(), metadata=about)
         for i, move in enumerate(part.instances, start=2):
             copy = free_name(f"{part.name}/{i}", self.taken)
@@ -150,11 +154,29 @@ class _Scene:
         }
         name = self._name_of_whole(node)
         try:
-            mesh = coloured(atomic_mesh(node, self.assembly), self.colours[parts[0].name])
+            mesh = self._looking(atomic_mesh(node, self.assembly), parts[0], placed=True)
         except NoSurfaceError:
             self._add_bare(name, parent, pose, about)
         else:
             self.scene.add_geometry(mesh, name, name, parent, pose, metadata=about)
+
+    def _looking(self, mesh: trimesh.Trimesh, part: Part, placed: bool = False) -> trimesh.Trimesh:
+        """The mesh in the part's map, or in its colour; placed: it is where the part is, not in its frame."""
+        texture = part_map(part)
+        if texture is None:
+            own = str(part.metadata.get("colour", ""))
+            known = re.fullmatch("#[0-9a-fA-F]{6}", own)
+            colour = np.array(list(bytes.fromhex(own[1:]))) if known else self.colours[part.name]
+            return coloured(mesh, colour)
+        pose = Similarity(1.0, part.rotation, part.translation)
+        if placed:
+            mesh = mesh.copy()
+            mesh.vertices = pose.inverse()(np.asarray(mesh.vertices))
+        result, uv, image = unwrapped(mesh, part.field, texture)
+        if placed:
+            result.vertices = pose(np.asarray(result.vertices))
+        result.visual = with_image(uv, image)
+        return result
 
     def _name_of_whole(self, node: Node) -> str:
         """A part that was cut keeps its name; of a repeated one, the first copy does."""
@@ -181,7 +203,17 @@ def _extras(part: Part) -> dict[str, Any]:
     }
     if part.instances:
         own["instances"] = [instance_dict(move) for move in part.instances]
-    return own | ({"metadata": dict(part.metadata)} if part.metadata else {})
+    known = {name: value for name, value in part.metadata.items() if name != KEY}  # which is an image here
+    return own | ({"metadata": known} if known else {})
+
+
+def with_image(uv: np.ndarray, image: Any) -> Any:
+    """A matt look: an image (PIL, sRGB) at texture coordinates (V, 2) from its lower left."""
+    from trimesh.visual import TextureVisuals
+    from trimesh.visual.material import PBRMaterial
+
+    material = PBRMaterial(baseColorTexture=image, metallicFactor=0.0, roughnessFactor=0.7)
+    return TextureVisuals(uv=uv, material=material)
 
 
 def coloured(mesh: trimesh.Trimesh, colour: np.ndarray) -> trimesh.Trimesh:

@@ -52,7 +52,7 @@ def read_mesh(path: Path) -> Source:
     """
     suffix = path.suffix.lower()
     stem = in_utf8(path.stem)
-    scene = _load_scene(path, suffix)
+    scene = load_scene(path, suffix)
     pieces = tuple(unique_names(_pieces(scene, stem)))
     if not pieces:
         return _source_without_faces(stem, list(scene.geometry.values()))
@@ -102,7 +102,11 @@ def source_of_mesh(mesh: trimesh.Trimesh | tuple[Any, Any]) -> Source:
     return Source("mesh", (Piece("mesh", v, _valid(f, len(v), "the mesh")),))
 
 
-def _load_scene(path: Path, suffix: str) -> trimesh.Scene:
+def load_scene(path: Path, suffix: str, colours: bool = False) -> trimesh.Scene:
+    """A mesh file as trimesh reads it; colours: with materials and their images.
+
+    Raises UnreadableFileError.
+    """
     import trimesh
 
     check_shape_file(path)
@@ -110,12 +114,12 @@ def _load_scene(path: Path, suffix: str) -> trimesh.Scene:
         _refuse_cut_stl(path)
     if suffix in (".glb", ".gltf"):
         check_gltf(path)
-    # Textures and colours are never used, so they are never decoded: that is faster and safer.
+    # A fit uses neither textures nor colours, so they are not decoded: that is faster and safer.
     options: dict[str, Any] = {"process": False}
-    if suffix in (".obj", ".glb", ".gltf"):
+    if suffix in (".obj", ".glb", ".gltf") and not colours:
         options["skip_materials"] = True
     if suffix == ".obj":
-        options |= {"split_objects": True, "group_material": False}
+        options |= {"split_objects": not colours, "group_material": colours}
     try:
         with np.errstate(all="ignore"), _named_in_utf8(path) as readable:
             scene = trimesh.load_scene(readable, **options)

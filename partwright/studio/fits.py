@@ -8,13 +8,14 @@ from typing import Any
 
 from partwright.assembly import Assembly
 from partwright.assembly.file_text import to_text
-from partwright.errors import SettingError
+from partwright.errors import NoColoursError, SettingError
 from partwright.fitting import Start, fit
 from partwright.fitting.options import check_able
 from partwright.methods import METHODS, Ability, Cancellation, Progress, Run
 from partwright.shapes import Shape
 from partwright.studio import messages
 from partwright.superfrusta.local_fits import LocalFit
+from partwright.textures import Colours, bake
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,23 @@ def reshaping(shape: Shape, message: messages.Reshape, assembly: Assembly) -> Ta
         return Done(result, messages.Fitted("converged", len(result), 0.0))
 
     return Task(label.get(message.action, "Part in a box"), work)
+
+
+def baking(colours: Colours | None, assembly: Assembly, size: int) -> Task:
+    """The input's colours as maps of the parts.
+
+    Raises:
+        NoColoursError: it has none.
+    """
+    if colours is None:
+        raise NoColoursError("the input has no colours: neither of vertices or faces nor of materials")
+
+    def work(progress: Callable[[Progress], None], cancel: Cancellation) -> Done:
+        progress(Progress("bake", 1, 1, len(assembly), 0.0, 0.1))
+        result = bake(assembly, colours, size)
+        return Done(result, messages.Fitted("converged", len(result), 0.0))
+
+    return Task("Bake colours", work)
 
 
 def _start(assembly: Assembly, message: messages.Fit) -> Start:

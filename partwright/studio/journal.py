@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import IO
 
 from partwright.errors import OutputError
+from partwright.studio.images import Images
 from partwright.studio.messages import Step
 
 _KEPT = 500  # steps that the page is told of; the journal has all
@@ -24,6 +25,8 @@ def state_folder() -> Path:
 class Journal:
     """The assembly's text, what came before, and what was undone. Each change is written before it is told.
 
+    Steps are kept without their images, which `images` has once.
+
     folder: of the state; made if need be, readable by its owner alone. file: the assembly file that is
     edited, which need not exist; original: its text, empty where there is none. A journal that began with
     another text is put aside: the file has been changed by something else since.
@@ -32,10 +35,12 @@ class Journal:
     def __init__(self, folder: Path, file: Path, original: str) -> None:
         self.past: list[Step] = []
         self.future: list[Step] = []
-        self.text = original
+        self.images = Images()
+        self.short, _ = self.images.taken_out(original)
+        """The text without its images."""
         self.revision = 0
         self.note = ""
-        self.saved = original
+        self._saved = self.short
         name = hashlib.sha256(os.fsencode(file.absolute())).hexdigest()[:16]
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -60,9 +65,20 @@ class Journal:
             out.write(made)
         return made
 
+    @property
+    def text(self) -> str:
+        return self.images.put_back(self.short)
+
+    @property
+    def saved(self) -> str:
+        return self.images.put_back(self._saved)
+
     def commit(self, label: str, text: str) -> None:
-        self._write({"action": "commit", "label": label, "text": text})
-        self._apply({"action": "commit", "label": label, "text": text})
+        short, new = self.images.taken_out(text)
+        for name in new:
+            self._write({"action": "image", "name": name, "data": self.images.known[name]})
+        self._write({"action": "commit", "label": label, "text": short})
+        self._apply({"action": "commit", "label": label, "text": short})
 
     def undo(self) -> None:
         self._move("undo")
@@ -71,8 +87,8 @@ class Journal:
         self._move("redo")
 
     def mark_saved(self) -> None:
-        self._write({"action": "saved", "text": self.text})
-        self.saved = self.text
+        self._write({"action": "saved", "text": self.short})
+        self._saved = self.short
 
     def steps(self) -> tuple[list[Step], list[Step]]:
         """The last of what came before, and what was undone."""
@@ -89,18 +105,21 @@ class Journal:
     def _apply(self, line: dict[str, str]) -> None:
         action = line["action"]
         if action == "saved":
-            self.saved = line["text"]
+            self._saved = line["text"]
+            return
+        if action == "image":
+            self.images.known[line["name"]] = line["data"]
             return
         self.revision += 1
         if action == "commit":
-            self.past.append(Step(line["label"], self.text))
+            self.past.append(Step(line["label"], self.short))
             self.future.clear()
-            self.text = line["text"]
+            self.short = line["text"]
         elif action in ("undo", "redo"):
             source, target = (self.past, self.future) if action == "undo" else (self.future, self.past)
             step = source.pop()
-            target.append(Step(step.label, self.text))
-            self.text = step.text
+            target.append(Step(step.label, self.short))
+            self.short = step.text
 
     def _write(self, line: dict[str, str]) -> None:
         try:
@@ -125,14 +144,15 @@ class Journal:
                     rest.append(json.loads(line))
                 except ValueError:
                     break  # the line that was being written when the server ended
-            self.text = self.saved = first
+            first, _ = self.images.taken_out(first)
+            self.short = self._saved = first
             for entry in rest:
                 self._apply(entry)
         except (ValueError, KeyError, IndexError, TypeError):
             self._put_aside("was damaged")
             self._reset(original)
             return
-        if original not in (first, self.saved):
+        if self.images.taken_out(original)[0] not in (first, self._saved):
             self._put_aside("is of an earlier state of the file, which something else has changed since")
             self._reset(original)
         elif self.revision:
@@ -140,7 +160,7 @@ class Journal:
 
     def _reset(self, original: str) -> None:
         self.past, self.future, self.revision = [], [], 0
-        self.text = self.saved = original
+        self.short = self._saved = self.images.taken_out(original)[0]
 
     def _put_aside(self, why: str) -> None:
         aside = self._path.with_suffix(f".{secrets.token_hex(4)}.old")

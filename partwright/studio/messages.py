@@ -22,6 +22,14 @@ class Step:
 
 
 @dataclass(frozen=True)
+class Image:
+    """What stands in texts under its name, once for all of them: see `partwright.studio.images`."""
+
+    name: str
+    data: str
+
+
+@dataclass(frozen=True)
 class Size:
     """An assembly of a curve."""
 
@@ -78,6 +86,13 @@ class Reshape:
 
 
 @dataclass(frozen=True)
+class Bake:
+    """Give the parts the input's colours, as maps of so many texels a side."""
+
+    size: int
+
+
+@dataclass(frozen=True)
 class Stop:
     """End the fit with its best so far."""
 
@@ -99,11 +114,15 @@ class State:
     """Empty where there is no assembly yet."""
     past: list[Step]
     future: list[Step]
+    images: list[Image]
+    """Of all these texts."""
     file: str
     """The file that Save writes."""
     saved: bool
     input: str
     """Name of the shape beside the assembly; empty where there is none."""
+    coloured: bool
+    """Whether the input has colours."""
     box: list[float]
     """Lowest and highest corner of the shape, own units; empty where there is none."""
     unit: str
@@ -174,7 +193,7 @@ class Failed:
     message: str
 
 
-FROM_PAGE: tuple[type, ...] = (Commit, Undo, Redo, Fit, Reshape, Stop, Save)
+FROM_PAGE: tuple[type, ...] = (Commit, Undo, Redo, Fit, Reshape, Bake, Stop, Save)
 FROM_SERVER: tuple[type, ...] = (State, Accepted, Fitting, Fitted, Curve, Scored, Saved, Failed)
 
 
@@ -232,7 +251,7 @@ def _fits(value: Any, hint: Any) -> bool:
 def typescript() -> str:
     """The types of all messages, for studio/src/server/messages.ts."""
     lines = ["/** Made by `python -m partwright.studio.messages`: change them there. */", ""]
-    inner = (Step, Size)
+    inner = (Step, Image, Size)
     for kind in (*inner, *FROM_PAGE, *FROM_SERVER):
         hints = get_type_hints(kind)
         own = [] if kind in inner else [f'  type: "{name_of(kind)}";']

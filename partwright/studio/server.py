@@ -32,6 +32,7 @@ from partwright.studio.journal import Journal, state_folder
 from partwright.studio.messages import Failed, read, written
 from partwright.studio.security import HEADERS, App, Guard
 from partwright.studio.session import Session
+from partwright.textures import Colours, load_colours
 
 LOOPBACK = "127.0.0.1"
 PORT = 8765
@@ -68,7 +69,8 @@ def application(session: Session, token: str, hosts: frozenset[str]) -> App:
             sender.cancel()
 
     async def triangles(request: Request) -> Response:
-        """Two counts, then places (V, 3) float32 and triangles (F, 3) uint32, own units."""
+        """Three counts, V, F and C, then places (V, 3) float32 and triangles (F, 3) uint32, own units, and
+        colours (C, 3) of the vertices as bytes, sRGB: C is V, or 0."""
         if session.shape is None:
             return Response(status_code=404)
         return Response(await asyncio.to_thread(_triangles, session), media_type="application/octet-stream")
@@ -162,7 +164,15 @@ def opened(file: Path | None, shape: Path | None = None, state: Path | None = No
         assembly = load_assembly(target)
         check_size(assembly)
     text = target.read_text("utf-8") if assembly is not None else ""
-    return Session(Journal(state or state_folder(), target, text), target, loaded)
+    colours = _colours(shape) if shape is not None else None
+    return Session(Journal(state or state_folder(), target, text), target, loaded, colours)
+
+
+def _colours(shape: Path) -> Colours | None:
+    try:
+        return load_colours(shape)
+    except PartwrightError:
+        return None
 
 
 def _source(file: Path, name: str) -> Path | None:
@@ -200,8 +210,12 @@ def _triangles(session: Session) -> bytes:
         faces = faces[
             (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
         ]
-    counts = np.array([len(vertices), len(faces)], "<u4")
-    return counts.tobytes() + vertices.astype("<f4").tobytes() + faces.astype("<u4").tobytes()
+    colours = np.zeros((0, 3), np.uint8)
+    if session.colours is not None:
+        colours = np.round(session.colours.at(vertices)).astype(np.uint8)
+    counts = np.array([len(vertices), len(faces), len(colours)], "<u4")
+    arrays = (counts, vertices.astype("<f4"), faces.astype("<u4"), colours)
+    return b"".join(array.tobytes() for array in arrays)
 
 
 def _exported(session: Session, suffix: str) -> tuple[str, bytes, int]:
@@ -238,7 +252,8 @@ async def _dropped(request: Request, session: Session) -> dict[str, str]:
             check_size(assembly)
             session.commit(f"Open {name}", assembly)
             return {"kind": "assembly"}
-        session.replace_shape(await asyncio.to_thread(load_shape, path))
+        shape = await asyncio.to_thread(load_shape, path)
+        session.replace_shape(shape, await asyncio.to_thread(_colours, path))
         return {"kind": "shape"}
 
 

@@ -22,6 +22,7 @@ from partwright.metrics import evaluate
 from partwright.shapes import Shape
 from partwright.studio import fits, messages
 from partwright.studio.journal import Journal
+from partwright.textures import Colours
 
 Send = Callable[[Any], None]
 
@@ -32,8 +33,10 @@ _QUIET = 0.4  # seconds without an edit before scores are taken
 class Session:
     """All methods but `_work...` run in the server's event loop, which the first page that joins tells of."""
 
-    def __init__(self, journal: Journal, file: Path, shape: Shape | None) -> None:
-        self.journal, self.file, self.shape = journal, file, shape
+    def __init__(
+        self, journal: Journal, file: Path, shape: Shape | None, colours: Colours | None = None
+    ) -> None:
+        self.journal, self.file, self.shape, self.colours = journal, file, shape, colours
         self.curve: messages.Curve | None = None
         self._pages: set[Send] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -68,12 +71,14 @@ class Session:
         )
         return messages.State(
             revision=self.journal.revision,
-            text=self.journal.text,
+            text=self.journal.short,
             past=past,
             future=future,
+            images=[messages.Image(name, data) for name, data in self.journal.images.known.items()],
             file=self.file.name,
             saved=self.journal.text == self.journal.saved,
             input=(shape.file or shape.name) if shape else "",
+            coloured=self.colours is not None,
             box=[float(v) for corner in corners for v in corner],
             unit=(shape.unit if shape else None) or "",
             up=(shape.up if shape else None) or "",
@@ -93,7 +98,7 @@ class Session:
         """Raises PartwrightError for what cannot be done."""
         if isinstance(message, messages.Commit | messages.Undo | messages.Redo):
             self._edit(message, send)
-        elif isinstance(message, messages.Fit | messages.Reshape):
+        elif isinstance(message, messages.Fit | messages.Reshape | messages.Bake):
             self._begin(message)
         elif isinstance(message, messages.Stop):
             if self._cancel is not None:
@@ -122,9 +127,9 @@ class Session:
         self.journal.mark_saved()
         self.tell(messages.Saved(str(self.file)))
 
-    def replace_shape(self, shape: Shape) -> None:
+    def replace_shape(self, shape: Shape, colours: Colours | None) -> None:
         """Another input beside the assembly."""
-        self.shape, self.curve = shape, None
+        self.shape, self.colours, self.curve = shape, colours, None
         self.tell(self.state())
         self.score_soon()
 
@@ -136,7 +141,7 @@ class Session:
 
     # Fitting
 
-    def _begin(self, message: messages.Fit | messages.Reshape) -> None:
+    def _begin(self, message: messages.Fit | messages.Reshape | messages.Bake) -> None:
         if self.shape is None:
             raise SettingError(
                 "there is no shape to fit to: drop one into the page, or name it on the command line"
@@ -145,6 +150,8 @@ class Session:
             raise SettingError("a fit is running already; stop it first")
         if isinstance(message, messages.Fit):
             task = fits.fitting(self.shape, message, self.assembly)
+        elif isinstance(message, messages.Bake):
+            task = fits.baking(self.colours, self.assembly(), message.size)
         else:
             task = fits.reshaping(self.shape, message, self.assembly())
         self._cancel = Cancellation()

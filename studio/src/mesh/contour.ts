@@ -3,6 +3,7 @@
  * passes, where the planes at its crossings meet, so that edges stay sharp. Blocks that are surely empty are skipped.
  */
 
+import { type Maps, mapColour } from "../model/maps";
 import { fold, leafDistance, programDistance } from "../model/distance";
 import { INTERSECTION, LEAF, POP, PUSH, SUBTRACT, UNION, type Program } from "../model/program";
 import { type Vec3, longestSide, sub } from "../model/vectors";
@@ -17,10 +18,17 @@ export interface Surface {
   colours: Uint8Array;
 }
 
+/** rgb bytes of each part, and of those with images the image's layer. */
+export interface Looks {
+  colours: Uint8Array;
+  layers: number[];
+  maps: Maps | null;
+}
+
 const BLOCK = 4;
 
-/** cells: along the longest side. colours: rgb bytes of the parts. */
-export function contour(program: Program, cells: number, colours: Uint8Array): Surface {
+/** cells: along the longest side. */
+export function contour(program: Program, cells: number, looks: Looks): Surface {
   const side = longestSide(program.box);
   const step = side / cells;
   const counts = sub(program.box[1], program.box[0]).map((extent) => Math.ceil(extent / step) + 4);
@@ -155,7 +163,7 @@ export function contour(program: Program, cells: number, colours: Uint8Array): S
   const owners = new Uint16Array(count);
   const shades = new Uint8Array(count * 3);
   for (let i = 0; i < count; i++) {
-    const found = colourAt(program, places[3 * i], places[3 * i + 1], places[3 * i + 2], colours);
+    const found = colourAt(program, places[3 * i], places[3 * i + 1], places[3 * i + 2], looks);
     owners[i] = found.owner;
     shades.set(found.colour, 3 * i);
   }
@@ -195,7 +203,7 @@ function whereTheyMeet(crossings: Float64Array[]): Vec3 {
 }
 
 /** Colour (bytes) and part of the surface at a point: as the shader has them. */
-export function colourAt(program: Program, x: number, y: number, z: number, colours: Uint8Array): { colour: number[]; owner: number } {
+export function colourAt(program: Program, x: number, y: number, z: number, looks: Looks): { colour: number[]; owner: number } {
   type State = { d: number; colour: number[]; owner: number };
   const stack: State[] = [];
   const empty = (d: number): State => ({ d, colour: [128, 128, 128], owner: 0 });
@@ -208,7 +216,12 @@ export function colourAt(program: Program, x: number, y: number, z: number, colo
     }
     let next = now;
     if (action === POP) now = stack.pop()!;
-    else if (action === LEAF) next = { d: leafDistance(program, i, x, y, z), colour: [...colours.subarray(3 * part, 3 * part + 3)], owner: part };
+    else if (action === LEAF) {
+      const layer = program.quadrics[i] ? -1 : (looks.layers[part] ?? -1);
+      const plain = () => [...looks.colours.subarray(3 * part, 3 * part + 3)];
+      const colour = layer >= 0 && looks.maps ? mapColour(program, i, layer, looks.maps, x, y, z) : plain();
+      next = { d: leafDistance(program, i, x, y, z), colour, owner: part };
+    }
     const lead = operation === UNION ? now.d - next.d : operation === SUBTRACT ? -next.d - now.d : next.d - now.d;
     const weight = blend > 1e-9 ? Math.max(0, Math.min(1, 0.5 + (0.5 * lead) / blend)) : lead > 0 ? 1 : 0;
     now = {

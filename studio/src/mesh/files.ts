@@ -26,6 +26,9 @@ export function toStl(surface: Surface, store: Store): ArrayBuffer {
   return buffer;
 }
 
+/** glTF's colours of vertices are in linear light. */
+const LINEAR = Uint8Array.from({ length: 256 }, (_, i) => Math.round(255 * (i <= 10 ? i / 255 / 12.92 : ((i / 255 + 0.055) / 1.055) ** 2.4)));
+
 /** Binary glTF, in metres where the unit is known, with y up. */
 export function toGlb(surface: Surface, store: Store): ArrayBuffer {
   const own = ownPlaces(surface, store);
@@ -41,7 +44,7 @@ export function toGlb(surface: Surface, store: Store): ArrayBuffer {
   };
   const count = own.length / 3;
   const colours = new Uint8Array(count * 4).fill(255);
-  for (let i = 0; i < count; i++) colours.set(surface.colours.subarray(3 * i, 3 * i + 3), 4 * i);
+  for (let i = 0; i < count; i++) for (let k = 0; k < 3; k++) colours[4 * i + k] = LINEAR[surface.colours[3 * i + k]];
   const places = Float32Array.from(own, (v) => v * scale);
   const chunks = [places, surface.normals, colours, surface.triangles];
   let offset = 0;

@@ -2,14 +2,21 @@
 
 import { rgb } from "../model/palette";
 import type { Store } from "../model/store";
-import type { Surface } from "./contour";
+import type { Maps } from "../model/maps";
+import type { Looks, Surface } from "./contour";
 import MeshWorker from "./worker?worker&inline";
 
 let worker: Worker | null = null;
 let last = 0;
 const waiting = new Map<number, { resolve: (surface: Surface) => void; reject: (error: Error) => void }>();
 
-export function mesh(store: Store, cells: number): Promise<Surface> {
+/** maps: of parts with baked colours; layers: which of them is whose, or -1. */
+export interface Baked {
+  maps: { maps: Maps | null };
+  layers: number[];
+}
+
+export function mesh(store: Store, cells: number, baked: Baked): Promise<Surface> {
   if (!worker) {
     worker = new MeshWorker();
     worker.onmessage = (event: MessageEvent<{ id: number; surface?: Surface; error?: string }>) => {
@@ -27,6 +34,8 @@ export function mesh(store: Store, cells: number): Promise<Surface> {
   };
   const id = ++last;
   const colours = Uint8Array.from(store.program.parts.flatMap((part) => rgb(store.colourOf(part)).map((v) => Math.round(v * 255))));
-  worker.postMessage({ id, program: store.program, cells, colours });
+  const layers = baked.layers; // which also begins to load what is not there yet
+  const looks: Looks = { colours, layers, maps: baked.maps.maps };
+  worker.postMessage({ id, program: store.program, cells, looks });
   return new Promise((resolve, reject) => waiting.set(id, { resolve, reject }));
 }

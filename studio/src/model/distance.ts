@@ -16,7 +16,31 @@ export function fold(operation: number, a: number, b: number, k: number): number
   return -smoothUnion(-a, b, k);
 }
 
-function crossSection(x: number, y: number, hx: number, hy: number, radius: number): number {
+/** Of what `unbend` was asked last. */
+export let unbentAcross = 0;
+export let unbentAlong = 0;
+
+/** Coordinates across and along the axis, as if its arc were straight. */
+export function unbend(x: number, z: number, h: number, bulge: number): void {
+  unbentAcross = x;
+  unbentAlong = z;
+  if (!(bulge > 0)) return;
+  const theta = (bulge * Math.PI) / 2;
+  const [s, k] = [Math.sin(theta), Math.cos(theta)];
+  const end = Math.abs(z) - h;
+  const over = x * s + end * k;
+  if (over <= 0) {
+    const [tx, ty] = [k * h - x * s, Math.abs(z) * s];
+    unbentAcross = ((x * x + z * z - h * h) * s - 2 * x * k * h) / (Math.sqrt(tx * tx + ty * ty) + h);
+    unbentAlong = (h / theta) * Math.atan2(ty, Math.max(tx, 0));
+  } else {
+    unbentAcross = end * s - x * k;
+    unbentAlong = h + over;
+  }
+  if (z < 0) unbentAlong = -unbentAlong;
+}
+
+export function crossSection(x: number, y: number, hx: number, hy: number, radius: number): number {
   const qx = Math.abs(x) - hx + radius;
   const qy = Math.abs(y) - hy + radius;
   const [ox, oy] = [Math.max(qx, 0), Math.max(qy, 0)];
@@ -34,24 +58,9 @@ export function superfrustumDistance(x: number, y: number, z: number, rows: Floa
   const onion = rows[at + 7];
   const m = Math.min(sx, sy) / 2;
   const h = rows[at + 2] / 2 + 1e-12;
-  let across = x;
-  let along = z;
-  if (bulge > 0) {
-    const theta = (bulge * Math.PI) / 2;
-    const [s, k] = [Math.sin(theta), Math.cos(theta)];
-    const end = Math.abs(z) - h;
-    const over = x * s + end * k;
-    if (over <= 0) {
-      const [tx, ty] = [k * h - x * s, Math.abs(z) * s];
-      across = ((x * x + z * z - h * h) * s - 2 * x * k * h) / (Math.sqrt(tx * tx + ty * ty) + h);
-      along = (h / theta) * Math.atan2(ty, Math.max(tx, 0));
-    } else {
-      across = end * s - x * k;
-      along = h + over;
-    }
-    if (z < 0) along = -along;
-  }
-  const q = crossSection(across, y, sx / 2, sy / 2, roundness * m);
+  unbend(x, z, h, bulge);
+  const along = unbentAlong;
+  const q = crossSection(unbentAcross, y, sx / 2, sy / 2, roundness * m);
   const closed = Math.max(taper, 1) * m * onion <= dilation;
   const outerTop = m * (taper - 1);
   const outer = edge(q, along, 0, outerTop, h);

@@ -353,8 +353,8 @@ function boxOf(scope: Scope): Box {
   ];
 }
 
-/** The table of the shader: TEXELS texels of four floats an instruction. */
-export function table(program: Program): Float32Array {
+/** The table of the shader: TEXELS texels of four floats an instruction. layers: of the parts' images, or -1. */
+export function table(program: Program, layers: number[] = []): Float32Array {
   const result = new Float32Array(program.count * TEXELS * 4);
   program.instructions.forEach((instruction, i) => {
     const { action, operation, blend, part } = instruction;
@@ -362,7 +362,8 @@ export function table(program: Program): Float32Array {
     const isQuadric = program.quadrics[i];
     // A push knows by what, and how softly, its group is folded in.
     const third = action === PUSH ? program.roles[i] : part;
-    result.set([action * 16 + operation * 4 + isQuadric * 2, blend, third, 0], at);
+    const layer = action === LEAF && !isQuadric ? (layers[part] ?? -1) + 1 : 0;
+    result.set([action * 16 + operation * 4 + isQuadric * 2, blend, third, layer], at);
     result.set(program.balls.subarray(i * 4, i * 4 + 4), at + 4);
     result.set(program.poses.subarray(i * 12, i * 12 + 12), at + 8);
     const row = program.rows.subarray(i * 12, i * 12 + 12);

@@ -43,8 +43,14 @@ type Json = { [name: string]: Value };
 
 export class AssemblyError extends Error {}
 
-/** The text of an assembly file as a tree; throws an AssemblyError that says what is wrong with it. */
-export function readAssembly(text: string): Group {
+/** Images that stand in many texts, by the names that stand there in their place. */
+export type Images = ReadonlyMap<string, string>;
+
+/**
+ * The text of an assembly file as a tree; throws an AssemblyError that says what is wrong with it. known: images that
+ * the text only names; trees share them.
+ */
+export function readAssembly(text: string, known: Images = new Map()): Group {
   let data: Json;
   try {
     data = JSON.parse(text) as Json;
@@ -55,12 +61,12 @@ export function readAssembly(text: string): Group {
     throw new AssemblyError("This is not an assembly file: it does not say \"format\": \"partwright-assembly\".");
   if (data.version !== 1)
     throw new AssemblyError(`This file has version ${String(data.version)}; this page reads version 1.`);
-  return readGroup(data, "assembly", 1);
+  return readGroup(data, "assembly", 1, known);
 }
 
-function readNode(data: Value, place: string, depth: number): Node {
+function readNode(data: Value, place: string, depth: number, known: Images): Node {
   if (!data || typeof data !== "object" || Array.isArray(data)) throw new AssemblyError(`${place}: expected an object`);
-  return "children" in data ? readGroup(data, place, depth) : readPart(data, place);
+  return "children" in data ? readGroup(data, place, depth, known) : readPart(data, place, known);
 }
 
 function numbers(value: Value | undefined, count: number, otherwise: number[], place: string): number[] {
@@ -80,7 +86,7 @@ function readMove(data: Json, place: string): Move {
 /** One that is of unit length already is kept to the bit, as the package does. */
 const unitQuaternion = (q: Quat): Quat => (Math.abs(Math.hypot(...q) - 1) < 1e-12 ? q : normalised(q));
 
-function readPart(data: Json, place: string): Part {
+function readPart(data: Json, place: string, known: Images): Part {
   const field = data.field as FieldData | undefined;
   if (!field || !(field.kind in PARAMETERS || field.kind === "quadric"))
     throw new AssemblyError(`${place}: this page cannot show a part of kind "${String(field?.kind)}".`);
@@ -92,12 +98,21 @@ function readPart(data: Json, place: string): Part {
     field,
     ...readMove(data, place),
     blend: numbers(data.blend === undefined ? undefined : [data.blend], 1, [0], `${place}.blend`)[0],
-    metadata: (data.metadata ?? {}) as Record<string, string | number>,
+    metadata: readMetadata(data.metadata, known),
     instances: ((data.instances ?? []) as Json[]).map((move, i) => readMove(move, `${place}.instances[${i}]`)),
   };
 }
 
-function readGroup(data: Json, place: string, depth: number): Group {
+const MARK = "partwright-image:";
+
+function readMetadata(data: Value | undefined, known: Images): Record<string, string | number> {
+  const result = (data ?? {}) as Record<string, string | number>;
+  const { texture } = result;
+  if (typeof texture !== "string" || !texture.startsWith(MARK)) return result;
+  return { ...result, texture: known.get(texture.slice(MARK.length)) ?? texture };
+}
+
+function readGroup(data: Json, place: string, depth: number, known: Images): Group {
   if (depth > 64) throw new AssemblyError(`${place}: assemblies nest at most 64 deep`);
   if (!OPERATIONS.includes(data.operation as Operation)) throw new AssemblyError(`${place}: unknown operation`);
   if (!Array.isArray(data.children) || !data.children.length) throw new AssemblyError(`${place}: it has no parts`);
@@ -109,7 +124,7 @@ function readGroup(data: Json, place: string, depth: number): Group {
     unit: (data.unit ?? null) as string | null,
     up: (data.up ?? null) as string | null,
     metadata: (data.metadata ?? {}) as Record<string, string | number>,
-    children: data.children.map((child, i) => readNode(child, `${place}.children[${i}]`, depth + 1)),
+    children: data.children.map((child, i) => readNode(child, `${place}.children[${i}]`, depth + 1, known)),
   };
 }
 

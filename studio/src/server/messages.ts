@@ -5,6 +5,11 @@ export interface Step {
   text: string;
 }
 
+export interface Image {
+  name: string;
+  data: string;
+}
+
 export interface Size {
   parts: number;
   iou: number;
@@ -47,6 +52,11 @@ export interface Reshape {
   box?: number[];
 }
 
+export interface Bake {
+  type: "bake";
+  size: number;
+}
+
 export interface Stop {
   type: "stop";
 }
@@ -61,9 +71,11 @@ export interface State {
   text: string;
   past: Step[];
   future: Step[];
+  images: Image[];
   file: string;
   saved: boolean;
   input: string;
+  coloured: boolean;
   box: number[];
   unit: string;
   up: string;
@@ -120,5 +132,5 @@ export interface Failed {
   message: string;
 }
 
-export type FromPage = Commit | Undo | Redo | Fit | Reshape | Stop | Save;
+export type FromPage = Commit | Undo | Redo | Fit | Reshape | Bake | Stop | Save;
 export type FromServer = State | Accepted | Fitting | Fitted | Curve | Scored | Saved | Failed;

@@ -2,6 +2,7 @@
 
 import { HINTS, type Measuring } from "../edit/measure";
 import { KINDS } from "../model/edits";
+import { PartMaps } from "../model/maps";
 import { rgb } from "../model/palette";
 import type { Store } from "../model/store";
 import { readAssembly, writeAssembly } from "../model/tree";
@@ -156,6 +157,9 @@ export class App {
       { label: "From above", key: "7", run: () => commands.run("top") },
       null,
       { icon: "eye", label: "Show all parts", key: "Alt H", run: () => commands.run("show") },
+      ...(PartMaps.some(this.store.program.parts)
+        ? [null, { label: this.viewport.baked ? "Parts in plain colours" : "Baked colours", run: () => this.viewport.showBaked(!this.viewport.baked) }]
+        : []),
       ...this.moreViews(),
     ];
   }
@@ -187,7 +191,7 @@ export class App {
     this.status.value = "Making the mesh …";
     try {
       const [{ mesh }, files] = await Promise.all([import("../mesh/mesher"), import("../mesh/files")]);
-      const surface = await mesh(this.store, 160);
+      const surface = await mesh(this.store, 160, this.viewport);
       if (!surface.triangles.length) {
         toast("Nothing of the assembly is inside, so there is no surface.", undefined, true);
         return;

@@ -26,6 +26,7 @@ export class FitPanel {
   private split = button({ label: "Split in two", run: () => this.reshape("split") }, true);
   private merge = button({ label: "Merge into one", run: () => this.reshape("merge") }, true);
   private box = button({ label: "A part is missing", run: () => this.onBox() }, true);
+  private bake = button({ label: "Bake its colours", run: () => this.onBake() }, true);
   private stop = button({ icon: "stop", label: "Stop, keep the best", run: () => this.onStop() }, true);
   private bar = h("progress", { max: 1, value: 0, "aria-label": "Progress" });
   private told = h("p", { class: "hint", "aria-live": "polite" });
@@ -35,17 +36,19 @@ export class FitPanel {
   onFit: (fit: Fit) => void = () => {};
   onReshape: (reshape: Reshape) => void = () => {};
   onBox: () => void = () => {};
+  onBake: () => void = () => {};
   onStop: () => void = () => {};
 
   constructor(private store: Store) {
     for (const quality of ["draft", "normal", "high"]) this.quality.append(h("option", { value: quality, selected: quality === "normal" }, quality));
     this.start.classList.add("primary");
     this.slider = new CurveSlider(store);
+    this.bake.title = "The input's colours as images of the parts, which keep them when they are changed";
     this.box.title = "Draw a box around it, and a part is fitted within";
     this.element.append(
       h("h2", {}, "Fit"),
       h("div", { class: "form" }, h("label", {}, "Method", this.method), h("label", {}, "Quality", this.quality), h("label", {}, "Most parts", this.most), h("label", { class: "check", title: "Takes longer: an assembly of every size, and a slider along them" }, this.curve, "Every size, from few parts to many")),
-      h("div", { class: "buttons" }, this.start, this.only, this.rest, this.split, this.merge, this.box, this.stop),
+      h("div", { class: "buttons" }, this.start, this.only, this.rest, this.split, this.merge, this.box, this.bake, this.stop),
       this.slider.element,
       this.bar,
       this.told,
@@ -68,6 +71,7 @@ export class FitPanel {
   private run(on: boolean): void {
     this.running = on;
     this.bar.hidden = this.stop.hidden = !on;
+    this.bake.hidden = on || !this.state?.coloured;
     for (const one of [this.start, this.only, this.rest, this.split, this.merge, this.box]) one.hidden = on;
     this.slider.enable(!on);
     this.enable();
@@ -85,7 +89,7 @@ export class FitPanel {
     this.split.title = this.split.disabled ? "Select one part" : "Two parts in its place, fitted to what it stands for";
     this.merge.disabled = !there || chosen.length < 2 || !free;
     this.merge.title = this.merge.disabled ? "Select two parts or more" : "One part in their place";
-    this.box.disabled = !there || !parts;
+    this.box.disabled = this.bake.disabled = !there || !parts;
     this.only.title = this.only.disabled ? "Select the parts that may change" : "Only the selected parts change";
   }
 

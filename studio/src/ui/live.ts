@@ -57,6 +57,7 @@ export class Live {
     };
     this.fit.onFit = (fit) => this.link.send(fit) || toast("The server is gone, so nothing can be fitted now.", undefined, true);
     this.fit.onReshape = (reshape) => this.link.send(reshape) || toast("The server is gone, so nothing can be fitted now.", undefined, true);
+    this.fit.onBake = () => this.link.send({ type: "bake", size: 128 });
     this.fit.onBox = () => this.drawBox();
     this.fit.onStop = () => this.link.send({ type: "stop" });
     store.onStep = (action, label) => {
@@ -65,6 +66,7 @@ export class Live {
       else this.link.edit({ type: action });
       this.keepUnsent();
     };
+    app.viewport.onLost = () => app.viewport.renderer?.setMesh("input", this.input && asMesh(this.input, store));
     app.moreViews = () => this.views();
     app.moreDownloads = () => this.downloads();
     app.onDrop = (file) => void this.drop(file);
@@ -109,7 +111,8 @@ export class Live {
     this.state = state;
     this.adopting = true;
     try {
-      const read = (text: string): Group => (text ? readAssembly(text) : empty(state));
+      const images = new Map(state.images.map(({ name, data }) => [name, data]));
+      const read = (text: string): Group => (text ? readAssembly(text, images) : empty(state));
       const steps = (given: SavedStep[]): Step[] => given.map(({ label, text }) => ({ label, root: read(text) }));
       const { box } = state;
       const first = !store.frameBox && !store.program.parts.length;

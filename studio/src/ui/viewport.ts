@@ -4,6 +4,7 @@ import { drawGizmo, type Handle } from "../edit/gizmo";
 import { type Measurement, type Measuring, measure, POINTS } from "../edit/measure";
 import { Region } from "../edit/region";
 import { type Axis, type Mode, Transform } from "../edit/transform";
+import { type Maps, PartMaps } from "../model/maps";
 import { fromUnit, toUnit } from "../model/program";
 import { rgb } from "../model/palette";
 import type { Store } from "../model/store";
@@ -12,7 +13,8 @@ import { partBox } from "../model/program";
 import { roundDown } from "../model/lengths";
 import { Camera, project, rayThrough, type View } from "../view/camera";
 import { across, type Hit, pick, through } from "../view/picking";
-import { NoWebGL, Renderer } from "../view/renderer";
+import { NoWebGL } from "../view/gpu";
+import { Renderer } from "../view/renderer";
 import { h, svg } from "./dom";
 
 export type Tool = "select" | Mode | "measure";
@@ -31,6 +33,8 @@ export class Viewport {
   onStatus: (text: string) => void = () => {};
   onTool: () => void = () => {};
   private points: Vec3[] = [];
+  readonly maps = new PartMaps(() => this.upload());
+  private uploadedMaps: Maps | null = null;
   private overlay = svg("svg", { class: "overlay" });
   private gizmoLayer = svg("g");
   private measureLayer = svg("g", { class: "measures" });
@@ -61,6 +65,7 @@ export class Viewport {
         grid: 0.1,
       });
       this.renderer.onPicture = () => this.drawOverlay();
+      this.renderer.onLost = () => this.restore();
     } catch (error) {
       if (!(error instanceof NoWebGL)) throw error;
       const text = `${error.message} The list of parts, their numbers and the downloads work all the same; to see the shape, use a browser with WebGL 2, or turn on hardware acceleration in this one.`;
@@ -81,12 +86,22 @@ export class Viewport {
     if (this.renderer && !this.renderer.ready) void this.standIn();
   }
 
+  /** Told to give the driver all again that it has lost. */
+  onLost: () => void = () => {};
+
+  private restore(): void {
+    this.uploadedMaps = null;
+    this.onLost();
+    this.look();
+    this.upload();
+  }
+
   /** A coarse mesh, until the shader is compiled. */
   private async standIn(): Promise<void> {
     const { store, renderer } = this;
     if (!store.program.parts.length) return;
     const { mesh } = await import("../mesh/mesher");
-    const surface = await mesh(store, 48).catch(() => null);
+    const surface = await mesh(store, 48, this).catch(() => null);
     if (!surface || !renderer || renderer.ready) return;
     const { places, normals, triangles } = surface;
     const colours = new Uint8Array((places.length / 3) * 4);
@@ -115,9 +130,26 @@ export class Viewport {
     this.drawOverlay();
   }
 
+  /** Whether parts that have baked colours show them. */
+  baked = true;
+  showBaked(on: boolean): void {
+    this.baked = on;
+    this.upload();
+  }
+
+  /** The layers of the parts' images, where they are to be seen. */
+  get layers(): number[] {
+    return this.baked ? this.maps.of(this.store.program.parts) : [];
+  }
+
   upload(): void {
-    this.renderer?.setColours(this.store.program.parts.map((part) => rgb(this.store.colourOf(part))));
-    this.renderer?.setProgram(this.store.program);
+    const { renderer, store } = this;
+    if (renderer) {
+      const layers = this.layers;
+      if (this.maps.maps !== this.uploadedMaps) renderer.setMaps((this.uploadedMaps = this.maps.maps));
+      renderer.setColours(store.program.parts.map((part) => rgb(store.colourOf(part))));
+      renderer.setProgram(store.program, layers);
+    }
     this.mark();
     this.drawOverlay();
   }

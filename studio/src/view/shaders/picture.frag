@@ -1,6 +1,7 @@
 // What is seen, from what was found along each ray: light, outlines, grid.
 uniform highp usampler2D uField;
 uniform highp usampler2D uMesh;
+uniform highp usampler2D uLearned;  // parts that are meshes
 uniform highp usampler2D uMarks;  // of parts: 1 selected, 2 hovered, 4 faded; 256 a row
 uniform vec3 uEye;
 uniform mat3 uAxes;
@@ -28,14 +29,17 @@ vec3 unpackNormal(uint packed_) {
 
 ivec2 cell(vec2 place, ivec2 size) { return clamp(ivec2(place * vec2(size)), ivec2(0), size - 1); }
 
+float depth(uvec4 what) { return what.x == 0u ? 1e9 : uintBitsToFloat(what.x); }
+
 uvec4 found(vec2 place) {
     uvec4 a = texelFetch(uField, cell(place, textureSize(uField, 0)), 0);
+    uvec4 c = texelFetch(uLearned, cell(place, textureSize(uLearned, 0)), 0);
+    if (depth(c) < depth(a)) a = c;
     if (uShow == 0) return a;
     uvec4 b = texelFetch(uMesh, cell(place, textureSize(uMesh, 0)), 0);
     if (uShow == 1) return b;
     if (uShow == 3) return place.x < uWipe ? b : a;
-    float ta = a.x == 0u ? 1e9 : uintBitsToFloat(a.x), tb = b.x == 0u ? 1e9 : uintBitsToFloat(b.x);
-    return ta < tb + 0.004 ? a : b;
+    return depth(a) < depth(b) + 0.004 ? a : b;
 }
 
 uint marks(uvec4 what) {

@@ -1,5 +1,33 @@
 // Normal, colour and part where the rays have met the surface.
 uniform highp sampler2D uColours; // of parts, 256 a row
+uniform highp sampler2DArray uMaps; // of parts: octahedral, of the outside and of a hollow part's inside
+
+vec3 texel(ivec2 at, int side, int layer) {
+    int n = textureSize(uMaps, 0).y;
+    at = clamp(at, ivec2(0), ivec2(n - 1));
+    return texelFetch(uMaps, ivec3(at.x + side * n, at.y, layer), 0).rgb;
+}
+
+// Colour of a part's own map at a point (partwright/textures/coordinates.py), in shares of its half extents.
+vec3 mapped(vec3 p, int i, int layer) {
+    vec4 q = vec4(p, 1.0);
+    vec3 v = vec3(dot(row(i, 2), q), dot(row(i, 3), q), dot(row(i, 4), q));
+    vec4 a = row(i, 5), b = row(i, 6), c = row(i, 7);
+    vec2 place = c.x > 0.0 ? bend(v.x, v.z, a.z, c.xyz) : v.xz;
+    vec2 off = abs(vec2(place.x, v.y)) - a.xy + a.w;
+    float across = length(max(off, 0.0)) + min(max(off.x, off.y), 0.0) - a.w;
+    float t = clamp((place.y / a.z + 1.0) / 2.0, 0.0, 1.0);
+    bool inner = b.z < 1e8 && across < (b.y * t + mix(b.z, b.w, t)) / 2.0;
+    vec3 n = vec3(place.x, v.y, place.y) / max(a.xyz + b.x, 1e-9);
+    n /= max(abs(n.x) + abs(n.y) + abs(n.z), 1e-9);
+    vec2 folded = n.z < 0.0 ? (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0) : n.xy;
+    vec2 at = (folded / 2.0 + 0.5) * float(textureSize(uMaps, 0).y) - 0.5;
+    ivec2 low = ivec2(floor(at));
+    vec2 s = at - floor(at);
+    int side = inner ? 1 : 0;
+    return mix(mix(texel(low, side, layer), texel(low + ivec2(1, 0), side, layer), s.x),
+               mix(texel(low + ivec2(0, 1), side, layer), texel(low + ivec2(1), side, layer), s.x), s.y);
+}
 
 mat4 shades;  // rgb in 24 bits, pushed beside the distances
 mat4 owners;
@@ -60,7 +88,7 @@ vec3 colourAt(vec3 p, int start, int count, out int part) {
         } else {
             if (beyond(p, i, operation, result, head.y)) continue;
             int index = int(head.z);
-            nextColour = texelFetch(uColours, ivec2(index & 255, index >> 8), 0).rgb;
+            nextColour = head.w > 0.5 ? mapped(p, i, int(head.w) - 1) : texelFetch(uColours, ivec2(index & 255, index >> 8), 0).rgb;
             next = leaf(p, i, (code & 2) != 0);
             nextOwner = head.z;
         }

@@ -1,0 +1,211 @@
+"""How well maps of parts keep the colours of a textured shape: PSNR of eight views at 512 x 512.
+
+    python benchmarks/textures.py --shapes FOLDER --output benchmarks/results/textures.md
+
+Each shape is fitted, its colours are baked into maps of 128 texels a side, and both are seen without light,
+by the same rays. PSNR is of all pixels ("picture": outlines count) and of those where both are met
+("surface": colours alone). The second row of a shape is GLB as it is exported and read again. For comparison,
+the part's mean colour instead of its map.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import partwright as pw
+from partwright.assembly import Assembly, Similarity
+from partwright.export import export
+from partwright.meshing import mesh_assembly
+from partwright.render.camera import Camera, View
+from partwright.render.raycast import Scene
+from partwright.textures import Colours, bake, load_colours, part_map
+
+NAMES = ("Duck.glb", "CesiumMilkTruck.glb", "fuze.obj")
+SIZE = 512
+VIEWS = 8
+
+
+def views(shape: Any) -> list[View]:
+    """Eight around the shape, from a little above and below in turn."""
+    cameras = [
+        Camera(azimuth=360 * i / VIEWS, elevation=25 if i % 2 == 0 else -10, up=shape.up or "y")
+        for i in range(VIEWS)
+    ]
+    return [camera.fitted(shape.vertices, SIZE, SIZE) for camera in cameras]
+
+
+def seen(scene: Scene, view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Pixels that meet the scene, faces, barycentric weights (N, 3) and places."""
+    rays = view.rays(SIZE, SIZE)
+    face, distance, uv = scene.first_hit(np.broadcast_to(view.eye, rays.shape), rays)
+    pixel = np.flatnonzero(face >= 0)
+    u, v = uv[pixel].T
+    return (
+        pixel,
+        face[pixel],
+        np.stack([1 - u - v, u, v], axis=1),
+        view.eye + distance[pixel, None] * rays[pixel],
+    )
+
+
+def picture(pixel: np.ndarray, colours: np.ndarray) -> np.ndarray:
+    result = np.full((SIZE * SIZE, 3), 255.0)
+    result[pixel] = colours
+    return result
+
+
+def map_colours(assembly: Assembly, points: np.ndarray) -> np.ndarray:
+    owner = np.abs(assembly.part_distances(points)).argmin(axis=0)
+    result = np.zeros((len(points), 3))
+    for i, part in enumerate(assembly.parts):
+        mine = np.flatnonzero(owner == i)
+        texture = part_map(part)
+        if not len(mine) or texture is None:
+            continue
+        own = [Similarity(1.0, c.rotation, c.translation).inverse()(points[mine]) for c in part.copies]
+        off = [np.abs(part.field(one.astype(np.float32))) for one in own]
+        local = np.stack(own)[np.argmin(off, axis=0), np.arange(len(mine))]
+        result[mine] = texture.at(part.field, local)
+    return result
+
+
+def mean_colours(assembly: Assembly, points: np.ndarray) -> np.ndarray:
+    owner = np.abs(assembly.part_distances(points)).argmin(axis=0)
+    means = [t.image.mean(axis=(0, 1)) if (t := part_map(part)) else np.zeros(3) for part in assembly.parts]
+    return np.array(means)[owner]
+
+
+def psnr(a: np.ndarray, b: np.ndarray) -> float:
+    error = float(((a - b) ** 2).mean())
+    return 10 * np.log10(255**2 / max(error, 1e-9))
+
+
+def fitted(path: Path, quality: str, size: int) -> tuple[Any, Colours, Any, Assembly]:
+    """The shape, its colours, the fit, and its assembly with maps."""
+    shape, colours = pw.load_shape(path), load_colours(path)
+    result = pw.fit(shape, quality=quality, symmetry=False)
+    return shape, colours, result, bake(result.assembly, colours, size)
+
+
+def picture_of(assembly: Assembly, view: View) -> np.ndarray:
+    mesh = mesh_assembly(assembly)
+    pixel, _, _, places = seen(Scene(mesh.vertices, mesh.faces), view)
+    return picture(pixel, map_colours(assembly, places))
+
+
+def write_pictures(shapes: Path, quality: str, size: int, path: Path) -> None:
+    """Beside one another: two shapes, their parts, and the parts after edits, maps and all."""
+    from PIL import Image
+
+    rows = []
+    for name, edit in (("Duck.glb", _bent), ("fuze.obj", _squared)):
+        shape, colours, _, baked = fitted(shapes / name, quality, size)
+        view = views(shape)[0]
+        pixel, face, weights, _ = seen(Scene(colours.vertices, colours.faces), view)
+        row = [picture(pixel, colours.on_faces(face, weights))]
+        row += [picture_of(one, view) for one in (baked, edit(baked))]
+        rows.append(np.concatenate([one.reshape(SIZE, SIZE, 3) for one in row], axis=1))
+    image = Image.fromarray(np.concatenate(rows).clip(0, 255).round().astype(np.uint8))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    image.resize((image.width * 5 // 8, image.height * 5 // 8), Image.Resampling.LANCZOS).save(
+        path, optimize=True
+    )
+
+
+def _largest(assembly: Assembly) -> Any:
+    return max(assembly.parts, key=lambda part: float(np.prod(np.ptp(part.bounds(), axis=0))))
+
+
+def _bent(assembly: Assembly) -> Assembly:
+    """The largest part flat at the top and a third longer across."""
+    part = _largest(assembly)
+    size = tuple(v * f for v, f in zip(part.field.size, (1.3, 0.8, 0.8), strict=True))
+    return assembly.replace_part(part.name, replace(part, field=replace(part.field, size=size, taper=0.6)))
+
+
+def _squared(assembly: Assembly) -> Assembly:
+    """The largest part with square corners."""
+    part = _largest(assembly)
+    return assembly.replace_part(
+        part.name, replace(part, field=replace(part.field, roundness=0.0, bulge=0.0))
+    )
+
+
+def measured(path: Path, quality: str, size: int) -> list[str]:
+    shape, colours, result, baked = fitted(path, quality, size)
+    truth = Scene(colours.vertices, colours.faces)
+    mesh = mesh_assembly(baked)
+    parts = Scene(mesh.vertices, mesh.faces)
+    with tempfile.TemporaryDirectory() as folder:
+        export(replace(baked, unit=None, up=None), Path(folder) / "a.glb")
+        glb = load_colours(Path(folder) / "a.glb")
+    exported = Scene(glb.vertices, glb.faces)
+    scores: dict[str, list[tuple[float, float]]] = {"maps": [], "GLB": [], "one colour a part": []}
+    for view in views(shape):
+        pixel, face, weights, _ = seen(truth, view)
+        want = picture(pixel, colours.on_faces(face, weights))
+        own, _, _, places = seen(parts, view)
+        found = {
+            "maps": (own, map_colours(baked, places)),
+            "one colour a part": (own, mean_colours(baked, places)),
+        }
+        at, face, weights, _ = seen(exported, view)
+        found["GLB"] = (at, glb.on_faces(face, weights))
+        for kind, (where, colour) in found.items():
+            both = np.intersect1d(where, pixel)
+            got = picture(where, colour)
+            scores[kind].append((psnr(got, want), psnr(got[both], want[both])))
+    kilobytes = sum(len(str(p.metadata.get("texture", ""))) for p in baked.parts) / 1000
+    rows = []
+    for kind, values in scores.items():
+        whole, surface = np.mean(values, axis=0)
+        head = (
+            f"{path.name} | {len(baked)} | {result.scores.iou:.3f} | {kilobytes:.0f}"
+            if kind == "maps"
+            else " | | |"
+        )
+        rows.append(f"| {head} | {kind} | {whole:.1f} | {surface:.1f} |")
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--output", type=Path)
+    parser.add_argument(
+        "--shapes", type=Path, required=True, metavar="FOLDER", help=f"that holds {', '.join(NAMES)}"
+    )
+    parser.add_argument("--quality", default="normal")
+    parser.add_argument("--size", type=int, default=128)
+    parser.add_argument("--picture", type=Path, help="draws two of them instead, before and after edits")
+    arguments = parser.parse_args()
+    if arguments.picture:
+        write_pictures(arguments.shapes, arguments.quality, arguments.size, arguments.picture)
+        return
+    command = "python benchmarks/textures.py --shapes FOLDER --output benchmarks/results/textures.md"
+    lines = [
+        "# Colours in maps of parts",
+        "",
+        f"Made by `{command}`: {VIEWS} views of {SIZE} x {SIZE} pixels without light, maps of "
+        f"{arguments.size} texels a side, quality {arguments.quality}.",
+        "",
+        "| shape | parts | IoU | kB of maps | colours | PSNR of pictures | PSNR of the surface |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name in NAMES:
+        rows = measured(arguments.shapes / name, arguments.quality, arguments.size)
+        print("\n".join(rows), flush=True)
+        lines += rows
+    if arguments.output:
+        arguments.output.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

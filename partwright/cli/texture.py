@@ -1,0 +1,29 @@
+"""`partwright texture`: a shape's colours as maps of the parts."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from partwright.cli.outputs import add_output, given
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "texture",
+        help="give an assembly's parts the colours of the shape that they stand for",
+        description="Bakes the colours of a mesh (of vertices, faces, materials and their images) into a map "
+        "for each part, in the part's own coordinates, so that it stays right when the part is changed. "
+        "Writes the assembly with its maps to FILE (.json); `partwright export` then writes them to GLB "
+        "and HTML.",
+    )
+    option = command.add_argument
+    option("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    option("shape", metavar="SHAPE", type=Path, help="a mesh with colours: GLB, glTF, OBJ, PLY or OFF")
+    add_output(command, "FILE", "where to write", reads=_reads, writes=lambda a: [a.output])
+    option("--size", metavar="N", type=int, default=128, help="texels a side (default: %(default)s)")
+    command.set_defaults(run="texture")
+
+
+def _reads(arguments: argparse.Namespace) -> list[Path]:
+    return given(arguments.assembly, arguments.shape)

@@ -1,0 +1,185 @@
+"""The colours of a file: those of its vertices and faces, of its materials, and their images."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.errors import NoColoursError
+from partwright.shapes.distance import MeshDistance
+from partwright.shapes.loading import READ_BY_TRIMESH, load_scene
+
+Floats = NDArray[np.float64]
+
+_PLAIN = (204, 204, 204)  # of pieces without a colour beside others that have some
+
+
+@dataclass(frozen=True)
+class Colours:
+    """A surface with colours: vertices (V, 3) and faces (F, 3) in the file's own units and place.
+
+    corners (F, 3, 3): colours of the faces' corners, 0 to 1, linear light, which multiply those of the
+    image. image (F,): which of `images` (h, w, 3 float, linear light) is on a face, -1 for none; uv
+    (F, 3, 2): where, from its lower left, repeated beyond 0 to 1.
+    """
+
+    vertices: Floats
+    faces: NDArray[np.int64]
+    corners: NDArray[np.float32]
+    image: NDArray[np.int64]
+    uv: NDArray[np.float32]
+    images: tuple[NDArray[np.float32], ...]
+
+    @cached_property
+    def _frame(self) -> tuple[Floats, float]:
+        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        return (low + high) / 2, 1.8 / max(float((high - low).max()), 1e-300)
+
+    @cached_property
+    def _surface(self) -> MeshDistance:
+        centre, scale = self._frame
+        return MeshDistance((self.vertices - centre) * scale, self.faces, self.faces, closed=False)
+
+    def at(self, points: NDArray[np.floating]) -> Floats:
+        """Colours (N, 3), sRGB, 0 to 255, at the places of the surface nearest to points (N, 3)."""
+        centre, scale = self._frame
+        local = (np.asarray(points, np.float64) - centre) * scale
+        face, _ = self._surface.nearest(local)
+        corners = ((self.vertices - centre) * scale)[self.faces[face]]
+        return self.on_faces(face.astype(np.int64), _barycentric(corners, local))
+
+    def on_faces(self, face: NDArray[np.int64], weights: Floats) -> Floats:
+        """Colours (N, 3), sRGB, 0 to 255, on faces (N,) at barycentric weights (N, 3)."""
+        result = np.einsum("nc,ncd->nd", weights, self.corners[face].astype(np.float64))
+        uv = np.einsum("nc,ncd->nd", weights, self.uv[face].astype(np.float64))
+        for i, image in enumerate(self.images):
+            mine = np.flatnonzero(self.image[face] == i)
+            result[mine] *= _read(image, uv[mine])
+        return 255 * to_srgb(result)
+
+
+def load_colours(path: str | Path) -> Colours:
+    """The colours of a mesh file: of glTF and OBJ with materials and their images, of PLY and OFF those of
+    vertices and faces.
+
+    Raises:
+        NoColoursError: it has none.
+        UnreadableFileError, UnsupportedFormatError: as `load_shape`.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in READ_BY_TRIMESH:
+        raise NoColoursError(f"{path.name}: colours are read from {', '.join(READ_BY_TRIMESH)}")
+    scene = load_scene(path, path.suffix.lower(), colours=True)
+    images: list[NDArray[np.float32]] = []
+    pieces: list[tuple[Any, ...]] = []
+    found, total = False, 0
+    is_gltf = path.suffix.lower() in (".glb", ".gltf")
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if not len(getattr(mesh, "faces", ())):
+            continue
+        corners, uv, image = _look(mesh, is_gltf)
+        found = found or corners is not None or image is not None
+        index = -1
+        if image is not None:
+            index = len(images)
+            images.append(image)
+        count = len(mesh.faces)
+        plain = np.broadcast_to(to_linear(np.array(_PLAIN) / 255), (count, 3, 3))
+        white = np.ones((count, 3, 3))
+        colour = corners if corners is not None else white if image is not None else plain
+        vertices = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+        pieces.append((vertices, np.asarray(mesh.faces) + total, colour, np.full(count, index), uv))
+        total += len(vertices)
+    if not found:
+        raise NoColoursError(f"{path.name}: has no colours: neither of vertices or faces nor of materials")
+    places, triangles, shades, which, where = (np.concatenate(one) for one in zip(*pieces, strict=True))
+    return Colours(
+        places.astype(np.float64),
+        triangles.astype(np.int64),
+        shades.astype(np.float32),
+        which.astype(np.int64),
+        where.astype(np.float32),
+        tuple(images),
+    )
+
+
+def to_linear(srgb: NDArray[Any]) -> Floats:
+    """Linear light of sRGB, both 0 to 1."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4)
+
+
+def to_srgb(linear: NDArray[Any]) -> Floats:
+    """The inverse of `to_linear`; what is out of range is cut."""
+    cut = np.clip(linear, 0, 1)
+    return np.where(cut <= 0.0031308, 12.92 * cut, 1.055 * cut ** (1 / 2.4) - 0.055)
+
+
+def _look(mesh: Any, is_gltf: bool) -> tuple[Floats | None, Floats, NDArray[np.float32] | None]:
+    """Colours of corners (F, 3, 3), linear light, or None; uv (F, 3, 2); the image, or None."""
+    faces = np.asarray(mesh.faces)
+    uv = np.zeros((len(faces), 3, 2))
+    visual = mesh.visual
+    if visual.kind == "texture":
+        material = visual.material
+        factor = getattr(material, "baseColorFactor", None)
+        if factor is None:
+            factor = getattr(material, "diffuse", None)
+        each = visual.vertex_attributes.get("color")
+        image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+        colour = None
+        if factor is not None:
+            # glTF's factors are linear; those of OBJ are what the screen shows.
+            values = np.asarray(factor, np.float64)[:3]
+            values = values / 255 if np.asarray(factor).dtype.kind in "iu" or values.max() > 1 else values
+            linear = values if is_gltf else to_linear(values)
+            colour = np.broadcast_to(linear, (len(faces), 3, 3))
+        if each is not None and is_gltf:  # which multiplies the material's
+            shares = np.asarray(each, np.float64)[:, :3] / (255 if np.asarray(each).dtype.kind in "iu" else 1)
+            colour = shares[faces] * (1.0 if colour is None else colour)
+        if image is None or visual.uv is None:
+            return colour, uv, None
+        uv = np.asarray(visual.uv, np.float64)[faces]
+        pixels = np.asarray(image.convert("RGB"))
+        if not is_gltf:
+            colour = None  # an image takes the place of the diffuse colour
+        return colour, uv, to_linear(pixels / 255).astype(np.float32)
+    if visual.kind == "vertex":
+        each = np.asarray(visual.vertex_colors)[:, :3][faces] / 255
+    elif visual.kind == "face":
+        each = np.broadcast_to(np.asarray(visual.face_colors)[:, None, :3] / 255, (len(faces), 3, 3))
+    else:
+        return None, uv, None
+    return (each if is_gltf else to_linear(each)), uv, None
+
+
+def _read(image: NDArray[np.float32], uv: Floats) -> Floats:
+    """Bilinear, repeated beyond the image; uv (N, 2) from its lower left."""
+    height, width = image.shape[:2]
+    x, y = uv[:, 0] * width - 0.5, (1 - uv[:, 1]) * height - 0.5
+    x0, y0 = np.floor(x), np.floor(y)
+    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+    left, right = (np.mod(x0 + d, width).astype(int) for d in (0, 1))
+    top, bottom = (np.mod(y0 + d, height).astype(int) for d in (0, 1))
+    upper = (1 - fx) * image[top, left] + fx * image[top, right]
+    lower = (1 - fx) * image[bottom, left] + fx * image[bottom, right]
+    return np.asarray((1 - fy) * upper + fy * lower)
+
+
+def _barycentric(corners: Floats, points: Floats) -> Floats:
+    """Weights (N, 3) of the place on each triangle (N, 3, 3) that is nearest to its point (N, 3), about:
+    of points off the triangle they are cut to its edges."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    u, v, w = b - a, c - a, points - a
+    uu, uv, vv = (np.einsum("nd,nd->n", p, q) for p, q in ((u, u), (u, v), (v, v)))
+    wu, wv = np.einsum("nd,nd->n", w, u), np.einsum("nd,nd->n", w, v)
+    det = np.maximum(uu * vv - uv * uv, 1e-300)
+    second, third = (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det
+    weights = np.clip(np.stack([1 - second - third, second, third], axis=1), 0, 1)
+    return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12))
