@@ -9,15 +9,14 @@ from __future__ import annotations
 from html import escape
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.file_text import to_text
+from partwright.assembly.joint import is_joint
 from partwright.atomic_io import write_bytes
 from partwright.errors import UnsupportedFormatError
 from partwright.export.formats import Format, Holds
-
-if TYPE_CHECKING:
-    from partwright.assembly import Assembly
+from partwright.export.part_meshes import part_meshes
 
 DEEPEST = 15
 """How deep groups may be nested in the page."""
@@ -36,14 +35,23 @@ def write(assembly: Assembly, path: str | Path) -> None:
 
 
 def to_html(assembly: Assembly) -> str:
-    """The text of the page with the assembly in it."""
+    """The text of the page with the assembly in it, and with meshes of its learned parts."""
     check_size(assembly)
     title = f"<title>{escape(assembly.name or 'Assembly')} · Partwright</title>"
-    return page().replace(_TITLE, title, 1).replace(_DATA, data_script("assembly", to_text(assembly)), 1)
+    data = data_script("assembly", to_text(assembly))
+    meshes = part_meshes(assembly)
+    if meshes is not None:
+        data += data_script("learned", meshes)
+    return page().replace(_TITLE, title, 1).replace(_DATA, data, 1)
 
 
 def check_size(assembly: Assembly) -> None:
     """Raises UnsupportedFormatError where the page could not show the assembly."""
+    cut = _cut_learned(assembly)
+    if cut is not None:
+        raise UnsupportedFormatError(
+            f"HTML shows learned parts whole, and {cut} is cut or taken away: export a mesh instead"
+        )
     copies = sum(len(part.copies) for part in assembly.parts)
     if assembly.depth > DEEPEST:
         raise UnsupportedFormatError(
@@ -54,6 +62,15 @@ def check_size(assembly: Assembly) -> None:
         raise UnsupportedFormatError(
             f"HTML shows at most {MOST_COPIES:,} parts, these are {copies:,}: export a mesh instead"
         )
+
+
+def _cut_learned(node: Node) -> str | None:
+    """A learned part in a group that does anything but join."""
+    if isinstance(node, Part):
+        return None
+    if node.operation != "union":
+        return next((part.name for part in node.parts if is_joint(part)), None)
+    return next((found for child in node.children if (found := _cut_learned(child))), None)
 
 
 def page() -> str:
@@ -67,4 +84,4 @@ def data_script(name: str, json_text: str) -> str:
     return f'<script type="application/json" id="{name}">{inert}</script>'
 
 
-FORMAT = Format("HTML", write, frozenset(Holds) - {Holds.LEARNED})
+FORMAT = Format("HTML", write, frozenset(Holds))

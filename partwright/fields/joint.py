@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
 from partwright.fields.base import Field
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 class Member(NamedTuple):
@@ -43,6 +46,13 @@ class JointField(Field):
         """This field as it is beside others (in the order of the assembly, itself among them).
 
         shared: one dictionary for them all, for what is made of the whole shape once.
+        """
+
+    @abstractmethod
+    def preview(self) -> trimesh.Trimesh:
+        """A mesh of its own frame that is quickly made, for a picture; of all members in one pass.
+
+        Raises NoSurfaceError where it has none.
         """
 
     @abstractmethod

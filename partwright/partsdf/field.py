@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -30,6 +30,7 @@ Quaternion = tuple[float, float, float, float]
 
 # The box around a part is looked for in so many cells an axis, twice, within its cuboid times _BOX_REACH.
 _BOX_CELLS, _BOX_REACH = 12, 1.5
+_COARSE, _PREVIEWED = 64, 128  # cells along the whole shape of a mesh that is only looked at
 _FINER = 3  # times the cells along one part are those along the whole shape
 
 
@@ -93,7 +94,7 @@ class NeuralField(JointField):
         return self.network.lipschitz
 
     @cached_property
-    def _shared(self) -> dict[int, tuple[str, dict[str, Any]]]:
+    def _shared(self) -> dict[object, tuple[str, dict[str, Any]]]:
         """The members' meshes of a resolution, and in whose frame they are."""
         return {}
 
@@ -106,9 +107,16 @@ class NeuralField(JointField):
         tells of them all. The cells are those of the whole shape: three times as many along [-1, 1] as are
         asked for along one part, or more where one is thin.
         """
-        if resolution not in self._shared:
-            self._shared[resolution] = self.part, self._surfaces(resolution)
-        maker, meshes = self._shared[resolution]
+        return self._mesh(resolution, lambda walls: resolution_for_wall(walls, _FINER * resolution))
+
+    def preview(self) -> trimesh.Trimesh:
+        return self._mesh("preview", lambda walls: min(resolution_for_wall(walls, _COARSE), _PREVIEWED))
+
+    def _mesh(self, key: object, cells: Callable[[float], int]) -> trimesh.Trimesh:
+        """cells: along the unit frame, by the thinnest wall of the shape in its lengths."""
+        if key not in self._shared:
+            self._shared[key] = self.part, self._surfaces(cells)
+        maker, meshes = self._shared[key]
         if self.part not in meshes:
             raise NoSurfaceError(
                 f"the part {self.part} of {self.model} has no surface, or it is thinner than a cell"
@@ -119,13 +127,12 @@ class NeuralField(JointField):
             mesh.vertices = Similarity(1.0, seen.rotation, seen.translation)(mesh.vertices)
         return mesh
 
-    def _surfaces(self, resolution: int) -> dict[str, trimesh.Trimesh]:
+    def _surfaces(self, cells: Callable[[float], int]) -> dict[str, trimesh.Trimesh]:
         """The members' meshes in this part's own frame, without those that have none."""
         frame = Similarity(1.0, self.frame_rotation, self.frame_translation)
         shape = _seen_from(self.shape, frame, self.unit)
-        cells = resolution_for_wall(float(shape.walls().min(initial=np.inf)), _FINER * resolution)
         try:
-            meshes = mesh_shape(shape, cells).parts
+            meshes = mesh_shape(shape, cells(float(shape.walls().min(initial=np.inf)))).parts
         except NoSurfaceError:
             return {}
         for mesh in meshes.values():

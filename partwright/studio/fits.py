@@ -43,6 +43,9 @@ def fitting(shape: Shape, message: messages.Fit, present: Callable[[], Assembly]
     """
     settings: dict[str, Any] = {}
     start, label = None, "Fit"
+    name, _, model = message.method.partition(":")
+    if model:
+        settings["model"] = model
     if message.mode != "new":
         assembly = present()
         start = _start(assembly, message)
@@ -56,7 +59,7 @@ def fitting(shape: Shape, message: messages.Fit, present: Callable[[], Assembly]
 
     def work(progress: Callable[[Progress], None], cancel: Cancellation) -> Done:
         result = fit(
-            shape, message.method, quality=message.quality, start=start, progress=progress, cancel=cancel,
+            shape, name, quality=message.quality, start=start, progress=progress, cancel=cancel,
             **settings,
         )  # fmt: skip
         told = messages.Fitted(result.outcome, len(result.assembly), float(result.scores.iou))

@@ -93,6 +93,16 @@ class Bake:
 
 
 @dataclass(frozen=True)
+class Learned:
+    """Another form for a learned part: a random one of the seed, or that of a training shape."""
+
+    action: Literal["resample", "swap"]
+    name: str
+    seed: int = 0
+    source: str = ""
+
+
+@dataclass(frozen=True)
 class Stop:
     """End the fit with its best so far."""
 
@@ -128,6 +138,8 @@ class State:
     unit: str
     up: str
     methods: list[str]
+    donors: list[str]
+    """Training shapes that learned parts of the assembly can be taken from."""
     formats: list[str]
     fitting: bool
     note: str = ""
@@ -193,7 +205,7 @@ class Failed:
     message: str
 
 
-FROM_PAGE: tuple[type, ...] = (Commit, Undo, Redo, Fit, Reshape, Bake, Stop, Save)
+FROM_PAGE: tuple[type, ...] = (Commit, Undo, Redo, Fit, Reshape, Bake, Learned, Stop, Save)
 FROM_SERVER: tuple[type, ...] = (State, Accepted, Fitting, Fitted, Curve, Scored, Saved, Failed)
 
 

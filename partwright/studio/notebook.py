@@ -30,7 +30,7 @@ def bundle(assembly: Assembly) -> dict[str, str]:
         format_of("a.html").check(assembly, {})
         page = escape(to_html(assembly), quote=True)
     except UnsupportedFormatError:
-        pass  # learned parts, or too many: the still shows them
+        pass  # learned parts that are cut, or too many: the still shows them
     except PartwrightError:
         return result
     else:

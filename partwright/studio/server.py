@@ -27,6 +27,7 @@ from partwright.errors import OutputError, PartwrightError, UnsupportedFormatErr
 from partwright.export import export
 from partwright.export.formats import FORMATS
 from partwright.export.html import check_size, data_script, page
+from partwright.export.part_meshes import part_meshes
 from partwright.shapes import load_shape
 from partwright.studio.journal import Journal, state_folder
 from partwright.studio.messages import Failed, read, written
@@ -75,6 +76,17 @@ def application(session: Session, token: str, hosts: frozenset[str]) -> App:
             return Response(status_code=404)
         return Response(await asyncio.to_thread(_triangles, session), media_type="application/octet-stream")
 
+    async def learned(request: Request) -> Response:
+        """Meshes of the learned parts of the assembly as it is now, and its revision."""
+        revision = session.journal.revision
+        try:
+            meshes = await asyncio.to_thread(lambda: part_meshes(session.assembly()))
+        except PartwrightError as error:
+            return _refused(error)
+        return Response(
+            f'{{"revision": {revision}, "meshes": {meshes or "{}"}}}', media_type="application/json"
+        )
+
     async def exported(request: Request) -> Response:
         suffix = request.query_params.get("format", "")
         if suffix not in FORMATS:
@@ -108,6 +120,7 @@ def application(session: Session, token: str, hosts: frozenset[str]) -> App:
         Route("/", index),
         WebSocketRoute("/socket", talk),
         Route("/input", triangles),
+        Route("/learned", learned),
         Route("/export", exported),
         Route("/drop", dropped, methods=["POST"]),
     ]

@@ -20,7 +20,7 @@ from partwright.export.formats import FORMATS
 from partwright.methods import METHODS, Cancellation, Progress
 from partwright.metrics import evaluate
 from partwright.shapes import Shape
-from partwright.studio import fits, messages
+from partwright.studio import fits, learned, messages
 from partwright.studio.journal import Journal
 from partwright.textures import Colours
 
@@ -82,11 +82,18 @@ class Session:
             box=[float(v) for corner in corners for v in corner],
             unit=(shape.unit if shape else None) or "",
             up=(shape.up if shape else None) or "",
-            methods=[name for name in METHODS if name != "parts"],
+            methods=[*(name for name in METHODS if name != "parts"), *learned.methods()],
+            donors=self._donors(),
             formats=list(FORMATS.own),
             fitting=self._cancel is not None,
             note=note,
         )
+
+    def _donors(self) -> list[str]:
+        try:
+            return learned.donors(self.assembly()) if '"neural"' in self.journal.short else []
+        except PartwrightError:
+            return []
 
     def assembly(self) -> Assembly:
         """Raises AssemblyFileError where there is none yet."""
@@ -99,7 +106,9 @@ class Session:
         if isinstance(message, messages.Commit | messages.Undo | messages.Redo):
             self._edit(message, send)
         elif isinstance(message, messages.Fit | messages.Reshape | messages.Bake):
-            self._begin(message)
+            self._begin(self._task(message))
+        elif isinstance(message, messages.Learned):
+            self._begin(learned.reforming(self.assembly(), message))
         elif isinstance(message, messages.Stop):
             if self._cancel is not None:
                 self._cancel.request()
@@ -141,19 +150,20 @@ class Session:
 
     # Fitting
 
-    def _begin(self, message: messages.Fit | messages.Reshape | messages.Bake) -> None:
+    def _task(self, message: messages.Fit | messages.Reshape | messages.Bake) -> fits.Task:
         if self.shape is None:
             raise SettingError(
                 "there is no shape to fit to: drop one into the page, or name it on the command line"
             )
+        if isinstance(message, messages.Fit):
+            return fits.fitting(self.shape, message, self.assembly)
+        if isinstance(message, messages.Bake):
+            return fits.baking(self.colours, self.assembly(), message.size)
+        return fits.reshaping(self.shape, message, self.assembly())
+
+    def _begin(self, task: fits.Task) -> None:
         if self._cancel is not None:
             raise SettingError("a fit is running already; stop it first")
-        if isinstance(message, messages.Fit):
-            task = fits.fitting(self.shape, message, self.assembly)
-        elif isinstance(message, messages.Bake):
-            task = fits.baking(self.colours, self.assembly(), message.size)
-        else:
-            task = fits.reshaping(self.shape, message, self.assembly())
         self._cancel = Cancellation()
         threading.Thread(target=self._work_on, args=(task, self._cancel), name="fit", daemon=True).start()
         self.tell(messages.Fitting("starting", 0.0, 0, 0.0))

@@ -1,6 +1,7 @@
 /** Starts the page with the assembly that stands in it. */
 
 import "./style.css";
+import { type GivenMeshes, readMeshes } from "./model/learned";
 import { Store } from "./model/store";
 import { readAssembly } from "./model/tree";
 import { App } from "./ui/app";
@@ -22,6 +23,8 @@ try {
     throw new Error("This page holds no assembly. Write one with: partwright export ASSEMBLY -o FILE.html");
   const store = new Store(data ? readAssembly(data) : empty({ unit: "", up: "", input: "" }));
   const app = new App(store);
+  const learned = document.getElementById("learned")?.textContent;
+  if (learned) app.viewport.setLearned(readMeshes(JSON.parse(learned) as GivenMeshes));
   if (server) Object.assign(window, { live: new Live(store, app, (JSON.parse(server) as { socket: string }).socket) });
   else remember(store, data!);
   // For scripts and tests: what the page holds.

@@ -1,9 +1,32 @@
 /** A surface as a file. */
 
+import { smoothNormals, type Triangles } from "../model/learned";
+import { rgb } from "../model/palette";
 import type { Store } from "../model/store";
+import { unit } from "../model/vectors";
 import type { Surface } from "./contour";
 
 const METRES: Record<string, number> = { m: 1, dm: 0.1, cm: 0.01, mm: 1e-3, um: 1e-6, in: 0.0254, ft: 0.3048 };
+
+/** Further triangles, in own units, each vertex in the colour of its part: shells of their own. */
+export function addTriangles(surface: Surface, more: Triangles, store: Store): void {
+  const { scale, offset } = store.frame;
+  const first = surface.places.length / 3;
+  const joined = <T extends Float32Array | Uint32Array | Uint8Array | Uint16Array>(a: T, b: T): T => {
+    const result = new (a.constructor as new (n: number) => T)(a.length + b.length);
+    result.set(a);
+    result.set(b, a.length);
+    return result;
+  };
+  const normals = smoothNormals(more);
+  for (let i = 0; i < normals.length; i += 3) normals.set(unit([normals[i], normals[i + 1], normals[i + 2]]), i);
+  const colours = store.program.parts.map((part) => rgb(store.colourOf(part)).map((v) => Math.round(v * 255)));
+  surface.places = joined(surface.places, more.places.map((v, i) => v * scale + offset[i % 3]));
+  surface.normals = joined(surface.normals, normals);
+  surface.triangles = joined(surface.triangles, more.triangles.map((v) => v + first));
+  surface.owners = joined(surface.owners, more.owners);
+  surface.colours = joined(surface.colours, Uint8Array.from([...more.owners].flatMap((owner) => colours[owner])));
+}
 
 /** Binary STL in the assembly's own unit. */
 export function toStl(surface: Surface, store: Store): ArrayBuffer {

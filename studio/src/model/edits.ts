@@ -153,6 +153,8 @@ export function stretched(field: FieldData, axis: number, factor: number): Field
     const size = (field.size as number[]).map((v, i) => (i === axis ? Math.max(v * factor, 1e-9) : v));
     return { ...field, size };
   }
+  if (field.kind === "neural")
+    return { ...field, half_lengths: (field.half_lengths as number[]).map((v, i) => (i === axis ? v * factor : v)) };
   if (field.kind === "quadric") {
     const c = field.coefficients as number[];
     // xx yy zz x y z 1 xy yz zx: how often each has the axis

@@ -58,6 +58,7 @@ export const PARAMETERS: Record<string, Parameter[]> = {
   tube: [RADIUS, WALL, HEIGHT],
   torus: [length("major_radius", "of the ring's centre line"), length("minor_radius", "of the tube that is bent")],
   hollow_box: [extents("full extents"), WALL],
+  neural: [{ name: "half_lengths", label: "half length", sort: "extents", low: 1e-6, help: "of the part's cuboid; the others adapt" }],
   hollow_frustum: [BOTTOM, TOP, WALL, HEIGHT],
 };
 
@@ -211,6 +212,11 @@ export function symmetricEigen(given: Vec3[]): { values: number[]; vectors: Vec3
 /** Of the part in its own frame; infinite where it does not end or that is not known. */
 export function fieldBox(field: FieldData): Box {
   const given = superfrustum(field);
+  if (field.kind === "neural") {
+    // A learned surface may leave its cuboid by a little.
+    const half = (field.half_lengths as number[]).map((v) => 1.1 * v) as Vec3;
+    return [half.map((v) => -v) as Vec3, half];
+  }
   if (!given) {
     const far = Infinity;
     return [

@@ -7,6 +7,7 @@
 
 import { programDistance } from "./distance";
 import { fieldBox, quadric, superfrustum } from "./fields";
+import { isLearned } from "./learned";
 import { type Group, type Node, type Part, isGroup, leaves, poses } from "./tree";
 import {
   type Box,
@@ -231,10 +232,10 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
 
   const node = (one: Node, role: number, blend: number): Scope[] => {
     if (isGroup(one)) {
-      if (![...leaves(one)].some((part) => !hidden.has(part.id))) return [];
+      if (![...leaves(one)].some((part) => !hidden.has(part.id) && !isLearned(part))) return [];
       return [group(OPERATION[one.operation], role, blend, () => children(one))];
     }
-    if (hidden.has(one.id)) return [];
+    if (hidden.has(one.id) || isLearned(one)) return []; // these are meshes
     const copies = 1 + one.instances.length;
     const some = (as: number) => Array.from({ length: copies }, (_, i) => leaf(one, i, as, one.blend));
     if (copies === 1 || role === UNION) return some(role);
@@ -278,6 +279,9 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
     setHulls(program, scope, infinite);
     setBalls(program, scope);
     program.box = boxOf(scope);
+    const learned = parts.filter((part) => isLearned(part) && !hidden.has(part.id)).map(partBox);
+    const boxes = learned.map(([low, high]): Box => [toUnit(frame, low), toUnit(frame, high)]);
+    if (boxes.length) program.box = [...boxes, ...(scope.children.length ? [program.box] : [])].reduce(joinBoxes);
   }
   return program;
 }

@@ -1,5 +1,6 @@
 /** What the page holds: the assembly and its history, and what of it is selected, hidden and locked. */
 
+import { cutsLearned } from "./learned";
 import { paletteColour } from "./palette";
 import { type Frame, type Program, compile, unitFrame } from "./program";
 import { type Group, type Node, type Part, edited, find, isGroup, leaves } from "./tree";
@@ -115,6 +116,12 @@ export class Store {
       this.show(from);
       this.tell("document");
       this.onRefused(`Groups would be nested more than ${DEEPEST - 1} deep, which the page cannot show.`);
+      return;
+    }
+    if (cutsLearned(root)) {
+      this.show(from);
+      this.tell("document");
+      this.onRefused("Learned parts can be joined to others, but neither cut nor taken away.");
       return;
     }
     this.past.push({ label, root: from });

@@ -57,6 +57,14 @@ export interface Bake {
   size: number;
 }
 
+export interface Learned {
+  type: "learned";
+  action: "resample" | "swap";
+  name: string;
+  seed?: number;
+  source?: string;
+}
+
 export interface Stop {
   type: "stop";
 }
@@ -80,6 +88,7 @@ export interface State {
   unit: string;
   up: string;
   methods: string[];
+  donors: string[];
   formats: string[];
   fitting: boolean;
   note: string;
@@ -132,5 +141,5 @@ export interface Failed {
   message: string;
 }
 
-export type FromPage = Commit | Undo | Redo | Fit | Reshape | Bake | Stop | Save;
+export type FromPage = Commit | Undo | Redo | Fit | Reshape | Bake | Learned | Stop | Save;
 export type FromServer = State | Accepted | Fitting | Fitted | Curve | Scored | Saved | Failed;

@@ -2,6 +2,7 @@
 
 import { HINTS, type Measuring } from "../edit/measure";
 import { KINDS } from "../model/edits";
+import { isLearned } from "../model/learned";
 import { PartMaps } from "../model/maps";
 import { rgb } from "../model/palette";
 import type { Store } from "../model/store";
@@ -24,6 +25,7 @@ const TOOLS: [Tool, Icon, string, string][] = [
 export class App {
   readonly viewport: Viewport;
   readonly commands: Commands;
+  readonly inspector: Inspector;
   readonly status = h("output", { class: "status", "aria-live": "polite" });
   readonly side = h("aside", { class: "panel left", "data-tab": "parts" });
   /** What else the top bar offers to download. */
@@ -38,6 +40,7 @@ export class App {
   constructor(readonly store: Store) {
     this.viewport = new Viewport(store);
     this.commands = new Commands(store, this.viewport);
+    this.inspector = new Inspector(store, this.commands);
     this.viewport.onStatus = (text) => (this.status.value = text);
     store.onRefused = (text) => toast(text, undefined, true);
     this.layout();
@@ -98,8 +101,7 @@ export class App {
 
     const list = new PartList(store);
     this.side.append(list.element);
-    const inspector = new Inspector(store, commands);
-    const right = h("aside", { class: "panel right", "data-tab": "numbers" }, inspector.element);
+    const right = h("aside", { class: "panel right", "data-tab": "numbers" }, this.inspector.element);
     viewport.element.append(tools, this.measureBar, this.status);
 
     // On a narrow screen the panels share the place below the picture.
@@ -192,6 +194,7 @@ export class App {
     try {
       const [{ mesh }, files] = await Promise.all([import("../mesh/mesher"), import("../mesh/files")]);
       const surface = await mesh(this.store, 160, this.viewport);
+      if (this.viewport.learned) files.addTriangles(surface, this.viewport.learned, this.store);
       if (!surface.triangles.length) {
         toast("Nothing of the assembly is inside, so there is no surface.", undefined, true);
         return;
@@ -206,6 +209,7 @@ export class App {
   }
 
   private async saveGlsl(): Promise<void> {
+    if (this.store.program.parts.some(isLearned)) return toast("A shader cannot hold learned parts; take a mesh.", undefined, true);
     const { toGlsl } = await import("../mesh/glsl");
     save(toGlsl(this.store.root), "text/plain", `${this.fileName}.glsl`);
   }

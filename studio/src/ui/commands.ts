@@ -2,6 +2,7 @@
 
 import type { Mode } from "../edit/transform";
 import { duplicated, grouped, mirrorCopies, roleOf, withNew, withRole, without } from "../model/edits";
+import { isLearned } from "../model/learned";
 import { fromUnit } from "../model/program";
 import type { Store } from "../model/store";
 import { type Node, type Operation, leaves } from "../model/tree";
@@ -122,6 +123,7 @@ export class Commands {
     const nodes = this.chosen;
     if (!nodes.length) return;
     const { store } = this;
+    if (nodes.some((node) => [...leaves(node)].some(isLearned))) return toast("A learned part cannot be mirrored: its model knows it one way round.");
     const middle = fromUnit(store.frame, [0, 0, 0])[axis];
     const { root, made } = mirrorCopies(store.root, nodes, axis, middle);
     store.commit(root, `Mirror across ${"XYZ"[axis]}`);

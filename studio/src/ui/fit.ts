@@ -62,7 +62,7 @@ export class FitPanel {
     if (this.state && this.state.input !== state.input) this.slider.clear();
     this.state = state;
     if (!this.method.options.length)
-      for (const name of state.methods) this.method.append(h("option", { value: name }, METHODS[name] ?? name));
+      for (const name of state.methods) this.method.append(h("option", { value: name }, METHODS[name] ?? name.replace(/^parts:/, "Learned parts: ")));
     this.run(state.fitting);
     if (!state.input) this.told.textContent = "No shape to fit to: drop a mesh, a scene or points into the page.";
     else if (!this.running && !this.told.textContent) this.told.textContent = `Input: ${state.input}`;

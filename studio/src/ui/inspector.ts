@@ -2,6 +2,7 @@
 
 import { asSuperfrustum, KINDS, newField, patterned, patternedAround, roleOf } from "../model/edits";
 import { complaint, type FieldData, type Parameter, PARAMETERS } from "../model/fields";
+import { isLearned } from "../model/learned";
 import { formatLength } from "../model/lengths";
 import { fromUnit, partBox } from "../model/program";
 import type { Store } from "../model/store";
@@ -18,6 +19,11 @@ export class Inspector {
   readonly element = h("div", { class: "inspector" });
   private fields: NumberField[] = [];
   private shown = "";
+
+  /** What can be done to a learned part, where there is somebody who can decode it. */
+  learnedActions: (part: Part) => HTMLElement[] = () => [
+    h("p", { class: "hint" }, "The other parts follow its changes where the model is: open the assembly by `partwright studio`."),
+  ];
 
   constructor(
     private store: Store,
@@ -153,6 +159,7 @@ export class Inspector {
     if (!parameters)
       return [this.section("Shape", h("p", { class: "hint" }, "A quadric: a face without end of its own. Move, turn and scale it; S with X, Y or Z stretches it."))];
     const rows = parameters.flatMap((parameter) => this.parameter(part, parameter));
+    if (isLearned(part)) return [this.section("Learned part", ...rows, ...this.learnedActions(part))];
     const kind = h("select", { "aria-label": "Kind" }, ...KINDS.map((k) => h("option", { value: k, selected: k === part.field.kind }, k.replace("_", " "))));
     kind.addEventListener("change", () => this.become(part, kind.value));
     return [h("section", {}, h("h3", {}, "Shape", kind), ...rows)];
@@ -190,8 +197,8 @@ export class Inspector {
       return AXES.map((axis, i) =>
         add(
           `${parameter.label} ${axis.toLowerCase()}`,
-          (field) => (field.size as number[])[i],
-          (field, value) => ({ ...field, size: (field.size as number[]).map((v, k) => (k === i ? value : v)) }),
+          (field) => (field[parameter.name] as number[])[i],
+          (field, value) => ({ ...field, [parameter.name]: (field[parameter.name] as number[]).map((v, k) => (k === i ? value : v)) }),
         ),
       );
     const otherwise = parameter.name === "taper" ? 1 : 0;

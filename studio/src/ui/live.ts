@@ -2,10 +2,11 @@
 
 import { surfacePlaces } from "../edit/region";
 import type { Step, Store } from "../model/store";
-import { type Group, newGroup, readAssembly, writeAssembly } from "../model/tree";
+import { type GivenMeshes, isLearned, readMeshes } from "../model/learned";
+import { type Group, newGroup, type Part, readAssembly, writeAssembly } from "../model/tree";
 import { asMesh, loadInput, type Triangles } from "../server/input";
 import { Link } from "../server/link";
-import type { State, Step as SavedStep } from "../server/messages";
+import type { Learned, State, Step as SavedStep } from "../server/messages";
 import type { Look } from "../view/renderer";
 import type { App } from "./app";
 import { type Button, button, save, toast } from "./controls";
@@ -47,6 +48,7 @@ export class Live {
     this.link.onConnection = (there) => this.connection(there);
     this.link.onMessage = (message) => {
       this.fit.hear(message);
+      if (message.type === "accepted") this.decodeSoon();
       if (message.type === "fitting" && message.text) this.preview(message.text);
       if (message.type === "fitted") this.store.cancel();
       if (message.type === "failed") {
@@ -57,6 +59,7 @@ export class Live {
     };
     this.fit.onFit = (fit) => this.link.send(fit) || toast("The server is gone, so nothing can be fitted now.", undefined, true);
     this.fit.onReshape = (reshape) => this.link.send(reshape) || toast("The server is gone, so nothing can be fitted now.", undefined, true);
+    app.inspector.learnedActions = (part) => this.learnedActions(part);
     this.fit.onBake = () => this.link.send({ type: "bake", size: 128 });
     this.fit.onBox = () => this.drawBox();
     this.fit.onStop = () => this.link.send({ type: "stop" });
@@ -74,6 +77,48 @@ export class Live {
       this.keepUnsent();
       if (this.link.waiting.length) event.preventDefault();
     });
+  }
+
+  // Learned parts
+
+  private learnedActions(part: Part): HTMLElement[] {
+    const ask = (what: Pick<Learned, "action" | "seed" | "source">) => {
+      if (!this.link.send({ type: "learned", name: part.name, ...what })) toast("The server is gone, and the model with it.", undefined, true);
+    };
+    const anew = button({ label: "Sample anew", run: () => ask({ action: "resample", seed: Math.floor(Math.random() * 2 ** 31) }) }, true);
+    anew.title = "Another form, drawn from those that the model knows; the other parts adapt";
+    const donors = h("select", { "aria-label": "Take it from" }, h("option", { value: "" }, "Take it from …"), ...(this.state?.donors ?? []).map((name) => h("option", { value: name }, name)));
+    donors.addEventListener("change", () => donors.value && ask({ action: "swap", source: donors.value }));
+    return [h("div", { class: "buttons" }, anew, donors)];
+  }
+
+  private decoding = false;
+  private decodeTimer = 0;
+
+  /** Asks for the meshes of learned parts as they are now, once edits have paused. */
+  private decodeSoon(): void {
+    if (!this.store.program.parts.some(isLearned)) return;
+    clearTimeout(this.decodeTimer);
+    this.decodeTimer = window.setTimeout(() => void this.decode(), 120);
+  }
+
+  private async decode(): Promise<void> {
+    if (this.decoding) return this.decodeSoon();
+    this.decoding = true;
+    this.app.status.value = "The parts adapt to one another …";
+    try {
+      const answer = await fetch("learned");
+      const text = await answer.text();
+      if (!answer.ok) throw new Error((JSON.parse(text) as { message: string }).message);
+      const { revision, meshes } = JSON.parse(text) as { revision: number; meshes: GivenMeshes };
+      this.app.viewport.setLearned(readMeshes(meshes));
+      if (revision !== this.link.revision) this.decodeSoon();
+    } catch (error) {
+      if (this.link.there) toast(`The learned parts cannot be shown: ${(error as Error).message}`, undefined, true);
+    } finally {
+      this.decoding = false;
+      this.app.status.value = "";
+    }
   }
 
   /** A box in the picture, over which the input is shown, for a part that is missing. */
@@ -124,6 +169,7 @@ export class Live {
     } finally {
       this.adopting = false;
     }
+    this.decodeSoon();
     if (state.note) toast(state.note);
     if (own && own !== writeAssembly(store.root)) store.commit(readAssembly(own), "Edits of this page");
     this.fit.show(state);
@@ -176,6 +222,7 @@ export class Live {
 
   private views(): (Button | null)[] {
     if (!this.input) return [];
+    const formula = !this.store.program.parts.some(isLearned); // which is what the errors are told by
     return [
       null,
       { label: "The parts", run: () => this.show("parts") },
@@ -183,7 +230,7 @@ export class Live {
       { label: "One over the other", run: () => this.show("both") },
       { label: "Beside one another", run: () => this.show("beside") },
       { label: "A wipe", run: () => this.show("wipe") },
-      { label: "Error on the input", run: () => this.show("input", true) },
+      ...(formula ? [{ label: "Error on the input", run: () => this.show("input", true) }] : []),
     ];
   }
 

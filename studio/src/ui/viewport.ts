@@ -4,6 +4,7 @@ import { drawGizmo, type Handle } from "../edit/gizmo";
 import { type Measurement, type Measuring, measure, POINTS } from "../edit/measure";
 import { Region } from "../edit/region";
 import { type Axis, type Mode, Transform } from "../edit/transform";
+import { combined, isLearned, type Meshes, rayHit, smoothNormals, type Triangles } from "../model/learned";
 import { type Maps, PartMaps } from "../model/maps";
 import { fromUnit, toUnit } from "../model/program";
 import { rgb } from "../model/palette";
@@ -34,6 +35,7 @@ export class Viewport {
   onTool: () => void = () => {};
   private points: Vec3[] = [];
   readonly maps = new PartMaps(() => this.upload());
+  private meshes: Meshes = new Map();
   private uploadedMaps: Maps | null = null;
   private overlay = svg("svg", { class: "overlay" });
   private gizmoLayer = svg("g");
@@ -130,6 +132,29 @@ export class Viewport {
     this.drawOverlay();
   }
 
+  /** Meshes of learned parts, as they were decoded last. */
+  setLearned(meshes: Meshes): void {
+    this.meshes = meshes;
+    this.upload();
+  }
+
+  /** Where the learned parts are now; null where there are none. */
+  learned: Triangles | null = null;
+
+  private placeLearned(): void {
+    const { store, renderer, meshes } = this;
+    const before = this.learned;
+    this.learned = meshes.size && store.program.parts.some(isLearned) ? combined(store.program.parts, store.hidden, meshes) : null;
+    if (!renderer || (!this.learned && !before)) return;
+    if (!this.learned) return renderer.setMesh("learned", null);
+    const { places, owners, triangles } = this.learned;
+    const { scale, offset } = store.frame;
+    const shown = store.program.parts.map((part) => rgb(store.colourOf(part)).map((v) => Math.round(v * 255)));
+    const colours = new Uint8Array(owners.length * 4);
+    owners.forEach((owner, i) => colours.set([...shown[owner], Math.min(owner + 1, 255)], 4 * i));
+    renderer.setMesh("learned", { places: places.map((v, i) => v * scale + offset[i % 3]), normals: smoothNormals(this.learned), colours, triangles });
+  }
+
   /** Whether parts that have baked colours show them. */
   baked = true;
   showBaked(on: boolean): void {
@@ -144,6 +169,7 @@ export class Viewport {
 
   upload(): void {
     const { renderer, store } = this;
+    this.placeLearned();
     if (renderer) {
       const layers = this.layers;
       if (this.maps.maps !== this.uploadedMaps) renderer.setMaps((this.uploadedMaps = this.maps.maps));
@@ -321,7 +347,28 @@ export class Viewport {
       x -= width;
     }
     const { view } = this;
-    return pick(this.store.program, view.eye, rayThrough(view, x, at.y, width, height));
+    const ray = rayThrough(view, x, at.y, width, height);
+    const hit = pick(this.store.program, view.eye, ray);
+    const learned = this.learnedHit(view.eye, ray);
+    return learned && (!hit || learned.distance < hit.distance) ? learned : hit;
+  }
+
+  /** What a ray of the unit frame meets of the learned parts; only: of one of them. */
+  private learnedHit(eye: Vec3, ray: Vec3, from = 0, only = -1): Hit | null {
+    if (!this.learned) return null;
+    const { frame } = this.store;
+    const hit = rayHit(this.learned, fromUnit(frame, eye), ray, from / frame.scale, only);
+    return hit && { part: hit.part, normal: hit.normal, distance: hit.distance * frame.scale, point: add(eye, mul(ray, hit.distance * frame.scale)) };
+  }
+
+  /** The other side of what is clicked: where its material ends, or, of a diameter, all across the part. */
+  private opposite(hit: Hit): Hit | null {
+    const { program } = this.store;
+    const whole = this.measuring === "diameter";
+    if (!isLearned(program.parts[hit.part])) return whole ? across(program, hit) : through(program, hit);
+    const inwards = mul(hit.normal, -1);
+    if (whole) return this.learnedHit(add(hit.point, mul(inwards, 4)), hit.normal, 0, hit.part);
+    return this.learnedHit(hit.point, inwards, 1e-3, hit.part);
   }
 
   private hoverAt(at: { x: number; y: number }): void {
@@ -352,7 +399,7 @@ export class Viewport {
     let { points } = this;
     this.points = [];
     if (this.measuring === "thickness" || this.measuring === "diameter") {
-      const other = this.measuring === "thickness" ? through(store.program, hit) : across(store.program, hit);
+      const other = this.opposite(hit);
       if (!other) {
         this.onStatus("There is no other side straight through from here.");
         return;
