@@ -17,7 +17,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import count
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from partwright.errors import OutputError
 
@@ -65,7 +65,8 @@ def report_path(path: str | Path) -> Path:
 
 @contextmanager
 def replacing_files(folder: str | Path, stale: re.Pattern[str] | None = None) -> Iterator[Path]:
-    """A temporary folder whose files move into `folder`, which is made if need be, when the block ends well.
+    """A temporary folder whose files move into `folder`, which is made if need be, when the block ends well;
+    those in folders of its own into folders of the same names.
 
     Other files of `folder` stay, but for those whose whole name matches `stale`: files of an earlier result
     that this one does not have. Where the block or a move fails, everything is as it was.
@@ -203,7 +204,7 @@ def _staged(folder: Path, suffix: str = "") -> Iterator[Path]:
 
 def _exchange(folder: Path, new: Path, old: Path, stale: re.Pattern[str] | None) -> None:
     """The files of `new` into `folder`, stale ones out of it; `old` keeps what they replace meanwhile."""
-    coming = sorted(path.name for path in new.iterdir())
+    coming = sorted(path.relative_to(new).as_posix() for path in new.rglob("*") if not path.is_dir())
     going = [
         path.name
         for path in sorted(folder.iterdir())
@@ -212,8 +213,11 @@ def _exchange(folder: Path, new: Path, old: Path, stale: re.Pattern[str] | None)
     for name in coming:
         _check_free(folder / name)
     begun: list[str] = []
+    made = [folder / name for name in sorted(map(str, _folders(coming))) if not _status(folder / name)]
     try:
         for name in (*coming, *going):
+            for place in (folder, old):
+                (place / name).parent.mkdir(parents=True, exist_ok=True)
             _keep(folder / name, old / name)
             begun.append(name)
             if name in coming:
@@ -226,7 +230,15 @@ def _exchange(folder: Path, new: Path, old: Path, stale: re.Pattern[str] | None)
                 os.replace(old / name, folder / name)
             else:
                 (folder / name).unlink(missing_ok=True)
+        for path in reversed(made):
+            with suppress(OSError):
+                path.rmdir()
         raise
+
+
+def _folders(names: Iterable[str]) -> set[PurePosixPath]:
+    """Folders, below one that is there, in which these files lie."""
+    return {parent for name in names for parent in PurePosixPath(name).parents if parent.parts}
 
 
 def _keep(path: Path, kept: Path) -> None:

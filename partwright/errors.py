@@ -125,6 +125,10 @@ class MessageError(PartwrightError):
     """What a page sent to the studio's server is none of the messages that they share."""
 
 
+class RobotError(PartwrightError):
+    """A robot's file contradicts itself, or has nothing that could be replaced."""
+
+
 class CancelledError(PartwrightError):
     """A run was cancelled before there was anything to keep."""
 

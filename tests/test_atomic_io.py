@@ -35,7 +35,23 @@ def names(folder: Path) -> list[str]:
 def save(folder: Path, files: dict[str, str]) -> None:
     with replacing_files(folder, STALE) as staging:
         for name, text in files.items():
+            (staging / name).parent.mkdir(exist_ok=True)
             (staging / name).write_text(text)
+
+
+def test_files_in_folders_move_into_folders_of_the_same_names(tmp_path: Path) -> None:
+    """Those that were there stay; a failure leaves no folder behind."""
+    (tmp_path / "out" / "meshes").mkdir(parents=True)
+    (tmp_path / "out" / "meshes" / "other").write_text("stays")
+    with replacing_files(tmp_path / "out") as staging:
+        (staging / "meshes" / "deep").mkdir(parents=True)
+        (staging / "meshes" / "deep" / "a").write_text("new")
+    assert (tmp_path / "out" / "meshes" / "deep" / "a").read_text() == "new"
+    assert (tmp_path / "out" / "meshes" / "other").read_text() == "stays"
+    (tmp_path / "out" / "way").mkdir()
+    with pytest.raises(OutputError, match="in the way"):
+        save(tmp_path / "out", {"fresh/a": "new", "way": "a folder has this name"})
+    assert names(tmp_path / "out") == ["meshes", "way"]
 
 
 def test_files_are_staged_inside_their_folder_which_may_be_a_mount_point(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 from partwright import __version__
 from partwright.cli import (
     clean,
+    collide,
     completion,
     describe,
     evaluate,
@@ -29,7 +30,7 @@ from partwright.cli.parser import Parser
 from partwright.cli.terminal import note
 from partwright.errors import CancelledError, PartwrightError
 
-COMMANDS = (fit, clean, evaluate, describe, export, segment, parts, texture, studio, completion)
+COMMANDS = (fit, clean, evaluate, describe, export, collide, segment, parts, texture, studio, completion)
 
 
 def parser() -> Parser:

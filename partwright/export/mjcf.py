@@ -97,11 +97,12 @@ def _add_geom(body: xml.Element, geom: Geometry) -> None:
         return
     field = geom.part.field
     place = {"pos": numbers(geom.part.translation), "quat": numbers(geom.part.rotation)}
-    size = numbers(_size(field))
+    size = numbers(geom_size(field))
     xml.SubElement(body, "geom", {"name": geom.name, "type": field.kind, "size": size, **place, "rgba": rgba})
 
 
-def _size(field: Field) -> tuple[float, ...]:
+def geom_size(field: Field) -> tuple[float, ...]:
+    """MuJoCo's `size` of one of `GEOMS`: half the sides, or radius and half the height."""
     match field:
         case Box(size=(x, y, z)):
             return x / 2, y / 2, z / 2

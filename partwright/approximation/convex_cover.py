@@ -1,0 +1,283 @@
+"""A closed solid as few convex ones that cover it: cut by planes, then joined again where that costs little.
+
+What is spent is volume: a piece is as bad as what its hull adds to it. Planes come from the solid itself:
+from the faces beside its concave edges, and across its principal axes. A cut through a ring gains nothing
+before
+the second one does, so where no cut gains anything the one whose halves can be cut best is taken. Other
+decompositions go by the depth of pockets (Wei et al., CoACD, 2022; Mamou, V-HACD, 2016); here depth is a
+limit, not the aim.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.approximation.cutting_planes import Corners, Plane, across_axes, candidates
+from partwright.shapes import MeshDistance
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+MOST = 64  # pieces at most, where nobody asked for fewer
+_EXACT = 5  # candidates whose pieces are really made
+_LOOKED_AT = 6  # candidates, beside those across the axes, where one cut alone gains nothing
+_GAIN = 0.03  # of what a hull adds: a cut that takes less off it looks one cut ahead
+_SLIVER = 1e-5  # of the whole volume: pieces below it are left out
+_SAMPLES = 0.5  # of the tolerance: spacing of points on a hull
+_FEWEST, _DENSEST = 12.0, 60.0  # points along the longest side of a hull, whatever the tolerance
+_COARSE = 0.05  # of the tolerance: how far the search's own copy of the solid may lie from it
+
+
+@dataclass(frozen=True)
+class Limits:
+    """deviation: how far a hull's surface may lie from the solid's, as a length. extra: volume that all hulls
+    may add, over the solid's. most: pieces at most; this one is kept where not all can be."""
+
+    deviation: float
+    extra: float = 0.03
+    most: int = MOST
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A part of the solid, and the least convex solid around it."""
+
+    solid: Manifold
+
+    @cached_property
+    def hull(self) -> Manifold:
+        return self.solid.hull()
+
+    @cached_property
+    def extra(self) -> float:
+        """Volume that the hull adds."""
+        return max(self.hull.volume() - self.solid.volume(), 0.0)
+
+    @cached_property
+    def corners(self) -> Corners:
+        return Corners.of(self.solid)
+
+    def deviation(self, limit: float) -> float:
+        """How far the hull's surface lies from the solid's at most, by points dense enough for the limit."""
+        mesh, hull = self.solid.to_mesh64(), self.hull
+        vertices = np.asarray(mesh.vert_properties)[:, :3]
+        side = float(np.ptp(vertices, axis=0).max())
+        spacing = float(np.clip(_SAMPLES * limit, side / _DENSEST, side / _FEWEST))
+        fine = hull.refine_to_length(spacing).to_mesh()
+        faces = np.asarray(mesh.tri_verts, dtype=np.int64)
+        points = np.asarray(fine.vert_properties)[:, :3]
+        middle, scale = vertices.mean(axis=0), 1.0 / side
+        there = MeshDistance((vertices - middle) * scale, faces, faces, True)
+        return float(there.unsigned((points - middle) * scale).max(initial=0.0)) / scale
+
+
+def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
+    """Pieces whose hulls together cover the solid: as few as keep the limits, as far as they are found.
+
+    solid: closed, of any number of bodies; a piece that ends up thinner than rounding is left out.
+    """
+    coarse = _simplified(solid, _COARSE * limits.deviation)
+    pieces = _cut_up(coarse, limits)
+    return _joined(pieces, coarse.volume(), limits)
+
+
+def covering(pieces: list[Piece], solid: Manifold) -> list[Manifold]:
+    """The hulls, each moved out by as much as the solid sticks out of their union, found to rounding."""
+    from manifold3d import Manifold, OpType
+
+    hulls = [piece.hull for piece in pieces]
+    left = solid - Manifold.batch_boolean(hulls, OpType.Add)
+    if left.is_empty() or left.volume() <= 0:
+        return hulls
+    size = float(np.ptp(np.reshape(solid.bounding_box(), (2, 3)), axis=0).max())
+    out = []
+    for hull in hulls:
+        near = left ^ grown(hull, 0.02 * size)
+        points = np.asarray(near.to_mesh64().vert_properties)[:, :3]
+        beyond = _beyond(hull, points).max(initial=0.0) if len(points) else 0.0
+        out.append(grown(hull, float(beyond) + 1e-7 * size) if beyond > 0 else hull)
+    return out
+
+
+def halved(piece: Piece) -> list[list[Piece]]:
+    """What a piece is cut into across the middle of each of its principal axes."""
+    least = _SLIVER * piece.solid.volume()
+    cut = [_cut(piece, normal, offset, least) for normal, offset in across_axes(piece.corners)[:3]]
+    return [parts for parts in cut if len(parts) > 1]
+
+
+def grown(hull: Manifold, by: float) -> Manifold:
+    """A convex solid with every face moved out by a length."""
+    from manifold3d import Manifold
+
+    normals, offsets = faces_of(hull)
+    lower, upper = np.reshape(hull.bounding_box(), (2, 3))
+    result = Manifold.cube(tuple((upper - lower + 2 * by).tolist())).translate(tuple((lower - by).tolist()))
+    for normal, offset in zip(normals, offsets, strict=True):
+        result = result.trim_by_plane(tuple((-normal).tolist()), -float(offset) - by)
+    return result
+
+
+def faces_of(hull: Manifold) -> tuple[np.ndarray, np.ndarray]:
+    """Outward unit normals (F, 3) and offsets (F,) of a convex solid's faces, each plane once.
+
+    Each plane is moved out to the farthest corner, so that slivers, whose normals are rounding, cut nothing
+    off.
+    """
+    mesh = hull.to_mesh64()
+    corners = np.asarray(mesh.vert_properties)[:, :3]
+    a, b, c = corners[np.asarray(mesh.tri_verts, dtype=np.int64).T]
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals[length[:, 0] > 0] / length[length[:, 0] > 0]
+    _, first = np.unique(np.round(normals, 9), axis=0, return_index=True)
+    normals = normals[np.sort(first)]
+    return normals, (corners @ normals.T).max(axis=0)
+
+
+def _beyond(hull: Manifold, points: np.ndarray) -> np.ndarray:
+    """(N,) how far points are outside of the nearest face's plane; negative inside."""
+    normals, offsets = faces_of(hull)
+    return np.asarray((points @ normals.T - offsets).max(axis=1))
+
+
+def _simplified(solid: Manifold, by: float) -> Manifold:
+    simple = solid.simplify(by)
+    return solid if simple.is_empty() or simple.volume() <= 0 else simple
+
+
+def _cut_up(solid: Manifold, limits: Limits) -> list[Piece]:
+    """Pieces that are cut, the worst one first, until all hulls keep the limits."""
+    least = _SLIVER * solid.volume()
+    allowed = limits.extra * solid.volume()
+    done: list[Piece] = []
+    open_: list[tuple[float, int, Piece]] = []
+    count = 0
+
+    def take(piece: Piece) -> None:
+        nonlocal count
+        count += 1
+        if piece.extra <= least:
+            done.append(piece)
+        else:
+            heapq.heappush(open_, (-piece.extra, count, piece))
+
+    for part in _components(solid, least):
+        take(part)
+    most = 2 * limits.most  # joining comes after
+    while open_ and len(done) + len(open_) < most:
+        total = sum(-entry[0] for entry in open_)
+        piece = heapq.heappop(open_)[2]
+        if total <= allowed and piece.deviation(limits.deviation) <= limits.deviation:
+            done.append(piece)
+            continue
+        parts = _best_cut(piece, least)
+        if len(parts) < 2:
+            done.append(piece)
+            continue
+        for part in parts:
+            take(part)
+    return done + [entry[2] for entry in open_]
+
+
+def _components(solid: Manifold, least: float) -> list[Piece]:
+    return [Piece(part) for part in solid.decompose() if part.volume() > least]
+
+
+def _best_cut(piece: Piece, least: float) -> list[Piece]:
+    """The pieces that the best plane makes of one."""
+    corners = piece.corners
+    planes = candidates(corners)
+    whole = piece.hull.volume()
+    left = np.array([corners.hulls(normal, offset) for normal, offset in planes])
+    if not len(left):
+        return [piece]
+    order = np.argsort(np.round(left / whole, 6), kind="stable")[:_EXACT]  # the earlier ones are plainer
+    best, parts = _GAIN * piece.extra, [piece]
+    for index in order:
+        normal, offset = planes[index]
+        made = _cut(piece, normal, offset, least)
+        gain = (whole - sum(one.hull.volume() for one in made)) / max(len(made) - 1, 1)
+        if len(made) > 1 and gain > best + 1e-6 * whole:
+            best, parts = gain, made
+    if len(parts) > 1:
+        return parts
+    return _ahead(piece, least) or [piece]
+
+
+def _ahead(piece: Piece, least: float) -> list[Piece]:
+    """The cut whose pieces are best cut again, of a few; of those that are alike the plainest."""
+    best, chosen = np.inf, []
+    for normal, offset in _few(piece.corners):
+        made = _cut(piece, normal, offset, least)
+        if len(made) < 2:
+            continue
+        left = 0.0
+        for one in made:
+            corners = one.corners
+            second = [corners.hulls(n, d) for n, d in _few(corners)]
+            left += min([*second, one.hull.volume()])
+        if left < best - 1e-6 * piece.hull.volume():
+            best, chosen = left, made
+    return chosen
+
+
+def _few(corners: Corners) -> list[Plane]:
+    return [*candidates(corners)[:_LOOKED_AT], *across_axes(corners)]
+
+
+def _cut(piece: Piece, normal: np.ndarray, offset: float, least: float) -> list[Piece]:
+    sides = piece.solid.split_by_plane(tuple(normal.tolist()), float(offset))
+    return [one for side in sides if not side.is_empty() for one in _components(side, least)]
+
+
+def _joined(pieces: list[Piece], volume: float, limits: Limits) -> list[Piece]:
+    """Pieces joined in pairs, the cheapest pair first, as long as the limits are kept or there are too
+    many."""
+    from manifold3d import Manifold, OpType
+
+    alive = dict(enumerate(pieces))
+    total = sum(piece.extra for piece in pieces)
+    heap: list[tuple[float, int, int]] = []
+
+    def price(i: int, j: int) -> None:
+        a, b = alive[i], alive[j]
+        if not _near(a.hull, b.hull):
+            return
+        hull = Manifold.batch_hull([a.hull, b.hull]).volume()
+        heapq.heappush(heap, (hull - a.hull.volume() - b.hull.volume(), i, j))
+
+    for i in alive:
+        for j in range(i):
+            price(i, j)
+    number = len(alive)
+    while heap and len(alive) > 1:
+        cost, i, j = heapq.heappop(heap)
+        if i not in alive or j not in alive:
+            continue
+        forced = len(alive) > limits.most
+        both = Piece(Manifold.batch_boolean([alive[i].solid, alive[j].solid], OpType.Add))
+        if not forced:
+            if total + cost > limits.extra * volume:
+                break
+            if both.deviation(limits.deviation) > limits.deviation:
+                continue
+        total += max(cost, 0.0)
+        del alive[i], alive[j]
+        alive[number] = both
+        for other in [key for key in alive if key != number]:
+            price(number, other)
+        number += 1
+    return list(alive.values())
+
+
+def _near(a: Manifold, b: Manifold) -> bool:
+    """Whether their boxes touch, with room to spare."""
+    first, second = (np.reshape(one.bounding_box(), (2, 3)) for one in (a, b))
+    room = 0.05 * float(np.ptp(np.concatenate([first, second]), axis=0).max())
+    return bool(((first[0] <= second[1] + room) & (second[0] <= first[1] + room)).all())

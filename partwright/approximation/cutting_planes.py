@@ -1,0 +1,146 @@
+"""Planes that may cut a solid well, and what the hulls of its two sides would be, without cutting it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+_SHARES = (0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875)  # of the extent along an axis
+_MOST = 24  # planes along concave edges
+_CONCAVE = 0.08  # radians by which an edge is concave at least
+_HALVING = 0.9  # of a plane that halves an angle, beside one that continues a face: pieces stay square
+_SAME = (0.05, 0.01)  # normals, and offsets over the size, that count as the same plane
+
+Plane = tuple[np.ndarray, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """A closed mesh as arrays. vertices: (V, 3). edges: (E, 2), each once, with the two faces (E, 2) beside
+    it."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    edges: np.ndarray
+    beside: np.ndarray
+
+    @classmethod
+    def of(cls, solid: Manifold) -> Corners:
+        mesh = solid.to_mesh64()
+        vertices = np.asarray(mesh.vert_properties)[:, :3]
+        faces = np.asarray(mesh.tri_verts, dtype=np.int64)
+        directed = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        owner = np.repeat(np.arange(len(faces)), 3)
+        forward = directed[:, 0] < directed[:, 1]
+        keys = np.sort(directed, axis=1) @ (len(vertices), 1)
+        first, second = np.argsort(keys[forward], kind="stable"), np.argsort(keys[~forward], kind="stable")
+        edges = directed[forward][first]
+        beside = np.stack([owner[forward][first], owner[~forward][second]], axis=1)
+        return cls(vertices, faces, edges, beside)
+
+    @cached_property
+    def size(self) -> float:
+        return float(np.ptp(self.vertices, axis=0).max())
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """(F, 3) unit normals; zero for triangles without area."""
+        a, b, c = self.vertices[self.faces.T]
+        normal = np.cross(b - a, c - a)
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+
+    @cached_property
+    def axes(self) -> np.ndarray:
+        """(3, 3) principal axes of the surface, in rows, the longest first."""
+        a, b, c = self.vertices[self.faces.T]
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        middle = (a + b + c) / 3
+        centred = middle - np.average(middle, axis=0, weights=area)
+        return np.linalg.eigh((centred * area[:, None]).T @ centred)[1].T[::-1]
+
+    def hulls(self, normal: np.ndarray, offset: float) -> float:
+        """Volume of the hulls of the two sides of a plane together; infinite where one side has nothing."""
+        from manifold3d import Manifold
+
+        height = self.vertices @ normal - offset
+        slack = 1e-7 * self.size
+        if height.max() < slack or height.min() > -slack:
+            return np.inf
+        start, stop = height[self.edges].T
+        crossing = start * stop < 0
+        share = (start[crossing] / (start[crossing] - stop[crossing]))[:, None]
+        first, last = self.vertices[self.edges[crossing].T]
+        between = first + share * (last - first)
+        sides = (self._side(height, slack), self._side(-height, slack))
+        return sum(Manifold.hull_points(np.concatenate([side, between])).volume() for side in sides)
+
+    def _side(self, height: np.ndarray, slack: float) -> np.ndarray:
+        """Corners (N, 3) above a plane, and those in it that belong to a triangle that reaches above."""
+        used = np.zeros(len(height), bool)
+        used[self.faces[(height[self.faces] > slack).any(axis=1)]] = True
+        return self.vertices[used & (height >= -slack)]
+
+
+def candidates(corners: Corners) -> list[Plane]:
+    """Normal (3,) and offset of each plane that may cut well, the plainest first."""
+    square = _across(corners, np.eye(3)) if np.abs(corners.axes).max(axis=1).min() < 0.999 else []
+    return [*_along_concave_edges(corners), *square, *_across(corners, corners.axes)]
+
+
+def across_axes(corners: Corners) -> list[Plane]:
+    """Nine planes across the principal axes: in the middle of each, then a quarter from either end."""
+    return _across(corners, corners.axes)[:9]
+
+
+def _across(corners: Corners, axes: np.ndarray) -> list[Plane]:
+    along = corners.vertices @ axes.T
+    low, high = along.min(axis=0), along.max(axis=0)
+    return [
+        (axes[i], float(low[i] + share * (high[i] - low[i])))
+        for share in _SHARES
+        for i in range(3)
+        if high[i] > low[i]
+    ]
+
+
+def _along_concave_edges(corners: Corners) -> list[Plane]:
+    """The planes of the faces beside concave edges, and those that halve the angle between them; of planes
+    that are nearly the same the one with the longest edges."""
+    vertices, normals = corners.vertices, corners.normals
+    first, second = normals[corners.beside.T]
+    start, stop = vertices[corners.edges.T]
+    along = stop - start
+    turn = np.einsum("ij,ij->i", np.cross(first, second), along)
+    length = np.linalg.norm(along, axis=1)
+    sine = np.divide(turn, length, out=np.zeros_like(turn), where=length > 0)
+    concave = sine < -_CONCAVE
+    if not concave.any():
+        return []
+    first, second, start, length = first[concave], second[concave], start[concave], length[concave]
+    between = first - second
+    rows = np.concatenate([first, second, between])
+    weight = np.tile(length * -sine[concave], 3)
+    weight[2 * len(first) :] *= _HALVING
+    norm = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows = np.divide(rows, norm, out=np.zeros_like(rows), where=norm > 0)
+    offsets = np.einsum("ij,ij->i", rows, np.tile(start, (3, 1)))
+    real = norm[:, 0] > 0
+    rows, offsets, weight = rows[real], offsets[real], weight[real]
+    leading = rows[np.arange(len(rows)), np.abs(rows).argmax(axis=1)]
+    sign = np.sign(leading)
+    rows, offsets = rows * sign[:, None], offsets * sign
+    keys = np.column_stack([np.round(rows / _SAME[0]), np.round(offsets / (_SAME[1] * corners.size))])
+    _, group = np.unique(keys, axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    total = np.bincount(group, weight)
+    order = np.lexsort((-weight, group))
+    longest = order[np.unique(group[order], return_index=True)[1]]
+    chosen = np.argsort(-total, kind="stable")[:_MOST]
+    return [(rows[longest[i]], float(offsets[longest[i]])) for i in chosen]

@@ -1,0 +1,60 @@
+"""`partwright collide`: a whole robot with simple collision shapes."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from partwright.cli.lengths import length
+from partwright.cli.outputs import add_output
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    command = commands.add_parser(
+        "collide",
+        help="replace a robot's collision meshes by few simple shapes",
+        description="Reads a robot (URDF or MJCF) and writes the same into FOLDER, with convex shapes in the "
+        "place of its collision meshes, the meshes it needs, a report and a picture of before and after.",
+    )
+    command.add_argument("robot", metavar="ROBOT", type=Path, help="a robot's file: .urdf, .xml or .mjcf")
+    add_output(
+        command,
+        "FOLDER",
+        "where to write",
+        reads=lambda a: [a.robot],
+        writes=_writes,
+        folder=lambda a: a.output,
+    )
+    option = command.add_argument_group("what the shapes keep to").add_argument
+    option("--enclose", action="store_true", help="they contain the visual meshes, tried on fresh points")
+    option("--inside", action="store_true", help="they lie inside of the collision meshes")
+    option(
+        "--tolerance",
+        metavar="T",
+        type=length,
+        help="how far their surface may lie from the mesh's: 5mm, 0.005 (metres), or 2%% of the link's "
+        "longest side (default: 2%%, and no less than 0.3%% of the robot's)",
+    )
+    option(
+        "--max-parts", metavar="N", type=int, default=24, help="shapes a link at most (default: %(default)s)"
+    )
+    option(
+        "--kinds",
+        metavar="A,B",
+        default="",
+        help="which may be used: box, cylinder, sphere, capsule, ellipsoid, hull (default: all it has)",
+    )
+    option(
+        "--packages",
+        metavar="DIR",
+        type=Path,
+        action="append",
+        default=[],
+        help="a folder in which packages of package:// and model:// addresses lie; may be given again",
+    )
+    command.set_defaults(run="collide")
+
+
+def _writes(arguments: argparse.Namespace) -> list[Path]:
+    name = arguments.robot.name
+    return [arguments.output / each for each in (name, f"{name}.report.json", f"{name}.png")]

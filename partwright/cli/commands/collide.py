@@ -1,0 +1,49 @@
+"""What `partwright collide` does."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+from partwright.cli.terminal import counted, note, say
+from partwright.robots import Collided, CollideOptions, collide, save
+from partwright.robots.report import LinkReport
+
+
+def run(arguments: argparse.Namespace) -> int:
+    options = CollideOptions(
+        enclose=arguments.enclose,
+        inside=arguments.inside,
+        tolerance=arguments.tolerance,
+        max_parts=arguments.max_parts,
+        kinds=tuple(filter(None, arguments.kinds.split(","))),
+    )
+    result = collide(arguments.robot, options, arguments.packages, told=note)
+    save(result, arguments.output)
+    for line in _table(result.links):
+        say(line)
+    say(_summary(result))
+    say(f"written to {arguments.output}")
+    return 0
+
+
+def _table(links: Sequence[LinkReport]) -> list[str]:
+    wide = max(len(link.link) for link in links)
+    lines = [f"{'link':{wide}}  shapes                        missing    extra  largest deviation"]
+    for link in links:
+        kinds = ", ".join(f"{number} {kind}" for kind, number in link.shapes.items())
+        errors = f"{100 * link.missing:6.1f} %  {100 * link.extra:6.1f} %"
+        far = f"{1000 * link.deviation:.2f} mm" + (" (over)" if link.deviation > link.tolerance else "")
+        lines.append(f"{link.link:{wide}}  {kinds:28}  {errors}  {far}")
+    return lines
+
+
+def _summary(result: Collided) -> str:
+    count = sum(link.count for link in result.links)
+    line = f"{counted(len(result.links), 'link')}, {counted(count, 'shape')}; colliding pairs at rest: "
+    line += f"{len(result.pairs_before)} before, {len(result.pairs_after)} after"
+    checked = [link for link in result.links if link.sticking_out is not None]
+    if checked:
+        held = sum(link.sticking_out == 0 for link in checked)
+        line += f"; {held} of {counted(len(checked), 'link')} contained"
+    return line

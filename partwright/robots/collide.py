@@ -1,0 +1,262 @@
+"""A whole robot with collision shapes in the place of its collision meshes."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.approximation.convex_fit import Mode
+from partwright.atomic_io import replacing_files
+from partwright.errors import RobotError, SettingError
+from partwright.robots.growing import shape_solid, sticking_out
+from partwright.robots.model import Link, RobotFile, Shape
+from partwright.robots.opening import open_robot
+from partwright.robots.overlaps import Pair, overlaps, too_near
+from partwright.robots.picture import picture
+from partwright.robots.report import LinkReport, report
+from partwright.robots.shaping import Wishes, shapes_for
+from partwright.robots.solids import Solids, Target, largest_deviation
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+    from partwright.fields import Field
+
+HULL = "hull"
+_SHARE, _LEAST_SHARE = 0.02, 0.003  # of the longest sides of link and robot: the tolerance that none gave
+_FINER = 1  # times a link's tolerance is halved where it overlaps a neighbour more than its mesh did
+_MORE_OVERLAP = 1e-3  # of the smaller link's volume
+Told = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class CollideOptions:
+    """What is wanted of a robot's collision shapes."""
+
+    enclose: bool = False
+    """The shapes contain the link's visual meshes (its collision meshes, where it has no others)."""
+    inside: bool = False
+    """The shapes lie inside of the link's collision meshes."""
+    tolerance: float | str | None = None
+    """How far a shape's surface may lie from the mesh's: metres, "5mm", or a share "2%" of the link's
+    longest side. Not given it is 2%, and no less than 0.3 % of the robot's."""
+    max_parts: int = 24
+    """Shapes a link at most."""
+    kinds: tuple[str, ...] = ()
+    """Native solids that may be used, and "hull" for convex meshes; all that the format has if empty."""
+    extra: float = 0.08
+    """Volume that convex pieces may add, over the link's, before it is cut further."""
+
+    def __post_init__(self) -> None:
+        if self.enclose and self.inside:
+            raise SettingError("--enclose and --inside contradict each other: take one of them")
+        if isinstance(self.max_parts, bool) or not isinstance(self.max_parts, int) or self.max_parts < 1:
+            raise SettingError(f"max_parts: expected a number of at least 1, got {self.max_parts!r}")
+        if not 0 < self.extra < np.inf:
+            raise SettingError(f"extra: expected a share of the volume such as 0.08, got {self.extra!r}")
+        self.length(1.0, 1.0)
+
+    @property
+    def mode(self) -> Mode:
+        return "around" if self.enclose else "within" if self.inside else "nearest"
+
+    def length(self, size: float, whole: float) -> float:
+        """The tolerance of a link of this longest side, of a robot of that, in metres.
+
+        Raises:
+            SettingError: it is none.
+        """
+        from partwright.shapes.units import METRES, canonical_unit
+
+        if self.tolerance is None:
+            return max(_SHARE * size, _LEAST_SHARE * whole)
+        text = str(self.tolerance).strip()
+        found = re.fullmatch(r"(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\s*([A-Za-z]*|%)", text)
+        if found is None or not 0 < float(found[1]) < np.inf:
+            raise SettingError(f"tolerance: expected a length such as 5mm or 2%, got {self.tolerance!r}")
+        value, unit = float(found[1]), found[2]
+        factor = size / 100 if unit == "%" else METRES[canonical_unit(unit)] if unit else 1.0
+        return value * factor
+
+
+@dataclass(frozen=True)
+class Collided:
+    """The robot as it was and what was written of it. shapes: by the link's name."""
+
+    robot: RobotFile
+    shapes: dict[str, list[Shape]]
+    links: list[LinkReport]
+    pairs_before: dict[Pair, float] = field(default_factory=dict)
+    pairs_after: dict[Pair, float] = field(default_factory=dict)
+
+
+def collide(
+    robot: str | Path | RobotFile,
+    options: CollideOptions | None = None,
+    packages: Sequence[str | Path] = (),
+    told: Told = lambda _: None,
+) -> Collided:
+    """Shapes for every link of the robot that has collision meshes.
+
+    told: gets a line a link.
+
+    Raises:
+        UnreadableFileError, UnsupportedFormatError, RobotError: of `open_robot`; no link has a collision
+        mesh. PartwrightError: a mesh is damaged or encloses nothing; the message names the link.
+        SettingError: an option does not fit the format.
+    """
+    options = options or CollideOptions()
+    robot = robot if isinstance(robot, RobotFile) else open_robot(robot, packages)
+    links = [link for link in robot.links if link.collisions]
+    if not links:
+        raise RobotError(
+            f"{robot.path}: none of its {len(robot.links)} links has a collision mesh to replace"
+        )
+    kinds, hulls = kinds_of(robot, options.kinds)
+    solids = Solids()
+    before = {link.name: solids.target(link, link.collisions) for link in links}
+    wanted = {
+        link.name: solids.target(link, link.visuals)
+        if options.enclose and link.visuals
+        else before[link.name]
+        for link in links
+    }
+    bodies = {link.name: _in_world(link, before[link.name].solid) for link in links}
+    pairs_before = overlaps(bodies)
+    corners = np.concatenate([np.reshape(body.bounding_box(), (2, 3)) for body in bodies.values()])
+    whole = float(np.ptp(corners, axis=0).max())
+    volumes = {name: body.volume() for name, body in bodies.items()}
+    wishes = {
+        name: Wishes(
+            options.length(target.size, whole),
+            kinds,
+            hulls,
+            options.max_parts,
+            options.extra,
+            options.mode,
+        )
+        for name, target in wanted.items()
+    }
+    shapes: dict[str, list[Shape]] = {}
+    todo = {link.name for link in links}
+    for turn in range(1 + _FINER):
+        for link in links:
+            if link.name in todo:
+                shapes[link.name] = _shaped(link, wanted[link.name], wishes[link.name])
+                told(f"{link.name}: {len(shapes[link.name])} shapes")
+        unions = {link.name: _union(shapes[link.name]) for link in links}
+        pairs_after = overlaps({link.name: _in_world(link, unions[link.name]) for link in links})
+        near = too_near(pairs_before, pairs_after, volumes, _MORE_OVERLAP)
+        neighbours = {frozenset((link.name, link.parent)) for link in links}
+        todo = {name for pair in near if frozenset(pair) in neighbours for name in pair}
+        if not todo or turn == _FINER:
+            break
+        for name in todo:
+            finer = dataclasses.replace(
+                wishes[name], tolerance=wishes[name].tolerance / 2, extra=wishes[name].extra / 2
+            )
+            wishes[name] = finer
+    reports = [
+        _measured(
+            link,
+            shapes[link.name],
+            unions[link.name],
+            wanted[link.name],
+            before[link.name],
+            wishes[link.name],
+        )
+        for link in links
+    ]
+    return Collided(robot, shapes, reports, pairs_before, pairs_after)
+
+
+def save(result: Collided, folder: str | Path) -> list[Path]:
+    """Write the robot into a folder, with the meshes it needs, FILE.report.json and FILE.png: all or none.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    files = result.robot.replaced(result.shapes)
+    name = result.robot.path.name
+    folder = Path(folder)
+    with replacing_files(folder) as staging:
+        for within, data in files.written.items():
+            _parent(staging / within).write_bytes(data)
+        for within, source in files.copied.items():
+            if within not in files.written:
+                shutil.copyfile(source, _parent(staging / within))
+        (staging / f"{name}.report.json").write_bytes(
+            report(name, result.links, result.pairs_before, result.pairs_after)
+        )
+        picture(result.robot, result.shapes, staging / f"{name}.png")
+        written = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
+    return [folder / path for path in written]
+
+
+def kinds_of(robot: RobotFile, names: Sequence[str]) -> tuple[tuple[type[Field], ...], bool]:
+    """Native kinds of these names, and whether hulls are among them.
+
+    Raises:
+        SettingError: the format has no such kind.
+    """
+    known = {kind.kind: kind for kind in robot.kinds}
+    for name in names:
+        if name not in known and name != HULL:
+            raise SettingError(
+                f"kinds: {robot.path.suffix} has no {name!r}; expected some of {', '.join((*known, HULL))}"
+            )
+    if not names:
+        return tuple(known.values()), True
+    return tuple(kind for name, kind in known.items() if name in names), HULL in names
+
+
+def _shaped(link: Link, target: Target, wishes: Wishes) -> list[Shape]:
+    stem = "".join(c if c.isascii() and (c.isalnum() or c in "_-.") else "_" for c in link.name)
+    shapes = shapes_for(f"{stem}_collision", target, wishes)
+    if not shapes:
+        raise RobotError(f"link {link.name!r}: no shape lies inside of its mesh; it is too thin")
+    return shapes
+
+
+def _union(shapes: Sequence[Shape]) -> Manifold:
+    from manifold3d import Manifold, OpType
+
+    return Manifold.batch_boolean([shape_solid(shape) for shape in shapes], OpType.Add)
+
+
+def _in_world(link: Link, solid: Manifold) -> Manifold:
+    return solid.transform(link.pose[:3])
+
+
+def _measured(
+    link: Link, shapes: Sequence[Shape], union: Manifold, target: Target, before: Target, wishes: Wishes
+) -> LinkReport:
+    own = target.solid.volume()
+    kinds: dict[str, int] = {}
+    for shape in shapes:
+        kinds[shape.kind] = kinds.get(shape.kind, 0) + 1
+    return LinkReport(
+        link=link.name,
+        meshes=tuple(use.source.name for use in link.collisions),
+        shapes=kinds,
+        stands_for="visual" if target is not before else "collision",
+        volume=own,
+        missing=(target.solid - union).volume() / own,
+        extra=(union - target.solid).volume() / own,
+        deviation=largest_deviation(target.solid, union),
+        tolerance=wishes.tolerance,
+        sticking_out=sticking_out(shapes, target) if wishes.mode == "around" else None,
+        notes=tuple(dict.fromkeys((*before.notes, *target.notes))),
+    )
+
+
+def _parent(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path

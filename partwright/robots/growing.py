@@ -1,0 +1,143 @@
+"""Shapes that contain what they stand for: grown by what sticks out of them, and tried on fresh points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.approximation.convex_cover import faces_of, grown
+from partwright.approximation.ellipsoid import Ellipsoid
+from partwright.assembly.similarity import rotation_matrix
+from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
+from partwright.robots.model import Shape
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+    from partwright.robots.solids import Target
+
+_POINTS = 20_000
+_ROUNDS = 8
+_MARGIN = 1e-6  # of the size: room for rounding
+_SEGMENTS = 64
+
+
+def enclosed(shapes: Sequence[Shape], target: Target) -> list[Shape]:
+    """The shapes, those grown out of which some of the target's surface sticks: each by what is nearest to
+    it."""
+    shapes = list(shapes)
+    room = _MARGIN * target.size
+    for turn in range(_ROUNDS):
+        points = _left_out(shapes, target.samples(_POINTS, seed=turn))
+        if not len(points):
+            break
+        outside = np.stack([outside_of(shape, points) for shape in shapes])
+        nearest, far = outside.argmin(axis=0), outside.min(axis=0)
+        for i in np.unique(nearest):
+            shapes[i] = _larger(shapes[i], float(far[nearest == i].max()) + room)
+    return shapes
+
+
+def sticking_out(shapes: Sequence[Shape], target: Target, seed: int = 1_000) -> float:
+    """How far the target's surface sticks out of the shapes, by fresh points and all its corners; 0 for not
+    at all."""
+    points = _left_out(shapes, target.samples(5 * _POINTS, seed))
+    return float(np.min([outside_of(shape, points) for shape in shapes], axis=0).max(initial=0.0))
+
+
+def _left_out(shapes: Sequence[Shape], points: np.ndarray) -> np.ndarray:
+    """Those of the points (N, 3) that are outside of all shapes."""
+    for shape in shapes:
+        lower, upper = np.reshape(shape_solid(shape).bounding_box(), (2, 3))
+        room = 1e-3 * float((upper - lower).max())  # facets lie within what they stand for
+        near = ((points > lower - room) & (points < upper + room)).all(axis=1)
+        near[near] = outside_of(shape, points[near]) <= 0
+        points = points[~near]
+    return points
+
+
+def outside_of(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """(N,) how far points are outside at most, in double precision; not positive inside."""
+    if shape.part is None:
+        normals, offsets = shape_planes(shape)
+        return np.asarray((points @ normals.T - offsets).max(axis=1))
+    local = (points - shape.part.translation) @ rotation_matrix(shape.part.rotation)
+    match shape.part.field:
+        case Box(size=size):
+            return np.asarray((np.abs(local) - np.array(size) / 2).max(axis=1))
+        case Sphere(radius=radius):
+            return np.linalg.norm(local, axis=1) - radius
+        case Cylinder(radius=radius, height=height):
+            across = np.hypot(local[:, 0], local[:, 1]) - radius
+            return np.maximum(across, np.abs(local[:, 2]) - height / 2)
+        case Capsule(radius=radius, height=height):
+            beyond = np.maximum(np.abs(local[:, 2]) - height / 2, 0)
+            return np.sqrt(local[:, 0] ** 2 + local[:, 1] ** 2 + beyond**2) - radius
+        case Ellipsoid(radii=radii):
+            return (np.linalg.norm(local / np.array(radii), axis=1) - 1) * max(radii)
+    raise AssertionError(f"{shape.part.field.kind} is no native solid")
+
+
+def shape_planes(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Normals (F, 3) and offsets (F,) of a hull."""
+    return faces_of(shape_solid(shape))
+
+
+def shape_solid(shape: Shape) -> Manifold:
+    """With curved surfaces as 64 facets to a circle, on corners that lie on the surface."""
+    from manifold3d import Manifold
+
+    if shape.part is None:
+        assert shape.mesh is not None
+        return Manifold.hull_points(np.asarray(shape.mesh.vertices))
+    pose = np.column_stack([rotation_matrix(shape.part.rotation), shape.part.translation])
+    return _native(shape.part.field).transform(pose)
+
+
+def _native(field: Field) -> Manifold:
+    from manifold3d import Manifold
+
+    match field:
+        case Box(size=size):
+            return Manifold.cube(size, True)
+        case Sphere(radius=radius):
+            return Manifold.sphere(radius, _SEGMENTS)
+        case Cylinder(radius=radius, height=height):
+            return Manifold.cylinder(height, radius, circular_segments=_SEGMENTS, center=True)
+        case Capsule(radius=radius, height=height):
+            ball = Manifold.sphere(radius, _SEGMENTS)
+            return Manifold.batch_hull([ball.translate((0, 0, side * height / 2)) for side in (1, -1)])
+        case Ellipsoid(radii=radii):
+            return Manifold.sphere(1.0, _SEGMENTS).scale(radii)
+    raise AssertionError(f"{field.kind} is no native solid")
+
+
+def _larger(shape: Shape, by: float) -> Shape:
+    """Every point of its surface further out by at least a length."""
+    import dataclasses
+
+    import trimesh
+
+    if shape.part is None:
+        mesh = grown(shape_solid(shape), by).to_mesh64()
+        vertices = np.asarray(mesh.vert_properties)[:, :3]
+        return Shape(shape.name, mesh=trimesh.Trimesh(vertices, np.asarray(mesh.tri_verts), process=False))
+    return Shape(shape.name, dataclasses.replace(shape.part, field=_larger_field(shape.part.field, by)))
+
+
+def _larger_field(field: Field, by: float) -> Field:
+    match field:
+        case Box(size=(x, y, z)):
+            return Box((x + 2 * by, y + 2 * by, z + 2 * by))
+        case Sphere(radius=radius):
+            return Sphere(radius + by)
+        case Cylinder(radius=radius, height=height):
+            return Cylinder(radius + by, height + 2 * by)
+        case Capsule(radius=radius, height=height):
+            return Capsule(radius + by, height)
+        case Ellipsoid(radii=(x, y, z)):
+            factor = 1 + by / min(x, y, z)
+            return Ellipsoid((factor * x, factor * y, factor * z))
+    raise AssertionError(f"{field.kind} is no native solid")

@@ -1,0 +1,78 @@
+"""FILE.report.json of a robot: what stands for each link, and how far off it is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from partwright import __version__
+
+
+@dataclass(frozen=True)
+class LinkReport:
+    """One link. Lengths are in metres, as robots are.
+
+    shapes: how many of each kind. stands_for: which meshes. missing, extra: volume that the shapes lack and
+    add, over that of the meshes. deviation: how far the surface of either reaches beyond the other.
+    sticking_out: how far the meshes reach beyond the shapes, by fresh points; None where they may.
+    """
+
+    link: str
+    meshes: tuple[str, ...]
+    shapes: dict[str, int]
+    stands_for: str
+    volume: float
+    missing: float
+    extra: float
+    deviation: float
+    tolerance: float
+    sticking_out: float | None
+    notes: tuple[str, ...]
+
+    @property
+    def count(self) -> int:
+        return sum(self.shapes.values())
+
+    def to_dict(self) -> dict[str, Any]:
+        own: dict[str, Any] = {
+            "link": self.link,
+            "meshes": list(self.meshes),
+            "shapes": self.shapes,
+            "stands_for": self.stands_for,
+            "volume": _short(self.volume),
+            "volume_missing_ratio": _short(self.missing),
+            "volume_extra_ratio": _short(self.extra),
+            "max_deviation": _short(self.deviation),
+            "tolerance": _short(self.tolerance),
+        }
+        if self.sticking_out is not None:
+            own |= {"contained": self.sticking_out <= 0, "sticking_out": _short(self.sticking_out)}
+        return own | ({"notes": list(self.notes)} if self.notes else {})
+
+
+def report(
+    name: str,
+    links: Sequence[LinkReport],
+    before: Mapping[tuple[str, str], float],
+    after: Mapping[tuple[str, str], float],
+) -> bytes:
+    """As JSON. before, after: volume that two links share at rest."""
+    pairs = [
+        {"links": list(pair), "before": _short(before.get(pair, 0.0)), "after": _short(after.get(pair, 0.0))}
+        for pair in dict.fromkeys((*before, *after))
+    ]
+    whole = {
+        "file": name,
+        "version": __version__,
+        "unit": "m",
+        "links": [link.to_dict() for link in links],
+        "colliding_pairs_at_rest": {"before": len(before), "after": len(after)},
+        "shared_volumes_at_rest": pairs,
+    }
+    return (json.dumps(whole, indent=2) + "\n").encode()
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.6g}")

@@ -1,0 +1,179 @@
+"""The shapes that stand for one link: as few as its tolerance asks for, each a native solid or a hull."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.approximation.convex_cover import (
+    Limits,
+    Piece,
+    convex_cover,
+    covering,
+    faces_of,
+    grown,
+    halved,
+)
+from partwright.approximation.convex_fit import ConvexFit, Mode, convex_fits
+from partwright.approximation.light_hull import light_hull
+from partwright.robots.growing import enclosed, shape_solid
+from partwright.robots.model import Shape
+from partwright.robots.solids import Target, surface_of
+from partwright.shapes import MeshDistance
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+    from partwright.fields import Field
+
+NATIVE_FOR = 0.03  # of its volume: by how much a native solid may be worse than the hull that it saves
+_LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners
+_POINTS = 50_000  # of the triangles, for the hulls of wrapped pieces
+_LEAST = 1e-3  # of a wrapped piece's volume: a hull of points below it is a sheet
+_STEPS = 14  # of the bisection for shapes within
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """How a link is to be replaced.
+
+    tolerance: largest deviation, as a length. kinds: native solids that may be used. hulls: whether convex
+    meshes may. most: shapes a link. extra: volume that hulls may add, over the link's. mode: whether they
+    contain the target, lie within it, or are nearest.
+    """
+
+    tolerance: float
+    kinds: tuple[type[Field], ...]
+    hulls: bool
+    most: int
+    extra: float
+    mode: Mode
+
+
+def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
+    """The shapes, named NAME_1, NAME_2 ..., or NAME for one."""
+    solid = target.wrap if wishes.mode == "around" else target.solid
+    pieces = convex_cover(solid, Limits(wishes.tolerance, wishes.extra, wishes.most))
+    if not wishes.hulls:
+        pieces = _fit_for_natives(pieces, wishes)
+    if target.loose and wishes.mode == "around":
+        hulls = [_tight(piece, target) for piece in pieces]
+    elif wishes.mode == "around":
+        hulls = covering(pieces, target.solid)
+    else:
+        hulls = [piece.hull for piece in pieces]
+    chosen = [_chosen(piece, hull, wishes) for piece, hull in zip(pieces, hulls, strict=True)]
+    if wishes.mode == "within":
+        chosen = [one for shape in chosen if (one := _within(shape, target)) is not None]
+    names = [name] if len(chosen) == 1 else [f"{name}_{i}" for i in range(1, len(chosen) + 1)]
+    shapes = [Shape(each, shape.part, shape.mesh) for each, shape in zip(names, chosen, strict=True)]
+    return enclosed(shapes, target) if wishes.mode == "around" else shapes
+
+
+def _chosen(piece: Piece, hull: Manifold, wishes: Wishes) -> Shape:
+    """By volume: a native solid where it is near enough and hardly worse than the hull."""
+    own = piece.solid.volume()
+    added = max(hull.volume() - own, 0.0) / own
+    fits = convex_fits(hull, wishes.kinds, wishes.mode) if wishes.kinds else []
+    if not wishes.hulls:
+        return Shape("", min(fits, key=lambda fit: fit.volume_error_ratio).part)
+    near = [fit for fit in fits if fit.deviation <= wishes.tolerance and fit.volume_error_ratio <= NATIVE_FOR]
+    if near and near[0].volume_error_ratio + added <= added + NATIVE_FOR:
+        return Shape("", near[0].part)
+    return Shape("", mesh=_mesh(_light(hull, wishes)))
+
+
+def _tight(piece: Piece, target: Target) -> Manifold:
+    """The hull of the triangles' own points that lie in a piece of what wraps them."""
+    from manifold3d import Manifold
+
+    points = target.samples(_POINTS, seed=0)
+    lower, upper = np.reshape(piece.hull.bounding_box(), (2, 3))
+    points = points[((points >= lower) & (points <= upper)).all(axis=1)]
+    normals, offsets = faces_of(piece.hull)
+    within = points[(points @ normals.T <= offsets + 1e-9 * target.size).all(axis=1)]
+    hull = Manifold.hull_points(within) if len(within) > 3 else Manifold()
+    return piece.hull if hull.is_empty() or hull.volume() < _LEAST * piece.hull.volume() else hull
+
+
+def _light(hull: Manifold, wishes: Wishes) -> Manifold:
+    light, beyond = light_hull(hull, _LIGHT * wishes.tolerance)
+    return grown(light, beyond) if wishes.mode == "around" and beyond > 0 else light
+
+
+def _fit_for_natives(pieces: list[Piece], wishes: Wishes) -> list[Piece]:
+    """Pieces cut in halves, the worst first, until a native solid is near to each or there are enough."""
+
+    def fitted(piece: Piece) -> tuple[Piece, ConvexFit]:
+        return piece, convex_fits(piece.hull, wishes.kinds, wishes.mode)[0]
+
+    def error(entry: tuple[Piece, ConvexFit]) -> float:
+        return entry[1].volume_error_ratio * entry[0].hull.volume()
+
+    done: list[Piece] = []
+    waiting = [fitted(piece) for piece in pieces]
+    while waiting and len(done) + len(waiting) < wishes.most:
+        worst = waiting.pop(max(range(len(waiting)), key=lambda i: error(waiting[i])))
+        ways = [list(map(fitted, parts)) for parts in halved(worst[0])]
+        best = min(ways, key=lambda parts: sum(map(error, parts)), default=[])
+        near = worst[1].deviation <= wishes.tolerance
+        if near or sum(map(error, best), start=0.0) >= error(worst) or not best:
+            done.append(worst[0])
+        else:
+            waiting += best
+    return done + [piece for piece, _ in waiting]
+
+
+def _within(shape: Shape, target: Target) -> Shape | None:
+    """The shape shrunk about its deepest point until nothing of it is outside of the target; None for a shape
+    of which nothing is inside."""
+    solid = shape_solid(shape)
+    common = solid ^ target.solid
+    if common.is_empty() or common.volume() <= 0:
+        return None
+    if _outside(solid, target) <= 0:
+        return shape
+    centre = _deepest(common)
+    low, high = 0.0, 1.0
+    for _ in range(_STEPS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _outside(_about(solid, centre, middle), target) <= 0 else (low, middle)
+    return _scaled(shape, centre, low) if low > 0 else None
+
+
+def _outside(solid: Manifold, target: Target) -> float:
+    """Volume outside, less what is rounding."""
+    return float((solid - target.solid).volume()) - 1e-9 * float(solid.volume())
+
+
+def _about(solid: Manifold, centre: np.ndarray, scale: float) -> Manifold:
+    return solid.translate(tuple(-centre)).scale((scale,) * 3).translate(tuple(centre))
+
+
+def _deepest(solid: Manifold) -> np.ndarray:
+    """The point of a lattice that lies deepest."""
+    vertices, faces = surface_of(solid)
+    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+    ticks = (np.arange(12) + 0.5) / 12
+    points = lower + np.stack(np.meshgrid(ticks, ticks, ticks), axis=-1).reshape(-1, 3) * (upper - lower)
+    size = float((upper - lower).max())
+    distance = MeshDistance((vertices - lower) / size, faces, faces, True).signed((points - lower) / size)
+    return np.asarray(points[distance.argmin()])
+
+
+def _scaled(shape: Shape, centre: np.ndarray, scale: float) -> Shape:
+    if shape.part is not None:
+        part = shape.part.translated((-centre).tolist()).scaled(scale).translated(centre.tolist())
+        return Shape(shape.name, part)
+    assert shape.mesh is not None
+    mesh = shape.mesh.copy()
+    mesh.vertices = (mesh.vertices - centre) * scale + centre
+    return Shape(shape.name, mesh=mesh)
+
+
+def _mesh(hull: Manifold):  # type: ignore[no-untyped-def]  # trimesh
+    import trimesh
+
+    return trimesh.Trimesh(*surface_of(hull), process=False)

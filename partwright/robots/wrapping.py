@@ -1,0 +1,77 @@
+"""Triangles that bound no solid as one: what cannot be reached from outside is inside.
+
+A lattice of distances to the surface is flooded from its border, through all that is farther from the surface
+than a little more than a cell. What the flood does not reach wraps the triangles, with that thickness around
+them; without it (a closing, in the terms of mathematical morphology) it is bounded by the triangles
+themselves, and sheets that bound nothing are gone.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.errors import FlatShapeError, NoSurfaceError
+from partwright.meshing import mesh_field
+from partwright.shapes import MeshDistance, UnitFrame
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+_CELLS = 96  # along the longest side
+_THICK = 1.2  # cells on either side of the surface; a gap of twice that is bridged
+_MOST_SHEETS = 0.5  # of what wraps the triangles: with less inside they bound no solid
+
+
+def wrapped(vertices: np.ndarray, faces: np.ndarray) -> tuple[Manifold, Manifold]:
+    """The solid that triangles bound, as far as they do, and the one that wraps them all.
+
+    vertices: (V, 3). faces: (F, 3). Triangles that are mostly sheets bound what wraps them.
+
+    Raises:
+        FlatShapeError: nothing is left to wrap.
+    """
+    from scipy.ndimage import distance_transform_edt, label
+
+    frame = UnitFrame.of(vertices[np.unique(faces)])
+    unit = frame.to_unit(vertices)
+    half = np.abs(unit[np.unique(faces)]).max(axis=0)
+    cell = 2 * float(half.max()) / _CELLS
+    thick = _THICK * cell
+    counts = np.ceil((half + 3 * thick) / cell).astype(int)
+    ticks = [cell * np.arange(-n, n + 1) for n in counts]
+    points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    near = MeshDistance(unit, faces, faces, False).unsigned(points, within=4 * cell)
+    distance = np.minimum(near, 4 * cell).reshape([2 * n + 1 for n in counts])
+    regions, _ = label(distance > thick)
+    outside = regions == regions[0, 0, 0]
+    around = np.where(outside, distance - thick, -np.maximum(thick - distance, 0.5 * cell))
+    beyond = outside | (cell * distance_transform_edt(~outside) < thick)
+    bounded = np.where(beyond, distance, -distance)
+    whole = _level(around, counts, cell, frame)
+    if whole is None:
+        raise FlatShapeError("it encloses nothing that could be wrapped")
+    inner = _level(bounded, counts, cell, frame)
+    if inner is None or inner.volume() < _MOST_SHEETS * whole.volume():
+        return whole, whole
+    return inner, whole
+
+
+def _level(values: np.ndarray, counts: np.ndarray, cell: float, frame: UnitFrame) -> Manifold | None:
+    """The zero level of values on the lattice; None where it has none."""
+    from manifold3d import Manifold, Mesh64
+    from scipy.ndimage import map_coordinates
+
+    def level(places: np.ndarray) -> np.ndarray:
+        index = (places / cell + counts).T
+        return np.asarray(map_coordinates(values, index, order=1, mode="nearest"), np.float32)
+
+    reach = (counts - 1) * cell
+    try:
+        mesh = mesh_field(level, -reach, reach, 2 * (counts - 1), lipschitz=3.0, sharp=False)
+    except NoSurfaceError:
+        return None
+    corners = np.array(frame.from_unit(mesh.vertices), np.float64)
+    solid = Manifold(Mesh64(corners, np.array(mesh.faces, np.uint64)))
+    return None if solid.is_empty() or solid.volume() <= 0 else solid

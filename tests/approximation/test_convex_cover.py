@@ -1,0 +1,96 @@
+"""Convex covers: they cover, they are few, and what they add keeps the limits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from manifold3d import Manifold, OpType
+
+from partwright.approximation.convex_cover import Limits, convex_cover, covering, faces_of, grown
+from partwright.approximation.light_hull import light_hull
+
+SEGMENTS = 96
+
+
+def union(solids: list[Manifold]) -> Manifold:
+    return Manifold.batch_boolean(solids, OpType.Add)
+
+
+def corners_of(solid: Manifold) -> np.ndarray:
+    return np.asarray(solid.to_mesh64().vert_properties)[:, :3]
+
+
+def box(*bounds: float) -> Manifold:
+    lower, upper = np.array(bounds[:3]), np.array(bounds[3:])
+    return Manifold.cube(tuple(upper - lower)).translate(tuple(lower))
+
+
+def hollow_box() -> Manifold:
+    return box(0, 0, 0, 3, 2, 1) - box(0.2, 0.2, -1, 2.8, 1.8, 2)
+
+
+@pytest.mark.parametrize(
+    ("solid", "count"),
+    [
+        (box(0, 0, 0, 3, 2, 1).rotate((10, 20, 30)), 1),
+        (union([box(0, 0, 0, 2, 1, 1), box(0, 0, 0, 1, 2, 1)]), 2),
+        (union([box(0, 0, 0, 3, 1, 1), box(1, -1, 0, 2, 2, 1)]).rotate((0, 0, 30)), 3),
+        (hollow_box(), 4),
+        (hollow_box() + box(0, 0, -0.2, 3, 2, 0), 8),  # five would do: no two cuts of its gain anything
+        (union([box(0, 0, 0, 1, 1, 1), box(3, 0, 0, 4, 1, 1)]), 2),
+    ],
+)
+def test_what_is_made_of_boxes_is_that_many_pieces_and_exact(solid: Manifold, count: int) -> None:
+    pieces = convex_cover(solid, Limits(0.05))
+    assert len(pieces) == count
+    assert sum(piece.hull.volume() for piece in pieces) == pytest.approx(solid.volume(), rel=1e-6)
+
+
+@pytest.mark.parametrize("deviation", [0.1, 0.04])
+def test_a_ring_is_as_many_pieces_as_its_chords_ask_for(deviation: float) -> None:
+    """A chord over an angle a of a circle of radius r is r (1 - cos a/2) from it: no cut gains anything
+    alone."""
+    ring = Manifold.cylinder(0.5, 1.0, circular_segments=SEGMENTS) - Manifold.cylinder(
+        2, 0.8, circular_segments=SEGMENTS, center=True
+    )
+    pieces = convex_cover(ring, Limits(deviation, extra=1.0))
+    least = math.ceil(math.pi / math.acos(1 - deviation / 0.8))
+    assert least <= len(pieces) <= 2 * least
+    assert all(piece.deviation(deviation) <= deviation for piece in pieces)
+
+
+def test_limits_are_kept_and_hulls_cover() -> None:
+    solid = union([Manifold.sphere(1.0, 48), Manifold.cylinder(3, 0.4, circular_segments=48, center=True)])
+    loose, tight = (convex_cover(solid, Limits(0.2, extra)) for extra in (0.2, 0.03))
+    assert len(loose) <= len(tight)
+    for pieces, extra in ((loose, 0.2), (tight, 0.03)):
+        assert sum(piece.extra for piece in pieces) <= extra * solid.volume() * (1 + 1e-6)
+        hulls = covering(pieces, solid)
+        assert (solid - union(hulls)).volume() < 1e-6 * solid.volume()
+
+
+def test_no_more_pieces_than_asked_for() -> None:
+    pieces = convex_cover(hollow_box(), Limits(0.05, most=2))
+    assert len(pieces) == 2
+    assert (hollow_box() - union([piece.hull for piece in pieces])).volume() < 1e-9
+
+
+def test_a_hull_grows_by_the_length_along_every_face() -> None:
+    cube = box(0, 0, 0, 1, 1, 1).rotate((10, 20, 30))
+    larger = grown(cube, 0.1)
+    round_ = Manifold.batch_hull([Manifold.sphere(0.1, 32).translate(tuple(c)) for c in corners_of(cube)])
+    assert (round_ - larger).volume() < 1e-12
+    assert round_.volume() < larger.volume() <= 1.2**3
+
+
+def test_a_light_hull_says_what_it_loses() -> None:
+    ball = Manifold.sphere(1.0, 64)
+    light, beyond = light_hull(ball, 0.05)
+    assert light.num_vert() < ball.num_vert() / 5
+    assert 0 < beyond <= 0.05
+    normals, offsets = faces_of(light)
+    assert (corners_of(ball) @ normals.T - offsets).max() == pytest.approx(beyond)
+    assert (light - ball).volume() < 1e-9
+    assert light_hull(ball, 0.0, most=20)[0].num_vert() <= 20

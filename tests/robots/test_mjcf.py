@@ -1,0 +1,115 @@
+"""MJCF in, MJCF out, as MuJoCo itself reads it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from partwright.errors import RobotError, UnreadableFileError
+from partwright.robots import CollideOptions, collide, open_robot, save
+from tests.robots.robots import mjcf
+
+mujoco = pytest.importorskip("mujoco")
+
+
+def both(tmp_path: Path, **options: Any) -> tuple[Any, Any]:
+    """The model before and after."""
+    path = mjcf(tmp_path / "in")
+    save(collide(path, CollideOptions(**options)), tmp_path / "out")
+    return [mujoco.MjModel.from_xml_path(str(p)) for p in (path, tmp_path / "out" / "pair.xml")]  # type: ignore[return-value]
+
+
+def test_bodies_joints_and_inertias_are_the_same(tmp_path: Path) -> None:
+    before, after = both(tmp_path)
+    for name in ("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_pos", "body_quat", "jnt_type"):
+        assert np.allclose(getattr(before, name), getattr(after, name), rtol=1e-6), name
+    assert [before.body(i).name for i in range(before.nbody)] == [
+        after.body(i).name for i in range(after.nbody)
+    ]
+
+
+def test_colliding_meshes_are_native_and_the_only_sight_stays(tmp_path: Path) -> None:
+    _, after = both(tmp_path)
+    collides = (after.geom_contype != 0) | (after.geom_conaffinity != 0)
+    kinds = after.geom_type[collides].tolist()
+    assert kinds.count(int(mujoco.mjtGeom.mjGEOM_BOX)) == 2  # the L
+    assert kinds.count(int(mujoco.mjtGeom.mjGEOM_SPHERE)) == 1  # the ball
+    assert int(mujoco.mjtGeom.mjGEOM_MESH) not in kinds
+    tip = after.geom("tip")  # weighs, and is seen
+    assert (tip.contype[0], tip.conaffinity[0], tip.group[0]) == (0, 0, 0)
+    boxes = [i for i in range(after.ngeom) if after.geom_type[i] == mujoco.mjtGeom.mjGEOM_BOX]
+    assert {int(after.geom_group[i]) for i in boxes} == {3}
+    assert {int(after.geom_condim[i]) for i in boxes} == {4}  # as their class says
+
+
+def test_geoms_are_in_place_through_classes_scales_and_angles(tmp_path: Path) -> None:
+    before, after = both(tmp_path)
+    boxes = []
+    for model in (before, after):
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        corners = []
+        for i in range(model.ngeom):
+            if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_PLANE or not model.geom_contype[i]:
+                continue
+            if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_MESH:
+                mesh = model.geom_dataid[i]
+                local = model.mesh_vert[model.mesh_vertadr[mesh] :][: model.mesh_vertnum[mesh]]
+            else:
+                centre, half = np.split(model.geom_aabb[i], 2)
+                local = centre + np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T * half
+            corners.append(local @ data.geom_xmat[i].reshape(3, 3).T + data.geom_xpos[i])
+        boxes.append([np.concatenate(corners).min(axis=0), np.concatenate(corners).max(axis=0)])
+    assert np.allclose(boxes[0], boxes[1], atol=0.01)
+
+
+def test_contact_pairs_reach_every_new_geom_and_files_keep_their_text(tmp_path: Path) -> None:
+    _, after = both(tmp_path)
+    assert after.npair == 2
+    assert "<!-- kept -->" in (tmp_path / "out" / "pair.xml").read_text()
+    body = (tmp_path / "out" / "body.xml").read_text()
+    assert "<!-- seen and hit, and what the body weighs by -->" in body
+    assert '<include file="body.xml"/>' in (tmp_path / "out" / "pair.xml").read_text()
+    assert (tmp_path / "out" / "assets" / "ell.stl").exists()
+
+
+def test_hulls_lie_in_the_file_itself(tmp_path: Path) -> None:
+    _, after = both(tmp_path, kinds=("hull",))
+    collides = (after.geom_contype != 0) & (after.geom_type == int(mujoco.mjtGeom.mjGEOM_MESH))
+    assert collides.sum() == 3
+
+
+def test_a_folder_above_is_drawn_in(tmp_path: Path) -> None:
+    path = mjcf(tmp_path / "in")
+    (tmp_path / "in" / "assets").rename(tmp_path / "assets")
+    path.write_text(path.read_text().replace('meshdir="assets"', 'meshdir="../assets"'))
+    save(collide(path), tmp_path / "out")
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "pair.xml")).nmesh == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error", "words"),
+    [
+        ("ell.stl", "gone.stl", UnreadableFileError, "link 'base': its mesh 'ell' is not there"),
+        ('mesh="ball"', 'mesh="bell"', RobotError, "link 'tip': no asset is the mesh 'bell'"),
+        ("body.xml", "nobody.xml", UnreadableFileError, "include 'nobody.xml' is not there"),
+        ('pos="0.5 0 0"', 'pos="0.5 0 x"', RobotError, "body 'base': pos: expected 3 numbers"),
+        ("<body", "<body name='base'/><body", RobotError, "two bodies are named 'base'"),
+    ],
+)
+def test_broken_models(tmp_path: Path, old: str, new: str, error: type[Exception], words: str) -> None:
+    path = mjcf(tmp_path)
+    for file in (path, tmp_path / "body.xml"):
+        file.write_text(file.read_text().replace(old, new, 1))
+    with pytest.raises(error, match=words):
+        open_robot(path)
+
+
+def test_includes_without_end(tmp_path: Path) -> None:
+    path = tmp_path / "a.xml"
+    path.write_text('<mujoco><include file="a.xml"/></mujoco>')
+    with pytest.raises(RobotError, match="included twice"):
+        open_robot(path)

@@ -1,0 +1,97 @@
+"""What the shapes promise: to contain, to lie within, to be near, to be few."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from partwright.errors import SettingError
+from partwright.robots import CollideOptions, collide
+from partwright.robots.growing import outside_of, shape_solid
+from partwright.robots.solids import Solids
+from tests.robots.robots import mjcf, urdf
+
+KINDS = ["box", "cylinder", "sphere", "capsule", "ellipsoid", "hull"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_enclosing_shapes_contain_every_point_of_the_visual_mesh(tmp_path: Path, kind: str) -> None:
+    """Fresh points, by distances of the shapes' own kind; the visual L is turned and moved."""
+    options = CollideOptions(enclose=True, kinds=(kind,), max_parts=6)
+    result = collide(mjcf(tmp_path), options)
+    base = next(link for link in result.robot.links if link.name == "base")
+    target = Solids().target(base, base.visuals)
+    points = target.samples(50_000, seed=12345)
+    outside = np.min([outside_of(shape, points) for shape in result.shapes["base"]], axis=0)
+    assert outside.max() <= 0
+    report = next(link for link in result.links if link.link == "base")
+    assert report.stands_for == "visual"
+    assert report.sticking_out == 0
+    assert report.missing < 2e-3  # facets of round shapes lie within them
+    assert {shape.kind for shape in result.shapes["base"]} == {kind}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_shapes_inside_reach_nowhere_beyond_the_mesh(tmp_path: Path, kind: str) -> None:
+    result = collide(mjcf(tmp_path), CollideOptions(inside=True, kinds=(kind,)))
+    base = next(link for link in result.robot.links if link.name == "base")
+    solid = Solids().target(base, base.collisions).solid
+    for shape in result.shapes["base"]:
+        own = shape_solid(shape)
+        assert (own - solid).volume() <= 1e-6 * own.volume()
+    report = next(link for link in result.links if link.link == "base")
+    assert report.extra < 1e-6
+    assert report.missing < (0.01 if kind in ("box", "hull") else 0.6)
+
+
+def test_a_tighter_tolerance_comes_nearer_with_more_shapes(tmp_path: Path) -> None:
+    path = urdf(tmp_path)
+    ring = trimesh.creation.annulus(0.4, 0.5, 0.2, sections=64)
+    ring.apply_translation((0, 0, 5))  # clear of the base
+    ring.export(tmp_path / "meshes" / "rod.stl")
+    found = []
+    for tolerance in ("60mm", "10mm"):
+        result = collide(path, CollideOptions(tolerance=tolerance, kinds=("hull",)))
+        found.append(next(link for link in result.links if link.link == "arm"))
+    assert found[0].count < found[1].count
+    assert found[1].extra < found[0].extra
+    assert found[1].deviation <= 0.0101
+    assert found[1].count <= 16
+
+
+def test_native_shapes_alone_are_taken_to_the_number_allowed(tmp_path: Path) -> None:
+    """No hull where none is wanted, whatever the tolerance; and the report says what that costs."""
+    path = urdf(tmp_path)
+    cone = trimesh.creation.cone(0.5, 1.0, sections=48)
+    cone.export(tmp_path / "meshes" / "rod.stl")
+    errors = []
+    for most in (1, 4):
+        result = collide(path, CollideOptions(kinds=("cylinder",), max_parts=most))
+        assert [shape.kind for shape in result.shapes["arm"]] == ["cylinder"] * len(result.shapes["arm"])
+        assert len(result.shapes["arm"]) <= most
+        arm = next(link for link in result.links if link.link == "arm")
+        errors.append(arm.missing + arm.extra)
+    assert errors[1] < 0.7 * errors[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"enclose": True, "inside": True}, "contradict"),
+        ({"tolerance": "wide"}, "expected a length"),
+        ({"tolerance": "0mm"}, "expected a length"),
+        ({"max_parts": 0}, "at least 1"),
+        ({"extra": -1}, "share of the volume"),
+    ],
+)
+def test_options_that_make_no_sense(given: dict, words: str) -> None:
+    with pytest.raises(SettingError, match=words):
+        CollideOptions(**given)
+
+
+def test_kinds_that_a_format_lacks(tmp_path: Path) -> None:
+    with pytest.raises(SettingError, match=r"has no 'ellipsoid'; expected some of box, cylinder, sphere"):
+        collide(urdf(tmp_path), CollideOptions(kinds=("ellipsoid",)))
