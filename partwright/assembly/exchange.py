@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from operator import is_
 
 from partwright.assembly.tree import Assembly, Node, Part
@@ -24,6 +24,14 @@ def exchanged(assembly: Assembly, name: str, parts: Sequence[Part]) -> Assembly:
     result = _exchanged(assembly, name, parts)
     assert isinstance(result, Assembly)
     return result
+
+
+def with_leaves(node: Assembly, change: Callable[[Part], Part]) -> Assembly:
+    """The assembly with each leaf changed; leaves that come to share a name are renamed, the later ones."""
+    children = tuple(
+        change(child) if isinstance(child, Part) else with_leaves(child, change) for child in node.children
+    )
+    return dataclasses.replace(node, children=children)
 
 
 def added(assembly: Assembly, part: Part) -> Assembly:

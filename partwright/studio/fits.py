@@ -14,6 +14,7 @@ from partwright.fitting.options import check_able
 from partwright.methods import METHODS, Ability, Cancellation, Progress, Run
 from partwright.shapes import Shape
 from partwright.studio import messages
+from partwright.studio.refits import Refit
 from partwright.superfrusta.local_fits import LocalFit
 from partwright.textures import Colours, bake
 
@@ -42,16 +43,17 @@ def fitting(shape: Shape, message: messages.Fit, present: Callable[[], Assembly]
         SettingError: every part is locked.
     """
     settings: dict[str, Any] = {}
-    start, label = None, "Fit"
+    start: Start | None = None
+    label = "Fit"
     name, _, model = message.method.partition(":")
     if model:
         settings["model"] = model
+    again: Refit | None = None
     if message.mode != "new":
-        assembly = present()
-        start = _start(assembly, message)
-        free = sorted({part.name for part in assembly.parts} - set(start.locked))
-        label = f"Refit {free[0] if len(free) == 1 else f'{len(free)} parts'}"
-        settings["max_parts"] = len(assembly)
+        again = Refit.of(present(), message)
+        start = again.start
+        label = f"Refit {again.free[0] if len(again.free) == 1 else f'{len(again.free)} parts'}"
+        settings["max_parts"] = len(start.assembly)
     elif message.max_parts is not None:
         settings["max_parts"] = message.max_parts
     if message.curve and start is None:
@@ -65,7 +67,8 @@ def fitting(shape: Shape, message: messages.Fit, present: Callable[[], Assembly]
         told = messages.Fitted(result.outcome, len(result.assembly), float(result.scores.iou))
         sizes = [messages.Size(p.parts, float(p.iou), to_text(p.assembly)) for p in result.curve]
         curve = messages.Curve(sizes, f"{shape.name} by {message.method}") if sizes else None
-        return Done(_with_locked(result.assembly, start), told, curve)
+        assembly = again.restored(result.assembly) if again else result.assembly
+        return Done(assembly, told, curve)
 
     return Task(label, work)
 
@@ -112,20 +115,3 @@ def baking(colours: Colours | None, assembly: Assembly, size: int) -> Task:
         return Done(result, messages.Fitted("converged", len(result), 0.0))
 
     return Task("Bake colours", work)
-
-
-def _start(assembly: Assembly, message: messages.Fit) -> Start:
-    names = {part.name for part in assembly.parts}
-    chosen = [name for name in message.names if name in names]
-    locked = chosen if message.mode == "except" else sorted(names - set(chosen))
-    if len(locked) == len(names):
-        raise SettingError("every part is locked, so there is nothing to refit")
-    return Start(assembly, tuple(locked))
-
-
-def _with_locked(assembly: Assembly, start: Start | None) -> Assembly:
-    """Locked solids under their own names: a fit of SuperFrusta gives them back as what they also are."""
-    for name in start.locked if start else ():
-        if any(part.name == name for part in assembly.parts):
-            assembly = assembly.replace_part(name, start.assembly[name])  # type: ignore[union-attr]
-    return assembly

@@ -141,6 +141,9 @@ class State:
     donors: list[str]
     """Training shapes that learned parts of the assembly can be taken from."""
     formats: list[str]
+    """Suffixes of what Download can write."""
+    format_names: list[str]
+    """What people call them."""
     fitting: bool
     note: str = ""
     """Why it was sent, where people should know."""
@@ -151,6 +154,13 @@ class Accepted:
     """An edit is in the journal."""
 
     revision: int
+
+
+@dataclass(frozen=True)
+class Unkept:
+    """The edit that was sent cannot be written to the journal, as on a full disk: to be sent again."""
+
+    message: str
 
 
 @dataclass(frozen=True)
@@ -206,7 +216,7 @@ class Failed:
 
 
 FROM_PAGE: tuple[type, ...] = (Commit, Undo, Redo, Fit, Reshape, Bake, Learned, Stop, Save)
-FROM_SERVER: tuple[type, ...] = (State, Accepted, Fitting, Fitted, Curve, Scored, Saved, Failed)
+FROM_SERVER: tuple[type, ...] = (State, Accepted, Unkept, Fitting, Fitted, Curve, Scored, Saved, Failed)
 
 
 def name_of(kind: type) -> str:

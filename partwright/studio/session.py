@@ -15,7 +15,7 @@ from partwright.assembly import Assembly
 from partwright.assembly.file_text import to_text
 from partwright.assembly.files import from_text
 from partwright.atomic_io import write_bytes
-from partwright.errors import NoSurfaceError, PartwrightError, SettingError
+from partwright.errors import NoSurfaceError, OutputError, PartwrightError, SettingError
 from partwright.export.formats import FORMATS
 from partwright.methods import METHODS, Cancellation, Progress
 from partwright.metrics import evaluate
@@ -85,6 +85,7 @@ class Session:
             methods=[*(name for name in METHODS if name != "parts"), *learned.methods()],
             donors=self._donors(),
             formats=list(FORMATS.own),
+            format_names=[FORMATS[suffix].name for suffix in FORMATS.own],
             fitting=self._cancel is not None,
             note=note,
         )
@@ -121,11 +122,16 @@ class Session:
             return
         if isinstance(message, messages.Commit):
             from_text(message.text)  # nothing gets into the journal that cannot be read again
-            self.journal.commit(message.label[:200], message.text)
-        elif isinstance(message, messages.Undo):
-            self.journal.undo()
-        else:
-            self.journal.redo()
+        try:
+            if isinstance(message, messages.Commit):
+                self.journal.commit(message.label[:200], message.text)
+            elif isinstance(message, messages.Undo):
+                self.journal.undo()
+            else:
+                self.journal.redo()
+        except OutputError as error:
+            send(messages.Unkept(str(error)))
+            return
         send(messages.Accepted(self.journal.revision))
         self.tell(self.state(), but=send)
         self.score_soon()

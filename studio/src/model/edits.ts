@@ -17,9 +17,10 @@ import {
   newGroup,
   newPart,
   parentOf,
+  poses,
   replaced,
 } from "./tree";
-import type { Vec3 } from "./vectors";
+import { normalised, type Quat, unit, type Vec3 } from "./vectors";
 
 /** The root as the first child of a new one, which is now what knows the unit. */
 function wrapped(root: Group, operation: Operation, rest: Node[]): Group {
@@ -127,6 +128,17 @@ export function simplified(root: Group): Group {
   return result;
 }
 
+/** A cylinder that is taken away: a hole of this radius and depth, straight in at a place with its outward normal. */
+export function drilled(root: Group, at: Vec3, normal: Vec3, radius: number, depth: number): { root: Group; part: Part } | null {
+  const axis = unit(normal);
+  // Turned from z to the normal.
+  const rotation = axis[2] < -1 + 1e-9 ? ([0, 1, 0, 0] as Quat) : normalised([1 + axis[2], -axis[1], axis[0], 0]);
+  const height = 2 * depth;
+  const part = newPart(freeName(root, "hole"), { kind: "cylinder", radius, height }, at, rotation);
+  const whole = withRole(added(root, part), [part], "difference");
+  return whole && { root: whole, part };
+}
+
 /** The nodes in a group of their own, where the first of them was. */
 export function grouped(root: Group, nodes: Node[], operation: Operation): { root: Group; group: Group } | null {
   const first = nodes[0];
@@ -170,6 +182,22 @@ export function stretched(field: FieldData, axis: number, factor: number): Field
   const result: FieldData = { ...field };
   for (const name of names) if (typeof result[name] === "number") result[name] = (result[name] as number) * factor;
   return result;
+}
+
+/** Each copy of a repeated part a part of its own, where the part was; those after the first have new names. */
+export function separated(root: Group, part: Part): { root: Group; made: Part[] } {
+  const made: Part[] = [];
+  for (const [i, pose] of poses(part).entries()) {
+    const alone: Part = { ...part, ...pose, instances: [] };
+    made.push(i ? (copied({ ...root, children: [...root.children, ...made] }, alone) as Part) : alone);
+  }
+  const parent = parentOf(root, part.id)!;
+  const at = parent.children.findIndex((child) => child.id === part.id);
+  // Beside one another where the parent joins, or takes each of them away; elsewhere as a group that joins them.
+  const flat = parent.operation === "union" || (parent.operation === "difference" && at > 0);
+  const nodes: Node[] = flat ? made : [{ ...newGroup("union", made), blend: part.blend }];
+  const children = [...parent.children.slice(0, at), ...nodes, ...parent.children.slice(at + 1)];
+  return { root: replaced(root, new Map([[parent.id, { ...parent, children }]])), made };
 }
 
 /** A row of copies, each `step` further on: instances of the part, so that they stay alike. */

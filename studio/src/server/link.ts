@@ -57,6 +57,10 @@ export class Link {
       this.sent--;
       this.flush();
     }
+    if (message.type === "unkept") {
+      this.sent = 0;
+      setTimeout(() => this.flush(), 2000);
+    }
     if (message.type === "state") {
       // As this page left it: what waits is sent now. Otherwise somebody else was there, and the page decides.
       const same = message.revision === this.revision;

@@ -90,6 +90,7 @@ export interface State {
   methods: string[];
   donors: string[];
   formats: string[];
+  format_names: string[];
   fitting: boolean;
   note: string;
 }
@@ -97,6 +98,11 @@ export interface State {
 export interface Accepted {
   type: "accepted";
   revision: number;
+}
+
+export interface Unkept {
+  type: "unkept";
+  message: string;
 }
 
 export interface Fitting {
@@ -142,4 +148,4 @@ export interface Failed {
 }
 
 export type FromPage = Commit | Undo | Redo | Fit | Reshape | Bake | Learned | Stop | Save;
-export type FromServer = State | Accepted | Fitting | Fitted | Curve | Scored | Saved | Failed;
+export type FromServer = State | Accepted | Unkept | Fitting | Fitted | Curve | Scored | Saved | Failed;

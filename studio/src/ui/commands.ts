@@ -1,11 +1,12 @@
 /** Everything that a key or a button does, in one table: the help lists it. */
 
 import type { Mode } from "../edit/transform";
-import { duplicated, grouped, mirrorCopies, roleOf, withNew, withRole, without } from "../model/edits";
+import { drilled, duplicated, grouped, mirrorCopies, roleOf, separated, withNew, withRole, without } from "../model/edits";
 import { isLearned } from "../model/learned";
 import { fromUnit } from "../model/program";
 import type { Store } from "../model/store";
-import { type Node, type Operation, leaves } from "../model/tree";
+import { roundDown } from "../model/lengths";
+import { isGroup, type Node, type Operation, type Part, leaves } from "../model/tree";
 import { toast } from "./controls";
 import type { Tool, Viewport } from "./viewport";
 
@@ -93,6 +94,7 @@ export class Commands {
   }
 
   private escape(): void {
+    if (this.viewport.forgetClick()) return;
     if (this.viewport.region.active) this.viewport.region.end();
     else if (this.viewport.tool === "measure" && this.viewport.measurements.length) this.viewport.clearMeasurements();
     else if (this.viewport.tool === "measure") this.viewport.setTool("select");
@@ -138,6 +140,16 @@ export class Commands {
       toast("An assembly needs at least one part, so the last one stays.", undefined, true);
       return;
     }
+    const only = nodes.length === 1 && !isGroup(nodes[0]) ? nodes[0] : null;
+    if (only?.instances.length)
+      toast(`${only.name} was there ${only.instances.length + 1} times, and all are deleted.`, {
+        label: "Keep the others",
+        run: () => {
+          this.store.undo();
+          this.separate(only);
+          toast("Now each is a part of its own: delete the one you mean.");
+        },
+      });
     this.store.commit(root, nodes.length === 1 ? `Delete ${nodes[0].name || "group"}` : `Delete ${nodes.length} parts`);
   }
 
@@ -146,6 +158,25 @@ export class Commands {
     if (!nodes.length) return;
     const cut = nodes.every((node) => roleOf(this.store.root, node) === "difference");
     this.role(cut ? "union" : "difference");
+  }
+
+  /** The copies of a repeated part as parts of their own. */
+  separate(part: Part): void {
+    const { root, made } = separated(this.store.root, part);
+    this.store.commit(root, `Separate ${part.name}`);
+    this.store.select(made.map((one) => one.id));
+  }
+
+  /** A hole straight in where the picture is clicked next, as deep as the material is there. */
+  hole(): void {
+    const { store, viewport } = this;
+    viewport.clickOnce("Click where the hole goes: it goes straight in, through what is there.", (hit, depth) => {
+      const radius = roundDown(store.size / 30);
+      const made = drilled(store.root, fromUnit(store.frame, hit.point), hit.normal, radius, (depth ?? store.size) * 1.02 + store.size / 200);
+      if (!made) return toast("There is nothing to drill.");
+      store.commit(made.root, "Drill a hole");
+      store.select([made.part.id]);
+    });
   }
 
   role(role: Operation): void {
@@ -174,7 +205,9 @@ export class Commands {
 
   add(kind: string): void {
     const { store, viewport } = this;
-    const { root, part } = withNew(store.root, kind, store.size, fromUnit(store.frame, viewport.camera.target));
+    // Where the picture's middle shows the surface, so that it is seen at once.
+    const place = viewport.middleHit()?.point ?? viewport.camera.target;
+    const { root, part } = withNew(store.root, kind, store.size, fromUnit(store.frame, place));
     store.commit(root, `Add ${part.name}`);
     store.select([part.id]);
     viewport.setTool("move");

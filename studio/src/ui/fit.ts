@@ -7,10 +7,17 @@ import { button } from "./controls";
 import { CurveSlider } from "./curve";
 import { h, icon } from "./dom";
 
-const METHODS: Record<string, string> = {
-  superfrusta: "SuperFrusta: rounded, tapered, bent parts",
-  solids: "Solids: boxes, cylinders, cones ...",
-  capri: "CSG tree of quadrics",
+/** What people read in the list, and more of it where the pointer rests. */
+const METHODS: Record<string, [string, string]> = {
+  superfrusta: ["Rounded parts", "SuperFrusta: rounded, tapered, bent and hollow parts that blend"],
+  solids: ["Named solids", "Boxes, cylinders, cones and other solids, added and taken away"],
+  capri: ["Mechanical parts", "CAPRI: a tree of planes, cylinders and other quadrics, with sharp edges"],
+};
+const OUTCOMES: Record<string, string> = {
+  converged: "Done",
+  budget_reached: "Done, all rounds used",
+  target_reached: "Target reached",
+  interrupted: "Stopped, the best is kept",
 };
 
 export class FitPanel {
@@ -48,7 +55,8 @@ export class FitPanel {
     this.element.append(
       h("h2", {}, "Fit"),
       h("div", { class: "form" }, h("label", {}, "Method", this.method), h("label", {}, "Quality", this.quality), h("label", {}, "Most parts", this.most), h("label", { class: "check", title: "Takes longer: an assembly of every size, and a slider along them" }, this.curve, "Every size, from few parts to many")),
-      h("div", { class: "buttons" }, this.start, this.only, this.rest, this.split, this.merge, this.box, this.bake, this.stop),
+      h("div", { class: "buttons" }, this.start, this.stop),
+      h("div", { class: "buttons pairs" }, this.only, this.rest, this.split, this.merge, this.box, this.bake),
       this.slider.element,
       this.bar,
       this.told,
@@ -62,7 +70,7 @@ export class FitPanel {
     if (this.state && this.state.input !== state.input) this.slider.clear();
     this.state = state;
     if (!this.method.options.length)
-      for (const name of state.methods) this.method.append(h("option", { value: name }, METHODS[name] ?? name.replace(/^parts:/, "Learned parts: ")));
+      for (const name of state.methods) this.method.append(h("option", { value: name, title: METHODS[name]?.[1] }, METHODS[name]?.[0] ?? name.replace(/^parts:/, "Learned: ")));
     this.run(state.fitting);
     if (!state.input) this.told.textContent = "No shape to fit to: drop a mesh, a scene or points into the page.";
     else if (!this.running && !this.told.textContent) this.told.textContent = `Input: ${state.input}`;
@@ -128,9 +136,8 @@ export class FitPanel {
       this.told.textContent = message.parts ? `${message.stage}: ${message.parts} parts${iou}` : `${message.stage} …`;
     } else if (message.type === "fitted") {
       this.run(false);
-      const word = message.outcome.replaceAll("_", " ");
       const iou = message.iou > 0 ? `, IoU ${formatNumber(message.iou)}` : "";
-      this.told.textContent = `${word[0].toUpperCase()}${word.slice(1)}: ${message.parts} parts${iou}`;
+      this.told.textContent = `${OUTCOMES[message.outcome] ?? message.outcome}: ${message.parts} parts${iou}`;
     } else if (message.type === "failed") {
       if (this.running) this.told.textContent = message.message;
     } else if (message.type === "curve") this.slider.set(message);

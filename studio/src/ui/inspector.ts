@@ -278,6 +278,7 @@ export class Inspector {
         label: `Around ${axis}, about the middle`,
         run: repeat((own) => patternedAround(own, number(), i, fromUnit(store.frame, [0, 0, 0]))),
       })),
+      ...(part.instances.length ? [{ label: "Each a part of its own", run: () => this.commands.separate(this.now(part)) }] : []),
       ...(part.instances.length ? [{ label: "No copies", run: repeat((own) => ({ ...own, instances: [] })) }] : []),
     ];
     return this.section("Pattern", h("div", { class: "pattern" }, h("label", {}, "copies", count), h("label", {}, "apart", step), menu("Repeat", "pattern", choices)));

@@ -13,6 +13,11 @@ import { type Button, button, save, toast } from "./controls";
 import { h } from "./dom";
 import { FitPanel } from "./fit";
 
+const LOOKS: [Look["show"], string][] = [
+  ["parts", "Parts"],
+  ["input", "Input"],
+  ["both", "Both"],
+];
 const UNSENT = "partwright-unsent";
 
 export class Live {
@@ -22,6 +27,7 @@ export class Live {
   private inputName = "";
   private state: State | null = null;
   private adopting = false;
+  private looks = h("div", { class: "looks choice float", role: "group", "aria-label": "What is shown", hidden: true });
   private banner = h("div", { class: "banner", role: "alert", hidden: true });
   private saveButton = button({ label: "Save", key: "Ctrl S", run: () => this.save() }, true);
 
@@ -34,6 +40,12 @@ export class Live {
     app.side.prepend(this.fit.element);
     app.addTab("fit", "Fit", this.fit.element);
     document.body.prepend(this.banner);
+    for (const [look, label] of LOOKS) {
+      const one = h("button", { type: "button", "data-show": look, "aria-pressed": "false" }, label);
+      one.addEventListener("click", () => this.show(look, false, false));
+      this.looks.append(one);
+    }
+    app.viewport.element.append(this.looks);
     app.actions.append(this.saveButton);
     document.addEventListener("keydown", (event) => {
       if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "s") {
@@ -49,6 +61,11 @@ export class Live {
     this.link.onMessage = (message) => {
       this.fit.hear(message);
       if (message.type === "accepted") this.decodeSoon();
+      if (message.type === "accepted") this.banner.hidden = true;
+      if (message.type === "unkept") {
+        this.banner.textContent = `Your edits are in this page alone: ${message.message}. It is tried again.`;
+        this.banner.hidden = false;
+      }
       if (message.type === "fitting" && message.text) this.preview(message.text);
       if (message.type === "fitted") this.store.cancel();
       if (message.type === "failed") {
@@ -170,6 +187,7 @@ export class Live {
       this.adopting = false;
     }
     this.decodeSoon();
+    this.showParts();
     if (state.note) toast(state.note);
     if (own && own !== writeAssembly(store.root)) store.commit(readAssembly(own), "Edits of this page");
     this.fit.show(state);
@@ -188,9 +206,17 @@ export class Live {
     }
   }
 
+  /** Whether the input is shown because there were no parts yet. */
+  private instead = false;
+
+  private showParts(): void {
+    if (this.instead && this.store.program.parts.length) this.show("parts", false, false);
+  }
+
   private preview(text: string): void {
     try {
       this.store.preview(this.store.named(readAssembly(text)));
+      this.showParts();
     } catch {
       // A method may pass through what the page cannot show; the result is what counts.
     }
@@ -206,15 +232,20 @@ export class Live {
       } catch (error) {
         toast(`The input cannot be shown: ${(error as Error).message}`, undefined, true);
       }
+    this.looks.hidden = !this.input;
     renderer?.setMesh("input", this.input && asMesh(this.input, this.store));
-    if (this.input && !this.store.program.parts.length) this.show("input");
-    if (!this.input) this.show("parts");
+    this.instead = this.input !== null && !this.store.program.parts.length;
+    const look = renderer?.look;
+    if (this.instead || !this.input) this.show(this.instead ? "input" : "parts");
+    else if (look) this.show(look.show, look.heat, false);
   }
 
   /** What stands in the picture: the parts, the input, or both. */
   show(show: Look["show"], heat = false, frame = true): void {
     const { viewport } = this.app;
+    this.instead &&= show === "input";
     viewport.renderer?.setLook({ show, heat });
+    for (const one of this.looks.children) one.setAttribute("aria-pressed", String((one as HTMLElement).dataset.show === (heat ? "" : show)));
     if (frame) viewport.frameAll();
     viewport.wipeHandle(show === "wipe");
     document.body.dataset.show = show;
@@ -235,8 +266,13 @@ export class Live {
   }
 
   private downloads(): (Button | null)[] {
-    const formats = (this.state?.formats ?? []).filter((format) => ![".json", ".glsl"].includes(format));
-    return [null, ...formats.map((format) => ({ label: "From the server", key: format, run: () => void this.download(format) }))];
+    const { formats, format_names: names } = this.state ?? { formats: [], format_names: [] };
+    const own = [".json", ".glsl", ".stl"]; // which the page writes itself
+    const label = (format: string, name: string) => (format === ".glb" ? "GLB, each part by itself" : name);
+    return [
+      null,
+      ...formats.flatMap((format, i) => (own.includes(format) ? [] : [{ label: label(format, names[i]), key: format, run: () => void this.download(format) }])),
+    ];
   }
 
   private async download(format: string): Promise<void> {

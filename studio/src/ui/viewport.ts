@@ -376,8 +376,37 @@ export class Viewport {
     this.store.hover(hit ? (this.store.program.parts[hit.part]?.id ?? null) : null);
   }
 
+  private awaited: ((hit: Hit, depth: number | null) => void) | null = null;
+
+  /** What the next click on the surface is for; depth: of the material there, own units, null where it is not told. */
+  clickOnce(status: string, then: (hit: Hit, depth: number | null) => void): void {
+    this.setTool("select");
+    this.awaited = then;
+    this.onStatus(status);
+  }
+
+  forgetClick(): boolean {
+    const was = this.awaited !== null;
+    this.awaited = null;
+    if (was) this.onStatus("");
+    return was;
+  }
+
+  /** What the picture's middle shows. */
+  middleHit(): Hit | null {
+    const [width, height] = this.size;
+    const shift = this.renderer?.look.show === "beside" ? width : 0;
+    return this.hitAt({ x: shift + width / 2, y: height / 2 });
+  }
+
   private click(at: { x: number; y: number }, more: boolean): void {
     const hit = this.hitAt(at);
+    const { awaited } = this;
+    if (awaited && hit) {
+      this.forgetClick();
+      const other = through(this.store.program, hit);
+      return awaited(hit, other && other.distance / this.store.frame.scale);
+    }
     if (this.tool === "measure") {
       if (hit) this.measureAt(hit);
       return;
