@@ -107,8 +107,10 @@ NB_MODULE(_kernel, m) {
     NormalEquations system;
     {
       nb::gil_scoped_release release;
-      system = normal_equations(parts_of(rows), flags(live), samples_of(points, distance, weight, background), beta,
-                                {overlap, blending}, threads);
+      const auto parts = parts_of(rows);
+      const Samples samples = samples_of(points, distance, weight, background);
+      system = normal_equations(parts, flags(live), samples, beta, {overlap, blending}, threads,
+                                part_distances(parts, samples, threads));
     }
     std::copy(system.gradient.begin(), system.gradient.end(), gradient.data());
     for (const auto& [pair, block] : system.blocks)
@@ -125,7 +127,10 @@ NB_MODULE(_kernel, m) {
   m.def("loss", [](In<float> rows, In<float> points, In<float> distance, In<float> weight, In<float> background, float beta,
                    float overlap, float blending, int threads) {
     nb::gil_scoped_release release;
-    return loss(parts_of(rows), samples_of(points, distance, weight, background), beta, {overlap, blending}, threads);
+    const auto parts = parts_of(rows);
+    const Samples samples = samples_of(points, distance, weight, background);
+    PartDistances distances(parts.size(), samples.count);
+    return loss(parts, std::vector<char>(parts.size(), 1), samples, beta, {overlap, blending}, threads, distances);
   }, "rows"_a, "points"_a, "distance"_a, "weight"_a, "background"_a, "beta"_a, "overlap"_a, "blending"_a,
      "threads"_a,
      "Half the sum of squared residuals.");

@@ -64,17 +64,17 @@ PW_CLONES void values(const Part& p, const Block& b, float* __restrict out) {
   }
 }
 
-PW_CLONES void derivatives(const Part& part, const Block& b, float* __restrict out) {
+PW_CLONES void derivatives(const Part& part, const Block& b, float* __restrict out, int count) {
   const Part p = part;
   alignas(64) float scratch[SCRATCH_ROWS * BLOCK];
-  for (int i = 0; i < BLOCK; ++i) bend_step(p, b.x[i], b.y[i], b.z[i], scratch + i, BLOCK);
-  for (int i = 0; i < BLOCK; ++i) section_step(p, scratch + i, BLOCK);
+  for (int i = 0; i < count; ++i) bend_step(p, b.x[i], b.y[i], b.z[i], scratch + i, BLOCK);
+  for (int i = 0; i < count; ++i) section_step(p, scratch + i, BLOCK);
   if (p.hollow) {
-    for (int i = 0; i < BLOCK; ++i) profile_step<true>(p, scratch + i, BLOCK);
+    for (int i = 0; i < count; ++i) profile_step<true>(p, scratch + i, BLOCK);
   } else {
-    for (int i = 0; i < BLOCK; ++i) profile_step<false>(p, scratch + i, BLOCK);
+    for (int i = 0; i < count; ++i) profile_step<false>(p, scratch + i, BLOCK);
   }
-  for (int i = 0; i < BLOCK; ++i) chain_step(p, scratch + i, out + i, BLOCK);
+  for (int i = 0; i < count; ++i) chain_step(p, scratch + i, out + i, BLOCK);
 }
 
 void begin(float* field, const float* g, const Part& part) {
@@ -99,18 +99,21 @@ PW_CLONES float largest(const float* v) {
   return *std::max_element(top, top + 16);
 }
 
-void forward(const std::vector<Part>& parts, const float* background, Workspace& w) {
+void fold_all(const std::vector<Part>& parts, const float* background, const float* g, Workspace& w) {
   if (background) std::memcpy(w.field, background, sizeof w.field);
   for (size_t m = 0; m < parts.size(); ++m) {
-    float* g = w.g.data() + m * BLOCK;
-    values(parts[m], w.block, g);
     if (m == 0 && !background) {
       begin(w.field, g, parts[m]);
       std::fill_n(w.weight.data(), BLOCK, parts[m].sign > 0 ? 0.f : 1.f);
     } else {
-      fold(w.field, g, parts[m], w.weight.data() + m * BLOCK);
+      fold(w.field, g + m * BLOCK, parts[m], w.weight.data() + m * BLOCK);
     }
   }
+}
+
+void forward(const std::vector<Part>& parts, Workspace& w) {
+  for (size_t m = 0; m < parts.size(); ++m) values(parts[m], w.block, w.g.data() + m * BLOCK);
+  fold_all(parts, nullptr, w.g.data(), w);
 }
 
 void backward(const std::vector<Part>& parts, Workspace& w) {

@@ -31,9 +31,10 @@ struct Block {
 // Missing points of the last block repeat the first one; callers ignore or zero-weight them.
 int load(const float* points, int64_t first, int64_t count, Block& block);
 
-// Of one part over a block: its signed distance, and (DERIVATIVES, BLOCK) with its derivatives.
+// Of one part over a block: its signed distance, and (DERIVATIVES, BLOCK) with its derivatives, of which only the
+// first `count` points are wanted.
 void values(const Part& part, const Block& block, float* out);
-void derivatives(const Part& part, const Block& block, float* out);
+void derivatives(const Part& part, const Block& block, float* out, int count = BLOCK);
 
 // What the first part of a fold leaves, nothing where it is subtracted.
 void begin(float* field, const float* g, const Part& part);
@@ -55,8 +56,11 @@ struct Workspace {
   alignas(64) float field[BLOCK], total[BLOCK], carried[BLOCK], assembled[BLOCK], weights[BLOCK];
 };
 
-// Fold of all parts over one block, keeping each part's value and fold weight.
-void forward(const std::vector<Part>& parts, const float* background, Workspace& w);
+// Fold of all parts over one block, from their distances g (M, BLOCK), keeping each part's fold weight.
+void fold_all(const std::vector<Part>& parts, const float* background, const float* g, Workspace& w);
+
+// The same from the points of the block, keeping each part's value, too.
+void forward(const std::vector<Part>& parts, Workspace& w);
 
 // dF/dg and dF/dk of every part from the fold weights; `carried` starts as the upstream derivative.
 void backward(const std::vector<Part>& parts, Workspace& w);

@@ -77,7 +77,7 @@ void gradients(const std::vector<Part>& parts, const float* points, const float*
     const auto [first, last] = piece_range(count, piece);
     for (int64_t b = first; b < last; ++b) {
       const int n = load(points, b * BLOCK, count, w.block);
-      forward(parts, nullptr, w);
+      forward(parts, w);
       for (int i = 0; i < BLOCK; ++i) w.carried[i] = i < n ? upstream[b * BLOCK + i] : 0.f;
       backward(parts, w);
       for (size_t m = 0; m < parts.size(); ++m) {
@@ -117,7 +117,7 @@ void removal_counts(const std::vector<Part>& parts, const float* points, const u
         in[i] = i < n && inside[b * BLOCK + i] ? 1.f : 0.f;
         weights[i] = i < n ? weight[b * BLOCK + i] : 0.f;
       }
-      forward(parts, nullptr, w);
+      forward(parts, w);
       count(w.field, in, weights, both, either);
       const double base_both = sum(both), base_either = sum(either);
       std::fill_n(w.carried, BLOCK, 1.f);

@@ -49,18 +49,18 @@ PW_CLONES void add(float* __restrict total, const float* __restrict v) {
   for (int i = 0; i < BLOCK; ++i) total[i] += v[i];
 }
 
-// Loads a block of samples and evaluates residuals; padding gets weight 0.
+// Residuals of the block of samples at which the parts' distances g (M, BLOCK) are; padding gets weight 0.
 double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t first, float beta, Penalties penalties,
-                    Workspace& w, Residuals& r) {
+                    const float* g, Workspace& w, Residuals& r) {
   alignas(64) float background[BLOCK], distance[BLOCK], target[BLOCK];
-  const int n = load(s.points, first, s.count, w.block);
+  const int n = int(std::min<int64_t>(BLOCK, s.count - first));
   for (int i = 0; i < BLOCK; ++i) {
     const int64_t j = first + (i < n ? i : 0);
     distance[i] = s.distance[j];
     w.weights[i] = i < n ? s.weight[j] : 0.f;
     if (s.background) background[i] = s.background[j];
   }
-  forward(parts, s.background ? background : nullptr, w);
+  fold_all(parts, s.background ? background : nullptr, g, w);
   occupancy(distance, beta, target);
   occupancy(w.field, beta, w.assembled);
   if (penalties.overlap > 0 || penalties.blending > 0) {
@@ -70,7 +70,7 @@ double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t fi
       std::fill_n(w.total, BLOCK, 0.f);
     for (size_t m = 0; m < parts.size(); ++m) {
       if (parts[m].sign < 0) continue;
-      occupancy(&w.g[m * BLOCK], beta, &w.occ[m * BLOCK]);
+      occupancy(g + m * BLOCK, beta, &w.occ[m * BLOCK]);
       add(w.total, &w.occ[m * BLOCK]);
     }
   } else {
@@ -79,31 +79,51 @@ double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t fi
   return residuals(target, w.weights, w.assembled, w.total, beta, penalties, r);
 }
 
-// Columns of a Jacobian: which points of a block have one, padded to whole lanes.
-struct Columns {
+// Points of a block, or of such a selection, that are of any use; as columns of a Jacobian padded to whole lanes.
+struct Selection {
   int index[BLOCK];
   int count = 0, padded = 0;
 
-  void collect(const float* size, float least) {
+  // Those of `from` points whose size is above the least; all of them where that is most.
+  void collect(const float* size, float least, int from) {
     count = 0;
-    for (int i = 0; i < BLOCK; ++i) {
+    for (int i = 0; i < from; ++i) {
       index[count] = i;
       count += size[i] > least;
+    }
+    if (4 * count > 3 * from) {
+      for (int i = count = from; i-- > 0;) index[i] = i;
     }
     padded = (count + 15) / 16 * 16;
   }
 };
 
-void gather(const float* v, const Columns& columns, float* out) {
-  for (int i = 0; i < columns.count; ++i) out[i] = v[columns.index[i]];
-  std::fill(out + columns.count, out + columns.padded, 0.f);
+void gather(const float* v, const Selection& selection, float* out) {
+  for (int i = 0; i < selection.count; ++i) out[i] = v[selection.index[i]];
+  std::fill(out + selection.count, out + selection.padded, 0.f);
 }
 
-PW_CLONES void gather_scaled(const float* __restrict d, const float* __restrict by, const Columns& columns, int rows, int length,
-                             float* __restrict out) {
+// Derivatives d (rows, BLOCK) at the selected of `from` points, times the selected factors `by`.
+PW_CLONES void scale_selected(const float* __restrict d, const float* __restrict by, const Selection& selection, int from, int rows,
+                              int length, float* __restrict out) {
+  const int padded = selection.padded;
   for (int r = 0; r < rows; ++r) {
-    for (int i = 0; i < columns.count; ++i) out[r * length + i] = d[r * BLOCK + columns.index[i]] * by[columns.index[i]];
-    for (int i = columns.count; i < columns.padded; ++i) out[r * length + i] = 0;
+    const float* row = d + r * BLOCK;
+    if (selection.count == from)
+      for (int i = 0; i < padded; ++i) out[r * length + i] = row[i] * by[i];
+    else
+      for (int i = 0; i < padded; ++i) out[r * length + i] = row[selection.index[i < selection.count ? i : 0]] * by[i];
+  }
+}
+
+// The selected points of a block, padded with one of them.
+void load_selected(const float* points, int64_t first, int64_t count, const Selection& selection, Block& block) {
+  for (int i = 0; i < selection.padded; ++i) {
+    const int64_t j = first + selection.index[i < selection.count ? i : 0];
+    const float* p = points + 3 * (j < count ? j : first);
+    block.x[i] = p[0];
+    block.y[i] = p[1];
+    block.z[i] = p[2];
   }
 }
 
@@ -113,20 +133,34 @@ PW_CLONES void keep_larger(float* __restrict size, const float* __restrict v) {
 
 }  // namespace
 
+PartDistances part_distances(const std::vector<Part>& parts, const Samples& samples, int threads) {
+  PartDistances out(parts.size(), samples.count);
+  parallel_for(PIECES, threads, [&](int64_t piece) {
+    Block block;
+    const auto [first, last] = piece_range(samples.count, piece);
+    for (int64_t b = first; b < last; ++b) {
+      load(samples.points, b * BLOCK, samples.count, block);
+      for (size_t m = 0; m < parts.size(); ++m) values(parts[m], block, out.block(b) + m * BLOCK);
+    }
+  });
+  return out;
+}
+
 NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples,
-                                 float beta, Penalties penalties, int threads) {
+                                 float beta, Penalties penalties, int threads, const PartDistances& distances) {
   std::vector<NormalEquations> pieces(PIECES);
   parallel_for(PIECES, threads, [&](int64_t piece) {
     NormalEquations& sum = pieces[size_t(piece)];
     sum.gradient.assign(parts.size() * DERIVATIVES, 0.0);
     Workspace w(parts.size());
     Residuals r;
+    Block block;
     alignas(64) float none[BLOCK] = {};
     std::vector<float> d(DERIVATIVES * BLOCK), rows, coefficients;
     std::vector<int> active;
     const auto [first, last] = piece_range(samples.count, piece);
     for (int64_t b = first; b < last; ++b) {
-      sum.loss += sample_block(parts, samples, b * BLOCK, beta, penalties, w, r);
+      sum.loss += sample_block(parts, samples, b * BLOCK, beta, penalties, distances.block(b), w, r);
       std::fill_n(w.carried, BLOCK, 1.f);
       backward(parts, w);
       // Each point has up to three residuals, and each residual that moves with some part is a column of the
@@ -137,7 +171,7 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
       const float* residual[KINDS] = {r.rec, r.over, r.blended};
       const float *by_field[KINDS] = {r.rec_f, none, r.blended_f}, *by_occupancy[KINDS] = {none, r.over_o, r.blended_o};
       const float least = 1e-3f * 0.25f * beta * std::sqrt(*std::max_element(w.weights, w.weights + BLOCK));
-      alignas(64) float size[KINDS][BLOCK] = {};
+      alignas(64) float size[KINDS][BLOCK] = {}, any[BLOCK] = {};
       active.clear();
       coefficients.clear();
       for (size_t m = 0; m < parts.size(); ++m) {
@@ -157,34 +191,47 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
         active.push_back(int(m));
       }
       if (active.empty()) continue;
-      Columns columns[KINDS];
+      for (const auto& of_kind : size) keep_larger(any, of_kind);
+      // Derivatives are of the points that have a column; what a kind lacks of those is left out of its columns.
+      Selection points, columns[KINDS];
+      points.collect(any, least, BLOCK);
+      load_selected(samples.points, b * BLOCK, samples.count, points, block);
       int length = 0;
+      alignas(64) float errors[KINDS * BLOCK], selected[BLOCK], by[BLOCK];
       for (int kind = 0; kind < KINDS; ++kind) {
-        if (used[kind]) columns[kind].collect(size[kind], least);
+        if (!used[kind]) continue;
+        gather(size[kind], points, selected);
+        columns[kind].collect(selected, least, points.count);
+        gather(residual[kind], points, selected);
+        gather(selected, columns[kind], errors + length);
         length += columns[kind].padded;
       }
-      alignas(64) float errors[KINDS * BLOCK];
-      for (int kind = 0, at = 0; kind < KINDS; at += columns[kind++].padded) gather(residual[kind], columns[kind], errors + at);
       rows.resize(active.size() * DERIVATIVES * size_t(length));
       for (size_t i = 0; i < active.size(); ++i) {
         const size_t m = size_t(active[i]);
         float* out = &rows[i * DERIVATIVES * size_t(length)];
-        derivatives(parts[m], w.block, d.data());
+        derivatives(parts[m], block, d.data(), points.padded);
+        gather(&w.blend[m * BLOCK], points, &d[D_BLEND * BLOCK]);
         for (int kind = 0, at = 0; kind < KINDS; at += columns[kind++].padded) {
-          gather_scaled(d.data(), &coefficients[(i * KINDS + size_t(kind)) * BLOCK], columns[kind], FIELD_DERIVATIVES, length, out + at);
-          gather_scaled(&w.blend[m * BLOCK], by_field[kind], columns[kind], 1, length, out + D_BLEND * length + at);
+          if (!used[kind]) continue;
+          gather(&coefficients[(i * KINDS + size_t(kind)) * BLOCK], points, selected);
+          gather(selected, columns[kind], by);
+          scale_selected(d.data(), by, columns[kind], points.count, FIELD_DERIVATIVES, length, out + at);
+          gather(by_field[kind], points, selected);
+          gather(selected, columns[kind], by);
+          scale_selected(&d[D_BLEND * BLOCK], by, columns[kind], points.count, 1, length, out + D_BLEND * length + at);
         }
         times_vector(out, errors, length, &sum.gradient[m * DERIVATIVES]);
       }
       for (size_t i = 0; i < active.size(); ++i)
         for (size_t j = i; j < active.size(); ++j) {
-          auto& block = sum.blocks[{active[i], active[j]}];
-          if (block.empty()) block.assign(DERIVATIVES * DERIVATIVES, 0.0);
+          auto& product = sum.blocks[{active[i], active[j]}];
+          if (product.empty()) product.assign(DERIVATIVES * DERIVATIVES, 0.0);
           const float *a = &rows[i * DERIVATIVES * size_t(length)], *c = &rows[j * DERIVATIVES * size_t(length)];
           if (i == j)
-            outer_square(a, length, block.data());
+            outer_square(a, length, product.data());
           else
-            outer_product(a, c, length, block.data());
+            outer_product(a, c, length, product.data());
         }
     }
   });
@@ -204,13 +251,20 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
   return total;
 }
 
-double loss(const std::vector<Part>& parts, const Samples& samples, float beta, Penalties penalties, int threads) {
+double loss(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples, float beta,
+            Penalties penalties, int threads, PartDistances& distances) {
   double sums[PIECES] = {};
   parallel_for(PIECES, threads, [&](int64_t piece) {
     Workspace w(parts.size());
     Residuals r;
     const auto [first, last] = piece_range(samples.count, piece);
-    for (int64_t b = first; b < last; ++b) sums[piece] += sample_block(parts, samples, b * BLOCK, beta, penalties, w, r);
+    for (int64_t b = first; b < last; ++b) {
+      float* g = distances.block(b);
+      load(samples.points, b * BLOCK, samples.count, w.block);
+      for (size_t m = 0; m < parts.size(); ++m)
+        if (live[m]) values(parts[m], w.block, g + m * BLOCK);
+      sums[piece] += sample_block(parts, samples, b * BLOCK, beta, penalties, g, w, r);
+    }
   });
   double total = 0;
   for (double sum : sums) total += sum;

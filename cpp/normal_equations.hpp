@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "superfrustum.hpp"
+#include "blocks.hpp"
 
 namespace partwright {
 
@@ -35,10 +35,27 @@ struct NormalEquations {
   double loss = 0;
 };
 
+// Distances of each part alone at all samples, by blocks. The search for a step asks for the same ones again and
+// again, and those of parts that stay never change.
+class PartDistances {
+ public:
+  PartDistances(size_t parts, int64_t count) : row_(parts * BLOCK), values_(size_t((count + BLOCK - 1) / BLOCK) * row_) {}
+  float* block(int64_t b) { return values_.data() + size_t(b) * row_; }
+  const float* block(int64_t b) const { return values_.data() + size_t(b) * row_; }
+
+ private:
+  size_t row_;
+  std::vector<float> values_;
+};
+
+PartDistances part_distances(const std::vector<Part>& parts, const Samples& samples, int threads);
+
 // `live[i]` says whether part i moves; blocks and gradients of the others are not formed.
 NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples,
-                                 float beta, Penalties penalties, int threads);
+                                 float beta, Penalties penalties, int threads, const PartDistances& distances);
 
-double loss(const std::vector<Part>& parts, const Samples& samples, float beta, Penalties penalties, int threads);
+// Brings the distances of live parts up to date on the way.
+double loss(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples, float beta,
+            Penalties penalties, int threads, PartDistances& distances);
 
 }  // namespace partwright

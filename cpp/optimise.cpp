@@ -185,9 +185,10 @@ Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& fr
   Outcome out{std::move(rows), 0, 0};
   std::vector<char> moving(size_t(parts) * DERIVATIVES);
   std::vector<double> step;
+  PartDistances distances = part_distances(prepared(out.rows), samples, threads), tried = distances;
   for (const Stage& stage : stages) {
     double damping = 1e-2;
-    NormalEquations system = normal_equations(prepared(out.rows), live, samples, stage.beta, penalties, threads);
+    NormalEquations system = normal_equations(prepared(out.rows), live, samples, stage.beta, penalties, threads, distances);
     tie(system, tied);
     for (int iteration = 0; iteration < stage.iterations; ++iteration) {
       // A variable at its bound that wants to leave the box takes no part in the step.
@@ -207,10 +208,11 @@ Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& fr
           std::vector<float> candidate = out.rows;
           for (int i = 0; i < parts; ++i)
             if (live[size_t(i)]) move(&candidate[size_t(i) * COLUMNS], &step[size_t(i) * DERIVATIVES], &moving[size_t(i) * DERIVATIVES], limits, tied[size_t(i)]);
-          const double now = loss(prepared(candidate), samples, stage.beta, penalties, threads);
+          const double now = loss(prepared(candidate), live, samples, stage.beta, penalties, threads, tried);
           if (now < system.loss) {
             gain = (system.loss - now) / system.loss;
             out.rows = std::move(candidate);
+            std::swap(distances, tried);
             accepted = true;
           }
         }
@@ -222,7 +224,7 @@ Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& fr
         system.loss *= 1 - gain;
         break;
       }
-      system = normal_equations(prepared(out.rows), live, samples, stage.beta, penalties, threads);
+      system = normal_equations(prepared(out.rows), live, samples, stage.beta, penalties, threads, distances);
       tie(system, tied);
     }
     out.loss = system.loss;

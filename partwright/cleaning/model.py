@@ -21,6 +21,8 @@ from partwright.errors import UncleanableError
 
 Floats = NDArray[np.float64]
 
+MOST_COPIES = 500
+"""Of parts that are cleaned together: time and memory grow with their square."""
 _RATIO_REACH = 0.5  # of the part's size: how far a ratio may move its surface
 
 
@@ -53,7 +55,8 @@ class Model:
 
     @classmethod
     def of(cls, assembly: Assembly) -> Model:
-        """Raises UncleanableError where a leaf is no SuperFrustum or named solid, or has no size."""
+        """Raises UncleanableError where a leaf is no SuperFrustum or named solid or has no size, or there are
+        too many."""
         for part in assembly.parts:
             if part.field.superfrustum() is None:
                 raise UncleanableError(
@@ -63,6 +66,11 @@ class Model:
             if size_of(part) == 0:
                 raise UncleanableError(f"part {part.name!r} has no size; take it out, or give it one")
         copies = [copy for part in assembly.parts for copy in part.copies]
+        if len(copies) > MOST_COPIES:
+            raise UncleanableError(
+                f"{len(copies):,} parts, copies counted; cleaning relates each to all others, and takes at "
+                f"most {MOST_COPIES}: clean pieces of the assembly by themselves"
+            )
         return cls(assembly, np.stack([rotation_matrix(copy.rotation) for copy in copies]))
 
     @property

@@ -8,6 +8,7 @@ fitted once more; all go to a grid; parts that repeat become one.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,6 +85,7 @@ def clean(
     shape: Shape | None = None,
     tolerance: float | None = None,
     cancel: Cancellation | None = None,
+    told: Callable[[str], None] | None = None,
 ) -> Cleaned:
     """The assembly with plain numbers: relations between parts made exact, lengths on a grid.
 
@@ -94,13 +96,16 @@ def clean(
         tolerance: how much further from the shape the surface of any part may come to lie, on average, in
             own units; half a thousandth of the longest side if not given.
         cancel: asked before each change, from any thread.
+        told: of each step as it begins, in a word.
 
     Raises:
         CancelledError: cancelled on the way; half cleaned, an assembly is neither as fitted nor plain.
-        UncleanableError: a part is neither a SuperFrustum nor a named solid.
+        UncleanableError: a part is neither a SuperFrustum nor a named solid, or there are too many.
         SettingError: the tolerance is no positive length, too large, or below the mesh's own noise.
         NoSurfaceError: nothing is left of the assembly.
     """
+    told = told or _nobody
+    told("sampling")
     model = Model.of(assembly)
     target = assembly if shape is None else shape
     tolerance = checked_tolerance(tolerance, target)
@@ -108,12 +113,18 @@ def clean(
     samples = DeviationSamples.of(model, shape)
     given = State.of(samples, model)
     acceptance = AcceptanceTest.of(given, tolerance * samples.scale, cancel or Cancellation())
-    state, frames = turned(plainer(given, acceptance, grid), acceptance)
+    told("naming solids")
+    plain = plainer(given, acceptance, grid)
+    told("turning")
+    state, frames = turned(plain, acceptance)
+    told("relating")
     state = snapped(state, acceptance, frames, grid)
     tidied = np.array([tidy(value, grid) for value in state.vector.tolist()])
+    told("finding repeats")
     made = collapsed(state.model.moved(tidied), frames, grid)
     changed = not unchanged(model, made, grid)
     result = made if changed else assembly
+    told("measuring")
     if shape is None:
         occupied = occupancy_grid(assembly.transformed(samples.frame).distance, RESOLUTION)
     else:
@@ -121,6 +132,10 @@ def clean(
     before = _agreement(assembly, samples, occupied)
     after = _agreement(result, samples, occupied) if changed else before
     return Cleaned(result, relations(result, frames, grid), tolerance, before, after, changed)
+
+
+def _nobody(_: str) -> None:
+    pass
 
 
 def _longest(of: Assembly | Shape) -> float:

@@ -61,7 +61,8 @@ def _add_method(group: Group) -> None:
         "--subtract",
         action=argparse.BooleanOptionalAction,
         default=None,
-        help="parts may also be subtracted: holes, slots, pockets (default: on for solids and capri)",
+        help="parts may also be subtracted: holes, slots, pockets (default: on for solids and capri, for "
+        "superfrusta where a hole would be covered)",
     )
     option("--clean", action="store_true", help="make numbers plain and relations exact after the fit")
     option(

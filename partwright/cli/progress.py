@@ -31,19 +31,19 @@ def _bar(detail: str) -> Progress | None:
     return Progress(*columns, console=console, transient=True)
 
 
-class Display:
-    """A context in which `show` takes the method's progress and `stage` names what else goes on."""
+class _Shown:
+    """A context with a bar of one task; `detail` stands beside it, `total` is None while not known."""
 
-    def __init__(self) -> None:
-        self._bar = _bar("{task.fields[detail]}")
-        self._last_stage, self._last_time = "", 0.0
+    def __init__(self, name: str, detail: str, total: float | None = 1.0) -> None:
+        self._name = name
+        self._bar = _bar(detail)
+        self._total = total
+        self._last_time = 0.0
 
     def __enter__(self) -> Self:
         if self._bar:
             self._bar.start()
-            self._task = self._bar.add_task("reading", total=1.0, detail="")
-        else:
-            self._line("reading")
+            self._task = self._bar.add_task(self._name, total=self._total, detail="")
         return self
 
     def __exit__(
@@ -51,6 +51,19 @@ class Display:
     ) -> None:
         if self._bar:
             self._bar.stop()
+
+
+class Display(_Shown):
+    """A context in which `show` takes the method's progress and `stage` names what else goes on."""
+
+    def __init__(self) -> None:
+        super().__init__("reading", "{task.fields[detail]}")
+        self._last_stage = ""
+
+    def __enter__(self) -> Self:
+        if not self._bar:
+            note(self._name)
+        return super().__enter__()
 
     def show(self, step: Any) -> None:
         """One report of the method: .stage .round .rounds .parts .iou .fraction."""
@@ -60,7 +73,7 @@ class Display:
             done = _FIT + step.fraction * (_SCORES - _FIT)
             self._bar.update(self._task, description=stage, completed=done, detail=detail)
         elif step.stage != self._last_stage or time.monotonic() - self._last_time > _QUIET:
-            self._line(f"{step.stage}: {detail}  {step.fraction:.0%}")
+            note(f"{step.stage}: {detail}  {step.fraction:.0%}")
             self._last_stage, self._last_time = step.stage, time.monotonic()
 
     def stage(self, name: str) -> None:
@@ -68,32 +81,14 @@ class Display:
         if self._bar:
             self._bar.update(self._task, description=name, completed=_WRITING)
         else:
-            self._line(name)
-
-    @staticmethod
-    def _line(text: str) -> None:
-        note(text)
+            note(name)
 
 
-class Count:
+class Count(_Shown):
     """A context in which `show` counts things that get done one by one."""
 
     def __init__(self, name: str) -> None:
-        self._name = name
-        self._bar = _bar("{task.completed:.0f}/{task.total:.0f}  {task.fields[detail]}")
-        self._last_time = 0.0
-
-    def __enter__(self) -> Self:
-        if self._bar:
-            self._bar.start()
-            self._task = self._bar.add_task(self._name, total=None, detail="")
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bar:
-            self._bar.stop()
+        super().__init__(name, "{task.completed:.0f}/{task.total:.0f}  {task.fields[detail]}", None)
 
     def show(self, done: int, total: int, what: str) -> None:
         """`what` was just done, the `done`th of `total`."""
@@ -104,25 +99,11 @@ class Count:
             self._last_time = time.monotonic()
 
 
-class Work:
+class Work(_Shown):
     """A context in which `stage` names what goes on, and `show` says how much of it is done."""
 
     def __init__(self, name: str) -> None:
-        self._name = name
-        self._bar = _bar("{task.percentage:.0f}%")
-        self._last_time = 0.0
-
-    def __enter__(self) -> Self:
-        if self._bar:
-            self._bar.start()
-            self._task = self._bar.add_task(self._name, total=1.0)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bar:
-            self._bar.stop()
+        super().__init__(name, "{task.percentage:.0f}%")
 
     def stage(self, name: str) -> None:
         """What begins now."""

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from partwright.metrics import CadScores, Scores
 
 
+_RELATIONS = 40  # lines that are printed
+
+
 def finish_fit(result: Result, folder: Path) -> int:
     """Prints the outcome of a fit that was written to a folder; the exit code."""
     print_result(result, folder)
@@ -52,9 +55,11 @@ def print_scores(name: str, scores: Scores, unit: str | None) -> None:
 
 
 def print_relations(cleaned: Cleaned) -> None:
-    """What cleaning found, a line each."""
-    for relation in cleaned.relations:
+    """What cleaning found, a line each, and how many more there are."""
+    for relation in cleaned.relations[:_RELATIONS]:
         say(relation)
+    if len(cleaned.relations) > _RELATIONS:
+        say(f"and {len(cleaned.relations) - _RELATIONS} relations more, all of them in the report")
 
 
 def print_cleaned(cleaned: Cleaned, path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from partwright.assembly import Assembly, Part
@@ -28,11 +30,13 @@ def overlap(assembly: Assembly, resolution: int = RESOLUTION) -> float:
             return added.part_distances(points)
         return np.stack([piece.distance(points) for piece in added.children])
 
-    inside = occupancy_grid(lambda points: each(points).min(axis=0), resolution)
+    # As a union without blends: the distances of thousands of parts to all points would fill the memory.
+    union = Assembly(tuple(replace(piece, blend=0.0) for piece in added.children))
+    inside = occupancy_grid(union.distance, resolution)
     centres = ((np.argwhere(inside) + 0.5) * (2.0 / resolution) - 1.0).astype(np.float32)
     if not len(centres):
         return 0.0
-    at_once = max(1, _AT_ONCE // max(1, len(added.children)))  # thousands of parts would fill the memory
+    at_once = max(1, _AT_ONCE // max(1, len(added.children)))
     twice = sum(
         int(((each(centres[i : i + at_once]) < 0).sum(axis=0) >= 2).sum())
         for i in range(0, len(centres), at_once)

@@ -59,8 +59,11 @@ class Deviations:
 def deviations(samples: FitSamples, rows: Rows) -> Deviations:
     """Of an assembly, over points of its parts' surfaces and of the shape's."""
     added = np.flatnonzero(rows[:, Column.SIGN] > 0)
-    found = zip(_of_parts(samples, rows, added), _of_shape(samples, rows, added), strict=True)
-    points, distance, off, part = (np.concatenate(pair) for pair in found)
+    found = zip(
+        *(find(samples, rows, added) for find in (_of_parts, _of_shape, _of_voxels)),
+        strict=True,
+    )
+    points, distance, off, part = (np.concatenate(one) for one in found)
     # At an edge, what is read off the grid may be wrong by half a voxel.
     kept = off > max(_CLOSE, samples.grid.spacing / 2)
     return Deviations(points[kept], distance[kept], off[kept], part[kept].astype(np.int64), len(rows))
@@ -94,3 +97,16 @@ def _of_shape(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tupl
     points, gap = samples.surface[gap > _CLOSE], gap[gap > _CLOSE]
     part = added[samples.parts_of(rows[added], points).argmin(axis=0)]
     return points, np.zeros_like(gap), gap, part
+
+
+def _of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
+    """Places inside the shape that no part fills, and outside that one does.
+
+    Where blends wall a void no part's surface is near it, and a hole may lie between the points of a face.
+    """
+    points, distance = samples.lattice
+    field = samples.distance_of(rows, points)
+    wrong = np.where(distance < 0, field, -field) > _BESIDE / 2
+    points, distance = points[wrong], distance[wrong]
+    part = added[samples.parts_of(rows[added], points).argmin(axis=0)]
+    return points, distance, np.abs(distance), part

@@ -122,6 +122,17 @@ def grow(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Grow
     return _select(samples, candidates, rows, settings.price / _PRICE_DIVISOR, most)
 
 
+def carve(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Grown:
+    """The same for parts to subtract: holes and slots that what is there covers."""
+    excess = np.maximum(samples.grid_field(rows), -samples.grid.values)
+    wanted = _pieces(samples, excess, rows, settings, -1.0)
+    if not wanted:
+        return Grown(NOTHING, NOTHING)
+    return _select(
+        samples, fit_regions(samples, wanted, settings), rows, settings.price / _PRICE_DIVISOR, most
+    )
+
+
 def _view(samples: FitSamples, region: Region) -> View:
     voxels = samples.grid_points[region.voxels]
     low, high = voxels.min(axis=0), voxels.max(axis=0)

@@ -7,16 +7,19 @@ fitted anew, split, joined by another or taken away, whichever serves an objecti
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from partwright.fields.columns import ROTATION
+from partwright.fields.columns import ROTATION, Column
 from partwright.fields.kernel import Target
 from partwright.superfrusta.deviations import Deviations, deviations
-from partwright.superfrusta.growing import Region, finalists, grow
+from partwright.superfrusta.growing import Region, carve, finalists, grow
 from partwright.superfrusta.merging import owners
 from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.pruning import cheapest_removal, neighbours
@@ -26,7 +29,7 @@ from partwright.superfrusta.settings import Settings
 
 Mask = NDArray[np.bool_]
 
-_ENOUGH = 0.018  # unit lengths, a hundredth of the longest side: what is nearer is not mended
+_ENOUGH = 0.026  # unit lengths, 1.4 % of the longest side: below, hardly any try bears fruit
 _FAR = 0.045  # unit lengths off from which on a part makes room for several
 _REGROWN = 3  # at most
 _TWICE = 0.02  # unit lengths off at which a sample weighs twice
@@ -35,7 +38,6 @@ _SAME_PLACE = 0.02  # unit lengths
 _STAGES: Stages = ((40.0, 4), (100.0, 5))
 _HOPELESS = 0.02  # of the objective: what is so much worse after a refit goes no further
 _REFITTED = 2  # of the ways to change a part
-_BEST_STARTS = 2  # parts for one region that are tried
 _LEAST_HALVED = 100  # voxels
 
 
@@ -66,7 +68,7 @@ class Mending:
         given_up: list[NDArray[np.float32]] = []
         part: int | None = None
         for _ in range(self.settings.mends + 1):
-            trials = self.moved(best, _all(best.rows), best) if part is None else self.ways(best, part)
+            trials = [self.firmed(best, _all(best.rows))] if part is None else self.ways(best, part)
             allowed = (trial for trial in trials if self.allowed(trial.rows, rows))
             found = max(allowed, key=lambda trial: trial.value, default=best)
             if found.value > best.value:
@@ -112,26 +114,35 @@ class Mending:
             best = self.trial(thinned)
         return best
 
-    def ways(self, best: Trial, part: int) -> Iterator[Trial]:
+    def ways(self, best: Trial, part: int) -> list[Trial]:
         """Assemblies that may be better: part and neighbours moved, the most promising changes refitted."""
         moving = neighbours(self.samples, best.rows, part)
         moving[part] = True
-        yield from self.moved(best, moving, best)
         if part < self.locked:
-            return
-        changes = [(self.trial(rows), new) for rows, new in self.changes(best, part)]
-        for changed, new in sorted(changes, key=lambda one: -one[0].value)[:_REFITTED]:
-            yield changed
-            yield from self.moved(changed, np.append(np.delete(moving, part), np.ones(new, bool)), best)
+            return [self.firmed(best, moving)]
+        changes = [(self.trial(rows), changed) for rows, changed in self.changes(best, part, moving)]
+        changes = sorted(changes, key=lambda one: -one[0].value)[:_REFITTED]
+        refits = [partial(self.refitted, trial, changed, best) for trial, changed in changes]
+        tried = self.at_once([lambda: [self.firmed(best, moving)], *refits])
+        return [trial for trials in tried for trial in trials]
 
-    def moved(self, given: Trial, moving: Mask, best: Trial) -> Iterator[Trial]:
-        """The parts moved to where they explain the most, and on to where they are nowhere far off."""
+    def at_once(self, jobs: list[Callable[[], list[Trial]]]) -> list[list[Trial]]:
+        """What jobs return, which take turns on the threads: half of their work is none of the kernel's."""
+        with ThreadPoolExecutor(self.samples.threads or cpu_count() or 1) as pool:
+            return [future.result() for future in [pool.submit(job) for job in jobs]]
+
+    def refitted(self, changed: Trial, moving: Mask, best: Trial) -> list[Trial]:
+        """A change, its parts moved to where they explain the most, and to where they are nowhere far off."""
+        free = moving & self.free(changed.rows)
+        plain = self.trial(refine(self.samples, changed.rows, TOUCH_UP, self.settings, free))
+        firm = [self.firmed(plain, moving)] if plain.value > best.value - _HOPELESS else []
+        return [changed, plain, *firm]
+
+    def firmed(self, given: Trial, moving: Mask) -> Trial:
+        """The parts moved to where they are nowhere far off."""
         moving = moving & self.free(given.rows)
-        plain = self.trial(refine(self.samples, given.rows, TOUCH_UP, self.settings, moving))
-        yield plain
-        if plain.value > best.value - _HOPELESS:
-            target = self.target(plain, moving)
-            yield self.trial(refine(self.samples, plain.rows, _STAGES, self.settings, moving, target))
+        target = self.target(given, moving)
+        return self.trial(refine(self.samples, given.rows, _STAGES, self.settings, moving, target))
 
     def target(self, given: Trial, moving: Mask) -> Target:
         """Samples that weigh by how far off they are, and the points where moving parts are off."""
@@ -149,35 +160,44 @@ class Mending:
             (weight / weight.sum()).astype(np.float32),
         )
 
-    def changes(self, best: Trial, part: int) -> Iterator[tuple[Rows, int]]:
-        """Assemblies before any refit, and how many of their last parts are new."""
+    def changes(self, best: Trial, part: int, moving: Mask) -> Iterator[tuple[Rows, Mask]]:
+        """Assemblies before any refit, and which of their parts move: those marked, and new ones."""
         samples, rows, off = self.samples, best.rows, best.off
         worst = off.worst(part)
-        others = np.delete(rows, part, axis=0)
+        others, still = np.delete(rows, part, axis=0), np.delete(moving, part)
+
+        def with_new(rows: Rows, moving: Mask, *new: Rows) -> tuple[Rows, Mask]:
+            return np.concatenate([rows, *new]), np.append(moving, _all(np.concatenate(new)))
+
         if len(others):
-            yield others, 0
+            yield others, still
         mine = owners(samples, rows) == part
         if mine.any():
-            for one in self.fitted(mine, others, rows[part]):
-                yield np.concatenate([others, one[None]]), 1
+            yield with_new(others, still, self.fitted(mine, others, rows[part]))
         if off.off[worst] > _FAR:
             grown = grow(samples, others, self.settings, _REGROWN)
             if len(grown):
-                yield grown.joined(others, self.locked), len(grown.last)
+                begun = np.insert(still, [self.locked] * len(grown.first), True)
+                yield grown.joined(others, self.locked), np.append(begun, _all(grown.last))
+        if self.settings.carving and off.distance[worst] > 0:
+            cut = carve(samples, rows, self.settings, self.settings.regions)
+            if len(cut):
+                yield with_new(rows, moving, cut.last)
         missed = self.missed(rows, off.points[worst]) if off.distance[worst] <= 0 else None
         if missed is not None:
-            for one in self.fitted(missed, rows, rows[part]):
-                yield np.concatenate([others, rows[[part]], one[None]]), 2
+            yield with_new(rows, moving, self.fitted(missed, rows, rows[part]))
         if np.count_nonzero(mine) > _LEAST_HALVED:
-            halves = [self.fitted(half, others, rows[part])[0] for half in _halves(samples, mine)]
-            yield np.concatenate([others, halves]), 2
+            halves = [self.fitted(half, others, rows[part]) for half in _halves(samples, mine)]
+            yield with_new(others, still, *halves)
 
     def fitted(self, voxels: Mask, others: Rows, like: NDArray[np.float32]) -> Rows:
-        """The best few parts for the voxels, beside the others; `like` gives a frame to start from."""
+        """The best part (1, 17) for the voxels, beside the others; `like` gives a frame to start from."""
         depth = float(np.abs(self.samples.grid.values.ravel()[voxels]).max())
-        region = Region(voxels, others, depth, margin=0.2, elsewhere=0.3, frames=like[None, ROTATION])
+        region = Region(
+            voxels, others, depth, 0.2, 0.3, frames=like[None, ROTATION], sign=float(like[Column.SIGN])
+        )
         found, _, losses = finalists(self.samples, [region], self.settings, self.settings.overlap)
-        return found[np.argsort(losses, kind="stable")[:_BEST_STARTS]]
+        return found[[int(losses.argmin())]]
 
     def missed(self, rows: Rows, place: NDArray[np.float32]) -> Mask | None:
         """The connected voxels inside the shape, about a place, that no part covers."""

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from partwright.assembly import Assembly, Similarity
 from partwright.assembly.parts_from_rows import parts_from_rows
 from partwright.fields.columns import UNSIGNED, Column
 from partwright.shapes import Shape
 from partwright.superfrusta.curve import with_parents
 from partwright.superfrusta.flat_tree import nested
+from partwright.superfrusta.part_names import part_names
 from partwright.superfrusta.samples import Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.solid_kinds import is_solid, solid
@@ -56,7 +59,11 @@ def assembly_of(
     moves: those of each part's further copies, if any.
     """
     added = rows[:, Column.SIGN] > 0
-    names = [*fixed, *(f"{_STEM[bool(added[i])]}_{i + 1:02d}" for i in range(len(fixed), len(rows)))]
+    if settings.family == "solid":
+        names = [*fixed, *(f"{_STEM[bool(added[i])]}_{i + 1:02d}" for i in range(len(fixed), len(rows)))]
+    else:
+        sides = shape.frame.length_to_unit(np.ptp(shape.vertices, axis=0))
+        names = part_names(rows, sides, shape.up, fixed)
     parts = parts_from_rows(rows[:, :UNSIGNED], names)
     if settings.family == "solid":
         parts = tuple(

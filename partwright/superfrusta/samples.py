@@ -28,6 +28,7 @@ _PROBES = 48  # along a side of that cube
 _SURFACE = 8000  # points of the shape's surface
 _STRAY = 0.05  # unit lengths: what an assembly covers further than this from the shape is astray
 _FAR = 0.1  # unit lengths from the shape
+_NOT_FAR = 0.3
 _FAR_COUNT = 400  # about so many samples stand for all that are far
 
 
@@ -120,6 +121,16 @@ class FitSamples:
     def grid_points(self) -> NDArray[np.float32]:
         """(X * Y * Z, 3), in the order of grid.values.ravel()."""
         return self.grid.points().astype(np.float32)
+
+    @cached_property
+    def lattice(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Voxels (n, 3) wholly inside the shape, every second, and outside but not far, every fourth; and the
+        shape's distance (n,) there."""
+        values = self.grid.values.ravel()
+        inside = np.flatnonzero(values < -self.grid.spacing)[::2]
+        outside = np.flatnonzero((values > self.grid.spacing) & (values < _NOT_FAR))[::4]
+        index = np.concatenate([inside, outside])
+        return self.grid_points[index], values[index]
 
     @cached_property
     def voxel(self) -> NDArray[np.int64]:

@@ -38,8 +38,9 @@ class Settings:
     squared). More of it costs parts and surface rather than buying less overlap."""
     blending: float = 0.02
     """Weight of the union loss (eq. 8), likewise."""
-    subtract: bool = False
-    """Parts may also be taken away from what came before them, where too much is covered."""
+    subtract: bool | None = None
+    """Whether parts may also be taken away from what came before them, where too much is covered: from the
+    first round on, never, or (None) only where mending finds that a hole is covered."""
     smooth: bool = True
     """Parts blend into each other (eq. 4); otherwise unions are plain."""
     family: Family = "superfrustum"
@@ -113,6 +114,11 @@ class Settings:
         """Parts that one round may add: few at first where some are subtracted, for each changes what is left
         to explain."""
         return min(most, 1 + round_ // 2) if self.subtract else most
+
+    @property
+    def carving(self) -> bool:
+        """Whether mending may subtract parts although growth does not."""
+        return self.subtract is None and self.optimiser == "newton"
 
     @property
     def price(self) -> float:

@@ -33,8 +33,8 @@ def starting_rows(
         names = ", ".join(part.name for part in unit.parts)
         raise SettingError(f"no part is named {', '.join(sorted(unknown))}; the start has {names}")
     leaves = [(copy, plus) for part, plus in flattened(unit) for copy in part.copies]
-    if not settings.subtract and not all(plus for _, plus in leaves):
-        raise SettingError("the start subtracts parts; allow it to the fit with --subtract")
+    if settings.subtract is False and not all(plus for _, plus in leaves):
+        raise SettingError("the start subtracts parts; allow it to the fit: leave out --no-subtract")
     leaves.sort(key=lambda leaf: leaf[0].name not in locked)
     fixed = tuple(part.name for part, _ in leaves if part.name in locked)
     if settings.family == "solid":

@@ -240,6 +240,18 @@ def test_a_part_without_a_size_is_named(beside: tuple[Part, ...]) -> None:
         clean(Assembly((flat, *beside)))
 
 
+def test_too_many_parts_are_refused_before_the_memory_is_full() -> None:
+    copies = tuple(Similarity(translation=(2.0 * i, 0.0, 0.0)) for i in range(1, 501))
+    with pytest.raises(UncleanableError, match=r"501 parts, copies counted; .* at most 500"):
+        clean(Assembly((Part(Box((1, 1, 1)), instances=copies),)))
+
+
+def test_steps_are_told_in_order() -> None:
+    told: list[str] = []
+    clean(Assembly((Part(Box((1, 2, 3))),)), told=told.append)
+    assert told == ["sampling", "naming solids", "turning", "relating", "finding repeats", "measuring"]
+
+
 class _Latent(Field):
     kind = "latent"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -100,6 +102,17 @@ def test_overlap_ignores_blends_and_subtracted_parts() -> None:
     assert overlap(blended) == pytest.approx(1 / 3, abs=0.01)
     cut = (box(0.0) | box(0.5)) - Part(Sphere(2.0), (1.0, 0.0, 0.0))
     assert overlap(cut) == pytest.approx(1 / 3, abs=0.01)
+
+
+def test_overlap_of_thousands_of_parts_fits_the_memory() -> None:
+    """The distances of all to all cells of the grid would take 15 GB."""
+    side = 12
+    places = np.stack(np.meshgrid(*[2.0 * np.arange(side)] * 3), axis=-1).reshape(-1, 3).tolist()
+    apart = Assembly(tuple(Part(Box((1.0, 1.0, 1.0)), tuple(place)) for place in places))
+    tracemalloc.start()
+    assert overlap(apart, resolution=64) == 0.0
+    assert tracemalloc.get_traced_memory()[1] < 5e8
+    tracemalloc.stop()
 
 
 def test_an_intersection_counts_as_one_part() -> None:

@@ -6,9 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+import trimesh
 
 from partwright.fields import kernel
-from partwright.fields.columns import WIDTH
+from partwright.fields.columns import WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
 from partwright.superfrusta.deviations import deviations
@@ -75,6 +76,27 @@ def test_an_exact_assembly_is_nowhere_off(samples: FitSamples, exact: np.ndarray
     assert off.norm == 0
 
 
+def test_a_void_that_only_blends_wall_is_off_by_its_depth(samples: FitSamples) -> None:
+    """Blends fill the corners, so that few points of any part's own surface are at its walls."""
+    (width, depth, height), (x, y, z) = BODY
+    hole = 0.04  # half of it, between six slabs
+    walls = [box_row(*ARM)]
+    for axis, size in ((0, width), (1, depth), (2, height)):
+        for side in (-1, 1):
+            slab, centre = [width, depth, height], [x, y, z]
+            slab[axis] = size / 2 - hole
+            centre[axis] += side * (size / 2 + hole) / 2
+            walls.append(box_row(tuple(slab), tuple(centre)))
+    rows = np.array(walls)
+    rows[1:, Column.BLEND] = 0.05
+    field = kernel.evaluate(rows, np.array([BODY[1]], np.float32))
+    assert 0 < field[0] < hole
+    off = deviations(samples, rows)
+    assert off.norm == pytest.approx(height / 2, abs=0.04)
+    void = off.points[off.distance < -0.1]
+    assert (np.abs(void - np.array(BODY[1])).max(axis=1) < 0.05).all()
+
+
 def test_a_thin_tab_is_off_by_its_length(samples: FitSamples, exact: np.ndarray) -> None:
     tab = box_row((0.3, 0.3, 0.006), (-0.3, 0.55, 0.1))
     off = deviations(samples, np.vstack([exact, tab]))
@@ -134,3 +156,24 @@ def test_mending_keeps_locked_parts_and_budgets(samples: FitSamples, exact: np.n
     assert mended.shape[1] == WIDTH
     one = Mending(samples, dataclasses.replace(SETTINGS, max_parts=1))(exact[:1])
     assert len(one) == 1
+
+
+@pytest.mark.parametrize("subtract", [None, False])
+def test_mending_carves_holes_unless_forbidden(subtract: bool | None) -> None:
+    plate = ((1.8, 1.2, 0.3), (0.0, 0.0, 0.0))
+    drills = [
+        trimesh.creation.cylinder(0.15, 1.0, sections=48).apply_translation((x, 0.2, 0)) for x in (-0.4, 0.5)
+    ]
+    drilled = trimesh.boolean.difference([box(*plate), *drills], engine="manifold")
+    found = FitSamples.of(load_shape(drilled), SETTINGS)
+    solid = np.array([box_row(*plate)])
+    assert deviations(found, solid).norm > 0.12  # both mouths are covered
+    mended = Mending(found, dataclasses.replace(SETTINGS, subtract=subtract))(solid)
+    cuts = mended[mended[:, Column.SIGN] < 0]
+    if subtract is None:
+        assert len(cuts) == 2
+        assert np.allclose(np.sort(cuts[:, Column.TX]), [-0.4, 0.5], atol=0.02)
+        assert np.allclose(cuts[:, Column.TY], 0.2, atol=0.02)
+        assert deviations(found, mended).norm < 0.03
+    else:
+        assert len(cuts) == 0

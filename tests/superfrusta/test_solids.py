@@ -123,7 +123,7 @@ def test_a_fit_of_solids_goes_on_from_its_own_tree_and_keeps_what_is_locked() ->
     np.testing.assert_allclose(locked.size, (1.8, 1.2, 0.2), rtol=1e-6)
     assert len(fitted.assembly) == 5
     assert fitted.assembly.operation == "difference"
-    with pytest.raises(SettingError, match="--subtract"):
+    with pytest.raises(SettingError, match="--no-subtract"):
         fit(shape, dataclasses.replace(DRAFT, subtract=False), start=start)
 
 

@@ -7,6 +7,7 @@ import argparse
 from partwright.assembly import load_assembly
 from partwright.cleaning import clean
 from partwright.cleaning.cleaned_file import check_suffix, write_cleaned
+from partwright.cli.progress import Work
 from partwright.cli.tables import print_cleaned
 from partwright.shapes import load_shape
 
@@ -17,7 +18,8 @@ def run(arguments: argparse.Namespace) -> int:
     shape = None
     if arguments.shape is not None:
         shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
-    cleaned = clean(assembly, shape, arguments.clean_tolerance)
+    with Work("cleaning") as work:
+        cleaned = clean(assembly, shape, arguments.clean_tolerance, told=work.stage)
     write_cleaned(cleaned, arguments.output)
     print_cleaned(cleaned, arguments.output)
     return 0
