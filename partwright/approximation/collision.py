@@ -9,14 +9,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.balanced_hull import balanced_hull
 from partwright.approximation.change import Change
-from partwright.approximation.convex import segments, wedges
-from partwright.approximation.decomposition import convex_pieces
+from partwright.approximation.convex import segments, walls
+from partwright.approximation.convex_cover import Limits, convex_cover
+from partwright.approximation.convex_fit import convex_fits
+from partwright.approximation.light_hull import light_hull
 from partwright.approximation.nearest import Approximation, nearest_solid
 from partwright.approximation.pieces import Piece, piece_mesh, pieces, require_some
-from partwright.assembly import Assembly, Node, Part
+from partwright.approximation.separation import node_solid
+from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.fields import Field, Solid
+from partwright.fields import Box, Field, Solid
 from partwright.meshing import mesh_part
 from partwright.shapes import MeshDistance
 
@@ -26,6 +30,11 @@ if TYPE_CHECKING:
 TOLERANCE = 0.05  # of the longest side: how far a solid's surface may lie from its part's
 _MOST_ERROR = 0.3  # of its volume: thin parts are within any tolerance of much
 _SPACING = 0.04  # of its size: between the points of a hull that are held against what it stands for
+_NATIVE_FOR = 0.05  # of its volume: by how much a solid may be worse than the hull that it saves
+_EXTRA = 0.1  # of its volume: what the hulls of its pieces may add, before they are balanced
+_AS_GOOD = 0.02  # of a piece's volume: a solid that is off by no more takes the place of its hull
+_CHORD = 0.05  # of the tolerance, or the thinnest wall: what curved faces may lose
+_LIGHT = 0.1  # of the tolerance: what hulls may lose for fewer corners
 _COMPARED = 32  # cells along what is compared
 
 
@@ -88,57 +97,83 @@ def _stand_ins(
 ) -> tuple[list[Geometry], Change | None]:
     """What stands for a piece, and the change that this is: the first of these that is near enough.
 
-    A solid; its hull, where only hulls collide; solids along the arc of a bent part; the hulls of the pieces
-    of a bent or hollow part, or of a difference; its mesh.
+    A solid, unless its hull is nearer by volume; its hull, where only hulls collide; solids along the arc
+    of a bent part; convex pieces, where only those collide; its mesh.
     """
     names = piece.part_names
     part = piece.node if isinstance(piece.node, Part) else None
-    if part is not None:
-        near = nearest_solid(part, kinds)
-        if _alike(near, allowed):
-            change = Change(names, near.solid.kind, near.volume_error_ratio, near.max_deviation)
-            return [Geometry(piece.name, piece.colour, near.part_with_solid, None)], (
-                None if near.exact else change
-            )
+    near = nearest_solid(part, kinds) if part is not None else None
+    if near is not None and near.exact:
+        return [Geometry(piece.name, piece.colour, near.part_with_solid, None)], None
     mesh, error, deviation = _mesh(piece, resolution, convex)
+    if near is not None and _alike(near, allowed):
+        hull_is_nearer = convex and deviation <= allowed and error + _NATIVE_FOR < near.volume_error_ratio
+        if not hull_is_nearer:
+            change = Change(names, near.solid.kind, near.volume_error_ratio, near.max_deviation)
+            return [Geometry(piece.name, piece.colour, near.part_with_solid, None)], change
     whole = [Geometry(piece.name, piece.colour, None, mesh)]
     mesh_change = Change(names, "convex mesh" if convex else "mesh", error, deviation)
     if convex and deviation <= allowed and error <= _MOST_ERROR:
         return whole, mesh_change
-    if part is None:
-        return _decomposed(piece, allowed) if convex else (whole, mesh_change)
-    if part.field.superfrustum() is None:
-        return whole, mesh_change  # it has no arc and no hole to go by
-    chain = _chain(piece, part, kinds, allowed, resolution)
-    if all(geometry.part for geometry in chain):
-        return chain, _compared(piece, chain, f"chain of {len(chain)} solids")
-    if not convex or len(chain) == 1:
+    boxes = walls(part) if part is not None and Box in kinds else []
+    if boxes:
+        found = _numbered(piece, boxes)
+        return found, _compared(piece, found, "4 boxes")
+    chain = _chain(part, kinds, allowed) if part is not None else []
+    if chain:
+        found = _numbered(piece, chain)
+        return found, _compared(piece, found, f"chain of {len(chain)} solids")
+    if not convex:
         return whole, mesh_change
-    return chain, _compared(piece, chain, f"{len(chain)} convex pieces")
-
-
-def _decomposed(piece: Piece, allowed: float) -> tuple[list[Geometry], Change]:
-    """The convex pieces of a difference or intersection."""
-    found = _numbered(piece, convex_pieces(piece.node, allowed))
+    found = _numbered(piece, _covered(piece.node, kinds, allowed))
+    if len(found) == 1:
+        return whole, mesh_change
     return found, _compared(piece, found, f"{len(found)} convex pieces")
 
 
-def _chain(
-    piece: Piece, part: Part, kinds: Sequence[type[Field]], allowed: float, resolution: int
-) -> list[Geometry]:
-    """The straight segments of a part as solids, or the hulls of their wedges."""
+def _covered(node: Node, kinds: Sequence[type[Field]], allowed: float) -> list[Part | trimesh.Trimesh]:
+    """Convex pieces of a hollow or bent part, a difference or an intersection: as few as the tolerance asks
+    for.
+
+    Each is a native solid where that is as good as its hull, whose faces are moved to add as much as they
+    lack. Found at a size of 1: engines' metres make micrometres of small assemblies.
+    """
+    import trimesh
+
+    lower, upper = node.bounds()
+    middle, side = (lower + upper) / 2, float((upper - lower).max())
+    if not side > 0 or not np.isfinite(side):
+        raise NoSurfaceError(f"{node.name or 'a difference'}: nothing is left of it")
+    thinnest = min(part.field.wall for part in node.parts)
+    unit = node_solid(node, _CHORD * min(allowed, thinnest)).translate(tuple(-middle)).scale((1 / side,) * 3)
+    frame = Similarity(side, translation=tuple(middle.tolist()))
     forms: list[Part | trimesh.Trimesh] = []
+    for one in convex_cover(unit, Limits(allowed / side, _EXTRA)):
+        hull = balanced_hull(one, allowed / side)
+        fits = convex_fits(hull, kinds, "nearest")
+        if fits[0].volume_error_ratio <= _AS_GOOD and fits[0].deviation * side <= allowed:
+            forms.append(fits[0].part.transformed(frame))
+        else:
+            light = light_hull(hull, _LIGHT * allowed / side)[0].to_mesh64()
+            corners = frame(np.asarray(light.vert_properties)[:, :3])
+            forms.append(trimesh.Trimesh(corners, np.asarray(light.tri_verts, np.int64), process=False))
+    return forms
+
+
+def _chain(part: Part, kinds: Sequence[type[Field]], allowed: float) -> list[Part]:
+    """The straight segments of a bent part as solids; none where one of them is near to no solid."""
     named = [kind for kind in kinds if issubclass(kind, Solid)]
-    for segment in segments(part, allowed):
+    own = part.field.superfrustum()
+    forms: list[Part] = []
+    for segment in segments(part, allowed) if own is not None and not own.hollow else ():
         try:
             near = nearest_solid(segment, named)
         except NoSurfaceError:
             continue  # a segment beyond a tip
-        if _alike(near, allowed):
-            forms.append(near.part_with_solid)
-        else:
-            forms += wedges(segment, allowed, resolution)
-    return _numbered(piece, forms)
+        if not _alike(near, allowed):
+            return []
+        forms.append(near.part_with_solid)
+    return forms
 
 
 def _numbered(piece: Piece, forms: Sequence[Part | trimesh.Trimesh]) -> list[Geometry]:

@@ -1,22 +1,15 @@
-"""A bent or hollow part as convex pieces: straight segments along the arc, wedges around the hole."""
+"""Parts as straight ones: a bent part along its arc, a hollow box as its walls."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from partwright.assembly import Part, Similarity
 from partwright.assembly.rows import as_superfrustum
-from partwright.fields import SuperFrustum
-from partwright.meshing import mesh_part
+from partwright.fields import Box, SuperFrustum
 
-if TYPE_CHECKING:
-    import trimesh
-
-MOST_SEGMENTS, FEWEST_WEDGES, MOST_WEDGES = 12, 6, 16
+MOST_SEGMENTS = 12
 _STRAIGHT = 1e-3  # radians
 
 
@@ -46,35 +39,26 @@ def segments(part: Part, allowed: float) -> list[Part]:
     return result
 
 
-def wedges(part: Part, allowed: float, resolution: int) -> list[trimesh.Trimesh]:
-    """Convex meshes that make up a straight part with a hole: hulls of its wedges around the axis.
-
-    So many that no chord leaves a round wall by more than `allowed` or half its thickness. A part without a
-    hole is one.
-    """
-    import trimesh
-    from manifold3d import Manifold, Mesh
-
-    f = as_superfrustum(part.field)
-    mesh = mesh_part(Part(dataclasses.replace(f, bulge=0.0)), resolution)
-    side = float(np.ptp(mesh.vertices, axis=0).max())
-    solid = Manifold(Mesh((mesh.vertices / side).astype(np.float32), mesh.faces.astype(np.uint32)))
-    parts = [solid]
-    if f.hollow:
-        reach = max(1.0, f.taper) * max(f.size[:2]) / 2
-        turn = math.acos(max(1 - min(allowed, f.thinnest / 2) / reach, 0.0))
-        count = min(max(math.ceil(math.pi / turn), FEWEST_WEDGES), MOST_WEDGES)
-        parts = [_wedge(solid, f, i, count) for i in range(count)]
+def walls(part: Part) -> list[Part]:
+    """The four walls of a hollow box, each a box; none of a part that is no hollow box."""
+    own = part.field.superfrustum()
+    if own is None or not own.hollow or own.roundness or own.dilation or own.bulge or own.taper != 1.0:
+        return []
+    x, y, z = own.size
+    wall = (1 - own.onion) * min(x, y) / 2
+    if wall <= 0:
+        return []
     pose = Similarity(1.0, part.rotation, part.translation)
-    result = []
-    for one in parts:
-        hull = one.hull()
-        if hull.volume() > 0:
-            found = hull.to_mesh()
-            result.append(
-                trimesh.Trimesh(pose(found.vert_properties[:, :3] * side), found.tri_verts, process=False)
-            )
-    return result
+    placed = [
+        (Box((x, wall, z)), (0.0, (y - wall) / 2, 0.0)),
+        (Box((x, wall, z)), (0.0, (wall - y) / 2, 0.0)),
+        (Box((wall, y - 2 * wall, z)), ((x - wall) / 2, 0.0, 0.0)),
+        (Box((wall, y - 2 * wall, z)), ((wall - x) / 2, 0.0, 0.0)),
+    ]
+    return [
+        Part(field, (one := pose @ Similarity(translation=place)).translation, one.rotation, part.blend)
+        for field, place in placed
+    ]
 
 
 def _segment(f: SuperFrustum, start: float, stop: float, height: float) -> SuperFrustum:
@@ -93,13 +77,3 @@ def _segment(f: SuperFrustum, start: float, stop: float, height: float) -> Super
         0.0,
         f.onion,
     )
-
-
-def _wedge(solid, f: SuperFrustum, index: int, count: int):  # type: ignore[no-untyped-def]  # Manifolds
-    """What lies between two half planes through the axis, which stand evenly around the cross-section."""
-    for i, sign in ((index, 1.0), (index + 1, -1.0)):
-        turn = 2 * math.pi * (i + 0.5) / count
-        x, y = f.size[0] * math.cos(turn), f.size[1] * math.sin(turn)
-        normal = np.array([-y, x, 0.0]) * sign
-        solid = solid.trim_by_plane(tuple(normal / np.linalg.norm(normal)), 0.0)
-    return solid

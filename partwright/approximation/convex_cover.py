@@ -17,7 +17,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.cutting_planes import Corners, Plane, across_axes, candidates
+from partwright.approximation.cutting_planes import (
+    Corners,
+    Plane,
+    across_axes,
+    beside_concave_edges,
+    candidates,
+)
 from partwright.shapes import MeshDistance
 
 if TYPE_CHECKING:
@@ -25,7 +31,8 @@ if TYPE_CHECKING:
 
 MOST = 64  # pieces at most, where nobody asked for fewer
 _EXACT = 5  # candidates whose pieces are really made
-_LOOKED_AT = 6  # candidates, beside those across the axes, where one cut alone gains nothing
+_LOOKED_AT, _MADE = 6, 3  # planes of faces that are tried and really cut along, where one cut gains nothing
+_TRIES, _CHANGED = 4, 0.005  # of simplifying, and the share of the volume that it may change
 _GAIN = 0.03  # of what a hull adds: a cut that takes less off it looks one cut ahead
 _SLIVER = 1e-5  # of the whole volume: pieces below it are left out
 _SAMPLES = 0.5  # of the tolerance: spacing of points on a hull
@@ -147,8 +154,15 @@ def _beyond(hull: Manifold, points: np.ndarray) -> np.ndarray:
 
 
 def _simplified(solid: Manifold, by: float) -> Manifold:
-    simple = solid.simplify(by)
-    return solid if simple.is_empty() or simple.volume() <= 0 else simple
+    """With fewer triangles, as far as that leaves its volume alone: walls may be thinner than what is
+    allowed."""
+    own = solid.volume()
+    for _ in range(_TRIES):
+        simple = solid.simplify(by)
+        if abs(simple.volume() - own) <= _CHANGED * own:
+            return simple
+        by /= 4
+    return solid
 
 
 def _cut_up(solid: Manifold, limits: Limits) -> list[Piece]:
@@ -217,18 +231,24 @@ def _ahead(piece: Piece, least: float) -> list[Piece]:
         made = _cut(piece, normal, offset, least)
         if len(made) < 2:
             continue
-        left = 0.0
-        for one in made:
-            corners = one.corners
-            second = [corners.hulls(n, d) for n, d in _few(corners)]
-            left += min([*second, one.hull.volume()])
+        left = sum(_after_a_cut(one, least) for one in made)
         if left < best - 1e-6 * piece.hull.volume():
             best, chosen = left, made
     return chosen
 
 
+def _after_a_cut(piece: Piece, least: float) -> float:
+    """Volume of the hulls after the best further cut, of a few; the plainest are really made, and may fall
+    apart."""
+    few = _few(piece.corners)
+    known = [piece.hull.volume(), *(piece.corners.hulls(normal, offset) for normal, offset in few)]
+    for normal, offset in few[:_MADE]:
+        known.append(sum(one.hull.volume() for one in _cut(piece, normal, offset, least)))
+    return min(known)
+
+
 def _few(corners: Corners) -> list[Plane]:
-    return [*candidates(corners)[:_LOOKED_AT], *across_axes(corners)]
+    return [*beside_concave_edges(corners)[:_LOOKED_AT], *across_axes(corners)]
 
 
 def _cut(piece: Piece, normal: np.ndarray, offset: float, least: float) -> list[Piece]:

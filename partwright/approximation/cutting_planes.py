@@ -91,7 +91,7 @@ class Corners:
 def candidates(corners: Corners) -> list[Plane]:
     """Normal (3,) and offset of each plane that may cut well, the plainest first."""
     square = _across(corners, np.eye(3)) if np.abs(corners.axes).max(axis=1).min() < 0.999 else []
-    return [*_along_concave_edges(corners), *square, *_across(corners, corners.axes)]
+    return [*_along_concave_edges(corners, halving=True), *square, *_across(corners, corners.axes)]
 
 
 def across_axes(corners: Corners) -> list[Plane]:
@@ -110,7 +110,12 @@ def _across(corners: Corners, axes: np.ndarray) -> list[Plane]:
     ]
 
 
-def _along_concave_edges(corners: Corners) -> list[Plane]:
+def beside_concave_edges(corners: Corners) -> list[Plane]:
+    """The planes of faces beside concave edges, those with the longest edges first."""
+    return _along_concave_edges(corners, halving=False)
+
+
+def _along_concave_edges(corners: Corners, *, halving: bool) -> list[Plane]:
     """The planes of the faces beside concave edges, and those that halve the angle between them; of planes
     that are nearly the same the one with the longest edges."""
     vertices, normals = corners.vertices, corners.normals
@@ -125,12 +130,13 @@ def _along_concave_edges(corners: Corners) -> list[Plane]:
         return []
     first, second, start, length = first[concave], second[concave], start[concave], length[concave]
     between = first - second
-    rows = np.concatenate([first, second, between])
-    weight = np.tile(length * -sine[concave], 3)
+    kinds = 3 if halving else 2
+    rows = np.concatenate([first, second, between][:kinds])
+    weight = np.tile(length * -sine[concave], kinds)
     weight[2 * len(first) :] *= _HALVING
     norm = np.linalg.norm(rows, axis=1, keepdims=True)
     rows = np.divide(rows, norm, out=np.zeros_like(rows), where=norm > 0)
-    offsets = np.einsum("ij,ij->i", rows, np.tile(start, (3, 1)))
+    offsets = np.einsum("ij,ij->i", rows, np.tile(start, (kinds, 1)))
     real = norm[:, 0] > 0
     rows, offsets, weight = rows[real], offsets[real], weight[real]
     leading = rows[np.arange(len(rows)), np.abs(rows).argmax(axis=1)]

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 _MOST = 128  # corners
+_LOST = 0.01  # of the volume: what is thin keeps more corners
 _FEW = 8  # corners that are taken at once
 
 
@@ -34,9 +35,10 @@ def light_hull(hull: Manifold, by: float, most: int = _MOST) -> tuple[Manifold, 
         normals, offsets = faces_of(light)
         beyond = (corners @ normals.T - offsets).max(axis=1)
         worst = float(beyond.max())
-        if worst <= by or len(chosen) >= min(most, len(corners)):
+        full = light.volume() >= (1 - _LOST) * hull.volume()
+        if (worst <= by and full) or len(chosen) >= min(most, len(corners)):
             return light, max(worst, 0.0)
         height = corners @ normals.T - offsets
-        farthest = np.unique(height.argmax(axis=0)[height.max(axis=0) > by / 2])
+        farthest = np.unique(height.argmax(axis=0)[height.max(axis=0) > min(by, worst) / 2])
         ranked = farthest[np.argsort(-beyond[farthest])]
         chosen.update(ranked[: min(_FEW, most - len(chosen))].tolist())

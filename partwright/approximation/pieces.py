@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
-from partwright.approximation.decomposition import separated
+from partwright.approximation.separation import separated
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.names import unique_names
 from partwright.assembly.palette import palette

@@ -20,8 +20,8 @@ import numpy as np
 
 from partwright import __version__
 from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic, is_operation
-from partwright.approximation.decomposition import separated
 from partwright.approximation.pieces import require_some
+from partwright.approximation.separation import separated
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.file_text import instance_dict
 from partwright.assembly.palette import palette

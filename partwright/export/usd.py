@@ -16,8 +16,8 @@ import numpy as np
 
 from partwright import __version__
 from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic, is_operation
-from partwright.approximation.decomposition import separated
 from partwright.approximation.pieces import nothing_to_export
+from partwright.approximation.separation import separated
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.palette import palette
 from partwright.atomic_io import write_bytes

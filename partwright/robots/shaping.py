@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.balanced_hull import balanced_hull
 from partwright.approximation.convex_cover import (
     Limits,
     Piece,
@@ -62,6 +63,8 @@ def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
         hulls = [_tight(piece, target) for piece in pieces]
     elif wishes.mode == "around":
         hulls = covering(pieces, target.solid)
+    elif wishes.mode == "nearest":
+        hulls = [balanced_hull(piece, wishes.tolerance) for piece in pieces]
     else:
         hulls = [piece.hull for piece in pieces]
     chosen = [_chosen(piece, hull, wishes) for piece, hull in zip(pieces, hulls, strict=True)]

@@ -93,9 +93,9 @@ def test_what_has_no_native_geom_is_told(tmp_path: Path) -> None:
     assert changes["spike",]["volume_error_ratio"] < 1e-3
     assert changes["hook",]["to"] == "chain of 3 solids"
     assert 0 < changes["hook",]["max_deviation"] < 0.05
-    assert changes["cup",]["to"] == "13 convex pieces"  # the tube stays open
+    assert changes["cup",]["to"].endswith("convex pieces")  # the tube stays open
     assert changes["cup",]["volume_error_ratio"] < 0.3
-    assert changes["cup",]["max_deviation"] == pytest.approx(0.01, abs=0.002)  # half the wall, by the chords
+    assert changes["cup",]["max_deviation"] < 0.05 * 1.5
 
     assert changes["block", "hole"]["to"].endswith("convex pieces")
     assert changes["block", "hole"]["volume_error_ratio"] < 0.25  # its hull: 1.01
@@ -114,9 +114,11 @@ def test_a_ball_falls_into_a_hollow_part(tmp_path: Path) -> None:
 
 
 def test_the_tolerance_decides_between_geom_and_mesh(tmp_path: Path) -> None:
-    cone = Assembly((Part(SuperFrustum((1, 1, 2), 1.0, taper=0.6)),), unit="m", up="z")
-    assert model(cone, tmp_path / "a.mjcf", tolerance=0.3).geom_type[0] != mujoco.mjtGeom.mjGEOM_MESH
-    assert model(cone, tmp_path / "a.mjcf", tolerance=0.01).geom_type[0] == mujoco.mjtGeom.mjGEOM_MESH
+    """A cone is no cylinder to speak of, and its hull is exact; one that hardly tapers saves a mesh."""
+    for taper, tolerance, native in ((0.6, 0.3, False), (0.98, 0.05, True), (0.98, 0.001, False)):
+        cone = Assembly((Part(SuperFrustum((1, 1, 2), 1.0, taper=taper)),), unit="m", up="z")
+        kind = model(cone, tmp_path / "a.mjcf", tolerance=tolerance).geom_type[0]
+        assert (kind != mujoco.mjtGeom.mjGEOM_MESH) == native
 
 
 def test_copies_of_a_repeated_part_are_geoms_of_their_own(tmp_path: Path) -> None:
