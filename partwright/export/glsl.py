@@ -1,8 +1,8 @@
 """GLSL: one self-contained `float sdf(vec3 p)`, for GLSL 3.30, GLSL ES 3.00 and later.
 
-The formulas (superfrustum.glsl and, where there are quadrics, quadric.glsl, beside this file) are followed by
-a table of the parts, one constant each, and by the tree of operations. All lengths are in the assembly's own
-unit.
+The formulas (distance.glsl, by which the studio draws as well, superfrustum.glsl and, where there are
+quadrics, quadric.glsl, beside this file) are followed by a table of the parts, one constant each, and by the
+tree of operations. All lengths are in the assembly's own unit.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ def to_glsl(assembly: Assembly) -> str:
         "// float sdf(vec3 p) is the signed distance, negative inside. Put it after `#version 330` or later,",
         "// or after `#version 300 es` and `precision highp float;`.",
         "",
+        _formula("distance.glsl"),
         _formula("superfrustum.glsl"),
     ]
     if any(part.field.quadric() is not None for part in assembly.parts):

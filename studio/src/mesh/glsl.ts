@@ -1,5 +1,6 @@
 /** One self-contained `float sdf(vec3 p)`, as `partwright export -o FILE.glsl` writes it. */
 
+import distanceFormula from "../../../partwright/export/distance.glsl?raw";
 import quadricFormula from "../../../partwright/export/quadric.glsl?raw";
 import superfrustumFormula from "../../../partwright/export/superfrustum.glsl?raw";
 import { quadric, superfrustum } from "../model/fields";
@@ -58,6 +59,7 @@ export function toGlsl(root: Group): string {
     "// float sdf(vec3 p) is the signed distance, negative inside. Put it after `#version 330` or later,",
     "// or after `#version 300 es` and `precision highp float;`.",
     "",
+    distanceFormula,
     superfrustumFormula,
     ...(parts.some((part) => part.field.kind === "quadric") ? [quadricFormula] : []),
     ...rows,

@@ -5,14 +5,16 @@ import { type Program, table, TEXELS } from "../model/program";
 import type { Vec3 } from "../model/vectors";
 import type { View } from "./camera";
 import type { Gpu, Shader, Target } from "./gpu";
-import fieldSource from "./shaders/field.glsl?raw";
+import distanceSource from "../../../partwright/export/distance.glsl?raw";
+import programSource from "./shaders/field.glsl?raw";
 import marchSource from "./shaders/march.frag?raw";
 import probeSource from "./shaders/probe.frag?raw";
 import screenSource from "./shaders/screen.vert?raw";
 import shadeSource from "./shaders/shade.frag?raw";
 import { cull, LISTED, wholeList } from "./tiles";
 
-export { default as fieldSource } from "./shaders/field.glsl?raw";
+/** The field of a program, for any shader to ask. */
+export const fieldSource = distanceSource + programSource;
 
 const BLOCKS = 2; // a side of a tile: rays of one block start together
 

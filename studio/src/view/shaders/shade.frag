@@ -14,8 +14,7 @@ vec3 mapped(vec3 p, int i, int layer) {
     vec3 v = vec3(dot(row(i, 2), q), dot(row(i, 3), q), dot(row(i, 4), q));
     vec4 a = row(i, 5), b = row(i, 6), c = row(i, 7);
     vec2 place = c.x > 0.0 ? bend(v.x, v.z, a.z, c.xyz) : v.xz;
-    vec2 off = abs(vec2(place.x, v.y)) - a.xy + a.w;
-    float across = length(max(off, 0.0)) + min(max(off.x, off.y), 0.0) - a.w;
+    float across = cross_section(vec2(place.x, v.y), a.xy, a.w);
     float t = clamp((place.y / a.z + 1.0) / 2.0, 0.0, 1.0);
     bool inner = b.z < 1e8 && across < (b.y * t + mix(b.z, b.w, t)) / 2.0;
     vec3 n = vec3(place.x, v.y, place.y) / max(a.xyz + b.x, 1e-9);
