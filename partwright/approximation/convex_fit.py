@@ -245,7 +245,7 @@ def _box_around(body: _Body, frame: np.ndarray) -> tuple[Field, Similarity]:
 
 def _cylinder_around(body: _Body, frame: np.ndarray) -> tuple[Field, Similarity]:
     low, high = _extent(body, frame)
-    middle, radius = _smallest_ball((body.corners @ frame)[:, :2])
+    middle, radius = smallest_ball((body.corners @ frame)[:, :2])
     centre = np.array([*middle, (low[2] + high[2]) / 2])
     return Cylinder((1 + _MARGIN) * radius, (1 + _MARGIN) * float(high[2] - low[2])), _placed(
         frame, frame @ centre
@@ -255,7 +255,7 @@ def _cylinder_around(body: _Body, frame: np.ndarray) -> tuple[Field, Similarity]
 def _capsule_around(body: _Body, frame: np.ndarray) -> tuple[Field, Similarity]:
     """The caps begin as near to the middle as the corners beyond them allow."""
     local = body.corners @ frame
-    middle, radius = _smallest_ball(local[:, :2])
+    middle, radius = smallest_ball(local[:, :2])
     radius *= 1 + _MARGIN
     room = np.sqrt(np.maximum(radius**2 - ((local[:, :2] - middle) ** 2).sum(axis=1), 0))
     low, high = float((local[:, 2] + room).min()), float((local[:, 2] - room).max())
@@ -266,7 +266,7 @@ def _capsule_around(body: _Body, frame: np.ndarray) -> tuple[Field, Similarity]:
 
 
 def _sphere_around(body: _Body, _: np.ndarray) -> tuple[Field, Similarity]:
-    centre, radius = _smallest_ball(body.corners)
+    centre, radius = smallest_ball(body.corners)
     return Sphere((1 + _MARGIN) * radius), _placed(np.eye(3), centre)
 
 
@@ -294,7 +294,7 @@ def _ellipsoid_around(body: _Body, frame: np.ndarray) -> tuple[Field, Similarity
     return Ellipsoid((x, y, z)), _placed(axes, centre)
 
 
-def _smallest_ball(points: np.ndarray) -> tuple[np.ndarray, float]:
+def smallest_ball(points: np.ndarray) -> tuple[np.ndarray, float]:
     """Centre and radius of the smallest ball around points (N, d), to about a hundredth, by steps towards the
     farthest one (Badoiu and Clarkson, 2003); it contains them all."""
     centre: np.ndarray = points.mean(axis=0)

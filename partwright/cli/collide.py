@@ -13,10 +13,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
         "collide",
         help="replace a robot's collision meshes by few simple shapes",
-        description="Reads a robot (URDF or MJCF) and writes the same into FOLDER, with convex shapes in the "
-        "place of its collision meshes, the meshes it needs, a report and a picture of before and after.",
+        description="Reads a robot (URDF, SDFormat or MJCF) and writes it into FOLDER with convex shapes "
+        "in the place of its collision meshes, the meshes it needs, a report, and a picture of both.",
     )
-    command.add_argument("robot", metavar="ROBOT", type=Path, help="a robot's file: .urdf, .xml or .mjcf")
+    command.add_argument("robot", metavar="ROBOT", type=Path, help="its file: .urdf, .sdf, .xml or .mjcf")
     add_output(
         command,
         "FOLDER",
@@ -52,9 +52,16 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         default=[],
         help="a folder in which packages of package:// and model:// addresses lie; may be given again",
     )
+    option(
+        "--spheres",
+        metavar="N",
+        type=int,
+        help="also N spheres a link, for planners: ROBOT.spheres.yml (cuRobo's) and ROBOT.spheres.json",
+    )
     command.set_defaults(run="collide")
 
 
 def _writes(arguments: argparse.Namespace) -> list[Path]:
     name = arguments.robot.name
-    return [arguments.output / each for each in (name, f"{name}.report.json", f"{name}.png")]
+    more = (f"{name}.spheres.yml", f"{name}.spheres.json") if arguments.spheres is not None else ()
+    return [arguments.output / each for each in (name, f"{name}.report.json", f"{name}.png", *more)]

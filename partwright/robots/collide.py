@@ -23,6 +23,7 @@ from partwright.robots.picture import picture
 from partwright.robots.report import LinkReport, report
 from partwright.robots.shaping import Wishes, shapes_for
 from partwright.robots.solids import Solids, Target, largest_deviation
+from partwright.robots.spheres import as_json, curobo, spheres_for
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -33,6 +34,7 @@ HULL = "hull"
 _SHARE, _LEAST_SHARE = 0.02, 0.003  # of the longest sides of link and robot: the tolerance that none gave
 _FINER = 1  # times a link's tolerance is halved where it overlaps a neighbour more than its mesh did
 _MORE_OVERLAP = 1e-3  # of the smaller link's volume
+_MOST_SPHERES = 1000
 Told = Callable[[str], None]
 
 
@@ -51,6 +53,8 @@ class CollideOptions:
     """Shapes a link at most."""
     kinds: tuple[str, ...] = ()
     """Native solids that may be used, and "hull" for convex meshes; all that the format has if empty."""
+    spheres: int | None = None
+    """Spheres a link that are found beside the shapes; none if not given."""
     extra: float = 0.08
     """Volume that convex pieces may add, over the link's, before it is cut further."""
 
@@ -59,6 +63,10 @@ class CollideOptions:
             raise SettingError("--enclose and --inside contradict each other: take one of them")
         if isinstance(self.max_parts, bool) or not isinstance(self.max_parts, int) or self.max_parts < 1:
             raise SettingError(f"max_parts: expected a number of at least 1, got {self.max_parts!r}")
+        if self.spheres is not None and (
+            isinstance(self.spheres, bool) or not 1 <= self.spheres <= _MOST_SPHERES
+        ):
+            raise SettingError(f"spheres: expected a number from 1 to {_MOST_SPHERES}, got {self.spheres!r}")
         if not 0 < self.extra < np.inf:
             raise SettingError(f"extra: expected a share of the volume such as 0.08, got {self.extra!r}")
         self.length(1.0, 1.0)
@@ -88,13 +96,15 @@ class CollideOptions:
 
 @dataclass(frozen=True)
 class Collided:
-    """The robot as it was and what was written of it. shapes: by the link's name."""
+    """The robot as it was and what is to be written of it. shapes, spheres ((N, 4), centre and radius): by
+    link."""
 
     robot: RobotFile
     shapes: dict[str, list[Shape]]
     links: list[LinkReport]
     pairs_before: dict[Pair, float] = field(default_factory=dict)
     pairs_after: dict[Pair, float] = field(default_factory=dict)
+    spheres: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 def collide(
@@ -174,7 +184,12 @@ def collide(
         )
         for link in links
     ]
-    return Collided(robot, shapes, reports, pairs_before, pairs_after)
+    spheres = {
+        name: spheres_for(target, options.spheres, options.enclose)
+        for name, target in wanted.items()
+        if options.spheres is not None
+    }
+    return Collided(robot, shapes, reports, pairs_before, pairs_after, spheres)
 
 
 def save(result: Collided, folder: str | Path) -> list[Path]:
@@ -195,6 +210,9 @@ def save(result: Collided, folder: str | Path) -> list[Path]:
         (staging / f"{name}.report.json").write_bytes(
             report(name, result.links, result.pairs_before, result.pairs_after)
         )
+        if result.spheres:
+            (staging / f"{name}.spheres.yml").write_bytes(curobo(result.spheres))
+            (staging / f"{name}.spheres.json").write_bytes(as_json(result.spheres))
         picture(result.robot, result.shapes, staging / f"{name}.png")
         written = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
     return [folder / path for path in written]

@@ -12,6 +12,7 @@ from partwright.robots.model import RobotFile
 # suffix -> where its reader is
 READERS = {
     ".urdf": "partwright.robots.urdf:Urdf",
+    ".sdf": "partwright.robots.sdf:Sdf",
     ".xml": "partwright.robots.mjcf:Mjcf",
     ".mjcf": "partwright.robots.mjcf:Mjcf",
 }

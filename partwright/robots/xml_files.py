@@ -21,11 +21,15 @@ def parsed(path: Path, tag: str | None) -> Any:
     """
     from lxml import etree
 
-    parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, huge_tree=False, remove_blank_text=False
-    )
+    # Prefixes that nobody declared are common in robots' files, and their readers take them.
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, recover=True)
     try:
         tree = etree.parse(str(path), parser)
+        for error in parser.error_log:
+            if error.domain != etree.ErrorDomains.NAMESPACE:
+                raise UnreadableFileError(f"{path}: it is no XML: line {error.line}: {error.message}")
+        if tree.getroot() is None:
+            raise UnreadableFileError(f"{path}: it is no XML: it is empty")
     except OSError as error:
         raise UnreadableFileError(
             f"{path}: it cannot be read: {error.strerror or 'it is not there'}"

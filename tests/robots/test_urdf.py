@@ -167,6 +167,12 @@ def test_an_open_box_is_closed_and_that_is_told(tmp_path: Path) -> None:
     assert arm.volume == pytest.approx(1.0, rel=0.05)
 
 
+def test_prefixes_that_nobody_declared_are_kept(tmp_path: Path) -> None:
+    path = changed(urdf(tmp_path / "in"), 'effort="1"', 'effort="1" drake:acceleration="10"')
+    save(collide(path), tmp_path / "out")
+    assert 'drake:acceleration="10"' in (tmp_path / "out" / "pair.urdf").read_text()
+
+
 def test_what_is_no_robot(tmp_path: Path) -> None:
     with pytest.raises(UnreadableFileError, match="there is no such file"):
         open_robot(tmp_path / "a.urdf")

@@ -16,6 +16,7 @@ def run(arguments: argparse.Namespace) -> int:
         inside=arguments.inside,
         tolerance=arguments.tolerance,
         max_parts=arguments.max_parts,
+        spheres=arguments.spheres,
         kinds=tuple(filter(None, arguments.kinds.split(","))),
     )
     result = collide(arguments.robot, options, arguments.packages, told=note)

@@ -1,0 +1,150 @@
+"""Whole robots with simple collision shapes: how many, how far off, whether they contain, and what a step
+costs.
+
+    python benchmarks/robots.py --rows rows.jsonl NAME=PATH ...
+
+PATH is a robot's file (URDF or MJCF), as packages on PyPI ship them: airo-models, gym-ignition-models,
+gymnasium-robotics, robosuite, example-robot-data. Each is done twice: nearest, and containing the visual
+meshes (--enclose) at 10 mm with at most 12 shapes a link. What --rows holds is not measured again. Steps
+are
+MuJoCo's, of MJCF robots, whose colliding meshes MuJoCo takes as their hulls. The table goes to
+benchmarks/results/robots.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import os
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from partwright.robots import CollideOptions, collide, save
+
+TARGET = Path(__file__).parent / "results" / "robots.md"
+STEPS = 500
+WAYS = {"nearest": CollideOptions(), "enclose": CollideOptions(enclose=True, tolerance="10mm", max_parts=12)}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One robot, one way. missing, extra: over the volume of all links. deviation: the largest, in metres.
+
+    contained: links whose fresh points all lie within. step: microseconds with the shapes, over with the
+    hulls of the meshes; None for a robot that is no MJCF. seconds: CPU.
+    """
+
+    robot: str
+    way: str
+    links: int
+    natives: int
+    hulls: int
+    missing: float
+    extra: float
+    deviation: float
+    contained: int | None
+    pairs: tuple[int, int]
+    step: tuple[float, float] | None
+    contacts: tuple[float, float] | None
+    seconds: float
+
+
+def simulated(path: Path) -> tuple[float, float]:
+    """CPU microseconds a step and contacts, means over the first steps from rest."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data)
+    contacts, start = 0, time.process_time()
+    for _ in range(STEPS):
+        mujoco.mj_step(model, data)
+        contacts += data.ncon
+    return 1e6 * (time.process_time() - start) / STEPS, contacts / STEPS
+
+
+def measure(name: str, path: Path, way: str) -> Row:
+    start = time.process_time()
+    result = collide(path, WAYS[way])
+    seconds = time.process_time() - start
+    step = contacts = None
+    if path.suffix == ".xml":
+        with tempfile.TemporaryDirectory() as folder:
+            save(result, folder)
+            (own, touching), (before, touched) = simulated(Path(folder) / path.name), simulated(path)
+        step, contacts = (own, before), (touching, touched)
+    volume = sum(link.volume for link in result.links)
+    hulls = sum(link.shapes.get("hull", 0) for link in result.links)
+    return Row(
+        name,
+        way,
+        len(result.links),
+        sum(link.count for link in result.links) - hulls,
+        hulls,
+        sum(link.missing * link.volume for link in result.links) / volume,
+        sum(link.extra * link.volume for link in result.links) / volume,
+        max(link.deviation for link in result.links),
+        sum(link.sticking_out == 0 for link in result.links) if way == "enclose" else None,
+        (len(result.pairs_before), len(result.pairs_after)),
+        step,
+        contacts,
+        seconds,
+    )
+
+
+def document(rows: list[Row]) -> str:
+    lines = [
+        "# Robots with simple collision shapes",
+        "",
+        f"`python benchmarks/robots.py`; {os.cpu_count()} cores. Missing and extra: volume that the shapes",
+        "lack and add, in % of the links' meshes (enclose: of the visual ones). Contained: links of whose",
+        "visual mesh no corner and none of 100,000 fresh points is outside. Pairs: links that share volume,",
+        f"with the meshes and with the shapes. Step and contacts: MuJoCo's, means of {STEPS} steps, with the",
+        "shapes and with the hulls of the meshes. Seconds are CPU seconds.",
+        "",
+        "| robot | way | links | native | hulls | missing % | extra % | deviation mm | contained | pairs "
+        "| step us | contacts | seconds |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for r in rows:
+        cells = (
+            f"{100 * r.missing:.1f}",
+            f"{100 * r.extra:.1f}",
+            f"{1000 * r.deviation:.1f}",
+            "" if r.contained is None else f"{r.contained} of {r.links}",
+            f"{r.pairs[0]} / {r.pairs[1]}",
+            "" if r.step is None else f"{r.step[0]:.0f} / {r.step[1]:.0f}",
+            "" if r.contacts is None else f"{r.contacts[0]:.1f} / {r.contacts[1]:.1f}",
+            f"{r.seconds:.0f}",
+        )
+        lines.append(f"| {r.robot} | {r.way} | {r.links} | {r.natives} | {r.hulls} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("robots", nargs="+", metavar="NAME=PATH")
+    parser.add_argument("--rows", type=Path, required=True, help="measured rows, kept between runs")
+    options = parser.parse_args()
+    kept = options.rows.read_text().splitlines() if options.rows.exists() else []
+    rows = [Row(**json.loads(line)) for line in kept]
+    for way in WAYS:
+        for name, _, path in (robot.partition("=") for robot in options.robots):
+            if any((row.robot, row.way) == (name, way) for row in rows):
+                continue
+            rows.append(measure(name, Path(path), way))
+            with options.rows.open("a") as file:
+                file.write(json.dumps(dataclasses.asdict(rows[-1])) + "\n")
+            TARGET.write_text(document(rows), encoding="utf-8")
+            print(rows[-1], flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

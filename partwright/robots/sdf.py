@@ -1,0 +1,210 @@
+"""SDFormat: read with its comments, written with other collision elements and else as it was."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from partwright.approximation.ellipsoid import Ellipsoid
+from partwright.assembly import Part, Similarity
+from partwright.assembly.similarity import rotation_matrix
+from partwright.errors import RobotError
+from partwright.export.rigid_body import numbers
+from partwright.export.urdf import roll_pitch_yaw
+from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
+from partwright.robots.model import Files, Link, MeshUse, RobotFile, Shape, frame, from_roll_pitch_yaw
+from partwright.robots.paths import Place, find, new_address, with_companions
+from partwright.robots.xml_files import parsed, serialised, stl, three
+
+
+class Sdf(RobotFile):
+    """A model, or a world of models, in SDFormat. Models that it includes by address stay as they are."""
+
+    kinds: ClassVar[tuple[type[Field], ...]] = (Box, Cylinder, Sphere, Capsule, Ellipsoid)
+
+    def __init__(self, path: Path, packages: Sequence[Path] = ()) -> None:
+        """Raises UnreadableFileError or RobotError, which name the link."""
+        self.path, self.packages = path, packages
+        self._tree = parsed(path, "sdf")
+        self._places: dict[str, Place] = {}
+        self._links = dict(self._named(self._tree.getroot(), ""))
+        parents = {}
+        for joint in self._tree.getroot().iter("joint"):
+            child = _scoped(joint, joint.findtext("child", "").strip())
+            parent = _scoped(joint, joint.findtext("parent", "").strip())
+            if child in parents and child in self._links:
+                raise RobotError(
+                    f"{path}: link {child!r} hangs on two joints: {joint.get('name')!r} closes a loop"
+                )
+            parents[child] = parent if parent in self._links else None
+        self.links = [self._link(name, element, parents.get(name)) for name, element in self._links.items()]
+
+    def replaced(self, shapes: Mapping[str, Sequence[Shape]]) -> Files:
+        files = Files()
+        tree = copy.deepcopy(self._tree)
+        for name, link in self._named(tree.getroot(), ""):
+            if name in shapes:
+                self._replace(link, shapes[name], files)
+        for uri in tree.getroot().iterfind(".//mesh/uri"):
+            place = self._places.get((uri.text or "").strip())
+            if place is not None and not uri.get("new"):
+                files.copied.update(with_companions(place))
+                uri.text = place.address
+        for uri in tree.getroot().iterfind(".//mesh/uri[@new]"):
+            del uri.attrib["new"]
+        files.written[self.path.name] = serialised(tree)
+        return files
+
+    def _named(self, element: Any, scope: str) -> Iterator[tuple[str, Any]]:
+        """Links with their names, those of nested models as MODEL::LINK."""
+        for child in element:
+            if child.tag == "link":
+                if not child.get("name"):
+                    raise RobotError(f"{self.path}: line {child.sourceline}: a link without a name")
+                yield scope + child.get("name"), child
+            elif child.tag in ("model", "world"):
+                within = f"{scope}{child.get('name')}::" if element.tag in ("model", "world") else ""
+                yield from self._named(child, within)
+
+    def _link(self, name: str, element: Any, parent: str | None) -> Link:
+        uses: dict[str, list[MeshUse]] = {"visual": [], "collision": []}
+        natives: list[Part] = []
+        for role, found in uses.items():
+            for child in element.findall(role):
+                place = _pose(child, self.path, name)
+                mesh = child.find("geometry/mesh")
+                if mesh is not None:
+                    found.append(self._use(mesh, place, name))
+                elif role == "collision":
+                    natives += _natives(child, place, self.path, name)
+        pose = _pose(element, self.path, name)
+        above = element.getparent()
+        while above is not None and above.tag == "model":
+            pose = _pose(above, self.path, name) @ pose
+            above = above.getparent()
+        return Link(name, pose, parent, tuple(uses["collision"]), tuple(uses["visual"]), tuple(natives))
+
+    def _use(self, mesh: Any, place: np.ndarray, link: str) -> MeshUse:
+        address = mesh.findtext("uri", "").strip()
+        if address not in self._places:
+            self._places[address] = find(address, self.path.parent, self.packages, link)
+        scale = three(mesh.findtext("scale", "1 1 1"), self.path, f"link {link!r}: scale")
+        return MeshUse(self._places[address].path, place @ np.diag([*scale, 1.0]))
+
+    def _replace(self, link: Any, shapes: Sequence[Shape], files: Files) -> None:
+        old = [c for c in link.findall("collision") if c.find("geometry/mesh") is not None]
+        like = self._places[old[0].findtext("geometry/mesh/uri", "").strip()]
+        first, tail = link.index(old[0]), old[0].tail
+        for element in old:
+            link.remove(element)
+        for i, shape in enumerate(shapes):
+            element = _collision(shape, like, old[0], files)
+            element.tail = tail
+            link.insert(first + i, element)
+
+
+def _scoped(joint: Any, name: str) -> str:
+    """A link as a joint names it, with the models that the joint is nested in."""
+    scope, above = "", joint.getparent()
+    while above is not None and above.getparent() is not None and above.getparent().tag in ("model", "world"):
+        scope, above = f"{above.get('name')}::{scope}", above.getparent()
+    return scope + name
+
+
+def _pose(element: Any, path: Path, name: str) -> np.ndarray:
+    """(4, 4) of the element's own pose.
+
+    Raises:
+        RobotError: it is no six numbers, or relative to another frame, which only a simulator resolves.
+    """
+    pose = element.find("pose")
+    if pose is None or not (pose.text or "").strip():
+        return np.eye(4)
+    other = pose.get("relative_to") or pose.get("frame")
+    if other and other not in ("__model__", "world"):
+        raise RobotError(
+            f"{path}: {name!r}: its pose is relative to {other!r}; give it relative to its parent"
+        )
+    words = pose.text.split()
+    if len(words) != 6:
+        raise RobotError(f"{path}: {name!r}: pose: expected six numbers, got {pose.text.strip()!r}")
+    place = three(" ".join(words[:3]), path, f"{name!r}: pose")
+    angles = three(" ".join(words[3:]), path, f"{name!r}: pose")
+    if pose.get("degrees") in ("true", "1"):
+        angles = np.radians(angles).tolist()
+    return frame(from_roll_pitch_yaw(*angles), place)
+
+
+def _natives(collision: Any, place: np.ndarray, path: Path, link: str) -> list[Part]:
+    """The solid of a collision element that is one; of another kind it stays, and is not measured."""
+    where = f"link {link!r}: collision"
+    fields: list[Field] = []
+    for element in collision.iterfind("geometry/*"):
+        match element.tag:
+            case "box":
+                x, y, z = three(element.findtext("size", ""), path, where)
+                fields.append(Box((x, y, z)))
+            case "ellipsoid":
+                x, y, z = three(element.findtext("radii", ""), path, where)
+                fields.append(Ellipsoid((x, y, z)))
+            case "sphere":
+                fields.append(Sphere(_number(element, "radius", path, where)))
+            case "cylinder" | "capsule":
+                kind = Cylinder if element.tag == "cylinder" else Capsule
+                fields.append(kind(*(_number(element, key, path, where) for key in ("radius", "length"))))
+    pose = Similarity.from_matrix(place)
+    return [Part(field, pose.translation, pose.rotation) for field in fields]
+
+
+def _number(element: Any, key: str, path: Path, where: str) -> float:
+    text = element.findtext(key, "")
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or value <= 0:
+        raise RobotError(f"{path}: {where}: {key} is {text!r}, expected a length")
+    return value
+
+
+def _collision(shape: Shape, like: Place, old: Any, files: Files) -> Any:
+    """A collision element with the surface, contact bits and whatever else the old one had."""
+    from lxml import etree
+
+    element = etree.Element("collision", name=shape.name)
+    geometry = etree.SubElement(element, "geometry")
+    if shape.part is None:
+        address, within = new_address(f"{shape.name}.stl", like)
+        files.written[within] = stl(shape.mesh)
+        uri = etree.SubElement(etree.SubElement(geometry, "mesh"), "uri", new="yes")
+        uri.text = address
+    else:
+        angles = roll_pitch_yaw(rotation_matrix(shape.part.rotation))
+        pose = etree.Element("pose")
+        pose.text = numbers([*shape.part.translation, *angles])
+        element.insert(0, pose)
+        solid = etree.SubElement(geometry, shape.part.field.kind)
+        for key, value in _sizes(shape.part.field).items():
+            etree.SubElement(solid, key).text = value
+    for child in old:
+        if child.tag not in ("pose", "geometry"):
+            element.append(copy.deepcopy(child))
+    return element
+
+
+def _sizes(field: Field) -> dict[str, str]:
+    match field:
+        case Box(size=size):
+            return {"size": numbers(size)}
+        case Sphere(radius=radius):
+            return {"radius": numbers([radius])}
+        case Cylinder(radius=radius, height=height) | Capsule(radius=radius, height=height):
+            return {"radius": numbers([radius]), "length": numbers([height])}
+        case Ellipsoid(radii=radii):
+            return {"radii": numbers(radii)}
+    raise AssertionError(f"SDFormat has no {field.kind}")
