@@ -8,6 +8,7 @@ import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.tree import Operation
+from partwright.errors import NoSurfaceError
 from partwright.fields import Box
 from partwright.meshing import has_exact_mesh, mesh_assembly, mesh_csg
 
@@ -26,6 +27,14 @@ def is_atomic(node: Node) -> bool:
 def is_operation(node: Node, operation: Operation) -> bool:
     """Whether the node is an assembly of that operation."""
     return isinstance(node, Assembly) and node.operation == operation
+
+
+def check_ends(assembly: Assembly) -> None:
+    """Raises NoSurfaceError for an assembly without end, of which no scene could show all that there is."""
+    box = assembly.bounds()
+    if not np.isfinite(box).all():
+        axes = ", ".join(axis for axis, low, high in zip("xyz", *box, strict=True) if not high - low < np.inf)
+        raise NoSurfaceError(f"the assembly does not end along {axes}; intersect it with what bounds it")
 
 
 def atomic_mesh(node: Node, assembly: Assembly) -> trimesh.Trimesh:

@@ -34,6 +34,19 @@ def separated(node: Node) -> Iterator[Node]:
             yield Assembly((child, *cutting), "difference", child.name) if cutting else child
 
 
+def subtracted_names(node: Node) -> frozenset[str]:
+    """Names of the parts that a node takes away: what a difference subtracts, less what that subtracts
+    itself."""
+    if isinstance(node, Part):
+        return frozenset()
+    if node.operation != "difference":
+        return frozenset().union(*map(subtracted_names, node.children))
+    first, *cutters = node.children
+    taken = {part.name for cutter in cutters for part in cutter.parts}
+    back = frozenset().union(*map(subtracted_names, cutters))
+    return subtracted_names(first) | (taken - back)
+
+
 def _common(a: Node, b: Node, tolerance: float | None) -> Manifold | None:
     """What two nodes have in common, one of them perhaps endless; None where that is nothing."""
     try:

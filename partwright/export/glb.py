@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from partwright import __version__
-from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic, is_operation
+from partwright.approximation.atomic_nodes import atomic_mesh, check_ends, is_atomic, is_operation
 from partwright.approximation.pieces import require_some
-from partwright.approximation.separation import separated
+from partwright.approximation.separation import separated, subtracted_names
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.file_text import instance_dict
 from partwright.assembly.palette import palette
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 _VERTICES, _INDICES = 34962, 34963  # glTF's targets of buffer views
 _HALF = math.sqrt(0.5)
+_SUBTRACTED = {"role": "subtracted"}
 # up axis -> the rotation that turns it to +Y
 _TO_Y_UP = {
     "y": NO_ROTATION,
@@ -57,8 +58,11 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
 
     Raises:
         NothingToExportError: no part has a surface.
+        NoSurfaceError: the assembly does not end.
     """
     from trimesh.exchange.gltf import export_glb
+
+    check_ends(assembly)
 
     def describe(tree: dict[str, Any]) -> None:
         tree["asset"]["generator"] = f"Partwright {__version__}"
@@ -121,9 +125,10 @@ class _Scene:
             add = self._add_whole if is_operation(child, "difference") and subtracts else self.add
             add(child, name, np.eye(4), {})
         for cutter in node.children[1:] if subtracts else ():
+            back = subtracted_names(cutter)
             for part in (cutter,) if isinstance(cutter, Part) else cutter.parts:
                 placed = Similarity(1.0, part.rotation, part.translation).matrix()
-                about = _extras(part) | {"role": "subtracted"}
+                about = _extras(part) | ({} if part.name in back else _SUBTRACTED)
                 self.scene.graph.update(frame_to=part.name, frame_from=name, matrix=placed, metadata=about)
 
     def _add_part(self, part: Part, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> None:
@@ -148,9 +153,10 @@ class _Scene:
         """One mesh in the assembly's own frame, in the colour of what is left of it or comes first."""
         parts = (node,) if isinstance(node, Part) else node.parts
         operation = "intersection" if isinstance(node, Part) else node.operation
+        taken = subtracted_names(node)
         about = extras | {
             "operation": operation,
-            "parts": [{"name": p.name} | _extras(p) for p in parts],
+            "parts": [{"name": p.name} | _extras(p) | _role(p.name, taken) for p in parts],
         }
         name = self._name_of_whole(node)
         try:
@@ -191,6 +197,10 @@ class _Scene:
     def _add_bare(self, name: str, parent: str, pose: np.ndarray, about: dict[str, Any]) -> None:
         about = about | {"note": "no surface of its own at this resolution"}
         self.scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=about)
+
+
+def _role(name: str, subtracted: frozenset[str]) -> dict[str, Any]:
+    return _SUBTRACTED if name in subtracted else {}
 
 
 def _extras(part: Part) -> dict[str, Any]:

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from partwright import __version__
-from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic, is_operation
+from partwright.approximation.atomic_nodes import atomic_mesh, check_ends, is_atomic, is_operation
 from partwright.approximation.pieces import nothing_to_export
-from partwright.approximation.separation import separated
+from partwright.approximation.separation import separated, subtracted_names
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.palette import palette
 from partwright.atomic_io import write_bytes
@@ -37,9 +37,11 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
 
     Raises:
         NothingToExportError: no part has a surface.
+        NoSurfaceError: the assembly does not end.
     """
     from pxr import Usd, UsdGeom
 
+    check_ends(assembly)
     stage = Usd.Stage.CreateInMemory()
     up = canonical_up(assembly.up) if assembly.up else "z"
     UsdGeom.SetStageUpAxis(stage, _AXES.get(up, "Z"))
@@ -101,7 +103,8 @@ class _Writer:
         parts = (node,) if isinstance(node, Part) else node.parts
         prim = self._xform(parent, node.name or ("convex" if is_atomic(node) else "cut"))
         about: dict[str, Any] = {} if isinstance(node, Part) else {"operation": node.operation}
-        about["parts"] = {part.name: _about(part) for part in parts}
+        taken = subtracted_names(node)
+        about["parts"] = {p.name: _about(p, (p.name in taken) != subtracted) for p in parts}
         try:
             mesh = atomic_mesh(node, self.assembly)
         except NoSurfaceError:
@@ -111,7 +114,7 @@ class _Writer:
         prim.SetCustomData({"partwright": _plain(about)})
 
     def _add_part(self, prim: Any, part: Part, parent: str, subtracted: bool) -> None:
-        about = _about(part)
+        about = _about(part, subtracted)
         pose = Similarity(1.0, part.rotation, part.translation)
         try:
             mesh = mesh_part(Part(part.field), self.resolution)
@@ -157,10 +160,12 @@ class _Writer:
         prim.CreateDisplayColorAttr(Vt.Vec3fArray.FromNumpy(colour[None].astype(np.float32)))
         if subtracted:
             prim.CreatePurposeAttr(UsdGeom.Tokens.guide)
+            prim.CreateVisibilityAttr(UsdGeom.Tokens.invisible)  # some viewers show guides
 
 
-def _about(part: Part) -> dict[str, Any]:
-    return {"field": part.field.to_dict(), "blend": part.blend, "metadata": dict(part.metadata)}
+def _about(part: Part, subtracted: bool) -> dict[str, Any]:
+    own = {"field": part.field.to_dict(), "blend": part.blend, "metadata": dict(part.metadata)}
+    return own | ({"role": "subtracted"} if subtracted else {})
 
 
 def _place(prim: Any, pose: Similarity) -> None:

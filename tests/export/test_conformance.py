@@ -61,11 +61,21 @@ def assemblies() -> dict[str, Assembly]:
     cube = Assembly(half_spaces(), "intersection", name="cube")
     drill = Part(Quadric.cylinder(0.5), name="drill")
     frustum = Part(SuperFrustum((1, 0.8, 2), 0.4, 0.05, 0.7), name="frustum")
+    core = Part(Cylinder(0.2, 3), name="core")  # what the hole leaves standing
+    body = Assembly((plate, Part(Box((0.4, 0.4, 1)), (2, 0, 0), name="beside")), name="body")
+    drilled = Assembly(
+        (body, Assembly((hole, core), "difference", name="ring")), "difference", name="drilled"
+    )
+    shallow = (drill, *half_spaces()[2::3])
     return {
         "one box": Assembly((Part(Box((1, 2, 3)), (4, 0, 0), name="box"),), unit="mm", up="z"),
         "a blended union": Assembly((Part(Box((1, 1, 1)), name="a"), ball), unit="cm", up="y"),
         "a difference": Assembly((plate, hole), "difference", unit="in", up="z"),
         "a repeated part": Assembly((plate, foot), name="table", unit="m", up="z"),
+        "a hole with a core": Assembly((drilled,), unit="mm", up="z"),
+        "a convex less a convex": Assembly(
+            (cube, Assembly(shallow, "intersection", name="shallow")), "difference", unit="mm", up="y"
+        ),
         "quadrics": Assembly((cube, drill), "difference", unit="mm", up="z"),
         "nothing known": Assembly((frustum, Part(Box((2, 2, 0.2)), (0, 0, -1), name="base"))),
     }

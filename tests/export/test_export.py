@@ -135,6 +135,17 @@ def test_subtracted_parts_are_marked(tmp_path: Path) -> None:
     assert "role" not in nodes["block"]["extras"]
 
 
+def test_what_is_subtracted_is_marked_within_wholes_too(tmp_path: Path) -> None:
+    """A hole's own core is none of what is subtracted."""
+    ring = Part(Sphere(0.5), name="hole") - Part(Sphere(0.2), name="core")
+    export(Part(Box((2, 2, 2)), name="block") - ring, tmp_path / "a.glb")
+    nodes = {node["name"]: node for node in header(tmp_path / "a.glb")["nodes"]}
+    roles = {part["name"]: part.get("role") for part in nodes["block"]["extras"]["parts"]}
+    assert roles == {"block": None, "hole": "subtracted", "core": None}
+    assert "mesh" not in nodes["hole"]
+    assert "role" not in nodes["core"]["extras"]
+
+
 def test_a_part_without_volume_is_a_node_without_mesh(tmp_path: Path) -> None:
     sheet = Part(SuperFrustum((1, 1, 1), onion=1.0), name="sheet")
     export(Part(Sphere(1.0), name="ball") | sheet, tmp_path / "a.glb")

@@ -198,3 +198,13 @@ def test_copies_that_are_turned_are_parts_of_their_own(tmp_path: Path) -> None:
     export(solid, tmp_path / "a.scad")
     assert "times" not in (tmp_path / "a.scad").read_text()
     assert rendered(tmp_path / "a.scad").volume == pytest.approx(mesh_csg(solid).volume, rel=2e-3)
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".usda"])
+def test_a_scene_of_what_does_not_end_is_refused_not_left_empty(tmp_path: Path, suffix: str) -> None:
+    if suffix == ".usda":
+        pytest.importorskip("pxr")
+    rod = Assembly((Part(Box((1, 1, 1))), Part(Quadric.cylinder(0.2))), unit="mm", up="z")
+    with pytest.raises(NoSurfaceError, match="does not end along z"):
+        export(rod, tmp_path / f"a{suffix}")
+    assert not list(tmp_path.iterdir())

@@ -94,6 +94,11 @@ def test_subtracted_parts_are_guides_and_copies_are_in_place(tmp_path: Path) -> 
     meshes = {str(p.GetPath()): UsdGeom.Mesh(p) for p in stage.Traverse() if p.IsA(UsdGeom.Mesh)}
     purposes = {path.split("/")[-2]: mesh.GetPurposeAttr().Get() for path, mesh in meshes.items()}
     assert purposes == {"block": "default", "hole": "guide", "leg": "default", "leg_2": "default"}
+    shown = {path.split("/")[-2]: mesh.ComputeVisibility() for path, mesh in meshes.items()}
+    assert shown == {"block": "inherited", "hole": "invisible", "leg": "inherited", "leg_2": "inherited"}
+    assert (
+        stage.GetPrimAtPath("/assembly/assembly/hole").GetCustomData()["partwright"]["role"] == "subtracted"
+    )
     assert np.allclose(bounds(stage), [[-1.0, -1.0, -1.0], [4.2, 1.0, 1.0]], atol=0.03)
 
 
