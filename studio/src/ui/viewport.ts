@@ -1,45 +1,30 @@
-/** The picture and what is done in it: orbit, pan, zoom, select, drag handles, measure. */
+/** What is done in the picture: orbit, pan, zoom, select, drag handles, measure. */
 
 import { drawGizmo, type Handle } from "../edit/gizmo";
-import { type Measurement, type Measuring, measure, POINTS } from "../edit/measure";
+import type { Measurement, Measuring } from "../edit/measure";
 import { Region } from "../edit/region";
 import { type Axis, type Mode, Transform } from "../edit/transform";
-import { combined, isLearned, type Meshes, rayHit, smoothNormals, type Triangles } from "../model/learned";
-import { type Maps, PartMaps } from "../model/maps";
-import { fromUnit, toUnit } from "../model/program";
-import { rgb } from "../model/palette";
+import { toUnit } from "../model/program";
 import type { Store } from "../model/store";
-import { type Box, type Vec3, add, dot, EMPTY, isFinite3, joinBoxes, mul, sub } from "../model/vectors";
-import { partBox } from "../model/program";
-import { roundDown } from "../model/lengths";
-import { Camera, project, rayThrough, type View } from "../view/camera";
-import { across, type Hit, pick, through } from "../view/picking";
-import { NoWebGL } from "../view/gpu";
-import { Renderer } from "../view/renderer";
+import { type Vec3, add, dot, mul, sub } from "../model/vectors";
+import { project, rayThrough } from "../view/camera";
+import { type Hit, through } from "../view/picking";
 import { h, svg } from "./dom";
+import { Measurements } from "./measurements";
+import { Scene } from "./scene";
 
 export type Tool = "select" | Mode | "measure";
 
 const DRAG = 4; // pixels that a click may wander
 
-export class Viewport {
-  readonly element: HTMLElement;
-  readonly canvas = h("canvas", { class: "picture", tabindex: "0", "aria-label": "The assembly" });
-  readonly camera: Camera;
-  renderer: Renderer | null = null;
+export class Viewport extends Scene {
   tool: Tool = "select";
-  measuring: Measuring = "distance";
-  readonly measurements: Measurement[] = [];
+  readonly measured: Measurements;
   transform: Transform | null = null;
   onStatus: (text: string) => void = () => {};
   onTool: () => void = () => {};
-  private points: Vec3[] = [];
-  readonly maps = new PartMaps(() => this.upload());
-  private meshes: Meshes = new Map();
-  private uploadedMaps: Maps | null = null;
   private overlay = svg("svg", { class: "overlay" });
   private gizmoLayer = svg("g");
-  private measureLayer = svg("g", { class: "measures" });
   readonly region: Region;
   private pointers = new Map<number, { x: number; y: number }>();
   private gesture: { x: number; y: number; moved: boolean; button: number; pan: boolean } | null = null;
@@ -47,176 +32,38 @@ export class Viewport {
   private start = { x: 0, y: 0 };
   private dragging = false;
 
-  constructor(private store: Store) {
-    this.camera = new Camera(store.root.up);
+  constructor(store: Store) {
+    super(store);
     this.region = new Region(store);
     this.region.redraw = () => this.drawOverlay();
     this.region.onStatus = (text) => this.onStatus(text);
-    this.overlay.append(this.measureLayer, this.region.layer, this.gizmoLayer);
-    this.element = h("div", { class: "viewport" }, this.canvas, this.overlay, this.region.bar);
-    try {
-      this.renderer = new Renderer(this.canvas, {
-        show: "parts",
-        wipe: 0.5,
-        heat: false,
-        most: 0.03,
-        paper: [1, 1, 1],
-        ink: [0, 0, 0],
-        accent: [0.2, 0.4, 1],
-        ground: [0, 0, 1, -0.9],
-        grid: 0.1,
-      });
-      this.renderer.onPicture = () => this.drawOverlay();
-      this.renderer.onLost = () => this.restore();
-    } catch (error) {
-      if (!(error instanceof NoWebGL)) throw error;
-      const text = `${error.message} The list of parts, their numbers and the downloads work all the same; to see the shape, use a browser with WebGL 2, or turn on hardware acceleration in this one.`;
-      this.element.append(h("div", { class: "no-webgl", role: "alert" }, text));
-    }
-    store.on(["document", "view"], () => this.upload());
-    store.on(["selection", "hover"], () => this.mark());
-    new ResizeObserver(() => this.resize()).observe(this.element);
+    this.measured = new Measurements(store, this, (text) => this.onStatus(text));
+    this.overlay.append(this.measured.layer, this.region.layer, this.gizmoLayer);
+    this.element.append(this.overlay, this.region.bar);
     this.listen();
   }
 
-  begin(): void {
-    this.camera.stand(this.store.root.up);
-    this.resize();
-    this.frameAll();
-    this.upload();
-    this.ground();
-    if (this.renderer && !this.renderer.ready) void this.standIn();
+  get measuring(): Measuring {
+    return this.measured.kind;
   }
 
-  /** Told to give the driver all again that it has lost. */
-  onLost: () => void = () => {};
-
-  private restore(): void {
-    this.uploadedMaps = null;
-    this.onLost();
-    this.look();
-    this.upload();
+  set measuring(kind: Measuring) {
+    this.measured.kind = kind;
   }
 
-  /** A coarse mesh, until the shader is compiled. */
-  private async standIn(): Promise<void> {
-    const { store, renderer } = this;
-    if (!store.program.parts.length) return;
-    const { mesh } = await import("../mesh/mesher");
-    const surface = await mesh(store, 48, this).catch(() => null);
-    if (!surface || !renderer || renderer.ready) return;
-    const { places, normals, triangles } = surface;
-    const colours = new Uint8Array((places.length / 3) * 4);
-    for (let i = 0; i < places.length / 3; i++) colours.set([...surface.colours.subarray(3 * i, 3 * i + 3), surface.owners[i] + 1], 4 * i);
-    renderer.setMesh("standIn", { places, normals, colours, triangles });
+  get measurements(): Measurement[] {
+    return this.measured.list;
   }
 
-  private get size(): [number, number] {
-    const half = this.renderer?.look.show === "beside" ? 0.5 : 1;
-    return [this.element.clientWidth * half, this.element.clientHeight];
-  }
-
-  get view(): View {
-    const [width, height] = this.size;
-    return this.camera.view(width / Math.max(height, 1));
-  }
-
-  private resize(): void {
-    this.renderer?.resize();
-    this.overlay.setAttribute("viewBox", `0 0 ${this.element.clientWidth} ${this.element.clientHeight}`);
-    this.look();
-  }
-
-  look(): void {
-    this.renderer?.setView(this.view);
-    this.drawOverlay();
-  }
-
-  /** Meshes of learned parts, as they were decoded last. */
-  setLearned(meshes: Meshes): void {
-    this.meshes = meshes;
-    this.upload();
-  }
-
-  /** Where the learned parts are now; null where there are none. */
-  learned: Triangles | null = null;
-
-  private placeLearned(): void {
-    const { store, renderer, meshes } = this;
-    const before = this.learned;
-    this.learned = meshes.size && store.program.parts.some(isLearned) ? combined(store.program.parts, store.hidden, meshes) : null;
-    if (!renderer || (!this.learned && !before)) return;
-    if (!this.learned) return renderer.setMesh("learned", null);
-    const { places, owners, triangles } = this.learned;
-    const { scale, offset } = store.frame;
-    const shown = store.program.parts.map((part) => rgb(store.colourOf(part)).map((v) => Math.round(v * 255)));
-    const colours = new Uint8Array(owners.length * 4);
-    owners.forEach((owner, i) => colours.set([...shown[owner], Math.min(owner + 1, 255)], 4 * i));
-    renderer.setMesh("learned", { places: places.map((v, i) => v * scale + offset[i % 3]), normals: smoothNormals(this.learned), colours, triangles });
-  }
-
-  /** Whether parts that have baked colours show them. */
-  baked = true;
-  showBaked(on: boolean): void {
-    this.baked = on;
-    this.upload();
-  }
-
-  /** The layers of the parts' images, where they are to be seen. */
-  get layers(): number[] {
-    return this.baked ? this.maps.of(this.store.program.parts) : [];
-  }
-
-  upload(): void {
-    const { renderer, store } = this;
-    this.placeLearned();
-    if (renderer) {
-      const layers = this.layers;
-      if (this.maps.maps !== this.uploadedMaps) renderer.setMaps((this.uploadedMaps = this.maps.maps));
-      renderer.setColours(store.program.parts.map((part) => rgb(store.colourOf(part))));
-      renderer.setProgram(store.program, layers);
-    }
-    this.mark();
-    this.drawOverlay();
-  }
-
-  mark(): void {
-    const chosen = new Set(this.store.selectedParts.map((part) => part.id));
-    const marks = this.store.program.parts.map(
-      (part) => (chosen.has(part.id) ? 1 : 0) + (part.id === this.store.hovered ? 2 : 0),
-    );
-    this.renderer?.setMarks(Uint8Array.from(marks));
-    this.drawOverlay();
-  }
-
-  private ground(): void {
-    const { above } = this.camera;
-    const { box } = this.store.program;
-    const low = Math.min(...[box[0], box[1]].map((corner) => dot(corner, above)));
-    this.renderer?.setLook({ ground: [...above, low - 0.002], grid: roundDown(this.store.size / 8) * this.store.frame.scale });
-  }
-
-  frameAll(): void {
-    const chosen = this.store.selectedParts.map(partBox).filter(isFinite3);
-    let box: Box = this.store.program.box;
-    if (chosen.length) {
-      const own = chosen.reduce(joinBoxes, EMPTY);
-      box = [toUnit(this.store.frame, own[0]), toUnit(this.store.frame, own[1])];
-    }
-    const [width, height] = this.size;
-    this.camera.frame(box, width / Math.max(height, 1));
-    this.look();
-  }
-
-  lookFrom(azimuth: number, elevation: number): void {
-    [this.camera.azimuth, this.camera.elevation] = [azimuth, elevation];
-    this.look();
+  protected override resize(): void {
+    this.overlay?.setAttribute("viewBox", `0 0 ${this.element.clientWidth} ${this.element.clientHeight}`);
+    super.resize();
   }
 
   setTool(tool: Tool): void {
     this.cancelTransform();
     this.tool = tool;
-    this.points = [];
+    this.measured.begin();
     this.onTool();
     this.drawOverlay();
   }
@@ -339,38 +186,6 @@ export class Viewport {
     this.click(this.place(event), event.shiftKey || event.metaKey);
   }
 
-  hitAt(at: { x: number; y: number }): Hit | null {
-    const [width, height] = this.size;
-    let x = at.x;
-    if (this.renderer?.look.show === "beside") {
-      if (x < width) return null;
-      x -= width;
-    }
-    const { view } = this;
-    const ray = rayThrough(view, x, at.y, width, height);
-    const hit = pick(this.store.program, view.eye, ray);
-    const learned = this.learnedHit(view.eye, ray);
-    return learned && (!hit || learned.distance < hit.distance) ? learned : hit;
-  }
-
-  /** What a ray of the unit frame meets of the learned parts; only: of one of them. */
-  private learnedHit(eye: Vec3, ray: Vec3, from = 0, only = -1): Hit | null {
-    if (!this.learned) return null;
-    const { frame } = this.store;
-    const hit = rayHit(this.learned, fromUnit(frame, eye), ray, from / frame.scale, only);
-    return hit && { part: hit.part, normal: hit.normal, distance: hit.distance * frame.scale, point: add(eye, mul(ray, hit.distance * frame.scale)) };
-  }
-
-  /** The other side of what is clicked: where its material ends, or, of a diameter, all across the part. */
-  private opposite(hit: Hit): Hit | null {
-    const { program } = this.store;
-    const whole = this.measuring === "diameter";
-    if (!isLearned(program.parts[hit.part])) return whole ? across(program, hit) : through(program, hit);
-    const inwards = mul(hit.normal, -1);
-    if (whole) return this.learnedHit(add(hit.point, mul(inwards, 4)), hit.normal, 0, hit.part);
-    return this.learnedHit(hit.point, inwards, 1e-3, hit.part);
-  }
-
   private hoverAt(at: { x: number; y: number }): void {
     const hit = this.hitAt(at);
     this.store.hover(hit ? (this.store.program.parts[hit.part]?.id ?? null) : null);
@@ -392,13 +207,6 @@ export class Viewport {
     return was;
   }
 
-  /** What the picture's middle shows. */
-  middleHit(): Hit | null {
-    const [width, height] = this.size;
-    const shift = this.renderer?.look.show === "beside" ? width : 0;
-    return this.hitAt({ x: shift + width / 2, y: height / 2 });
-  }
-
   private click(at: { x: number; y: number }, more: boolean): void {
     const hit = this.hitAt(at);
     const { awaited } = this;
@@ -408,37 +216,13 @@ export class Viewport {
       return awaited(hit, other && other.distance / this.store.frame.scale);
     }
     if (this.tool === "measure") {
-      if (hit) this.measureAt(hit);
+      if (hit) this.measured.add(hit);
+      this.drawOverlay();
       return;
     }
     const part = hit && this.store.program.parts[hit.part];
     if (part) this.store.select([part.id], more);
     else if (!more) this.store.select([]);
-  }
-
-  // Measuring
-
-  private measureAt(hit: Hit): void {
-    const { store } = this;
-    this.points.push(fromUnit(store.frame, hit.point));
-    if (this.points.length < POINTS[this.measuring]) {
-      this.drawOverlay();
-      return;
-    }
-    let { points } = this;
-    this.points = [];
-    if (this.measuring === "thickness" || this.measuring === "diameter") {
-      const other = this.opposite(hit);
-      if (!other) {
-        this.onStatus("There is no other side straight through from here.");
-        return;
-      }
-      points = [points[0], fromUnit(store.frame, other.point)];
-    }
-    const made = measure(this.measuring, points, store.size, store.root.unit);
-    this.measurements.push(made);
-    this.onStatus(`${{ distance: "Distance", diameter: "Across", thickness: "Through", angle: "Angle" }[made.kind]}: ${made.label}`);
-    this.drawOverlay();
   }
 
   private wipe: HTMLElement | null = null;
@@ -469,8 +253,7 @@ export class Viewport {
   }
 
   clearMeasurements(): void {
-    this.measurements.length = 0;
-    this.points = [];
+    this.measured.clear();
     this.drawOverlay();
   }
 
@@ -589,30 +372,16 @@ export class Viewport {
 
   // Over the picture
 
-  drawOverlay(): void {
+  override drawOverlay(): void {
     if (!this.renderer) return;
     const [width, height] = this.size;
     const { view, store } = this;
     const shift = this.renderer.look.show === "beside" ? width : 0;
-    for (const layer of [this.gizmoLayer, this.measureLayer, this.region.layer]) layer.setAttribute("transform", `translate(${shift} 0)`);
+    for (const layer of [this.gizmoLayer, this.measured.layer, this.region.layer]) layer.setAttribute("transform", `translate(${shift} 0)`);
     if (this.tool === "move" || this.tool === "rotate" || this.tool === "scale")
       drawGizmo(this.gizmoLayer, store, this.tool, view, width, height, (handle, event) => this.beginDrag(handle, event));
     else this.gizmoLayer.replaceChildren();
     this.region.draw(view, width, height);
-    this.measureLayer.replaceChildren();
-    const on = (p: Vec3) => project(view, toUnit(store.frame, p), width, height);
-    for (const { points, label, kind } of this.measurements) {
-      const at = points.map(on);
-      if (at.some((p) => p.depth <= 0)) continue;
-      this.measureLayer.append(svg("polyline", { points: at.map((p) => `${p.x},${p.y}`).join(" ") }));
-      for (const p of at) this.measureLayer.append(svg("circle", { cx: p.x, cy: p.y, r: 3 }));
-      const where = kind === "angle" ? at[1] : { x: (at[0].x + at[1].x) / 2, y: (at[0].y + at[1].y) / 2 };
-      const wide = label.length * 7.2 + 14;
-      this.measureLayer.append(
-        svg("rect", { x: where.x - wide / 2, y: where.y - 26, width: wide, height: 20, rx: 4 }),
-        svg("text", { x: where.x, y: where.y - 12 }, label),
-      );
-    }
-    for (const p of this.points.map(on)) this.measureLayer.append(svg("circle", { cx: p.x, cy: p.y, r: 4, class: "pending" }));
+    this.measured.draw(view, width, height);
   }
 }

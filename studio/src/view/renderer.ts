@@ -1,6 +1,6 @@
 /**
- * The picture: when what is marched, coarsely while something moves and finely once it rests, and how what was
- * found along the rays becomes pixels. Numbers are uploaded, shaders are compiled once.
+ * When what is marched and drawn: coarsely while something moves, finely once it rests. Numbers are uploaded,
+ * shaders are compiled once.
  */
 
 import type { Maps } from "../model/maps";
@@ -8,35 +8,15 @@ import type { Program } from "../model/program";
 import type { Vec3 } from "../model/vectors";
 import type { View } from "./camera";
 import { Gpu, NoWebGL, type Target } from "./gpu";
-import { camera, fieldSource, Marcher } from "./marcher";
-import { type Mesh, MeshLayer } from "./meshes";
-import meshFragment from "./shaders/mesh.frag?raw";
-import meshVertex from "./shaders/mesh.vert?raw";
-import pictureSource from "./shaders/picture.frag?raw";
-import screenSource from "./shaders/screen.vert?raw";
+import { Marcher } from "./marcher";
+import type { Mesh } from "./meshes";
+import { JITTERS, type Look, Picture } from "./picture";
 
-const JITTERS: [number, number][] = [
-  [0, 0],
-  [-0.375, 0.125],
-  [0.125, 0.375],
-  [0.375, -0.125],
-];
+export type { Look } from "./picture";
+
 const MOVING_MS = 40; // what a frame may take while something moves
 const BAND_MS = 60; // what is marched before the page gets its turn
 const MOST_PIXELS = 2_000_000; // of pictures that are smoothed
-
-export interface Look {
-  show: "parts" | "input" | "both" | "wipe" | "beside";
-  wipe: number;
-  heat: boolean;
-  /** Where the scale of errors ends, in the unit frame. */
-  most: number;
-  paper: Vec3;
-  ink: Vec3;
-  accent: Vec3;
-  ground: [number, number, number, number];
-  grid: number;
-}
 
 interface Job {
   target: Target;
@@ -55,17 +35,15 @@ export class Renderer {
   onReady: () => void = () => {};
   /** Told where the driver has lost all that it was given, and is to be given it again. */
   onLost: () => void = () => {};
-  look: Look;
   ready = false;
   readonly gl: WebGL2RenderingContext;
   private gpu: Gpu;
   private marcher: Marcher;
-  private meshes: Record<"input" | "standIn" | "learned", MeshLayer>;
+  private picture: Picture;
   private quick: Target | null = null;
   private full: Target[] = [];
   private complete = 0; // of `full`
   private dirty = true; // what the rays find has changed
-  private marked = false; // whether anything is selected or hovered
   private stale = true; // the picture has to be made anew
   private job: Job | null = null;
   private waiting = false;
@@ -78,13 +56,12 @@ export class Renderer {
     readonly canvas: HTMLCanvasElement,
     look: Look,
   ) {
-    this.look = look;
     const gl = canvas.getContext("webgl2", { antialias: false, alpha: false, powerPreference: "high-performance" });
     if (!gl) throw new NoWebGL("This browser offers no WebGL 2.");
     this.gl = gl;
     this.gpu = new Gpu(gl);
     this.marcher = new Marcher(this.gpu);
-    this.meshes = { input: new MeshLayer(this.gpu), standIn: new MeshLayer(this.gpu), learned: new MeshLayer(this.gpu) };
+    this.picture = new Picture(this.gpu, this.marcher, look);
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       this.ready = false;
@@ -94,6 +71,10 @@ export class Renderer {
       this.onLost();
     });
     this.start();
+  }
+
+  get look(): Look {
+    return this.picture.look;
   }
 
   get compilations(): number {
@@ -109,7 +90,7 @@ export class Renderer {
     const start = ++this.starts;
     this.ready = false;
     gpu.forget();
-    for (const layer of Object.values(this.meshes)) layer.forget();
+    this.picture.forget();
     this.quick = this.job = null;
     this.full = [];
     this.complete = 0;
@@ -118,8 +99,7 @@ export class Renderer {
     this.marcher.forget();
     const parallel = gl.getExtension("KHR_parallel_shader_compile");
     const marching = this.marcher.build();
-    gpu.linked("picture", gpu.build(screenSource, pictureSource));
-    gpu.linked("mesh", gpu.build(meshVertex, meshFragment.replace(/uHeat == 1 \? .*? : vColour/, "vColour")));
+    this.picture.build();
     const poll = () => {
       if (start !== this.starts || gl.isContextLost()) return;
       const done = ([, program]: [string, WebGLProgram]) => !parallel || gl.getProgramParameter(program, parallel.COMPLETION_STATUS_KHR);
@@ -141,7 +121,7 @@ export class Renderer {
   /** layers: of each part, the number of its image; -1 where it has none. */
   setProgram(program: Program, layers?: number[]): void {
     this.marcher.setProgram(program, layers);
-    if (this.look.heat) this.meshes.input.dirty = true;
+    if (this.look.heat) this.picture.meshes.input.dirty = true;
     this.changed();
   }
 
@@ -158,38 +138,29 @@ export class Renderer {
 
   /** Of each part: 1 selected, 2 hovered, 4 faded. */
   setMarks(marks: Uint8Array): void {
-    const { gl } = this;
-    const rows = Math.max(1, Math.ceil(marks.length / 256));
-    const data = new Uint8Array(rows * 256);
-    data.set(marks);
-    this.marked = marks.some((mark) => (mark & 3) > 0);
-    this.gpu.upload("uMarks", gl.R8UI, 256, rows, gl.RED_INTEGER, gl.UNSIGNED_BYTE, data);
+    this.picture.setMarks(marks);
     this.redraw();
   }
 
   setView(view: View): void {
     this.marcher.setView(view);
-    this.meshesChanged();
+    this.picture.changed();
     this.changed();
   }
 
   setMesh(which: "input" | "standIn" | "learned", mesh: Mesh | null): void {
-    this.meshes[which].set(mesh);
+    this.picture.meshes[which].set(mesh);
     this.redraw();
   }
 
   get hasInput(): boolean {
-    return this.meshes.input.there;
+    return this.picture.meshes.input.there;
   }
 
   setLook(changes: Partial<Look>): void {
-    this.look = { ...this.look, ...changes };
-    this.meshesChanged();
+    this.picture.look = { ...this.look, ...changes };
+    this.picture.changed();
     this.redraw();
-  }
-
-  private meshesChanged(): void {
-    for (const layer of Object.values(this.meshes)) layer.dirty = true;
   }
 
   resize(): void {
@@ -330,76 +301,12 @@ export class Renderer {
     setTimeout(poll, 0);
   }
 
-  // How it is drawn
-
   private draw(): void {
     this.stale = false;
-    const { gl } = this;
-    this.gpu.empty(); // made before anything is bound
     const known = this.complete ? this.full.slice(0, this.complete) : this.quick ? [this.quick] : [];
-    const standing = !this.ready || !known.length;
-    const { show } = this.look;
-    const mesh = this.meshes[standing ? "standIn" : "input"];
-    if (standing || show !== "parts") this.drawMesh(mesh, this.look.heat && !standing);
-    if (this.meshes.learned.there) this.drawMesh(this.meshes.learned, false);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    const { width, height } = this.canvas;
-    gl.viewport(0, 0, width, height);
-    if (show === "beside") {
-      const half = Math.floor(width / 2);
-      this.compose([], this.meshes.input, 1, 0, half);
-      this.compose(known, mesh, standing ? 1 : 0, half, half);
-    } else {
-      const code = standing ? 1 : { parts: 0, input: 1, both: 2, wipe: 3 }[show];
-      this.compose(known, mesh, code, 0, width);
-    }
+    this.picture.draw(this.canvas.width, this.canvas.height, known, !this.ready || !known.length);
     this.pictures++;
     this.onPicture();
-  }
-
-  private drawMesh(layer: MeshLayer, heat: boolean): void {
-    layer.draw(this.marchWidth, this.canvas.height, () => {
-      const shader = heat ? this.gpu.use("heat", () => this.gpu.build(meshVertex, fieldSource + meshFragment)) : this.gpu.use("mesh");
-      camera(this.gpu, shader, this.marcher.view!);
-      if (!heat) return;
-      this.marcher.wholeField(shader);
-      this.gl.uniform1i(shader.at("uHeat"), 1);
-      this.gl.uniform1f(shader.at("uMost"), this.look.most);
-    });
-  }
-
-  private compose(targets: Target[], mesh: MeshLayer, show: number, left: number, width: number): void {
-    const { gl, gpu, look } = this;
-    const shader = gpu.use("picture");
-    const { height } = this.canvas;
-    gl.viewport(left, 0, width, height);
-    camera(gpu, shader, this.marcher.view!);
-    gl.uniform1i(shader.at("uShow"), show);
-    gl.uniform1f(shader.at("uWipe"), look.wipe);
-    gl.uniform3f(shader.at("uPaper"), ...look.paper);
-    gl.uniform3f(shader.at("uInk"), ...look.ink);
-    gl.uniform3f(shader.at("uAccent"), ...look.accent);
-    gl.uniform4f(shader.at("uGround"), ...look.ground);
-    gl.uniform1f(shader.at("uGrid"), look.grid);
-    gl.uniform1i(shader.at("uOutlines"), this.marked ? 1 : 0);
-    gpu.texture(shader, "uMarks", 2);
-    gl.enable(gl.SCISSOR_TEST);
-    gl.scissor(left, 0, width, height);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.CONSTANT_ALPHA, gl.ONE_MINUS_CONSTANT_ALPHA);
-    gl.uniform2f(shader.at("uSize"), width, height);
-    gl.uniform2f(shader.at("uOrigin"), left, 0);
-    const { learned } = this.meshes;
-    (targets.length ? targets : [gpu.empty()]).forEach((target, i) => {
-      gl.blendColor(0, 0, 0, 1 / (i + 1));
-      gl.uniform2f(shader.at("uJitter"), ...JITTERS[i]);
-      gpu.bind(shader, "uField", 0, target.texture);
-      gpu.bind(shader, "uMesh", 1, (mesh.target ?? gpu.empty()).texture);
-      gpu.bind(shader, "uLearned", 3, ((learned.there && learned.target) || gpu.empty()).texture);
-      gl.drawArrays(gl.TRIANGLES, 0, 3);
-    });
-    gl.disable(gl.BLEND);
-    gl.disable(gl.SCISSOR_TEST);
   }
 
   // For tests, measurements and files
@@ -418,8 +325,7 @@ export class Renderer {
     const began = performance.now();
     this.marcher.setProgram(this.marcher.program!);
     const target = this.marcher.now(this.marchWidth, this.canvas.height, false);
-    this.gl.bindFramebuffer(this.gl.FRAMEBUFFER, null);
-    this.compose([target], this.meshes.input, 0, 0, this.canvas.width);
+    this.picture.draw(this.canvas.width, this.canvas.height, [target], false);
     const pixel = new Uint8Array(4);
     this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, pixel);
     this.gpu.drop(target);
