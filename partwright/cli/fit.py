@@ -17,7 +17,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "report.json and preview.png.",
     )
     _add_input(command.add_argument_group("input"))
-    _add_method(command.add_argument_group("method and budget"))
+    method = command.add_argument_group("method and budget")
+    add_method(method)
+    _add_finish(method)
     lengths = "lengths: 0.5 in the shape's unit, 0.5mm, or 1% of its longest side"
     _add_bounds(command.add_argument_group("bounds", lengths))
     _add_start(command.add_argument_group("start"))
@@ -32,7 +34,8 @@ def _add_input(group: Group) -> None:
     group.add_argument("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
 
 
-def _add_method(group: Group) -> None:
+def add_method(group: Group) -> None:
+    """Options that choose the method and what it may spend."""
     option = group.add_argument
     option(
         "--method",
@@ -50,7 +53,6 @@ def _add_method(group: Group) -> None:
     )
     option("--max-parts", metavar="N", type=int, help="at most N parts")
     option("--min-iou", metavar="X", type=float, help="stop at the fewest parts that reach IoU X")
-    option("--per-node", action="store_true", help="fit each node of a scene by itself")
     option(
         "--symmetry",
         action=argparse.BooleanOptionalAction,
@@ -64,6 +66,11 @@ def _add_method(group: Group) -> None:
         help="parts may also be subtracted: holes, slots, pockets (default: on for solids and capri, for "
         "superfrusta where a hole would be covered)",
     )
+
+
+def _add_finish(group: Group) -> None:
+    option = group.add_argument
+    option("--per-node", action="store_true", help="fit each node of a scene by itself")
     option("--clean", action="store_true", help="make numbers plain and relations exact after the fit")
     option(
         "--clean-tolerance",

@@ -12,6 +12,7 @@ from typing import Any
 
 from partwright import __version__
 from partwright.cli import (
+    batch,
     clean,
     collide,
     completion,
@@ -30,7 +31,20 @@ from partwright.cli.parser import Parser
 from partwright.cli.terminal import note
 from partwright.errors import CancelledError, PartwrightError
 
-COMMANDS = (fit, clean, evaluate, describe, export, collide, segment, parts, texture, studio, completion)
+COMMANDS = (
+    fit,
+    clean,
+    evaluate,
+    describe,
+    export,
+    collide,
+    segment,
+    parts,
+    batch,
+    texture,
+    studio,
+    completion,
+)
 
 
 def parser() -> Parser:

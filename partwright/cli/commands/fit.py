@@ -19,9 +19,15 @@ from partwright.shapes import load_shape
 _SETTINGS = ("max_parts", "min_iou", "curve", "symmetry", "subtract", "model")
 
 
+def given_settings(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The settings among the options that were given; switches have three states."""
+    values = {name: getattr(arguments, name, None) for name in _SETTINGS}
+    switches = ("symmetry", "subtract")
+    return {n: v for n, v in values.items() if v is not None and (v is not False or n in switches)}
+
+
 def run(arguments: argparse.Namespace) -> int:
     cancel = Cancellation()
-    settings = {name: getattr(arguments, name) for name in _SETTINGS}
     options: dict[str, Any] = {
         "quality": arguments.quality,
         "seed": arguments.seed,
@@ -30,8 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
         "tolerance": Tolerance(arguments.tolerance, arguments.contain, arguments.inside),
         "cancel": cancel,
         "clean": Clean.keeping(arguments.clean, arguments.clean_tolerance),
-        **{name: value for name, value in settings.items() if value is not None and value is not False},
-        **{name: False for name in ("symmetry", "subtract") if settings[name] is False},
+        **given_settings(arguments),
     }
     with Display() as display:
         shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
