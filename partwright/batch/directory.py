@@ -124,7 +124,8 @@ def fit_folder(
         cancel: ends the workers; what they were at is lost.
 
     Raises:
-        SettingError: an unknown method, another batch in the folder, or a value that cannot be used.
+        SettingError: an unknown method, another batch in the folder, the folder with the shapes itself, or a
+            value that cannot be used.
         OutputError: the folder cannot be written, or another process is at work there.
     """
     if plan.method not in METHODS:
@@ -132,6 +133,8 @@ def fit_folder(
     if at_once < 0:
         raise SettingError(f"--at-once {at_once}: expected a number of processes, or 0 for one a core")
     share, limits = share or Share(), limits or Limits(900.0, 8_000_000_000)
+    if output.resolve() == plan.source.resolve():
+        raise SettingError(f"{output}: the folder with the shapes; give another to write into with -o")
     plan.save(output)
     cores = os.cpu_count() or 1
     at_once = at_once or cores

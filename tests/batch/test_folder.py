@@ -229,6 +229,7 @@ def test_a_file_that_cannot_be_opened_fails_alone(tmp_path: Path) -> None:
     ("words", "told"),
     [
         (["nowhere", "-o", "out"], "expected a folder with shapes"),
+        (["in", "-o", "in"], "the folder with the shapes"),
         (["in", "-o", "out", "--shard", "4/3"], "--shard 4/3"),
         (["in", "-o", "out", "--shard", "x"], "expected I/N"),
         (["in", "-o", "out", "--limit", "0"], "--limit 0"),
