@@ -38,10 +38,13 @@ export class CurveSlider {
   follow(): void {
     const { sizes } = this;
     if (!sizes.length) return;
-    const count = this.store.program.parts.length;
+    const shown = /^(\d+) of at most/.exec(this.store.undoLabel ?? "");
+    const count = shown ? Number(shown[1]) : this.store.program.parts.length;
     const off = sizes.map((size) => Math.abs(size.parts - count));
     this.range.value = String(off.indexOf(Math.min(...off)));
     this.mark();
+    // What was edited since is none of them.
+    if (!shown) this.told.value = `${sizes[0].parts} to ${sizes.at(-1)!.parts} parts`;
   }
 
   private mark(): Size {
