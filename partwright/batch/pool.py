@@ -55,7 +55,14 @@ class Worker:
         self._process: subprocess.Popen[str] | None = None
 
     def do(self, job: dict[str, Any]) -> Answer | None:
-        """The answer; None where all was stopped meanwhile."""
+        """The answer; None where all was stopped meanwhile.
+
+        A job whose worker dies gets a second one: it may have been the machine, and not the shape.
+        """
+        answer = self._tried(job)
+        return self._tried(job) if answer is not None and answer.status == "crashed" else answer
+
+    def _tried(self, job: dict[str, Any]) -> Answer | None:
         process = self._process = self._running()
         assert process.stdin is not None
         begun, peak = time.monotonic(), 0

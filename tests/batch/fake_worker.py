@@ -23,6 +23,8 @@ def answer(job: dict) -> dict:
     if path.stem.startswith("segfault"):
         print("about to fall", file=sys.stderr, flush=True)
         os.kill(os.getpid(), signal.SIGSEGV)
+    if path.stem.startswith("once") and Path(os.environ["FAKE_LOG"]).read_text().count(path.name) == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
     if path.stem.startswith("big"):
         hoard = bytearray(b"x") * 600_000_000
         time.sleep(60)
