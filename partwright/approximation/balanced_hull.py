@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _FACES = 8  # of a hull, the largest that bridge something
 _STEPS = 6  # depths that are tried of each
+_KEPT = 0.5  # of the piece's own volume, at least
 _WORTH = 0.002  # of the piece's volume: bridges that add less stay
 
 
@@ -35,6 +36,8 @@ def balanced_hull(piece: Piece, deepest: float) -> Manifold:
             height = float(offset - step)
             gone = extra.volume() - extra.trim_by_plane(inward, -height).volume()
             lost = solid.volume() - solid.trim_by_plane(inward, -height).volume()
+            if solid.volume() - lost < _KEPT * piece.solid.volume():
+                break
             if gone - lost > best:
                 best, depth = gone - lost, float(step)
             elif depth:

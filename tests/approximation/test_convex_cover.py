@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from manifold3d import Manifold, OpType
 
-from partwright.approximation.convex_cover import Limits, convex_cover, covering, faces_of, grown
+from partwright.approximation.balanced_hull import balanced_hull
+from partwright.approximation.convex_cover import Limits, Piece, convex_cover, covering, faces_of, grown
 from partwright.approximation.light_hull import light_hull
 
 SEGMENTS = 96
@@ -94,3 +95,18 @@ def test_a_light_hull_says_what_it_loses() -> None:
     assert (corners_of(ball) @ normals.T - offsets).max() == pytest.approx(beyond)
     assert (light - ball).volume() < 1e-9
     assert light_hull(ball, 0.0, most=20)[0].num_vert() <= 20
+
+
+@pytest.mark.parametrize("wall", [0.3, 0.02])
+def test_a_balanced_hull_is_nearer_than_the_hull_and_keeps_what_it_stands_for(wall: float) -> None:
+    """Half a bowl: its hull is filled, and moved inwards without end it would be gone."""
+    bowl = (Manifold.sphere(1.0, 48) - Manifold.sphere(1 - wall, 48)).trim_by_plane((0, 0, -1), 0)
+    piece = Piece(bowl)
+    balanced = balanced_hull(piece, 0.9)
+
+    def apart(solid: Manifold) -> float:
+        return (solid - bowl).volume() + (bowl - solid).volume()
+
+    assert apart(balanced) <= (0.8 if wall < 0.1 else 1.0) * apart(piece.hull)
+    assert (bowl ^ balanced).volume() >= 0.5 * bowl.volume()
+    assert balanced_hull(Piece(box(0, 0, 0, 1, 2, 3)), 0.9).volume() == pytest.approx(6.0)
