@@ -6,7 +6,7 @@ fitted anew, split, joined by another or taken away, whichever serves an objecti
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +20,7 @@ from partwright.fields.columns import ROTATION, Column
 from partwright.fields.kernel import Target
 from partwright.superfrusta.deviations import Deviations, deviations
 from partwright.superfrusta.growing import Region, carve, finalists, grow
-from partwright.superfrusta.merging import owners
+from partwright.superfrusta.merging import Merger, carried_out, mergers, owners
 from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.pruning import cheapest_removal, neighbours
 from partwright.superfrusta.refining import POLISH, TOUCH_UP, Stages, refine
@@ -39,6 +39,7 @@ _STAGES: Stages = ((40.0, 4), (100.0, 5))
 _HOPELESS = 0.02  # of the objective: what is so much worse after a refit goes no further
 _REFITTED = 2  # of the ways to change a part
 _LEAST_HALVED = 100  # voxels
+_JOINED = 4  # pairs at most, and of the most promising that are tried for each
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class Mending:
             part = _next(best.off, given_up)
             if part is None:
                 break
-        slim = self.slimmed(best)
+        slim = self.slimmed(self.joined(best))
         polished = self.trial(refine(self.samples, slim.rows, POLISH, self.settings, self.free(slim.rows)))
         better = polished.value > slim.value and self.allowed(polished.rows, slim.rows)
         return polished.rows if better else slim.rows
@@ -102,6 +103,22 @@ class Mending:
             return True
         least = min(settings.min_iou, volume_iou(self.samples, given))
         return len(trial) <= len(given) and volume_iou(self.samples, trial) >= least
+
+    def joined(self, best: Trial) -> Trial:
+        """With pairs of parts as one where that pays: what mending added may make others vain."""
+        for _ in range(_JOINED if self.settings.merging else 0):
+            found = mergers(self.samples, best.rows, self.settings, self.locked)[:_JOINED]
+            jobs = [partial(self.merged, best.rows, one) for one in found if one.gain > -_HOPELESS]
+            tried = [trial for trials in self.at_once(jobs) for trial in trials]
+            better = max(tried, key=lambda trial: trial.value, default=best)
+            if better.value <= best.value:
+                break
+            best = better
+        return best
+
+    def merged(self, rows: Rows, merger: Merger) -> list[Trial]:
+        fewer = carried_out(self.samples, rows, *merger.pair, merger.part, self.settings, self.locked)
+        return [self.trial(fewer)] if self.allowed(fewer, rows) else []
 
     def slimmed(self, best: Trial) -> Trial:
         """Without the parts that do not pay for themselves any more."""
@@ -126,7 +143,7 @@ class Mending:
         tried = self.at_once([lambda: [self.firmed(best, moving)], *refits])
         return [trial for trials in tried for trial in trials]
 
-    def at_once(self, jobs: list[Callable[[], list[Trial]]]) -> list[list[Trial]]:
+    def at_once(self, jobs: Sequence[Callable[[], list[Trial]]]) -> list[list[Trial]]:
         """What jobs return, which take turns on the threads: half of their work is none of the kernel's."""
         with ThreadPoolExecutor(self.samples.threads or cpu_count() or 1) as pool:
             return [future.result() for future in [pool.submit(job) for job in jobs]]

@@ -44,7 +44,7 @@ def merge(samples: FitSamples, rows: Rows, settings: Settings, locked: int = 0) 
         if merger.gain < -_UNREFITTED_SCORE_LOSS or gone & set(merger.pair):
             continue
         first, second = (int(np.flatnonzero(alive == part)[0]) for part in merger.pair)
-        trial = _carried_out(samples, rows, first, second, merger.part, settings, locked)
+        trial = carried_out(samples, rows, first, second, merger.part, settings, locked)
         reached = score(samples, trial)
         if reached + settings.alpha >= whole:
             rows, whole = trial, reached
@@ -62,7 +62,7 @@ def cheapest_merger(
     """
     best: tuple[Rows, float] | None = None
     for merger in mergers(samples, rows, settings, locked, apart=True)[: 2 * settings.trials]:
-        trial = _carried_out(samples, rows, *merger.pair, merger.part, settings, locked)
+        trial = carried_out(samples, rows, *merger.pair, merger.part, settings, locked)
         reached = coverage(samples, trial)
         if best is None or reached > best[1]:
             best = trial, reached
@@ -158,7 +158,7 @@ def _folded(occupied: NDArray[np.bool_], added: NDArray[np.bool_]) -> NDArray[np
     return result
 
 
-def _carried_out(
+def carried_out(
     samples: FitSamples,
     rows: Rows,
     first: int,
