@@ -23,7 +23,7 @@ from partwright.robots.picture import picture
 from partwright.robots.report import LinkReport, report
 from partwright.robots.shaping import Wishes, shapes_for
 from partwright.robots.solids import Solids, Target, largest_deviation
-from partwright.robots.spheres import as_json, curobo, spheres_for
+from partwright.robots.spheres import as_json, curobo, errors_of, spheres_for
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -105,6 +105,7 @@ class Collided:
     pairs_before: dict[Pair, float] = field(default_factory=dict)
     pairs_after: dict[Pair, float] = field(default_factory=dict)
     spheres: dict[str, np.ndarray] = field(default_factory=dict)
+    sphere_errors: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
 def collide(
@@ -189,7 +190,8 @@ def collide(
         for name, target in wanted.items()
         if options.spheres is not None
     }
-    return Collided(robot, shapes, reports, pairs_before, pairs_after, spheres)
+    errors = {name: errors_of(found, wanted[name]) for name, found in spheres.items()}
+    return Collided(robot, shapes, reports, pairs_before, pairs_after, spheres, errors)
 
 
 def save(result: Collided, folder: str | Path) -> list[Path]:
@@ -212,7 +214,7 @@ def save(result: Collided, folder: str | Path) -> list[Path]:
         )
         if result.spheres:
             (staging / f"{name}.spheres.yml").write_bytes(curobo(result.spheres))
-            (staging / f"{name}.spheres.json").write_bytes(as_json(result.spheres))
+            (staging / f"{name}.spheres.json").write_bytes(as_json(result.spheres, result.sphere_errors))
         picture(result.robot, result.shapes, staging / f"{name}.png")
         written = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
     return [folder / path for path in written]

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 _ROUNDS = 12
 _INSIDE, _SURFACE = 14, 3000  # cells along the solid's box; points of its surface
 _MARGIN = 1e-6
+_ERRORS = ("mean", "best", "worst")
 Spheres = np.ndarray  # (N, 4): centre and radius
 
 
@@ -64,11 +65,24 @@ def curobo(spheres: Mapping[str, Spheres]) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def as_json(spheres: Mapping[str, Spheres]) -> bytes:
-    """For each link a list of `origin` and `radius`, as sphere decompositions such as foam's have them."""
+def errors_of(spheres: Spheres, target: Target) -> dict[str, float]:
+    """Mean, smallest and largest distance of the target's surface from that of the spheres, as lengths."""
+    points = target.samples(_SURFACE, seed=2)
+    distance = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2) - spheres[:, 3]
+    apart = np.abs(distance.min(axis=1))
+    return {
+        name: _short(float(v))
+        for name, v in zip(_ERRORS, (apart.mean(), apart.min(), apart.max()), strict=True)
+    }
+
+
+def as_json(spheres: Mapping[str, Spheres], errors: Mapping[str, Mapping[str, float]]) -> bytes:
+    """For each link its errors, and a list of `origin` and `radius`, as foam's sphere decompositions have
+    them."""
     whole = {
         link: {
-            "spheres": [{"origin": [_short(v) for v in row[:3]], "radius": _short(row[3])} for row in found]
+            **errors[link],
+            "spheres": [{"origin": [_short(v) for v in row[:3]], "radius": _short(row[3])} for row in found],
         }
         for link, found in spheres.items()
     }

@@ -133,5 +133,6 @@ def test_spheres_are_written_for_curobo_and_as_json(tmp_path: Path) -> None:
         == len(result.spheres["arm"])
         == text.count("radius") - len(found["base"]["spheres"])
     )
+    assert 0 <= found["arm"]["best"] <= found["arm"]["mean"] <= found["arm"]["worst"] < 0.3
     with pytest.raises(SettingError, match="spheres: expected a number from 1"):
         CollideOptions(spheres=0)
