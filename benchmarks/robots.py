@@ -122,6 +122,14 @@ def document(rows: list[Row]) -> str:
             f"{r.seconds:.0f}",
         )
         lines.append(f"| {r.robot} | {r.way} | {r.links} | {r.natives} | {r.hulls} | {' | '.join(cells)} |")
+    done = {(row.robot, row.way) for row in rows}
+    left = [
+        f"{name}, {way}"
+        for name in dict.fromkeys(r.robot for r in rows)
+        for way in WAYS
+        if (name, way) not in done
+    ]
+    lines += ["", f"Not measured: {'; '.join(left)}."] if left else []
     return "\n".join(lines) + "\n"
 
 
