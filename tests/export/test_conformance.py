@@ -102,6 +102,9 @@ class Learned(JointField):
     def surface(self, resolution: int) -> trimesh.Trimesh:
         return trimesh.creation.icosphere(subdivisions=3, radius=self.radius)
 
+    def preview(self) -> trimesh.Trimesh:
+        return self.surface(0)
+
     def among(self, members: Sequence[Member], shared: dict[Any, Any]) -> Self:
         return self
 
@@ -217,7 +220,8 @@ def test_learned_parts_are_written_or_refused(tmp_path: Path, suffix: str) -> No
     assembly = Assembly((Part(Learned(0.7), name="ball"),), unit="m", up="z")
     if Holds.LEARNED in form.holds:
         save(assembly, path, form)
-        if suffix != ".json" and Holds.BLENDS in form.holds:  # the others may take the nearest solid
+        # Files of parts by their kind cannot be read back, for this one is in no registry.
+        if suffix not in (".json", ".html") and Holds.BLENDS in form.holds:
             check_contents(path, suffix, form, assembly)
     else:
         error = fails(assembly, path)
