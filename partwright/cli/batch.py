@@ -9,31 +9,16 @@ from typing import Any
 from partwright.cli.fit import add_method
 from partwright.cli.parser import Parser
 
-_COMMANDS = ("run", "status", "retry")
 
-
-class _Batch(Parser):
-    """`batch FOLDER` is `batch run FOLDER`."""
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        if args and args[0] not in (*_COMMANDS, "-h", "--help"):
-            args = ["run", *args]
-        return super().parse_known_args(args, namespace)
-
-
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    before = commands._parser_class
-    commands._parser_class = _Batch
+def add(commands: argparse._SubParsersAction[Parser]) -> None:
     command = commands.add_parser(
         "batch",
         help="fit every shape of a folder",
         description="Fits every shape of a folder, each by a worker process that is killed past its limits. "
         "The same command resumes. `partwright batch FOLDER -o OUT` is short for `partwright batch run`.",
     )
-    commands._parser_class = before
-    subcommands = command.add_subparsers(
-        title="commands", metavar="COMMAND", required=True, parser_class=Parser
-    )
+    command.implied = "run"
+    subcommands = command.add_subparsers(title="commands", metavar="COMMAND", required=True)
     _add_run(subcommands)
     _add_status(subcommands)
     _add_retry(subcommands)

@@ -15,7 +15,12 @@ from partwright.errors import shortened
 class Parser(argparse.ArgumentParser):
     """Subparsers are of the same class, so each command tells its own mistakes."""
 
+    implied: str | None = None
+    """The subcommand that is meant where none is named."""
+
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        if self.implied and args and args[0] not in (*self._subcommands(), "-h", "--help"):
+            args = [self.implied, *args]
         namespace, unknown = super().parse_known_args(
             None if args is None else self._with_defaults(args), namespace
         )
@@ -34,6 +39,9 @@ class Parser(argparse.ArgumentParser):
             raise argparse.ArgumentError(
                 action, f"invalid choice: {value!r} (choose from {choices}){_guess(value, action.choices)}"
             )
+
+    def _subcommands(self) -> Iterable[str]:
+        return (n for a in self._actions if isinstance(a, argparse._SubParsersAction) for n in a.choices)
 
     def _with_defaults(self, words: Sequence[str]) -> list[str]:
         """The words, where an option with an optional value keeps off a word that cannot be its value.

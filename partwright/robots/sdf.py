@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,13 +10,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from partwright.approximation.ellipsoid import Ellipsoid
-from partwright.assembly import Part, Similarity
+from partwright.assembly import Part
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import RobotError
 from partwright.export.rigid_body import numbers
 from partwright.export.urdf import roll_pitch_yaw
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.robots.model import Files, Link, MeshUse, RobotFile, Shape, frame, from_roll_pitch_yaw
+from partwright.robots.native_solids import native_solids
 from partwright.robots.paths import Place, find, new_address, with_companions
 from partwright.robots.xml_files import parsed, serialised, stl, three
 
@@ -81,7 +81,9 @@ class Sdf(RobotFile):
                 if mesh is not None:
                     found.append(self._use(mesh, place, name))
                 elif role == "collision":
-                    natives += _natives(child, place, self.path, name)
+                    natives += native_solids(
+                        child, place, _read, self.kinds, f"link {name!r}: collision", self.path
+                    )
         pose = _pose(element, self.path, name)
         above = element.getparent()
         while above is not None and above.tag == "model":
@@ -140,38 +142,6 @@ def _pose(element: Any, path: Path, name: str) -> np.ndarray:
     return frame(from_roll_pitch_yaw(*angles), place)
 
 
-def _natives(collision: Any, place: np.ndarray, path: Path, link: str) -> list[Part]:
-    """The solid of a collision element that is one; of another kind it stays, and is not measured."""
-    where = f"link {link!r}: collision"
-    fields: list[Field] = []
-    for element in collision.iterfind("geometry/*"):
-        match element.tag:
-            case "box":
-                x, y, z = three(element.findtext("size", ""), path, where)
-                fields.append(Box((x, y, z)))
-            case "ellipsoid":
-                x, y, z = three(element.findtext("radii", ""), path, where)
-                fields.append(Ellipsoid((x, y, z)))
-            case "sphere":
-                fields.append(Sphere(_number(element, "radius", path, where)))
-            case "cylinder" | "capsule":
-                kind = Cylinder if element.tag == "cylinder" else Capsule
-                fields.append(kind(*(_number(element, key, path, where) for key in ("radius", "length"))))
-    pose = Similarity.from_matrix(place)
-    return [Part(field, pose.translation, pose.rotation) for field in fields]
-
-
-def _number(element: Any, key: str, path: Path, where: str) -> float:
-    text = element.findtext(key, "")
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or value <= 0:
-        raise RobotError(f"{path}: {where}: {key} is {text!r}, expected a length")
-    return value
-
-
 def _collision(shape: Shape, like: Place, old: Any, files: Files) -> Any:
     """A collision element with the surface, contact bits and whatever else the old one had."""
     from lxml import etree
@@ -195,6 +165,10 @@ def _collision(shape: Shape, like: Place, old: Any, files: Files) -> Any:
         if child.tag not in ("pose", "geometry"):
             element.append(copy.deepcopy(child))
     return element
+
+
+def _read(element: Any, key: str) -> str:
+    return str(element.findtext(key, ""))
 
 
 def _sizes(field: Field) -> dict[str, str]:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
-from partwright.assembly import Part, Similarity
+from partwright.assembly import Part
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import RobotError
 from partwright.export.rigid_body import numbers
 from partwright.export.urdf import roll_pitch_yaw
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.robots.model import Files, Link, MeshUse, RobotFile, Shape, frame, from_roll_pitch_yaw
+from partwright.robots.native_solids import native_solids
 from partwright.robots.paths import Place, find, new_address, with_companions
 from partwright.robots.xml_files import parsed, serialised, stl, three
 
@@ -101,7 +101,9 @@ class Urdf(RobotFile):
                 if mesh is not None:
                     found.append(self._use(mesh, place, name))
                 elif role == "collision":
-                    natives += _natives(child, place, self.path, name)
+                    natives += native_solids(
+                        child, place, _read, self.kinds, f"link {name!r}: collision", self.path
+                    )
         parent = parents.get(name, (None,))[0]
         return Link(name, pose, parent, tuple(uses["collision"]), tuple(uses["visual"]), tuple(natives))
 
@@ -142,35 +144,6 @@ def _origin(element: Any, path: Path, name: str) -> np.ndarray:
     return frame(from_roll_pitch_yaw(*angles), three(origin.get("xyz", "0 0 0"), path, f"{name!r}: xyz"))
 
 
-def _natives(collision: Any, place: np.ndarray, path: Path, link: str) -> list[Part]:
-    """The solid of a collision element that is one; a kind that is not known stays, and is not measured."""
-    where = f"link {link!r}: collision"
-    fields: list[Field] = []
-    for element in collision.iterfind("geometry/*"):
-        match element.tag:
-            case "box":
-                x, y, z = three(element.get("size", ""), path, where)
-                fields.append(Box((x, y, z)))
-            case "sphere":
-                fields.append(Sphere(_number(element, "radius", path, where)))
-            case "cylinder" | "capsule":
-                kind = Cylinder if element.tag == "cylinder" else Capsule
-                sizes = [_number(element, key, path, where) for key in ("radius", "length")]
-                fields.append(kind(*sizes))
-    pose = Similarity.from_matrix(place)
-    return [Part(field, pose.translation, pose.rotation) for field in fields]
-
-
-def _number(element: Any, key: str, path: Path, where: str) -> float:
-    try:
-        value = float(element.get(key, ""))
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or value <= 0:
-        raise RobotError(f"{path}: {where}: {key} is {element.get(key)!r}, expected a length")
-    return value
-
-
 def _elements(shape: Shape, like: Place, files: Files) -> list[tuple[str, str, dict[str, str], np.ndarray]]:
     """URDF's elements for a shape: name, tag, attributes and (4, 4)."""
     if shape.part is None:
@@ -197,6 +170,11 @@ def _elements(shape: Shape, like: Place, files: Files) -> list[tuple[str, str, d
 
 def _round(radius: float, height: float) -> dict[str, str]:
     return {"radius": numbers([radius]), "length": numbers([height])}
+
+
+def _read(element: Any, key: str) -> str | None:
+    value: str | None = element.get(key)
+    return value
 
 
 def _collision(name: str, kind: str, sizes: dict[str, str], pose: np.ndarray) -> Any:

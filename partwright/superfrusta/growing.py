@@ -80,11 +80,15 @@ class View:
 
 def regions(samples: FitSamples, rows: Rows, settings: Settings) -> list[Region]:
     """Pieces of the residual max(S, -F), to add, and, where settings allow, of max(F, -S), to subtract."""
-    values, field = samples.grid.values, samples.grid_field(rows)
-    found = _pieces(samples, np.maximum(values, -field), rows, settings, 1.0)
+    field = samples.grid_field(rows)
+    found = _pieces(samples, np.maximum(samples.grid.values, -field), rows, settings, 1.0)
     if settings.subtract and len(rows):
-        found += _pieces(samples, np.maximum(field, -values), rows, settings, -1.0)
+        found += _excess(samples, field, rows, settings)
     return found
+
+
+def _excess(samples: FitSamples, field: NDArray[np.float32], rows: Rows, settings: Settings) -> list[Region]:
+    return _pieces(samples, np.maximum(field, -samples.grid.values), rows, settings, -1.0)
 
 
 def _pieces(
@@ -115,22 +119,20 @@ def _pieces(
 
 def grow(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Grown:
     """New rows, at most `most`, that raise the objective by more than their price; none when nothing does."""
-    wanted = regions(samples, rows, settings)
-    if not wanted or most <= 0:
-        return Grown(NOTHING, NOTHING)
-    candidates = fit_regions(samples, wanted, settings)
-    return _select(samples, candidates, rows, settings.price / _PRICE_DIVISOR, most)
+    return _grown(samples, regions(samples, rows, settings), rows, settings, most)
 
 
 def carve(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Grown:
     """The same for parts to subtract: holes and slots that what is there covers."""
-    excess = np.maximum(samples.grid_field(rows), -samples.grid.values)
-    wanted = _pieces(samples, excess, rows, settings, -1.0)
-    if not wanted:
+    wanted = _excess(samples, samples.grid_field(rows), rows, settings)
+    return _grown(samples, wanted, rows, settings, most)
+
+
+def _grown(samples: FitSamples, wanted: list[Region], rows: Rows, settings: Settings, most: int) -> Grown:
+    if not wanted or most <= 0:
         return Grown(NOTHING, NOTHING)
-    return _select(
-        samples, fit_regions(samples, wanted, settings), rows, settings.price / _PRICE_DIVISOR, most
-    )
+    candidates = fit_regions(samples, wanted, settings)
+    return _select(samples, candidates, rows, settings.price / _PRICE_DIVISOR, most)
 
 
 def _view(samples: FitSamples, region: Region) -> View:

@@ -56,9 +56,7 @@ def test_real_shapes_become_what_a_fit_makes_of_them(tmp_path: Path) -> None:
     assert main(["batch", str(source), "-o", str(out), "--quality", "draft", "--at-once", "1"]) == 0
     assert main(["batch", str(source), "-o", str(out), "--quality", "draft"]) == 0
     found = list(entries(out / "manifest.jsonl"))
-    assert [(e.file, e.status) for e in found] == [("cut.stl", "failed"), ("deeper/block.stl", "done")] or [
-        (e.file, e.status) for e in found
-    ] == [("cut.stl", "failed"), ("twin.stl", "done")]
+    assert [(e.file, e.status) for e in found] == [("cut.stl", "failed"), ("twin.stl", "done")]
     assert found[0].reason.startswith("UnreadableFileError")
     done = found[1]
     assert done.peak_memory > 5e7
