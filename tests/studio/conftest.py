@@ -72,6 +72,16 @@ class Page:
     def settle(self) -> None:
         self.wait("() => partwright.viewport.renderer.settled")
 
+    def middle(self, selector: str) -> tuple[float, float]:
+        """Of an element, in pixels. One that is just drawn anew has no place: it is asked again."""
+        end = time.monotonic() + PATIENCE
+        element = self.page.locator(selector)
+        box = element.bounding_box()
+        while box is None:
+            assert time.monotonic() < end, f"{selector} has no place in the page"
+            box = element.bounding_box()
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
     def assembly(self) -> str:
         """The text of the file that the page would save."""
         return str(self.ask("() => partwright.text()"))

@@ -184,8 +184,7 @@ def test_a_drag_of_a_handle_is_one_step(shared: Callable[..., Page]) -> None:
     start = load_assembly_text(page)
     page.page.locator(".row[data-name=leg]").click()
     page.page.get_by_title("Move (W)").click()
-    box = page.page.locator("[data-handle=move-z] .head").bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    x, y = page.middle("[data-handle=move-z] .head")
     page.page.mouse.move(x, y)
     page.page.mouse.down()
     for i in range(1, 6):

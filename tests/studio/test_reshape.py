@@ -107,8 +107,7 @@ def test_a_box_is_drawn_where_a_part_is_missing_and_gets_one(table: Any) -> None
     )
     assert np.abs(box - [[11, -9, 45], [29, 9, 70]]).max() < 3
     # The upper face goes down by 8 mm, and the part ends there.
-    top = page.page.locator("[data-face='z+']").bounding_box()
-    x, y = top["x"] + top["width"] / 2, top["y"] + top["height"] / 2
+    x, y = page.middle("[data-face='z+']")
     (_, y0), (_, y1) = page.ask(place, [20, 0, 70]), page.ask(place, [20, 0, 62])
     page.page.mouse.move(x, y)
     page.page.mouse.down()

@@ -53,8 +53,7 @@ def test_a_hole_is_drilled_where_the_surface_is_clicked(shared: Callable[..., Pa
     page.settle()
     page.page.get_by_role("button", name="Add", exact=True).click()
     page.page.get_by_role("menuitem", name="Hole, where you click").click()
-    box = page.page.locator(".viewport").bounding_box()
-    page.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.page.mouse.click(*page.middle(".viewport"))
     drilled = from_text(page.assembly())
     assert drilled.operation == "difference"
     hole = drilled["hole"]

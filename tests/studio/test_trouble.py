@@ -111,6 +111,7 @@ def test_two_tabs_see_each_other_and_neither_loses_an_edit(
     two.page.keyboard.press("Control+z")
     one.wait("(t) => partwright.text() === t", two.assembly())
     assert from_text(one.assembly()) == TABLE
+    two.wait("() => !live.link.waiting.length")
     # Both at once: what the second has is on its way while the first changes something else.
     two.ask("() => void (live.link.sent = 1)")
     move(two, "top", "z4")

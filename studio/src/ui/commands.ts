@@ -53,7 +53,7 @@ export class Commands {
     };
     // What is being moved hears keys first, wherever the focus is.
     const moving = (event: KeyboardEvent) => {
-      if (!viewport.transformKey(event)) return;
+      if (!viewport.dragging.key(event)) return;
       event.preventDefault();
       event.stopPropagation();
     };

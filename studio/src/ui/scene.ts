@@ -84,7 +84,7 @@ export class Scene {
     renderer.setMesh("standIn", { places, normals, colours, triangles });
   }
 
-  protected get size(): [number, number] {
+  get size(): [number, number] {
     const half = this.renderer?.look.show === "beside" ? 0.5 : 1;
     return [this.element.clientWidth * half, this.element.clientHeight];
   }

@@ -1,13 +1,13 @@
 /** What is done in the picture: orbit, pan, zoom, select, drag handles, measure. */
 
+import { Dragging } from "../edit/dragging";
 import { drawGizmo, type Handle } from "../edit/gizmo";
 import type { Measurement, Measuring } from "../edit/measure";
 import { Region } from "../edit/region";
-import { type Axis, type Mode, Transform } from "../edit/transform";
-import { toUnit } from "../model/program";
+import type { Mode } from "../edit/transform";
 import type { Store } from "../model/store";
-import { type Vec3, add, dot, mul, sub } from "../model/vectors";
-import { project, rayThrough } from "../view/camera";
+import { add, dot, mul, sub } from "../model/vectors";
+import { rayThrough } from "../view/camera";
 import { type Hit, through } from "../view/picking";
 import { h, svg } from "./dom";
 import { Measurements } from "./measurements";
@@ -20,7 +20,7 @@ const DRAG = 4; // pixels that a click may wander
 export class Viewport extends Scene {
   tool: Tool = "select";
   readonly measured: Measurements;
-  transform: Transform | null = null;
+  readonly dragging: Dragging;
   onStatus: (text: string) => void = () => {};
   onTool: () => void = () => {};
   private overlay = svg("svg", { class: "overlay" });
@@ -29,11 +29,10 @@ export class Viewport extends Scene {
   private pointers = new Map<number, { x: number; y: number }>();
   private gesture: { x: number; y: number; moved: boolean; button: number; pan: boolean } | null = null;
   private last = { x: 0, y: 0 };
-  private start = { x: 0, y: 0 };
-  private dragging = false;
 
   constructor(store: Store) {
     super(store);
+    this.dragging = new Dragging(store, this);
     this.region = new Region(store);
     this.region.redraw = () => this.drawOverlay();
     this.region.onStatus = (text) => this.onStatus(text);
@@ -61,7 +60,7 @@ export class Viewport extends Scene {
   }
 
   setTool(tool: Tool): void {
-    this.cancelTransform();
+    this.dragging.cancel();
     this.tool = tool;
     this.measured.begin();
     this.onTool();
@@ -119,9 +118,9 @@ export class Viewport extends Scene {
     this.canvas.focus({ preventScroll: true });
     const at = this.place(event);
     this.last = at;
-    if (this.transform && !this.dragging) {
-      if (event.button === 2) this.cancelTransform();
-      else this.finishTransform();
+    if (this.dragging.active && !this.dragging.held) {
+      if (event.button === 2) this.dragging.cancel();
+      else this.dragging.finish();
       return;
     }
     if (event.button === 0 && this.region.down(this.inView(at))) {
@@ -140,8 +139,8 @@ export class Viewport extends Scene {
     const [dx, dy] = [at.x - (previous ?? this.last).x, at.y - (previous ?? this.last).y];
     this.last = at;
     if (this.region.move(this.inView(at))) return;
-    if (this.transform) {
-      this.drag(at, event.ctrlKey !== this.store.snapping);
+    if (this.dragging.active) {
+      this.dragging.to(at, event.ctrlKey !== this.store.snapping);
       return;
     }
     if (!previous) {
@@ -173,10 +172,9 @@ export class Viewport extends Scene {
   private up(event: PointerEvent, cancelled = false): void {
     if (this.region.up(this.view, ...this.size)) return;
     this.pointers.delete(event.pointerId);
-    if (this.dragging) {
-      this.dragging = false;
-      if (cancelled) this.cancelTransform();
-      else this.finishTransform();
+    if (this.dragging.held) {
+      if (cancelled) this.dragging.cancel();
+      else this.dragging.finish();
       return;
     }
     const { gesture } = this;
@@ -257,117 +255,16 @@ export class Viewport extends Scene {
     this.drawOverlay();
   }
 
-  // Moving, turning, scaling
-
-  /** By the keyboard: follows the pointer until it is confirmed. */
-  beginTransform(mode: Mode, axis: Axis | null = null): void {
-    this.cancelTransform();
-    const transform = new Transform(this.store, mode, axis, mode === "scale");
-    if (!transform.possible) {
-      this.onStatus(this.store.selection.size ? "What is selected is locked." : "Select a part first: click it.");
-      return;
-    }
-    this.transform = transform;
-    this.start = { ...this.last };
-    this.onStatus(transform.status);
-    this.onTool();
-  }
-
   private beginDrag(handle: Handle, event: PointerEvent): void {
     event.stopPropagation();
     event.preventDefault();
-    this.cancelTransform();
-    const transform = new Transform(this.store, handle.mode, handle.plane ? null : handle.axis, handle.local);
-    if (handle.plane && handle.axis !== null) transform.constrain(handle.axis, true);
-    if (!transform.possible) return;
-    this.transform = transform;
-    this.dragging = true;
-    this.start = this.last = this.place(event);
-    this.element.setPointerCapture(event.pointerId);
+    this.last = this.place(event);
+    if (this.dragging.byHandle(handle, this.last)) this.element.setPointerCapture(event.pointerId);
   }
 
-  private drag(at: { x: number; y: number }, snap: boolean): void {
-    const transform = this.transform!;
-    if (transform.typed) return;
-    const { view } = this;
-    const [width, height] = this.size;
-    const centre = toUnit(this.store.frame, transform.pivot);
-    const middle = project(view, centre, width, height);
-    const pixel = (2 * view.half[1] * Math.max(middle.depth, 0.01)) / height / this.store.frame.scale;
-    const [dx, dy] = [at.x - this.start.x, at.y - this.start.y];
-    if (transform.mode === "move") {
-      let offset = add(mul(view.right, dx * pixel), mul(view.up, -dy * pixel));
-      if (transform.axis !== null) {
-        // As far along the axis as its picture moves with the pointer.
-        const along = transform.direction(transform.axis);
-        const [ax, ay] = [dot(along, view.right), -dot(along, view.up)];
-        const seen = Math.max(ax * ax + ay * ay, 0.02);
-        offset = mul(along, ((dx * ax + dy * ay) / seen) * pixel);
-      } else if (transform.plane !== null) {
-        offset = this.onPlane(transform.direction(transform.plane), centre, at) ?? offset;
-      }
-      transform.by(offset, view.back, snap);
-    } else if (transform.mode === "rotate") {
-      const angle = (p: { x: number; y: number }) => Math.atan2(-(p.y - middle.y), p.x - middle.x);
-      let turn = angle(at) - angle(this.start);
-      turn = Math.atan2(Math.sin(turn), Math.cos(turn));
-      const axis = transform.axis === null ? view.back : transform.direction(transform.axis);
-      const facing = dot(axis, view.back);
-      // A ring seen from its edge turns as the pointer goes along it.
-      if (Math.abs(facing) < 0.2) {
-        const along = [dot(axis, view.up), dot(axis, view.right)];
-        turn = (dx * along[0] + dy * along[1]) / 90;
-      } else if (facing < 0) turn = -turn;
-      transform.by([turn, 0, 0], view.back, snap);
-    } else {
-      const from = Math.max(Math.hypot(this.start.x - middle.x, this.start.y - middle.y), 12);
-      transform.by([Math.max(0.02, Math.hypot(at.x - middle.x, at.y - middle.y) / from), 0, 0], view.back, snap);
-    }
-    this.onStatus(transform.status);
-  }
-
-  /** How far the pointer has gone on the plane through `centre` (of the unit frame), in own units. */
-  private onPlane(normal: Vec3, centre: Vec3, at: { x: number; y: number }): Vec3 | null {
-    const [width, height] = this.size;
-    const { view } = this;
-    const meet = (p: { x: number; y: number }): Vec3 | null => {
-      const ray = rayThrough(view, p.x, p.y, width, height);
-      const t = dot(sub(centre, view.eye), normal) / dot(ray, normal);
-      return t > 0 && t < 60 ? add(view.eye, mul(ray, t)) : null;
-    };
-    const [a, b] = [meet(this.start), meet(at)];
-    return a && b ? mul(sub(b, a), 1 / this.store.frame.scale) : null;
-  }
-
-  /** A key while something is moved; whether it was taken. */
-  transformKey(event: KeyboardEvent): boolean {
-    const { transform } = this;
-    if (!transform) return false;
-    const axis = "xyz".indexOf(event.key.toLowerCase());
-    if (event.key === "Escape") this.cancelTransform();
-    else if (event.key === "Enter") this.finishTransform();
-    else if (axis >= 0 && event.key.length === 1) transform.constrain(axis as Axis, event.shiftKey && transform.mode === "move");
-    else if (!transform.type(event.key)) return ["g", "r", "s"].includes(event.key.toLowerCase());
-    if (this.transform) this.onStatus(transform.status);
-    return true;
-  }
-
-  private finishTransform(): void {
-    const { transform } = this;
-    this.transform = null;
-    this.dragging = false;
-    transform?.commit();
-    this.onStatus("");
-    this.onTool();
-  }
-
-  cancelTransform(): void {
-    if (!this.transform) return;
-    this.transform.cancel();
-    this.transform = null;
-    this.dragging = false;
-    this.onStatus("");
-    this.onTool();
+  /** By the keyboard: follows the pointer until it is confirmed. */
+  beginTransform(mode: Mode): void {
+    this.dragging.byKeys(mode, this.last);
   }
 
   // Over the picture
