@@ -18,6 +18,7 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "load_shape": "partwright.shapes",
     "Shape": "partwright.shapes",
+    "shape_from_image": "partwright.generators",
     "fit": "partwright.fitting",
     "fit_nodes": "partwright.fitting",
     "fit_many": "partwright.batch",

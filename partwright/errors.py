@@ -129,6 +129,10 @@ class RobotError(PartwrightError):
     """A robot's file contradicts itself, or has nothing that could be replaced."""
 
 
+class GeneratorError(PartwrightError):
+    """A generator failed, took too long, or answered with something that is no mesh."""
+
+
 class CancelledError(PartwrightError):
     """A run was cancelled before there was anything to keep."""
 

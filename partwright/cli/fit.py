@@ -29,9 +29,26 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def _add_input(group: Group) -> None:
-    group.add_argument("shape", metavar="SHAPE", type=Path, help="mesh, scene, points, grid or STEP file")
+    group.add_argument(
+        "shape",
+        metavar="SHAPE",
+        type=Path,
+        help="mesh, scene, points, grid or STEP file; with --via a picture",
+    )
     group.add_argument("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
     group.add_argument("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
+    group.add_argument(
+        "--via",
+        metavar="GENERATOR",
+        help="what makes a mesh of the picture: a command with {input} and {output} in it, or the "
+        "address of a service that answers with a GLB; its mesh is kept as generated.glb",
+    )
+    group.add_argument(
+        "--via-timeout",
+        metavar="SECONDS",
+        type=float,
+        help="how long the generator may take (default: 600)",
+    )
 
 
 def add_method(group: Group) -> None:

@@ -80,7 +80,12 @@ def _fit_writes(arguments: argparse.Namespace) -> list[Path]:
 
     folder: Path = arguments.output
     there = sorted(folder.iterdir()) if folder.is_dir() else []
-    return [folder / name for name in FILES] + [path for path in there if CURVE_FILES.fullmatch(path.name)]
+    names: list[str] = [*FILES, *(path.name for path in there if CURVE_FILES.fullmatch(path.name))]
+    if getattr(arguments, "via", None) is not None:
+        from partwright.generators import GENERATED
+
+        names.append(GENERATED)
+    return [folder / name for name in names]
 
 
 def given(*paths: str | Path | None) -> list[Path]:

@@ -76,10 +76,10 @@ class Display(_Shown):
             note(f"{step.stage}: {detail}  {step.fraction:.0%}")
             self._last_stage, self._last_time = step.stage, time.monotonic()
 
-    def stage(self, name: str) -> None:
-        """A stage without rounds, after the method's own."""
+    def stage(self, name: str, done: float = _WRITING) -> None:
+        """A stage without rounds, as a rule after the method's own; done: share of the work before it."""
         if self._bar:
-            self._bar.update(self._task, description=name, completed=_WRITING)
+            self._bar.update(self._task, description=name, completed=done)
         else:
             note(name)
 

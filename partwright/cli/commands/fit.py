@@ -13,7 +13,7 @@ from partwright.errors import SettingError
 from partwright.fitting import Clean, Start, Tolerance, fit, fit_nodes
 from partwright.fitting.report import check_density_of
 from partwright.methods import Cancellation
-from partwright.shapes import load_shape
+from partwright.shapes import Shape, load_shape
 
 # Options that are settings of methods; those not given are left to the method.
 _SETTINGS = ("max_parts", "min_iou", "curve", "symmetry", "subtract", "model")
@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
         **given_settings(arguments),
     }
     with Display() as display:
-        shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
+        shape = _shape(arguments, display, cancel)
         check_density_of(arguments.density, shape.unit)
         begun = load_assembly(arguments.start) if arguments.start else None
         start = Start.locking(begun, [name for name in (arguments.lock or "").split(",") if name])
@@ -55,3 +55,24 @@ def run(arguments: argparse.Namespace) -> int:
         display.stage("writing")
         result.save(arguments.output)
     return finish_fit(result, arguments.output)
+
+
+def _shape(arguments: argparse.Namespace, display: Display, cancel: Cancellation) -> Shape:
+    """The file's, or what a generator makes of the picture."""
+    if arguments.via is None:
+        if arguments.via_timeout is not None:
+            raise SettingError("--via-timeout is of a generator: it needs --via")
+        return load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
+    from partwright.generators import GENERATED, TIME_LIMIT, shape_from_image
+
+    display.stage("generating", done=0.0)
+    with stopping(cancel.request):
+        return shape_from_image(
+            arguments.shape,
+            arguments.via,
+            time_limit=TIME_LIMIT if arguments.via_timeout is None else arguments.via_timeout,
+            keep=arguments.output / GENERATED,
+            unit=arguments.unit,
+            up=arguments.up,
+            cancel=cancel,
+        )

@@ -1,0 +1,5 @@
+"""The method that fits in no time."""
+
+from tests.cli.conftest import method
+
+__all__ = ["method"]
