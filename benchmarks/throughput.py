@@ -2,9 +2,9 @@
 
     python benchmarks/throughput.py --shapes FOLDER [--names mug,bunny] [--device cuda] [--at-once 1,2,4]
 
-Times `partwright.fit_many` in one process, shapes loaded before. One at a time has all cores to itself; the
-latency of one shape is its seconds. Assemblies have to be the same whatever the number at once. FOLDER is as
-for fit.py; twelve of its shapes are taken where it has them. The table goes to
+Times `partwright.fit_many`, the start of its worker processes included, shapes loaded before. One at a time
+has all cores to itself; the latency of one shape is its seconds. Assemblies have to be the same whatever the
+number at once. FOLDER is as for fit.py; twelve of its shapes are taken where it has them. The table goes to
 benchmarks/results/throughput.md (throughput_cuda.md with --device cuda).
 """
 

@@ -133,6 +133,10 @@ class GeneratorError(PartwrightError):
     """A generator failed, took too long, or answered with something that is no mesh."""
 
 
+class WorkerError(PartwrightError):
+    """A worker process crashed, or was killed past its limit of time or memory."""
+
+
 class CancelledError(PartwrightError):
     """A run was cancelled before there was anything to keep."""
 

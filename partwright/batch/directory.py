@@ -132,7 +132,7 @@ def fit_folder(
         raise SettingError(f"method: expected one of {', '.join(METHODS)}, got {plan.method!r}")
     if at_once < 0:
         raise SettingError(f"--at-once {at_once}: expected a number of processes, or 0 for one a core")
-    share, limits = share or Share(), limits or Limits(900.0, 8_000_000_000)
+    share, limits = share or Share(), limits or Limits()
     if output.resolve() == plan.source.resolve():
         raise SettingError(f"{output}: the folder with the shapes; give another to write into with -o")
     plan.save(output)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import queue
 import subprocess
 import sys
@@ -13,13 +14,17 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 import psutil
 
+from partwright.batch.worker import STOP
+from partwright.errors import SettingError
 from partwright.methods import Cancellation
 
 _POLL = 0.1  # seconds between looks at a worker
+_START = 60.0  # seconds that a process has to begin, which count for no item
 _LAST_WORDS = 400  # characters of what a worker that died had written
 
 Key = TypeVar("Key")
@@ -29,9 +34,15 @@ Key = TypeVar("Key")
 class Limits:
     """Of one item."""
 
-    seconds: float
-    memory: int
+    seconds: float = 900.0
+    memory: int = 8_000_000_000
     """Bytes of resident memory, of the worker and its children."""
+
+    def __post_init__(self) -> None:
+        if not (0 < self.seconds < math.inf and self.memory > 0):
+            raise SettingError(
+                f"limits of {self.seconds} s and {self.memory} bytes: expected numbers above 0"
+            )
 
 
 @dataclass(frozen=True)
@@ -50,40 +61,54 @@ class Worker:
 
     command = (sys.executable, "-m", "partwright.batch.worker")
 
-    def __init__(self, limits: Limits, cancel: Cancellation) -> None:
-        self._limits, self._cancel = limits, cancel
+    def __init__(self, limits: Limits, cancel: Cancellation, gently: bool, given_up: threading.Event) -> None:
+        self._limits, self._cancel, self._gently, self._given_up = limits, cancel, gently, given_up
         self._process: subprocess.Popen[str] | None = None
 
-    def do(self, job: dict[str, Any]) -> Answer | None:
-        """The answer; None where all was stopped meanwhile.
+    def do(self, job: dict[str, Any], told: Callable[[dict[str, Any]], None]) -> Answer | None:
+        """The answer; None where all was stopped meanwhile. `told` of progress, if the job asks for it.
 
         A job whose worker dies gets a second one: it may have been the machine, and not the shape.
         """
-        answer = self._tried(job)
-        return self._tried(job) if answer is not None and answer.status == "crashed" else answer
+        answer = self._tried(job, told)
+        crashed = answer is not None and answer.status == "crashed"
+        return self._tried(job, told) if crashed and not self._cancel.requested else answer
 
-    def _tried(self, job: dict[str, Any]) -> Answer | None:
+    def _tried(self, job: dict[str, Any], told: Callable[[dict[str, Any]], None]) -> Answer | None:
+        new = self._process is None or self._process.poll() is not None
         process = self._process = self._running()
-        assert process.stdin is not None
-        begun, peak = time.monotonic(), 0
-        with suppress(OSError):  # it died: the next look says so
-            process.stdin.write(json.dumps(job) + "\n")
-            process.stdin.flush()
+        begun, peak, asked = time.monotonic() + (_START if new else 0.0), 0, False
+        self._say(json.dumps(job) + "\n")
         while True:
             line = self._line()
-            spent, now = time.monotonic() - begun, _memory(process.pid)
+            spent, now = max(time.monotonic() - begun, 0.0), _memory(process.pid)
             peak = max(peak, now)
             if line:
                 said = json.loads(line)
-                failed = said.get("error", "")
-                return Answer("failed" if failed else "done", failed, said.get("result", {}), spent, peak)
-            if self._cancel.requested:
+                if "ready" in said:
+                    begun = time.monotonic()
+                elif "progress" in said:
+                    told(said["progress"])
+                else:
+                    failed = said.get("error", "")
+                    return Answer("failed" if failed else "done", failed, said.get("result", {}), spent, peak)
+            if self._given_up.is_set() or (self._cancel.requested and not self._gently):
                 self.close()
                 return None
+            if self._cancel.requested and not asked:
+                self._say(STOP)
+                asked = True
             status, reason = self._trouble(process, spent, now)
             if status:
                 self.close()
                 return Answer(status, reason, {}, spent, peak)
+
+    def _say(self, line: str) -> None:
+        assert self._process is not None
+        assert self._process.stdin is not None
+        with suppress(OSError):  # it died: the next look says so
+            self._process.stdin.write(line)
+            self._process.stdin.flush()
 
     def close(self) -> None:
         """Ends the process and its children at once."""
@@ -141,32 +166,40 @@ class Worker:
 
 
 class Pool(Generic[Key]):
-    """`at_once` workers, and jobs that are asked for only when one is free, so that none pile up."""
+    """`at_once` workers, and jobs that are asked for only when one is free, so that none pile up.
 
-    def __init__(self, at_once: int, limits: Limits, cancel: Cancellation) -> None:
-        self._at_once, self._limits, self._cancel = at_once, limits, cancel
+    A cancellation kills what is running; gently, it lets that end with its best so far.
+    """
 
-    def run(self, jobs: Iterator[tuple[Key, dict[str, Any]]], done: Callable[[Key, Answer], None]) -> None:
-        """Does all jobs; `done` is called in this thread, in the order in which they end."""
-        idle = [Worker(self._limits, self._cancel) for _ in range(self._at_once)]
-        workers, running = list(idle), dict[Future[Answer | None], tuple[Key, Worker]]()
+    def __init__(self, at_once: int, limits: Limits, cancel: Cancellation, gently: bool = False) -> None:
+        self._cancel, self._given_up = cancel, threading.Event()
+        self._workers = [Worker(limits, cancel, gently, self._given_up) for _ in range(at_once)]
+
+    def run(
+        self,
+        jobs: Iterator[tuple[Key, dict[str, Any]]],
+        done: Callable[[Key, Answer], None],
+        told: Callable[[Key, dict[str, Any]], None] = lambda key, step: None,
+    ) -> None:
+        """Does all jobs; `done` is called in this thread, in the order of their ends, `told` in others."""
+        idle, running = list(self._workers), dict[Future[Answer | None], tuple[Key, Worker]]()
         try:
-            with ThreadPoolExecutor(self._at_once) as threads:
+            with ThreadPoolExecutor(len(idle)) as threads:
                 try:
                     for key, job in jobs:
-                        worker = idle.pop()
-                        running[threads.submit(worker.do, job)] = key, worker
-                        while running and not idle:
-                            self._collect(running, idle, done)
                         if self._cancel.requested:
                             break
+                        worker = idle.pop()
+                        running[threads.submit(worker.do, job, partial(told, key))] = key, worker
+                        while running and not idle:
+                            self._collect(running, idle, done)
                     while running:
                         self._collect(running, idle, done)
                 except BaseException:
-                    self._cancel.request()  # or the threads would wait for their jobs to end
+                    self._given_up.set()  # or the threads would wait for their jobs to end
                     raise
         finally:
-            for worker in workers:
+            for worker in self._workers:
                 worker.close()
 
     def _collect(

@@ -98,6 +98,13 @@ class Shape:
     def __repr__(self) -> str:
         return f"Shape({self.name!r}, {len(self.faces)} triangles, unit={self.unit}, up={self.up})"
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what is computed from it, so that a shape can go to another process."""
+        return {name: value for name, value in vars(self).items() if name not in ("_source", "_cache")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _source=state["_surface"].distance(), _cache={})
+
     @property
     def area(self) -> float:
         """Area of the outer surface in own units squared."""
