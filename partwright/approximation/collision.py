@@ -13,7 +13,7 @@ from partwright.approximation.balanced_hull import balanced_hull
 from partwright.approximation.change import Change
 from partwright.approximation.convex import segments, walls
 from partwright.approximation.convex_cover import Limits, convex_cover
-from partwright.approximation.convex_fit import convex_fits
+from partwright.approximation.convex_fit import CONVEX_KINDS, convex_fits
 from partwright.approximation.light_hull import light_hull
 from partwright.approximation.nearest import Approximation, nearest_solid
 from partwright.approximation.pieces import Piece, piece_mesh, pieces, require_some
@@ -40,12 +40,17 @@ _COMPARED = 32  # cells along what is compared
 
 @dataclass(frozen=True)
 class Geometry:
-    """A piece in the format's terms: `part`, placed, holds a solid; else `mesh` stands for it."""
+    """A piece in the format's terms: `part`, placed, holds a solid; else `mesh` stands for it.
+
+    piece, parts: names of the piece that it is of, and of the parts in that.
+    """
 
     name: str
     colour: np.ndarray
     part: Part | None
     mesh: trimesh.Trimesh | None
+    piece: str
+    parts: tuple[str, ...]
 
 
 def geometries(
@@ -104,14 +109,14 @@ def _stand_ins(
     part = piece.node if isinstance(piece.node, Part) else None
     near = nearest_solid(part, kinds) if part is not None else None
     if near is not None and near.exact:
-        return [Geometry(piece.name, piece.colour, near.part_with_solid, None)], None
+        return [Geometry(piece.name, piece.colour, near.part_with_solid, None, piece.name, names)], None
     mesh, error, deviation = _mesh(piece, resolution, convex)
     if near is not None and _alike(near, allowed):
         hull_is_nearer = convex and deviation <= allowed and error + _NATIVE_FOR < near.volume_error_ratio
         if not hull_is_nearer:
             change = Change(names, near.solid.kind, near.volume_error_ratio, near.max_deviation)
-            return [Geometry(piece.name, piece.colour, near.part_with_solid, None)], change
-    whole = [Geometry(piece.name, piece.colour, None, mesh)]
+            return [Geometry(piece.name, piece.colour, near.part_with_solid, None, piece.name, names)], change
+    whole = [Geometry(piece.name, piece.colour, None, mesh, piece.name, names)]
     mesh_change = Change(names, "convex mesh" if convex else "mesh", error, deviation)
     if convex and deviation <= allowed and error <= _MOST_ERROR:
         return whole, mesh_change
@@ -150,8 +155,8 @@ def _covered(node: Node, kinds: Sequence[type[Field]], allowed: float) -> list[P
     forms: list[Part | trimesh.Trimesh] = []
     for one in convex_cover(unit, Limits(allowed / side, _EXTRA)):
         hull = balanced_hull(one, allowed / side)
-        fits = convex_fits(hull, kinds, "nearest")
-        if fits[0].volume_error_ratio <= _AS_GOOD and fits[0].deviation * side <= allowed:
+        fits = convex_fits(hull, [kind for kind in kinds if kind in CONVEX_KINDS], "nearest")
+        if fits and fits[0].volume_error_ratio <= _AS_GOOD and fits[0].deviation * side <= allowed:
             forms.append(fits[0].part.transformed(frame))
         else:
             light = light_hull(hull, _LIGHT * allowed / side)[0].to_mesh64()
@@ -179,7 +184,12 @@ def _chain(part: Part, kinds: Sequence[type[Field]], allowed: float) -> list[Par
 def _numbered(piece: Piece, forms: Sequence[Part | trimesh.Trimesh]) -> list[Geometry]:
     return [
         Geometry(
-            f"{piece.name}/{i}", piece.colour, *((form, None) if isinstance(form, Part) else (None, form))
+            f"{piece.name}/{i}",
+            piece.colour,
+            form if isinstance(form, Part) else None,
+            None if isinstance(form, Part) else form,
+            piece.name,
+            piece.part_names,
         )
         for i, form in enumerate(forms, 1)
     ]

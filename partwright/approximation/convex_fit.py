@@ -24,6 +24,7 @@ from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
+CONVEX_KINDS = (Box, Cylinder, Sphere, Capsule, Ellipsoid)  # that a convex solid can become
 Mode = Literal["nearest", "around", "within"]
 _DIRECTIONS = 400  # on the sphere, in which supports are compared, beside the faces' own
 _CELLS = 18  # along each side of the lattice on which volumes are compared
@@ -94,7 +95,7 @@ class _Body:
 def convex_fits(hull: Manifold, kinds: Sequence[type[Field]], mode: Mode) -> list[ConvexFit]:
     """The best solid of each kind by volume, the best of all first; kinds without one are left out.
 
-    hull: convex. kinds: of `Box`, `Cylinder`, `Sphere`, `Capsule`, `Ellipsoid`. mode: "around" contains every
+    hull: convex. kinds: of `CONVEX_KINDS`. mode: "around" contains every
     corner of the hull, "within" lies inside all its faces.
     """
     body = _Body.of(hull)

@@ -18,6 +18,7 @@ import numpy as np
 
 from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.approximation.recognise import SAME, exact_solid
+from partwright.approximation.round_cone import RoundCone
 from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import NO_ROTATION, quaternion_product, rotation_matrix
 from partwright.errors import NoSurfaceError, ParameterError
@@ -58,7 +59,7 @@ class Approximation:
 
 
 def nearest_solid(part: Part, kinds: Sequence[type[Field]] = SOLIDS) -> Approximation:
-    """The nearest of `kinds` (`SOLIDS` and `Ellipsoid`) to the part alone, unblended.
+    """The nearest of `kinds` (`SOLIDS`, `Ellipsoid` and `RoundCone`) to the part alone, unblended.
 
     Raises:
         NoSurfaceError: the part has no volume.
@@ -220,7 +221,7 @@ def _starts(lattice: _Lattice, kinds: Sequence[type[Field]]) -> Iterator[_Placed
         if lengths is None:
             continue
         field = _of_lengths(kind, lengths)
-        if not isinstance(field, Cone | Frustum):
+        if not isinstance(field, Cone | Frustum | RoundCone):
             yield _Placed(field, rotation, centre)
             continue
         for turn in (rotation, quaternion_product(rotation, _FLIP)):
@@ -254,6 +255,11 @@ def _capsule(v: np.ndarray, _: float) -> Sequence[float]:
     return radius, max(1.1 * math.sqrt(12 * v[2]) - 2 * radius, 0.1 * radius)
 
 
+def _round_cone(v: np.ndarray, volume: float) -> Sequence[float]:
+    radius, height = _capsule(v, volume)
+    return 1.15 * radius, 0.85 * radius, max(height, 0.4 * radius)
+
+
 def _disc(v: np.ndarray) -> float:
     return math.sqrt(2 * (v[0] + v[1]))
 
@@ -267,6 +273,7 @@ _BY_MOMENTS: dict[type[Field], Callable[[np.ndarray, float], Sequence[float] | N
     Cone: lambda v, _: (math.sqrt(10 / 3 * (v[0] + v[1])), math.sqrt(80 / 3 * v[2])),
     Frustum: lambda v, _: (1.15 * _disc(v), 0.85 * _disc(v), math.sqrt(12 * v[2])),
     Capsule: _capsule,
+    RoundCone: _round_cone,
     Tube: _tube,
     Torus: _torus,
 }
@@ -283,6 +290,8 @@ def _of_lengths(kind: type[Field], lengths: Sequence[float] | np.ndarray) -> Fie
         return kind((v[0], v[1], v[2]))
     if kind is Frustum:
         v[1] = min(v[1], 2 * v[0])
+    if kind is RoundCone:
+        v[2] = max(v[2], 1.01 * abs(v[0] - v[1]))
     if kind in (Tube, Torus):
         v[1] = min(v[1], 0.999 * v[0])
     return kind(*v)

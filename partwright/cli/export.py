@@ -19,11 +19,16 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     add_output(command, "FILE", "where to write", reads=lambda a: [a.assembly], writes=_writes)
     option = command.add_argument_group("of some formats").add_argument
-    option("--density", metavar="D", type=float, help="in kg/m3 (MJCF, URDF; default: water)")
+    option("--density", metavar="D", type=float, help="in kg/m3 (rigid bodies; default: water)")
     option(
         "--tolerance", metavar="T", type=float, help="what a native solid may be off before a mesh is written"
     )
-    option("--free-joint", action="store_true", default=None, help="let the body move (MJCF, URDF)")
+    option("--free-joint", action="store_true", default=None, help="let the body move")
+    option(
+        "--physics",
+        metavar="NAME",
+        help="colliders, too: khr (GLB: rigid bodies), usd (USD), or by names: unreal, godot (GLB, OBJ)",
+    )
     option("--by-part", action="store_true", default=None, help="each part by itself (OBJ, PLY, STL, 3MF)")
     option("--resolution", metavar="N", type=int, help="cells along the longest side of what is meshed")
     option("--facets", metavar="N", type=int, help="facets of a full circle (OpenSCAD; default: 96)")

@@ -11,7 +11,6 @@ there without a mesh, for its parameters.
 
 from __future__ import annotations
 
-import math
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,13 +24,19 @@ from partwright.approximation.separation import separated, subtracted_names
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.file_text import instance_dict
 from partwright.assembly.palette import palette
-from partwright.assembly.similarity import NO_ROTATION
 from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
+from partwright.export.axes import to_gltf
 from partwright.export.formats import Format, Holds
+from partwright.export.glb_colliders import (
+    KHR,
+    add_named_colliders,
+    add_rigid_body,
+    check_physics,
+    collider_body,
+)
 from partwright.export.identifiers import free_name
 from partwright.meshing import mesh_part
-from partwright.shapes import METRES, canonical_unit, canonical_up
 from partwright.textures import part_map
 from partwright.textures.maps import KEY
 from partwright.textures.unwrapping import unwrapped
@@ -40,27 +45,32 @@ if TYPE_CHECKING:
     import trimesh
 
 _VERTICES, _INDICES = 34962, 34963  # glTF's targets of buffer views
-_HALF = math.sqrt(0.5)
 _SUBTRACTED = {"role": "subtracted"}
-# up axis -> the rotation that turns it to +Y
-_TO_Y_UP = {
-    "y": NO_ROTATION,
-    "-y": (0.0, 1.0, 0.0, 0.0),
-    "z": (_HALF, -_HALF, 0.0, 0.0),
-    "-z": (_HALF, _HALF, 0.0, 0.0),
-    "x": (_HALF, 0.0, 0.0, _HALF),
-    "-x": (_HALF, 0.0, 0.0, -_HALF),
-}
 
 
-def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
+def write(
+    assembly: Assembly,
+    path: str | Path,
+    resolution: int = 32,
+    physics: str | None = None,
+    density: float | None = None,
+    tolerance: float | None = None,
+    free_joint: bool = False,
+) -> None:
     """Write the parts; `resolution` is the number of cells along each part.
+
+    physics: colliders, too: "khr" as rigid bodies of KHR_physics_rigid_bodies, "unreal" or "godot" as meshes
+    under the names that these engines know. density, free_joint: of "khr", which may then move. tolerance: as
+    of MJCF.
 
     Raises:
         NothingToExportError: no part has a surface.
         NoSurfaceError: the assembly does not end.
+        SettingError: there is no such physics, or a density or joint without it.
     """
     from trimesh.exchange.gltf import export_glb
+
+    check_physics(physics, density, free_joint)
 
     check_ends(assembly)
 
@@ -68,9 +78,19 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
         tree["asset"]["generator"] = f"Partwright {__version__}"
         tree["asset"]["extras"] = _about(assembly)
         _say_targets(tree)
+        if collide is not None:
+            collide(tree)
 
-    scene = _Scene(assembly, resolution).scene
+    made = _Scene(assembly, resolution, bodily=physics == KHR)
+    scene, collide = made.scene, None
     require_some(assembly, list(scene.geometry))
+    if physics is not None:
+        body = collider_body(assembly, physics, density, tolerance)
+        if physics == KHR:
+            collide = add_rigid_body(scene, made.body, body, free_joint, made.taken)
+        else:
+            collide = add_named_colliders(scene, physics, body, made.shown)
+        body.write_report(path)
     data = export_glb(scene, include_normals=False, tree_postprocessor=describe)
     write_bytes(path, data)
 
@@ -84,12 +104,6 @@ def _say_targets(tree: dict[str, Any]) -> None:
                 tree["bufferViews"][tree["accessors"][index]["bufferView"]]["target"] = target
 
 
-def to_gltf(assembly: Assembly) -> Similarity:
-    """From the assembly's own units and axes to metres and Y up, as far as they are known."""
-    scale = METRES[canonical_unit(assembly.unit)] if assembly.unit else 1.0
-    return Similarity(scale, _TO_Y_UP[canonical_up(assembly.up)] if assembly.up else NO_ROTATION)
-
-
 def _about(assembly: Assembly) -> dict[str, Any]:
     about: dict[str, Any] = {"unit": assembly.unit, "up": assembly.up, "operation": assembly.operation}
     if assembly.unit is None:
@@ -100,14 +114,19 @@ def _about(assembly: Assembly) -> dict[str, Any]:
 class _Scene:
     """Adds nodes to a scene."""
 
-    def __init__(self, assembly: Assembly, resolution: int) -> None:
+    def __init__(self, assembly: Assembly, resolution: int, bodily: bool = False) -> None:
+        """bodily: all is below a node `body`, in metres."""
         import trimesh
 
         self.scene = trimesh.Scene(base_frame="world")
         self.assembly, self.resolution = assembly, resolution
+        self.shown: dict[tuple[str, ...], str] = {}  # parts of which a node has the mesh -> its name
         self.colours = dict(zip((p.name for p in assembly.parts), palette(len(assembly)), strict=True))
         self.taken = {"world", *self.colours}
-        self.add(assembly, "world", to_gltf(assembly).matrix(), {})
+        self.body = free_name("body", self.taken) if bodily else "world"
+        if bodily:
+            self.scene.graph.update(frame_to=self.body, frame_from="world")
+        self.add(assembly, self.body, to_gltf(assembly).matrix(), {})
 
     def add(self, node: Node, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> None:
         """A node below another. A difference holds what is left of it, and what it subtracts without mesh."""
@@ -141,6 +160,7 @@ class _Scene:
             return
         mesh = self._looking(mesh, part)
         self.scene.add_geometry(mesh, part.name, part.name, parent, pose @ own.matrix(), metadata=about)
+        self.shown[(part.name,)] = part.name
         for i, move in enumerate(part.instances, start=2):
             copy = free_name(f"{part.name}/{i}", self.taken)
             within = own.inverse().conjugate(move).matrix()
@@ -165,6 +185,7 @@ class _Scene:
             self._add_bare(name, parent, pose, about)
         else:
             self.scene.add_geometry(mesh, name, name, parent, pose, metadata=about)
+            self.shown.setdefault(tuple(p.name for p in parts), name)
 
     def _looking(self, mesh: trimesh.Trimesh, part: Part, placed: bool = False) -> trimesh.Trimesh:
         """The mesh in the part's map, or in its colour; placed: it is where the part is, not in its frame."""

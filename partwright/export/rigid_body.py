@@ -1,9 +1,9 @@
-"""What MJCF and URDF share: one body in metres with Z up, its geometries, mass and inertia."""
+"""What formats of rigid bodies share: one body, its geometries, mass and inertia."""
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as xml
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,9 +16,10 @@ from partwright.export.axes import to_metres_z_up, unknowns
 from partwright.export.export_report import write_report
 from partwright.fields import Field
 from partwright.meshing.mass import MassProperties, check_density, mass_properties
+from partwright.shapes import METRES, canonical_unit
 
 if TYPE_CHECKING:
-    from partwright.assembly import Assembly
+    from partwright.assembly import Assembly, Similarity
 
 DENSITY = 1000.0  # kg/m3: water
 
@@ -32,6 +33,8 @@ class Body:
     changes: list[Change]
     properties: MassProperties
     density: float
+    metres: bool = True
+    """Whether it is in metres, as far as the assembly's unit is known; else in the assembly's own unit."""
 
     @classmethod
     def of(
@@ -43,20 +46,23 @@ class Body:
         resolution: int,
         *,
         convex: bool,
+        frame: Callable[[Assembly], Similarity] = to_metres_z_up,
     ) -> Body:
-        """The arguments are those of `geometries`; density: in kg/m3.
+        """The arguments are those of `geometries`; density: in kg/m3. frame: from the assembly's axes to the
+        format's.
 
         Raises:
             ParameterError: the density is not a positive number, or the tolerance none of at least 0.
             NothingToExportError: no piece has a volume.
         """
         check_density(density)
-        frame = to_metres_z_up(assembly)
-        local = assembly.transformed(frame)
+        place = frame(assembly)
+        local = assembly.transformed(place)
         found, changes = geometries(
-            local, kinds, tolerance, resolution, convex=convex, length=1 / frame.scale
+            local, kinds, tolerance, resolution, convex=convex, length=1 / place.scale
         )
-        return cls(assembly, found, changes, mass_properties(local), density)
+        metres = assembly.unit is None or place.scale == METRES[canonical_unit(assembly.unit)]
+        return cls(assembly, found, changes, mass_properties(local), density, metres)
 
     @property
     def name(self) -> str:
@@ -74,8 +80,13 @@ class Body:
         """Write the document, and FILE.report.json where something was changed."""
         xml.indent(root)
         write_bytes(path, xml.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n")
-        mass = self.properties.to_dict("m" if self.assembly.unit else None, self.density)
-        write_report(self.assembly, path, self.changes, unknowns(self.assembly), mass_properties=mass)
+        self.write_report(path)
+
+    def write_report(self, path: str | Path) -> None:
+        """FILE.report.json, where something was changed."""
+        unit = "m" if self.assembly.unit else None
+        mass = {"mass_properties": self.properties.to_dict(unit, self.density)} if self.metres else {}
+        write_report(self.assembly, path, self.changes, unknowns(self.assembly), **mass)
 
 
 def numbers(values: Iterable[float]) -> str:

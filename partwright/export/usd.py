@@ -24,6 +24,7 @@ from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
 from partwright.export.axes import to_metres_z_up
 from partwright.export.formats import Format, Holds
+from partwright.export.usd_physics import add_physics, body_of, check_physics
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
 
@@ -32,15 +33,27 @@ _NO_SURFACE = "no surface of its own at this resolution"
 _UNKNOWN_UNIT = "the length unit is unknown: metersPerUnit is USD's way of saying nothing, 1"
 
 
-def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
+def write(
+    assembly: Assembly,
+    path: str | Path,
+    resolution: int = 32,
+    physics: str | None = None,
+    density: float | None = None,
+    tolerance: float | None = None,
+    free_joint: bool = False,
+) -> None:
     """Write .usda as text, .usdc and .usd in binary; resolution: cells along each part.
+
+    physics: "usd" for colliders, too. density (kg/m3), tolerance, free_joint (the body may move): as of MJCF.
 
     Raises:
         NothingToExportError: no part has a surface.
         NoSurfaceError: the assembly does not end.
+        SettingError: there is no such physics, or an option that needs it.
     """
     from pxr import Usd, UsdGeom
 
+    check_physics(physics, density, tolerance, free_joint)
     check_ends(assembly)
     stage = Usd.Stage.CreateInMemory()
     up = canonical_up(assembly.up) if assembly.up else "z"
@@ -55,6 +68,10 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 32) -> None:
     stage.SetDefaultPrim(root)
     if up not in _AXES:
         _place(root, Similarity(rotation=to_metres_z_up(assembly).rotation))
+    if physics is not None:
+        body = body_of(assembly, density, tolerance)
+        add_physics(stage, root, body, free_joint)
+        body.write_report(path)
     # Where USD itself cannot write, it says so in errors of its own: our own file errors are clearer.
     with tempfile.TemporaryDirectory() as folder:
         whole = Path(folder) / f"stage{Path(path).suffix.lower()}"

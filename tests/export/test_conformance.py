@@ -32,9 +32,8 @@ from partwright.errors import (
     UnsupportedFormatError,
 )
 from partwright.export import export
-from partwright.export.axes import to_metres_z_up
+from partwright.export.axes import to_gltf, to_metres_z_up
 from partwright.export.formats import FORMATS, Format, Holds
-from partwright.export.glb import to_gltf
 from partwright.fields import Box, Cylinder, Quadric, Sphere, SuperFrustum
 from partwright.fields.joint import JointField, Member
 from partwright.meshing import mesh_assembly

@@ -1,0 +1,137 @@
+"""UsdPhysics: colliders as native Gprims and convex meshes, and mass where the body may move.
+
+They lie below the root, in a prim with the purpose "guide", which renderers leave out. All numbers are in the
+stage's own unit, and masses in kilograms.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from partwright.approximation.collision import TOLERANCE, Geometry
+from partwright.approximation.round_cone import RoundCone
+from partwright.assembly import Assembly, Similarity
+from partwright.errors import SettingError
+from partwright.export.collider_meshes import collider_mesh
+from partwright.export.gltf_physics import principal_inertia
+from partwright.export.rigid_body import DENSITY, Body
+from partwright.fields import Box, Capsule, Cone, Cylinder, Field, Frustum, Sphere
+from partwright.meshing.mass import check_density
+from partwright.shapes import METRES, canonical_unit
+
+USD = "usd"
+SHAPES: tuple[type[Field], ...] = (Box, Cylinder, Cone, Frustum, Sphere, Capsule, RoundCone)
+_CELLS = 24  # along a part that becomes a hull
+
+
+def check_physics(physics: str | None, density: float | None, tolerance: float | None, free: bool) -> None:
+    """Raises SettingError for a kind of physics that there is not, or for options that need one."""
+    if physics not in (None, USD):
+        raise SettingError(f"physics: expected {USD}, got {physics!r}")
+    if physics is None and (density is not None or tolerance is not None or free):
+        raise SettingError(f"density, tolerance and free_joint are of rigid bodies: they need physics {USD}")
+
+
+def body_of(assembly: Assembly, density: float | None, tolerance: float | None) -> Body:
+    """The colliders in the assembly's own frame; its density is per cubic unit of length.
+
+    Raises:
+        NothingToExportError: no piece has a volume.
+    """
+    metres = METRES[canonical_unit(assembly.unit)] if assembly.unit else 1.0
+    return Body.of(
+        assembly,
+        SHAPES,
+        check_density(DENSITY if density is None else density) * metres**3,
+        TOLERANCE if tolerance is None else tolerance,
+        _CELLS,
+        convex=True,
+        frame=lambda _: Similarity(),
+    )
+
+
+def add_physics(stage: Any, root: Any, body: Body, moves: bool) -> None:
+    """Add colliders below `root`, which becomes a rigid body where it `moves`."""
+    from pxr import Gf, Tf, UsdGeom, UsdPhysics
+
+    if moves:
+        UsdPhysics.RigidBodyAPI.Apply(root)
+        mass = UsdPhysics.MassAPI.Apply(root)
+        moments, (w, x, y, z) = principal_inertia(body)
+        mass.CreateMassAttr(body.properties.mass(body.density))
+        mass.CreateCenterOfMassAttr(Gf.Vec3f(*body.properties.centre.tolist()))
+        mass.CreateDiagonalInertiaAttr(Gf.Vec3f(*moments.tolist()))
+        mass.CreatePrincipalAxesAttr(Gf.Quatf(w, x, y, z))
+        UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
+    path = root.GetPath().AppendChild("colliders")
+    number = 1
+    while stage.GetPrimAtPath(path):
+        number += 1
+        path = root.GetPath().AppendChild(f"colliders_{number}")
+    UsdGeom.Xform.Define(stage, path).CreatePurposeAttr(UsdGeom.Tokens.guide)
+    for i, geometry in enumerate(body.geometries, 1):
+        prim = _define(stage, path.AppendChild(f"{Tf.MakeValidIdentifier(geometry.name)}_{i:02d}"), geometry)
+        UsdPhysics.CollisionAPI.Apply(prim)
+
+
+def _define(stage: Any, path: Any, geometry: Geometry) -> Any:
+    from pxr import Gf, Usd, UsdGeom, UsdPhysics
+
+    if geometry.part is None:
+        gprim = _mesh(stage, path, geometry)
+        UsdPhysics.MeshCollisionAPI.Apply(gprim.GetPrim()).CreateApproximationAttr("convexHull")
+        return gprim.GetPrim()
+    gprim = _native(stage, path, geometry.part.field)
+    double = UsdGeom.XformOp.PrecisionDouble
+    gprim.AddTranslateOp(double).Set(Gf.Vec3d(*geometry.part.translation))
+    gprim.AddOrientOp(double).Set(Gf.Quatd(*geometry.part.rotation))
+    if isinstance(geometry.part.field, Box):
+        gprim.AddScaleOp(double).Set(Gf.Vec3d(*geometry.part.field.size))
+    time = Usd.TimeCode.Default()
+    gprim.CreateExtentAttr(UsdGeom.Boundable.ComputeExtentFromPlugins(gprim, time))
+    return gprim.GetPrim()
+
+
+def _native(stage: Any, path: Any, field: Field) -> Any:
+    """The Gprim of one of `SHAPES`, about z; a box is a cube of side 1."""
+    from pxr import UsdGeom
+
+    match field:
+        case Box():
+            made, numbers = UsdGeom.Cube, {"Size": 1.0}
+        case Sphere(radius=radius):
+            made, numbers = UsdGeom.Sphere, {"Radius": radius}
+        case Cylinder(radius=radius, height=height):
+            made, numbers = UsdGeom.Cylinder, {"Radius": radius, "Height": height}
+        case Capsule(radius=radius, height=height):
+            made, numbers = UsdGeom.Capsule, {"Radius": radius, "Height": height}
+        case Cone(radius=radius, height=height):
+            made, numbers = UsdGeom.Cone, {"Radius": radius, "Height": height}
+        case Frustum(bottom_radius=bottom, top_radius=top, height=height):
+            made, numbers = UsdGeom.Cylinder_1, {"RadiusBottom": bottom, "RadiusTop": top, "Height": height}
+        case RoundCone(bottom_radius=bottom, top_radius=top, height=height):
+            made, numbers = UsdGeom.Capsule_1, {"RadiusBottom": bottom, "RadiusTop": top, "Height": height}
+        case _:
+            raise AssertionError(f"{field.kind} is not among SHAPES")
+    gprim = made.Define(stage, path)
+    for name, value in numbers.items():
+        getattr(gprim, f"Create{name}Attr")(value)
+    if "Height" in numbers:
+        gprim.CreateAxisAttr(UsdGeom.Tokens.z)
+    return gprim
+
+
+def _mesh(stage: Any, path: Any, geometry: Geometry) -> Any:
+    from pxr import UsdGeom, Vt
+
+    mesh = collider_mesh(geometry)
+    points, faces = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
+    gprim = UsdGeom.Mesh.Define(stage, path)
+    gprim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    gprim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, np.int32)))
+    gprim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.ravel()))
+    gprim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    gprim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array([points.min(axis=0), points.max(axis=0)])))
+    return gprim
