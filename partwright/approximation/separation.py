@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError
 from partwright.meshing import mesh_assembly, mesh_part
 from partwright.meshing.csg import has_exact_mesh, solid_of
+from partwright.meshing.thin_parts import as_manifold
 
 if TYPE_CHECKING:
-    import trimesh
     from manifold3d import Manifold
 
 _CELLS = 48  # along what has no exact mesh
@@ -67,11 +65,4 @@ def node_solid(node: Node, tolerance: float | None) -> Manifold:
     """
     if has_exact_mesh(node):
         return solid_of(node, tolerance)
-    return _manifold(mesh_part(node, _CELLS) if isinstance(node, Part) else mesh_assembly(node, _CELLS))
-
-
-def _manifold(mesh: trimesh.Trimesh) -> Manifold:
-    from manifold3d import Manifold, Mesh64
-
-    vertices, faces = np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.uint64)
-    return Manifold(Mesh64(vertices, faces))
+    return as_manifold(mesh_part(node, _CELLS) if isinstance(node, Part) else mesh_assembly(node, _CELLS))

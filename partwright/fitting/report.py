@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from partwright.metrics import Scores
 
 POOR_IOU = 0.85
-POOR_DEVIATION = 0.1  # of the longest side
+POOR_DEVIATION = 0.05  # of the longest side
 UNSURE = 0.5
 MUCH_MISSING = 0.02  # of the surface
 SAME_VOLUME = 0.01  # of the input's triangles and of its inside: then no surface runs through it twice

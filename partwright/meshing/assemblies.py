@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from partwright.fields.base import LIPSCHITZ
 from partwright.meshing.csg import has_exact_mesh, mesh_csg
 from partwright.meshing.marching import mesh_field
 from partwright.meshing.small_components import without_small_components
+from partwright.meshing.thin_parts import separate, united
 
 if TYPE_CHECKING:
     import trimesh
@@ -23,6 +25,7 @@ ACROSS, _ACROSS_PART = 2.0, 3.0
 _FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin walls
 _PART_CELLS = 120_000  # a part's surface is given at most this many cells
 _MOST = 1024.0  # cells along one axis of a part
+_LEAST = 24  # cells along the longest side of a thin part, or of what cuts it
 _CHORDS = 32  # a chord of an exact mesh is this part of a cell from its surface at most
 _ROOM = 1e-3  # of the longest side, around the bounds
 
@@ -36,24 +39,46 @@ def mesh_assembly(
     where all leaves are quadrics or named solids without blends. Otherwise by marching cubes:
 
     resolution: cells along the longest side; up to twice as many where that is enough to put two cells across
-    a thin wall. Walls that are thinner still may come out with holes through them (the mesh is closed all the
-    same), and crumbs of them that are shorter than three cells are left out.
+    a thin wall. Parts that are thinner still are meshed along their own axes and united with the others by a
+    boolean, without their blend (see `thin_parts`). Where thin ones are subtracted or intersected, holes may
+    be left (the mesh is closed all the same); crumbs that are shorter than three cells are left out.
 
     Raises NoSurfaceError where nothing is left of the assembly, as when a difference takes all away, or where
     it does not end; ParameterError where it has no exact mesh, but one is asked for.
     """
-    import trimesh
-
     if exact or (exact is None and has_exact_mesh(assembly)):
         return _exact(assembly, resolution)
-    lower, upper = assembly.bounds()
+    cell = float(np.ptp(assembly.bounds(), axis=0).max()) / resolution
+    rest, solids = separate(assembly, lambda part: _is_thin(part, cell), partial(_alone, cell, sharp))
+    if not solids:
+        return _marched(assembly, cell, sharp)
+    return united(None if rest is None else _marched(rest, cell, sharp), solids)
+
+
+def _is_thin(part: Part, cell: float) -> bool:
+    """Whether not even the finest cells would put enough of them across its thinnest wall."""
+    return part.field.wall < ACROSS * cell / _FINEST
+
+
+def _alone(cell: float, sharp: bool, node: Assembly | Part) -> trimesh.Trimesh:
+    """A part, or what is subtracted from one, in cells about as long as those of the whole."""
+    resolution = max(int(np.ceil(np.ptp(node.bounds(), axis=0).max() / cell)), _LEAST)
+    if isinstance(node, Part):
+        return mesh_part(node, resolution, sharp=sharp)
+    return mesh_assembly(node, resolution, sharp=sharp)
+
+
+def _marched(node: Assembly | Part, cell: float, sharp: bool) -> trimesh.Trimesh:
+    """The whole blended surface by cubes of this size, own units, or down to half of it where it is thin."""
+    import trimesh
+
+    lower, upper = node.bounds()
     frame, longest = _frame(lower, upper), float((upper - lower).max())
-    thinnest = np.array([part.field.wall for part in assembly.parts]) / longest
-    wanted = ACROSS / np.maximum(thinnest, 1e-9)
-    counts = int(np.ceil(wanted[wanted <= _FINEST * resolution].max(initial=resolution)))
-    local = assembly.transformed(frame)
+    thinnest = min((part.field.wall for part in node.parts if not _is_thin(part, cell)), default=np.inf)
+    counts = int(np.ceil(longest / min(cell, thinnest / ACROSS)))
+    local = node.transformed(frame)
     room = _ROOM + (upper - lower) * frame.scale / 2
-    mesh = mesh_field(local.distance, -room, room, counts, lipschitz=_lipschitz(assembly), sharp=sharp)
+    mesh = mesh_field(local.distance, -room, room, counts, lipschitz=_lipschitz(node), sharp=sharp)
     vertices, faces = without_small_components(mesh.vertices, mesh.faces, np.full(3, 2 * room.max() / counts))
     return trimesh.Trimesh(frame.inverse()(vertices), faces, process=False)
 

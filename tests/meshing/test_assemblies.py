@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Assembly, Part, Similarity
 from partwright.errors import NoSurfaceError
 from partwright.fields import Box, Cylinder, Sphere, SuperFrustum, Torus
 from partwright.meshing import mesh_assembly, mesh_part, occupancy_grid
@@ -98,9 +98,39 @@ def test_thin_wall_in_an_assembly() -> None:
     assert mesh.volume == pytest.approx(0.02, rel=0.02)
 
 
+def test_a_sheet_is_whole_beside_thick_parts_and_is_cut_with_them() -> None:
+    """A wall of a thousandth of the size, where a frame stands on it and a hole goes through both."""
+    turn = (0.9659258, 0.2588190, 0.0, 0.0)
+    sheet = Part(SuperFrustum((1.0, 1.0, 0.002)), rotation=turn, blend=0.01)
+    frame = Part(Box((0.4, 1.0, 0.3)), rotation=turn)
+    hole = Part(Cylinder(0.1, 2.0), rotation=turn, blend=1e-3)
+    mesh = mesh_assembly(Assembly((Assembly((frame, sheet)), hole), "difference"))
+    assert mesh.is_volume
+    assert mesh.euler_number == 0
+    circle = np.pi * 0.1**2
+    assert mesh.volume == pytest.approx(0.4 * 0.3 + 0.6 * 0.002 - circle * 0.3, rel=2e-3)
+    whole = mesh_assembly(
+        Assembly((Assembly((frame, sheet)), Part(Sphere(0.1), (9, 9, 9), blend=0.1)), "difference")
+    )
+    assert whole.euler_number == 2
+    assert whole.volume == pytest.approx(0.4 * 0.3 + 0.6 * 0.002, rel=2e-3)
+
+
+def test_sheets_alone_and_copies_that_overlap() -> None:
+    sheet = Part(SuperFrustum((1.0, 1.0, 0.002)), instances=(Similarity(translation=(0.5, 0.0, 0.001)),))
+    mesh = mesh_assembly(sheet, 48)
+    assert mesh.is_volume
+    assert mesh.body_count == 1
+    assert mesh.volume == pytest.approx(2 * 0.002 - 0.5 * 0.001, rel=5e-3)
+    assert mesh_assembly(
+        Assembly((Part(Sphere(1.0), blend=0.1), Part(Sphere(1e-9), (0, 0, 3)))), 24
+    ).is_volume
+
+
 def test_crumbs_are_left_out_and_bodies_kept() -> None:
     ball = Part(Sphere(0.5))
-    crumb, pebble = (Part(Sphere(r), translation=(0.9, 0.0, 0.0)) for r in (0.01, 0.1))
+    large = Part(Sphere(0.2), translation=(0.9, 0.0, 0.0))
+    crumb, pebble = (large & Part(Sphere(r), translation=(0.9, 0.0, 0.0)) for r in (0.01, 0.1))
     assert mesh_assembly(ball | crumb, 32, exact=False).body_count == 1
     assert mesh_assembly(ball | pebble, 32, exact=False).body_count == 2
     assert mesh_assembly(ball | crumb, 32, exact=False).is_volume

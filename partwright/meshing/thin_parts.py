@@ -1,0 +1,101 @@
+"""Parts too thin for the cells of a whole: meshed along their own axes, and joined by booleans (manifold3d).
+
+Marching cubes at any affordable resolution leaves holes in a plate of a five-hundredth of the longest side,
+or nothing of it. Such a part is meshed alone, cut by what cuts it, and united with the mesh of all others,
+but without its blend: a sheet has no room for a fillet that would show.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.assembly import Part
+from partwright.assembly.tree import Node
+from partwright.errors import NoSurfaceError
+
+if TYPE_CHECKING:
+    import trimesh
+    from manifold3d import Manifold
+
+_OF_WALL = 64  # a side of a thin part may move by this part of its wall where that takes fewer triangles
+
+Mesher = Callable[[Node], "trimesh.Trimesh"]
+Thin = Callable[[Part], bool]
+
+
+def separate(node: Node, thin: Thin, mesh: Mesher) -> tuple[Node | None, list[Manifold]]:
+    """The node without its thin parts, None where nothing else is left, and what of them the whole contains.
+
+    Parts that are subtracted, intersected with others, or cut by what does not end stay, however thin.
+
+    mesh: of a part, or of what is subtracted from one.
+    """
+    if node.is_part:
+        if not thin(node):
+            return node, []
+        # Cells across its wall make a great many triangles of its flat sides.
+        return None, [one.simplify(node.field.wall / _OF_WALL) for one in _solids(node, mesh)]
+    cut = node.operation == "difference"
+    if node.operation == "intersection" or (cut and not np.isfinite(_bounds(node.children[1:])).all()):
+        return node, []
+    kept: list[Node] = []
+    solids: list[Manifold] = []
+    for child in node.children[:1] if cut else node.children:
+        rest, found = separate(child, thin, mesh)
+        kept += [rest] if rest is not None else []
+        solids += found
+    cutters = node.children[1:] if cut else ()
+    if solids and cutters:
+        taken = [one for cutter in cutters for one in _solids(cutter, mesh)]
+        solids = [_without(solid, taken) for solid in solids]
+    if not kept:
+        return None, solids
+    return dataclasses.replace(node, children=(*kept, *cutters)) if solids else node, solids
+
+
+def united(mesh: trimesh.Trimesh | None, solids: list[Manifold]) -> trimesh.Trimesh:
+    """A closed mesh and solids as one closed mesh.
+
+    Raises:
+        NoSurfaceError: nothing is left of any.
+    """
+    import trimesh
+    from manifold3d import Manifold, OpType
+
+    thick = [] if mesh is None else [as_manifold(mesh)]
+    whole = Manifold.batch_boolean(thick + solids, OpType.Add)
+    if whole.is_empty():
+        raise NoSurfaceError("Nothing is left of the assembly: what it subtracts takes all away.")
+    made = whole.to_mesh64()
+    vertices = np.asarray(made.vert_properties, dtype=np.float64)[:, :3]
+    return trimesh.Trimesh(vertices, np.asarray(made.tri_verts, dtype=np.int64), process=False)
+
+
+def as_manifold(mesh: trimesh.Trimesh) -> Manifold:
+    """A closed mesh as the solid that it bounds."""
+    from manifold3d import Manifold, Mesh64
+
+    vertices, faces = np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.uint64)
+    return Manifold(Mesh64(vertices, faces))
+
+
+def _solids(node: Node, mesh: Mesher) -> list[Manifold]:
+    """A node as solids, each copy of a part by itself, as copies may overlap; none of what has no volume."""
+    try:
+        return [as_manifold(mesh(copy)) for copy in (node.copies if node.is_part else (node,))]
+    except NoSurfaceError:
+        return []
+
+
+def _bounds(nodes: tuple[Node, ...]) -> np.ndarray:
+    return np.array([node.bounds() for node in nodes])
+
+
+def _without(solid: Manifold, taken: list[Manifold]) -> Manifold:
+    from manifold3d import Manifold, OpType
+
+    return Manifold.batch_boolean([solid, *taken], OpType.Subtract)
