@@ -7,7 +7,10 @@ import signal
 from hypothesis import settings
 
 # A busy machine is no defect: how long an example takes is measured by benchmarks, not by tests.
-settings.register_profile("patient", deadline=None)
+# The same examples each time, so that a change is judged by what it changes; others are drawn by
+# `--hypothesis-profile=search`.
+settings.register_profile("patient", deadline=None, derandomize=True)
+settings.register_profile("search", deadline=None)
 settings.load_profile("patient")
 
 # A shell starts background jobs with Ctrl-C ignored, and Python then leaves it so.

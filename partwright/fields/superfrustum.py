@@ -15,6 +15,12 @@ from partwright.fields.operations import is_tensor
 from partwright.fields.superfrustum_support import support
 
 _TIP = 0.25  # of a wall that tapers to nothing, the part that is looked at
+_LEAST = float(np.finfo(np.float32).tiny)  # the kernel's least number: what is smaller is nothing to it
+
+
+def _or_nothing(share: float) -> float:
+    """Bent or straight, hollow or solid: for the kernel as for the reference."""
+    return share if share >= _LEAST else 0.0
 
 
 def tightest_bulge(width: Any, height: Any) -> Any:
@@ -55,8 +61,8 @@ class SuperFrustum(Field):
             roundness=number(self, "roundness", 0.0, 1.0),
             dilation=number(self, "dilation", 0.0, LARGEST),
             taper=number(self, "taper", 0.0, 2.0),
-            bulge=number(self, "bulge", 0.0, 1.0),
-            onion=number(self, "onion", 0.0, 1.0),
+            bulge=_or_nothing(number(self, "bulge", 0.0, 1.0)),
+            onion=_or_nothing(number(self, "onion", 0.0, 1.0)),
         )
 
     def __call__(self, points: Array) -> Array:

@@ -10,7 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from partwright.fields import kernel, reference
+from partwright.fields import SuperFrustum, kernel, reference
 from partwright.fields.columns import (
     POSE,
     PROPORTIONS,
@@ -246,3 +246,11 @@ def test_no_points_and_wrong_shapes() -> None:
         kernel.evaluate(row, np.zeros((4, 2), np.float32))
     with pytest.raises(ValueError, match="parameter rows must be"):
         kernel.evaluate(row[:, :12], np.zeros((4, 3), np.float32))
+
+
+def test_what_is_nothing_to_the_kernel_is_nothing_to_the_reference() -> None:
+    """A slit or a bend below the least number of single precision: solid and straight for both."""
+    for name in ("onion", "bulge"):
+        field = SuperFrustum((1.0, 1.0, 1.0), **{name: 2.3e-308})
+        assert field == SuperFrustum((1.0, 1.0, 1.0))
+        assert getattr(SuperFrustum((1.0, 1.0, 1.0), **{name: 1e-30}), name) == 1e-30
