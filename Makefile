@@ -10,7 +10,7 @@ DEMO_SHAPE := examples/shapes/watering_can.ply
 
 LOWEST_TESTS := tests/shapes tests/assembly tests/meshing tests/render tests/cli
 
-.PHONY: setup demo test test-lowest lint types docs page bench clean
+.PHONY: setup demo test test-lowest lint types docs page release bench clean
 setup: $(INSTALLED)
 
 $(BIN)/python:
@@ -63,6 +63,20 @@ page:
 	if command -v npm >/dev/null && (cd studio && npm ci --no-audit --no-fund --silent); then \
 		cd studio && npm run --silent build && git diff --exit-code --stat -- ../partwright/export/page.html; \
 	else echo "no Node or no registry: the page is not built again"; fi
+
+# What a release uploads, from a clean build, and the wheel of this machine tried where no compiler can be found. Takes
+# minutes, so it is not in .ci/run.
+release: .venv/release
+	rm -rf dist
+	$(BIN)/python -m build
+	$(BIN)/python release/sbom.py
+	rm -rf build/try && $(PYTHON) -m venv build/try
+	build/try/bin/pip install --quiet --only-binary :all: dist/*.whl
+	CC=false CXX=false build/try/bin/python release/try_wheel.py
+
+.venv/release: pyproject.toml | $(BIN)/python
+	$(BIN)/pip install --quiet build "cyclonedx-python-lib[json-validation]" nanobind packaging
+	touch $@
 
 bench: setup
 	$(BIN)/python benchmarks/fit.py
