@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -37,7 +38,9 @@ from partwright.meshing import mesh_assembly
 from partwright.shapes import METRES
 
 TARGET = Path(__file__).parent / "results" / "formats.md"
-SHARP = (".step", ".scad", ".build123d.py")  # no blends: held against the assembly without them
+METRIC = (".glb", ".usdc", ".mjcf.xml", ".urdf", ".step")  # read in metres, where the unit is known
+# No blends: held against the assembly without them.
+SHARP = (*METRIC, ".scad", ".build123d.py")
 PATIENCE = 400  # seconds for another program
 CELLS = 256  # along the longest side of the mesh whose volume counts as the assembly's own
 _BLENDER = """
@@ -91,30 +94,91 @@ def read_mesh(path: Path) -> float:
     return float(mesh.volume)
 
 
-def read_scene(path: Path) -> None:
-    trimesh.load_scene(path).to_geometry()
+def shown_volume(meshes: list[trimesh.Trimesh]) -> float:
+    """Of all that a scene shows, what overlaps counted once."""
+    from manifold3d import Manifold, Mesh64, OpType
+
+    places = np.concatenate([mesh.vertices for mesh in meshes])
+    middle, side = places.mean(axis=0), float(np.ptp(places, axis=0).max())
+    solids = []
+    for mesh in meshes:
+        merged = trimesh.Trimesh((mesh.vertices - middle) / side, mesh.faces)
+        solids.append(Manifold(Mesh64(np.array(merged.vertices), np.array(merged.faces, np.uint64))))
+        if solids[-1].is_empty() and len(mesh.faces):
+            raise RuntimeError("a part is not closed")
+    return float(Manifold.batch_boolean(solids, OpType.Add).volume()) * side**3
 
 
-def read_usd(path: Path) -> None:
-    from pxr import Usd, UsdValidation
+def read_glb(path: Path) -> float:
+    return shown_volume(list(trimesh.load_scene(path).dump()))
 
+
+def read_usd(path: Path) -> float:
+    """In metres; guides are not shown."""
+    from pxr import Usd, UsdGeom, UsdValidation
+
+    stage = Usd.Stage.Open(str(path))
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
-    errors = UsdValidation.ValidationContext(validators).Validate(Usd.Stage.Open(str(path)))
+    errors = UsdValidation.ValidationContext(validators).Validate(stage)
     if errors:
         raise RuntimeError(errors[0].GetMessage()[:80])
+    meshes = []
+    for prim in stage.Traverse():
+        mesh = UsdGeom.Mesh(prim)
+        if mesh and mesh.ComputePurpose() != UsdGeom.Tokens.guide:
+            matrix = np.array(mesh.ComputeLocalToWorldTransform(0))
+            points = np.array(mesh.GetPointsAttr().Get(), np.float64) @ matrix[:3, :3] + matrix[3, :3]
+            faces = np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
+            meshes.append(trimesh.Trimesh(points, faces))
+    return shown_volume(meshes) * float(UsdGeom.GetStageMetersPerUnit(stage)) ** 3
 
 
-def read_mjcf(path: Path) -> None:
+def read_mjcf(path: Path) -> float:
+    """What MuJoCo shows, geoms of the first three groups, by the meshes that it holds."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_path(str(path))
-    mujoco.mj_step(model, mujoco.MjData(model))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    meshes = []
+    for geom in np.flatnonzero(model.geom_group <= 2):
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
+        meshes.append(geom_mesh(model, int(geom)).apply_transform(pose))
+    mujoco.mj_step(model, data)
+    return shown_volume(meshes)
 
 
-def read_urdf(path: Path) -> None:
+def geom_mesh(model: Any, geom: int) -> trimesh.Trimesh:
+    """A geom in its own frame."""
+    from partwright.approximation.ellipsoid import Ellipsoid
+    from partwright.assembly import Part
+    from partwright.fields import Box, Capsule, Cylinder, Sphere
+    from partwright.meshing import mesh_part
+
+    size = model.geom_size[geom].tolist()
+    kinds: list[Callable[[], Any]] = [
+        lambda: Sphere(size[0]),
+        lambda: Capsule(size[0], 2 * size[1]),
+        lambda: Ellipsoid(tuple(size)),
+        lambda: Cylinder(size[0], 2 * size[1]),
+        lambda: Box(tuple(2 * side for side in size)),
+    ]
+    kind = int(model.geom_type[geom]) - 2  # after mjtGeom: a plane and a height field come before
+    if kind < len(kinds):
+        return mesh_part(Part(kinds[kind]()), 64)
+    mesh = model.geom_dataid[geom]
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    begin, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    return trimesh.Trimesh(model.mesh_vert[first : first + count], model.mesh_face[begin : begin + faces])
+
+
+def read_urdf(path: Path) -> float:
+    """What a viewer shows; what collides is loaded, too."""
     import yourdfpy
 
-    yourdfpy.URDF.load(str(path), build_collision_scene_graph=True, load_collision_meshes=True)
+    robot = yourdfpy.URDF.load(str(path), build_collision_scene_graph=True, load_collision_meshes=True)
+    return shown_volume([mesh for mesh in robot.scene.dump() if isinstance(mesh, trimesh.Trimesh)])
 
 
 def read_step(path: Path) -> float:
@@ -153,7 +217,7 @@ def read_glsl(path: Path) -> None:
 
 
 READERS: dict[str, tuple[str, Callable[[Path], float | None]]] = {
-    ".glb": ("", read_scene),
+    ".glb": ("", read_glb),
     ".usdc": ("", read_usd),
     ".obj": ("", read_mesh),
     ".ply": ("", read_mesh),
@@ -236,9 +300,9 @@ def document(rows: list[Row]) -> str:
         "# Every format, written and read back",
         "",
         f"`python benchmarks/formats.py`; {os.cpu_count()} cores. Medians over the assemblies, the worst in",
-        "brackets. Volume: of what the reader sees, off the assembly's own (STEP, OpenSCAD and build123d:",
-        f"the assembly's without its blends, which they cannot hold), by a mesh of {CELLS} cells along its",
-        "longest side. Changed: parts in FILE.report.json, dropped blends included; by: the most that one",
+        "brackets. Volume: of what the reader is shown, overlaps counted once, off the assembly's own (of formats",
+        f"that cannot hold blends: without them), by a mesh of {CELLS} cells along its longest side. "
+        " Changed: parts in FILE.report.json, dropped blends included; by: the most that one",
         "part was changed by, in % of its volume. Seconds are CPU seconds, with the start of other programs.",
     ]
     for method in dict.fromkeys(row.method for row in rows):
@@ -301,7 +365,8 @@ def main() -> int:
         for suffix in wanted:
             with tempfile.TemporaryDirectory() as folder:
                 own = sharp if suffix in SHARP else blended
-                own *= METRES[assembly.unit or "mm"] ** 3 if suffix == ".step" else 1
+                unit = assembly.unit or ("mm" if suffix == ".step" else "m")
+                own *= METRES[unit] ** 3 if suffix in METRIC else 1
                 row = measure(method, name, assembly, suffix, own, Path(folder) / f"assembly{suffix}")
             rows.append(row)
             with options.rows.open("a") as file:

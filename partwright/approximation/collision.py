@@ -42,7 +42,8 @@ _COMPARED = 32  # cells along what is compared
 class Geometry:
     """A piece in the format's terms: `part`, placed, holds a solid; else `mesh` stands for it.
 
-    piece, parts: names of the piece that it is of, and of the parts in that.
+    piece, parts: names of the piece that it is of, and of the parts in that. exact: whether it
+    has the piece's own surface.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Geometry:
     mesh: trimesh.Trimesh | None
     piece: str
     parts: tuple[str, ...]
+    exact: bool = False
 
 
 def geometries(
@@ -109,14 +111,14 @@ def _stand_ins(
     part = piece.node if isinstance(piece.node, Part) else None
     near = nearest_solid(part, kinds) if part is not None else None
     if near is not None and near.exact:
-        return [Geometry(piece.name, piece.colour, near.part_with_solid, None, piece.name, names)], None
+        return [Geometry(piece.name, piece.colour, near.part_with_solid, None, piece.name, names, True)], None
     mesh, error, deviation = _mesh(piece, resolution, convex)
     if near is not None and _alike(near, allowed):
         hull_is_nearer = convex and deviation <= allowed and error + _NATIVE_FOR < near.volume_error_ratio
         if not hull_is_nearer:
             change = Change(names, near.solid.kind, near.volume_error_ratio, near.max_deviation)
             return [Geometry(piece.name, piece.colour, near.part_with_solid, None, piece.name, names)], change
-    whole = [Geometry(piece.name, piece.colour, None, mesh, piece.name, names)]
+    whole = [Geometry(piece.name, piece.colour, None, mesh, piece.name, names, not convex)]
     mesh_change = Change(names, "convex mesh" if convex else "mesh", error, deviation)
     if convex and deviation <= allowed and error <= _MOST_ERROR:
         return whole, mesh_change

@@ -19,15 +19,21 @@ from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import rotation_matrix
 from partwright.atomic_io import write_bytes
 from partwright.export.formats import Format, Holds
-from partwright.export.rigid_body import DENSITY, Body, numbers
+from partwright.export.identifiers import free_name
+from partwright.export.links import Joint
+from partwright.export.rigid_body import DENSITY, bodies, document, numbers, write_document
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.mass import MassProperties
 
 if TYPE_CHECKING:
+    import trimesh
+
     from partwright.assembly import Assembly
 
 SOLIDS: tuple[type[Field], ...] = (Box, Cylinder, Sphere, Capsule)
 _AXES = "xyz"
+Shape = tuple[str, dict[str, str], np.ndarray, np.ndarray]  # element, attributes, centre and rotation
+_ENOUGH = "1000"  # N, Nm, m/s or rad/s: assemblies know none
 
 
 def write(
@@ -37,23 +43,44 @@ def write(
     tolerance: float = TOLERANCE,
     free_joint: bool = False,
     resolution: int = 32,
+    links: bool = False,
+    visuals: bool = True,
 ) -> None:
     """Write the robot, and an STL beside it (FILE_part.stl) for each part that no solid is near to.
 
     density: in kg/m3. tolerance: how far a solid's surface may lie from its part's, as a share of the longest
     side. free_joint: whether a floating joint ties it to a link "world"; else the link is the root.
-    resolution: cells along a part that becomes a mesh.
+    resolution: cells along a part that becomes a mesh. links: each child of the root is a link, as `links_of`
+    says. visuals: what collides as something else than it is is seen as its own mesh.
     """
-    body = Body.of(assembly, SOLIDS, density, tolerance, resolution, convex=False)
-    root = body.root("robot", name=body.name)
-    link = xml.SubElement(root, "link", name=body.name)
-    _add_inertial(link, body.properties, density)
-    files = _write_meshes([geometry for geometry in body.geometries if geometry.part is None], Path(path))
-    for geometry in body.geometries:
-        _add_geometry(link, geometry, files)
+    made = bodies(assembly, links, SOLIDS, density, tolerance, resolution, convex=False)
+    root = document("robot", assembly, density, name=assembly.name or "assembly")
+    meshes: list[tuple[str, str, trimesh.Trimesh]] = []  # link, piece, mesh
+    seen = {}
+    for link, body in made:
+        meshes += [(link.name, g.name, g.mesh) for g in body.geometries if g.mesh is not None]
+        seen[link.name] = body.visuals(resolution) if visuals else []
+        meshes += [(link.name, name, mesh) for name, _, mesh in seen[link.name]]
+    files = _write_meshes(meshes, Path(path), several=len(made) > 1)
+    taken = {link.name for link, _ in made}  # readers keep links and shapes in one table of names
+    for link, body in made:
+        element = xml.SubElement(root, "link", name=link.name)
+        _add_inertial(element, body.properties, density)
+        own = {name: file for (of, name), file in files.items() if of == link.name}
+        apart = {name for name, _, _ in seen[link.name]}
+        for geometry in body.geometries:
+            shapes = _shapes(geometry, own)
+            name = free_name(geometry.name, taken)
+            _add_shapes(element, geometry, shapes, name, both=geometry.piece not in apart)
+        for name, colour, _ in seen[link.name]:
+            shape = ("mesh", {"filename": own[name]}, np.zeros(3), np.eye(3))
+            _add_shape(element, "visual", free_name(f"{name} visual", taken), shape, name, colour)
+    for link, _ in made:
+        if link.joint:
+            _add_joint(root, link.name, link.joint)
     if free_joint:
-        _add_free_joint(root, body.name)
-    body.write(root, path)
+        _add_free_joint(root, made[0][0].name)
+    write_document(root, path, assembly, made)
 
 
 def roll_pitch_yaw(rotation: np.ndarray) -> tuple[float, float, float]:
@@ -75,21 +102,47 @@ def _add_inertial(link: xml.Element, properties: MassProperties, density: float)
     xml.SubElement(inertial, "inertia", entries)
 
 
-def _add_geometry(link: xml.Element, geometry: Geometry, files: dict[str, str]) -> None:
-    for i, (kind, sizes, centre, rotation) in enumerate(_shapes(geometry, files)):
-        for role in ("visual", "collision"):
-            element = xml.SubElement(link, role, name=geometry.name if i == 0 else f"{geometry.name}/{i + 1}")
-            xml.SubElement(element, "origin", xyz=numbers(centre), rpy=numbers(roll_pitch_yaw(rotation)))
-            xml.SubElement(xml.SubElement(element, "geometry"), kind, sizes)
-            if role == "visual":
-                material = xml.SubElement(element, "material", name=geometry.name)
-                xml.SubElement(material, "color", rgba=numbers([*geometry.colour, 1.0]))
+def _add_shapes(link: xml.Element, geometry: Geometry, shapes: list[Shape], name: str, both: bool) -> None:
+    """both: it is also what is seen."""
+    for i, shape in enumerate(shapes, 1):
+        for role in ("visual", "collision") if both else ("collision",):
+            own = name if i == 1 else f"{name}/{i}"
+            _add_shape(link, role, own, shape, geometry.name, geometry.colour)
 
 
-def _shapes(
-    geometry: Geometry, files: dict[str, str]
-) -> list[tuple[str, dict[str, str], np.ndarray, np.ndarray]]:
-    """URDF's elements for it: name, attributes, centre and rotation."""
+def _add_shape(
+    link: xml.Element,
+    role: str,
+    name: str,
+    shape: Shape,
+    material: str,
+    colour: np.ndarray,
+) -> None:
+    kind, sizes, centre, rotation = shape
+    element = xml.SubElement(link, role, name=name)
+    xml.SubElement(element, "origin", xyz=numbers(centre), rpy=numbers(roll_pitch_yaw(rotation)))
+    xml.SubElement(xml.SubElement(element, "geometry"), kind, sizes)
+    if role == "visual":
+        look = xml.SubElement(element, "material", name=material)
+        xml.SubElement(look, "color", rgba=numbers([*colour, 1.0]))
+
+
+def _add_joint(root: xml.Element, name: str, joint: Joint) -> None:
+    """Its limits of force and speed are none; URDF demands numbers for them."""
+    element = xml.SubElement(root, "joint", name=f"{name} joint", type=joint.kind)
+    xml.SubElement(element, "parent", link=joint.parent)
+    xml.SubElement(element, "child", link=name)
+    xml.SubElement(element, "origin", xyz=numbers(joint.origin), rpy="0 0 0")
+    if joint.kind == "fixed":
+        return
+    xml.SubElement(element, "axis", xyz=numbers(joint.axis))
+    if joint.limits is not None:
+        lower, upper = (numbers([limit]) for limit in joint.limits)
+        xml.SubElement(element, "limit", lower=lower, upper=upper, effort=_ENOUGH, velocity=_ENOUGH)
+
+
+def _shapes(geometry: Geometry, files: dict[str, str]) -> list[Shape]:
+    """URDF's elements for it."""
     if geometry.part is None:
         return [("mesh", {"filename": files[geometry.name]}, np.zeros(3), np.eye(3))]
     centre, rotation = np.array(geometry.part.translation), rotation_matrix(geometry.part.rotation)
@@ -112,15 +165,18 @@ def _shapes(
     raise AssertionError(f"{geometry.part.field.kind} is not among SOLIDS")
 
 
-def _write_meshes(geometries: list[Geometry], path: Path) -> dict[str, str]:
-    """STL files beside `path`: the name of the piece -> that of its file."""
+def _write_meshes(
+    meshes: list[tuple[str, str, trimesh.Trimesh]], path: Path, several: bool
+) -> dict[tuple[str, str], str]:
+    """STL files beside `path`: link and name of the piece -> the name of its file. several: links."""
     from trimesh.exchange.stl import export_stl
 
-    plain = [re.sub(r"[^\w.-]", "_", geometry.name, flags=re.ASCII) for geometry in geometries]
+    keys = [f"{link}_{name}" if several else name for link, name, _ in meshes]
+    plain = [re.sub(r"[^\w.-]", "_", key, flags=re.ASCII) for key in keys]
     files = {}
-    for geometry, name in zip(geometries, unique_names(plain, plain), strict=True):
-        files[geometry.name] = f"{path.stem}_{name}.stl"
-        write_bytes(path.with_name(files[geometry.name]), export_stl(geometry.mesh))
+    for (link, piece, mesh), name in zip(meshes, unique_names(plain, plain), strict=True):
+        files[link, piece] = f"{path.stem}_{name}.stl"
+        write_bytes(path.with_name(files[link, piece]), export_stl(mesh))
     return files
 
 

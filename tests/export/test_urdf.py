@@ -65,6 +65,7 @@ def test_meshes_lie_beside_it_where_no_solid_fits(tmp_path: Path) -> None:
         "a.urdf.report.json",
         "a_block.stl",
         "a_cup.stl",
+        "a_hook.stl",  # to be seen: it collides as a chain
         "a_spike.stl",
     ]
     robot = yourdfpy.URDF.load(str(path), build_collision_scene_graph=True, load_collision_meshes=True)

@@ -13,7 +13,18 @@ from partwright.export.export_report import approximated_parts
 from partwright.export.formats import format_of
 
 # Options of formats; those not given are left to the format.
-_OPTIONS = ("density", "tolerance", "free_joint", "physics", "by_part", "resolution", "facets", "separate")
+_OPTIONS = (
+    "density",
+    "tolerance",
+    "free_joint",
+    "physics",
+    "links",
+    "visuals",
+    "by_part",
+    "resolution",
+    "facets",
+    "separate",
+)
 
 
 def run(arguments: argparse.Namespace) -> int:
