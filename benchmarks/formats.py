@@ -300,9 +300,9 @@ def document(rows: list[Row]) -> str:
         "# Every format, written and read back",
         "",
         f"`python benchmarks/formats.py`; {os.cpu_count()} cores. Medians over the assemblies, the worst in",
-        "brackets. Volume: of what the reader is shown, overlaps counted once, off the assembly's own (of formats",
-        f"that cannot hold blends: without them), by a mesh of {CELLS} cells along its longest side. "
-        " Changed: parts in FILE.report.json, dropped blends included; by: the most that one",
+        "brackets. Volume: of what the reader is shown, overlaps counted once, off the assembly's own (of",
+        f"formats that cannot hold blends: without them), by a mesh of {CELLS} cells along its longest",
+        "side. Changed: parts in FILE.report.json, dropped blends included; by: the most that one",
         "part was changed by, in % of its volume. Seconds are CPU seconds, with the start of other programs.",
     ]
     for method in dict.fromkeys(row.method for row in rows):
