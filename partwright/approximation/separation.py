@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError
 from partwright.meshing import mesh_assembly, mesh_part
@@ -20,15 +22,19 @@ _CELLS = 48  # along what has no exact mesh
 def separated(node: Node) -> Iterator[Node]:
     """Nodes whose union is the node: a difference of a union is the union of its children's differences, each
     with what cuts into it; a child that nothing cuts into is itself again."""
+    yield from _separated(node, _Meetings())
+
+
+def _separated(node: Node, meetings: _Meetings) -> Iterator[Node]:
     if not isinstance(node, Assembly) or node.operation == "intersection":
         yield node
     elif node.operation == "union":
         for child in node.operands:
-            yield from separated(child)
+            yield from _separated(child, meetings)
     else:
         first, *cutters = node.operands
-        for child in separated(first):
-            cutting = [cutter for cutter in cutters if _common(child, cutter, None) is not None]
+        for child in _separated(first, meetings):
+            cutting = [cutter for cutter in cutters if meetings.of(child, cutter)]
             yield Assembly((child, *cutting), "difference", child.name) if cutting else child
 
 
@@ -45,16 +51,36 @@ def subtracted_names(node: Node) -> frozenset[str]:
     return subtracted_names(first) | (taken - back)
 
 
-def _common(a: Node, b: Node, tolerance: float | None) -> Manifold | None:
-    """What two nodes have in common, one of them perhaps endless; None where that is nothing."""
-    try:
+class _Meetings:
+    """Which nodes have volume in common. Each is meshed once, however many others it is held against."""
+
+    def __init__(self) -> None:
+        self.known: dict[int, tuple[Node, Manifold | None]] = {}  # by identity, so the node must live on
+
+    def of(self, a: Node, b: Node) -> bool:
+        """Whether two nodes, one of them perhaps endless, have volume in common."""
+        (low_a, high_a), (low_b, high_b) = a.bounds(), b.bounds()
+        if (np.maximum(low_a, low_b) >= np.minimum(high_a, high_b)).any():
+            return False
         both = Assembly((a, b), "intersection")
-        solid = (
-            solid_of(both, tolerance) if has_exact_mesh(both) else node_solid(a, None) ^ node_solid(b, None)
-        )
+        if has_exact_mesh(both):
+            common = _solid_or_nothing(both)
+        else:
+            one, other = self.solid(a), self.solid(b)
+            common = None if one is None or other is None else one ^ other
+        return common is not None and not common.is_empty() and common.volume() > 0
+
+    def solid(self, node: Node) -> Manifold | None:
+        if id(node) not in self.known:
+            self.known[id(node)] = node, _solid_or_nothing(node)
+        return self.known[id(node)][1]
+
+
+def _solid_or_nothing(node: Node) -> Manifold | None:
+    try:
+        return node_solid(node, None)
     except NoSurfaceError:
         return None
-    return None if solid.is_empty() or solid.volume() <= 0 else solid
 
 
 def node_solid(node: Node, tolerance: float | None) -> Manifold:
