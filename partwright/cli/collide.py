@@ -13,15 +13,21 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
         "collide",
         help="replace a robot's collision meshes by few simple shapes",
-        description="Reads a robot (URDF, SDFormat or MJCF) and writes it into FOLDER with convex shapes "
-        "in the place of its collision meshes, the meshes it needs, a report, and a picture of both.",
+        description="Reads a robot (URDF, SDFormat, MJCF, USD, or a folder of meshes) and writes it into "
+        "FOLDER with convex shapes in the place of its collision meshes, the meshes it needs, a report, and "
+        "a picture of both.",
     )
-    command.add_argument("robot", metavar="ROBOT", type=Path, help="its file: .urdf, .sdf, .xml or .mjcf")
+    command.add_argument(
+        "robot",
+        metavar="ROBOT",
+        type=Path,
+        help="its file: .urdf, .sdf, .xml, .mjcf or .usd, or a folder of meshes",
+    )
     add_output(
         command,
         "FOLDER",
         "where to write",
-        reads=lambda a: [a.robot],
+        reads=_reads,
         writes=_writes,
         folder=lambda a: a.output,
     )
@@ -61,7 +67,17 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.set_defaults(run="collide")
 
 
+def _reads(arguments: argparse.Namespace) -> list[Path]:
+    return _meshes(arguments.robot) or [arguments.robot]
+
+
+def _meshes(robot: Path) -> list[Path]:
+    """The meshes of a folder; none where it is a file."""
+    return [file for file in robot.iterdir() if file.is_file()] if robot.is_dir() else []
+
+
 def _writes(arguments: argparse.Namespace) -> list[Path]:
-    name = arguments.robot.name
+    name = arguments.robot.resolve().name if arguments.robot.is_dir() else arguments.robot.name
     more = (f"{name}.spheres.yml", f"{name}.spheres.json") if arguments.spheres is not None else ()
-    return [arguments.output / each for each in (name, f"{name}.report.json", f"{name}.png", *more)]
+    own = [file.name for file in _meshes(arguments.robot)] or [name]
+    return [arguments.output / each for each in (*own, f"{name}.report.json", f"{name}.png", *more)]

@@ -6,11 +6,11 @@ stage's own unit, and masses in kilograms.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from partwright.approximation.collision import TOLERANCE, Geometry
+from partwright.approximation.collision import TOLERANCE
 from partwright.approximation.round_cone import RoundCone
 from partwright.assembly import Assembly, Similarity
 from partwright.errors import SettingError
@@ -20,6 +20,11 @@ from partwright.export.rigid_body import DENSITY, Body
 from partwright.fields import Box, Capsule, Cone, Cylinder, Field, Frustum, Sphere
 from partwright.meshing.mass import check_density
 from partwright.shapes import METRES, canonical_unit
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from partwright.assembly import Part
 
 USD = "usd"
 SHAPES: tuple[type[Field], ...] = (Box, Cylinder, Cone, Frustum, Sphere, Capsule, RoundCone)
@@ -72,26 +77,48 @@ def add_physics(stage: Any, root: Any, body: Body, moves: bool) -> None:
         path = root.GetPath().AppendChild(f"colliders_{number}")
     UsdGeom.Xform.Define(stage, path).CreatePurposeAttr(UsdGeom.Tokens.guide)
     for i, geometry in enumerate(body.geometries, 1):
-        prim = _define(stage, path.AppendChild(f"{Tf.MakeValidIdentifier(geometry.name)}_{i:02d}"), geometry)
-        UsdPhysics.CollisionAPI.Apply(prim)
+        where = path.AppendChild(f"{Tf.MakeValidIdentifier(geometry.name)}_{i:02d}")
+        mesh = collider_mesh(geometry) if geometry.part is None else None
+        define_collider(stage, where, geometry.part, mesh)
 
 
-def _define(stage: Any, path: Any, geometry: Geometry) -> Any:
+def define_collider(stage: Any, path: Any, part: Part | None, mesh: trimesh.Trimesh | None) -> None:
+    """A prim that collides: the Gprim of a part whose field is one of `SHAPES`, or a mesh as its hull."""
     from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
-    if geometry.part is None:
-        gprim = _mesh(stage, path, geometry)
+    if part is None:
+        gprim = _mesh(stage, path, mesh)
+        UsdPhysics.CollisionAPI.Apply(gprim.GetPrim())
         UsdPhysics.MeshCollisionAPI.Apply(gprim.GetPrim()).CreateApproximationAttr("convexHull")
-        return gprim.GetPrim()
-    gprim = _native(stage, path, geometry.part.field)
+        return
+    gprim = _native(stage, path, part.field)
     double = UsdGeom.XformOp.PrecisionDouble
-    gprim.AddTranslateOp(double).Set(Gf.Vec3d(*geometry.part.translation))
-    gprim.AddOrientOp(double).Set(Gf.Quatd(*geometry.part.rotation))
-    if isinstance(geometry.part.field, Box):
-        gprim.AddScaleOp(double).Set(Gf.Vec3d(*geometry.part.field.size))
+    gprim.AddTranslateOp(double).Set(Gf.Vec3d(*part.translation))
+    gprim.AddOrientOp(double).Set(Gf.Quatd(*part.rotation))
+    if isinstance(part.field, Box):
+        gprim.AddScaleOp(double).Set(Gf.Vec3d(*part.field.size))
     time = Usd.TimeCode.Default()
     gprim.CreateExtentAttr(UsdGeom.Boundable.ComputeExtentFromPlugins(gprim, time))
-    return gprim.GetPrim()
+    UsdPhysics.CollisionAPI.Apply(gprim.GetPrim())
+
+
+def native_field(prim: Any) -> tuple[Field, np.ndarray] | None:
+    """The field of a Gprim, and the (4, 4) that turns the field's z to the prim's axis; None for others."""
+    from pxr import UsdGeom
+
+    turn = np.eye(4)
+    axes = {"X": [2, 0, 1], "Y": [1, 2, 0], "Z": [0, 1, 2]}
+    if prim.IsA(UsdGeom.Cube):
+        side = UsdGeom.Cube(prim).GetSizeAttr().Get()
+        return Box((side, side, side)), turn
+    if prim.IsA(UsdGeom.Sphere):
+        return Sphere(UsdGeom.Sphere(prim).GetRadiusAttr().Get()), turn
+    for schema, kind in ((UsdGeom.Cylinder, Cylinder), (UsdGeom.Capsule, Capsule), (UsdGeom.Cone, Cone)):
+        if prim.IsA(schema):
+            made = schema(prim)
+            turn[:3, :3] = np.eye(3)[axes[str(made.GetAxisAttr().Get())]]
+            return kind(made.GetRadiusAttr().Get(), made.GetHeightAttr().Get()), turn
+    return None
 
 
 def _native(stage: Any, path: Any, field: Field) -> Any:
@@ -123,10 +150,9 @@ def _native(stage: Any, path: Any, field: Field) -> Any:
     return gprim
 
 
-def _mesh(stage: Any, path: Any, geometry: Geometry) -> Any:
+def _mesh(stage: Any, path: Any, mesh: Any) -> Any:
     from pxr import UsdGeom, Vt
 
-    mesh = collider_mesh(geometry)
     points, faces = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
     gprim = UsdGeom.Mesh.Define(stage, path)
     gprim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))

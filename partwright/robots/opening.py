@@ -1,4 +1,4 @@
-"""A robot's file by its suffix."""
+"""A robot's file by its suffix, or a folder of meshes."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ READERS = {
     ".sdf": "partwright.robots.sdf:Sdf",
     ".xml": "partwright.robots.mjcf:Mjcf",
     ".mjcf": "partwright.robots.mjcf:Mjcf",
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), "partwright.robots.usd:Usd"),
 }
 
 
@@ -31,11 +32,11 @@ def open_robot(path: str | Path, packages: Sequence[str | Path] = ()) -> RobotFi
     path = Path(path)
     if not path.exists():
         raise UnreadableFileError(f"{path}: there is no such file")
-    where = READERS.get(path.suffix.lower())
+    where = "partwright.robots.mesh_folder:MeshFolder" if path.is_dir() else READERS.get(path.suffix.lower())
     if where is None:
         raise UnsupportedFormatError(
-            f"{path}: {path.suffix or 'a folder'!r} is no format of robots that is read; expected one of "
-            f"{', '.join(READERS)}"
+            f"{path}: {path.suffix!r} is no format of robots that is read; expected one of "
+            f"{', '.join(READERS)}, or a folder of meshes"
         )
     module, _, name = where.partition(":")
     reader: Callable[[Path, Sequence[Path]], RobotFile] = getattr(import_module(module), name)

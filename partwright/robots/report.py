@@ -67,11 +67,28 @@ def report(
         "file": name,
         "version": __version__,
         "unit": "m",
+        "warnings": warnings(links),
         "links": [link.to_dict() for link in links],
         "colliding_pairs_at_rest": {"before": len(before), "after": len(after)},
         "shared_volumes_at_rest": pairs,
     }
     return (json.dumps(whole, indent=2) + "\n").encode()
+
+
+def warnings(links: Sequence[LinkReport]) -> list[str]:
+    """What a user should be told, a sentence a link: where a tolerance is not kept, or a mesh sticks out."""
+    result = []
+    for link in links:
+        if link.deviation > link.tolerance:
+            result.append(
+                f"link {link.link!r}: the shapes are {1000 * link.deviation:.1f} mm off somewhere, and "
+                f"{1000 * link.tolerance:.1f} mm were asked for; allow more with --max-parts, or more kinds"
+            )
+        if link.sticking_out:
+            result.append(
+                f"link {link.link!r}: its mesh sticks out of the shapes by {1000 * link.sticking_out:.3f} mm"
+            )
+    return result
 
 
 def _short(value: float) -> float:

@@ -105,6 +105,10 @@ def test_the_report_says_how_far_off_and_who_collides(tmp_path: Path) -> None:
     assert base["shapes"] == {"box": 1}
     assert base["volume"] == pytest.approx(3.0)
     assert base["max_deviation"] > base["tolerance"]  # one box for an L is far off, and it says so
+    assert any("link 'base': the shapes are" in warning for warning in report["warnings"])
+    assert not any(
+        "'arm'" in warning and arm["max_deviation"] <= arm["tolerance"] for warning in report["warnings"]
+    )
     assert 0 < base["volume_missing_ratio"] + base["volume_extra_ratio"] < 1
     # the rod stands in the L's corner at rest, half of it above
     pair = report["shared_volumes_at_rest"][0]
@@ -153,6 +157,16 @@ def test_meshes_without_volume_name_their_link(tmp_path: Path) -> None:
     (tmp_path / "in" / "meshes" / "rod.stl").write_bytes(b"solid")
     with pytest.raises(PartwrightError, match=r"link 'arm': rod.stl"):
         collide(path)
+
+
+def test_a_sheet_that_is_seen_cannot_be_enclosed_and_names_its_link(tmp_path: Path) -> None:
+    path = urdf(tmp_path / "in")
+    sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    sheet.export(tmp_path / "in" / "meshes" / "seen.stl")
+    with pytest.raises(PartwrightError, match=r"link 'base': seen.stl") as caught:
+        collide(path, CollideOptions(enclose=True))
+    assert "\n" not in str(caught.value)
+    assert collide(path).links  # what is only seen is not measured
 
 
 def test_an_open_box_is_closed_and_that_is_told(tmp_path: Path) -> None:

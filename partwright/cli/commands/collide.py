@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from partwright.cli.terminal import counted, note, say
+from partwright.cli.terminal import counted, note, say, warn
 from partwright.robots import Collided, CollideOptions, collide, save
-from partwright.robots.report import LinkReport
+from partwright.robots.report import LinkReport, warnings
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -25,6 +25,7 @@ def run(arguments: argparse.Namespace) -> int:
         say(line)
     say(_summary(result))
     say(f"written to {arguments.output}")
+    warn(warnings(result.links))
     return 0
 
 
