@@ -9,6 +9,7 @@
 #include "morphology.hpp"
 #include "normal_equations.hpp"
 #include "optimise.hpp"
+#include "profile.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -193,4 +194,27 @@ NB_MODULE(_kernel, m) {
   }, "field"_a, "spacing"_a, "regions"_a, "fraction"_a, "least_depth"_a,
      "least_voxels"_a,
      "Each voxel's region, thickest first, and the regions' erosion depths.");
+
+  m.def("profile_distances", [](In<double> corners, In<int64_t> starts, In<uint8_t> counts, In<double> points, int threads) {
+    auto out = array<double>({points.shape(0)});
+    const Outline outline = outline_of(corners.data(), copy(starts), counts.data());
+    nb::gil_scoped_release release;
+    profile_distances(outline, points.data(), int64_t(points.shape(0)), out.data(), threads);
+    return out;
+  }, "corners"_a, "starts"_a, "counts"_a, "points"_a, "threads"_a,
+     "Signed distances (N,) in the plane to loops of lines and arcs.");
+
+  m.def("profile_gradients", [](In<double> corners, In<int64_t> starts, In<uint8_t> counts, In<double> points,
+                                In<double> upstream, int threads) {
+    auto out = array<double>({corners.shape(0), size_t(3)});
+    auto by_point = array<double>({points.shape(0), size_t(2)});
+    const Outline outline = outline_of(corners.data(), copy(starts), counts.data());
+    {
+      nb::gil_scoped_release release;
+      profile_gradients(outline, points.data(), upstream.data(), int64_t(points.shape(0)), int64_t(corners.shape(0)),
+                        out.data(), by_point.data(), threads);
+    }
+    return nb::make_tuple(out, by_point);
+  }, "corners"_a, "starts"_a, "counts"_a, "points"_a, "upstream"_a, "threads"_a,
+     "Derivatives (V, 3) of sum(upstream * distance) by the corners, and (N, 2) of each distance by its point.");
 }

@@ -16,7 +16,17 @@ from partwright.approximation.closed_quadrics import closes_alike, with_closed_q
 from partwright.approximation.nearest import SOLIDS, Approximation, nearest_solid
 from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.fields import Cone, Cylinder, Field, Frustum, HollowBox, HollowFrustum, SuperFrustum, Tube
+from partwright.fields import (
+    Cone,
+    Cylinder,
+    Field,
+    Frustum,
+    HollowBox,
+    HollowFrustum,
+    SuperFrustum,
+    Swept,
+    Tube,
+)
 
 _LOOPED: tuple[type[Field], ...] = (*SOLIDS, HollowBox, HollowFrustum, SuperFrustum)
 Keep = Callable[[Part], Approximation | None]
@@ -24,7 +34,7 @@ Keep = Callable[[Part], Approximation | None]
 
 def _looped(part: Part) -> bool:
     """Whether its repeats stay repeats in a source."""
-    return type(part.field) in _LOOPED or closes_alike(part)
+    return type(part.field) in _LOOPED or isinstance(part.field, Swept) or closes_alike(part)
 
 
 def _keep_none(_: Part) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly.placed import placed_quadric
-from partwright.fields import NormalForm, normal_form
+from partwright.fields import NormalForm, Profile, normal_form
 
 if TYPE_CHECKING:
     from partwright.assembly.tree import Node, Part
@@ -72,6 +72,8 @@ def _value(value: object, digits: int) -> str:
         return value if len(value) < _LONG_NAME else f"{value[:12]}..."
     if isinstance(value, tuple) and len(value) > _MAX_NUMBERS:
         return f"of {len(value)} numbers"
+    if isinstance(value, Profile):
+        return str(value)
     return _numbers(value, digits)
 
 

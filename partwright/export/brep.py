@@ -1,8 +1,9 @@
 """Exact B-rep solids by OpenCASCADE, of the `cad` extra: analytic faces, no facets.
 
 Three constructions cover the SuperFrustum: round ones are their profile turned about the axis, other straight
-ones their profile swept around the rounded rectangle, bent ones that along the arc. What was built is checked
-against the field: where OpenCASCADE lost something, the part does not count as built.
+ones their profile swept around the rounded rectangle, bent ones that along the arc. Extrusions and
+revolutions are what OpenCASCADE makes of their profiles. What was built is checked against the field: where
+OpenCASCADE lost something, the part does not count as built.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
-from partwright.fields import Field, SuperFrustum
+from partwright.export.brep_swept_profile import swept_profile
+from partwright.fields import Field, SuperFrustum, Swept
 from partwright.meshing import mesh_part
 
 if TYPE_CHECKING:
@@ -45,6 +47,8 @@ def built(part: Part) -> Approximation | None:
     field = part.field
     if field.quadric() is not None:  # by `quadric_solid`, or not at all
         return Approximation(field, part, 0.0, 0.0)
+    if isinstance(field, Swept):
+        return _built_swept(part)
     f = field.superfrustum()
     if f is None or f.thinnest < SAME * max(*f.size, f.dilation):
         return None
@@ -56,6 +60,19 @@ def built(part: Part) -> Approximation | None:
     return None
 
 
+def _built_swept(part: Part) -> Approximation | None:
+    """An extrusion or revolution, which is exact; None where OpenCASCADE fails at it."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    try:
+        shape = solid_of(part.field)
+    except NoSurfaceError:
+        return None
+    volume = float(mesh_part(dataclasses.replace(part, instances=()), 128).volume)
+    same = abs(volume_and_area(shape)[0] / volume - 1) < _SAME_VOLUME
+    return Approximation(part.field, part, 0.0, 0.0) if same and BRepCheck_Analyzer(shape).IsValid() else None
+
+
 @lru_cache(maxsize=256)
 def solid_of(field: Field) -> TopoDS_Shape:
     """The field as a solid in its own frame.
@@ -63,6 +80,8 @@ def solid_of(field: Field) -> TopoDS_Shape:
     Raises:
         NoSurfaceError: OpenCASCADE cannot build it.
     """
+    if isinstance(field, Swept):
+        return swept_profile(field)
     f = as_superfrustum(field)
     longest = max(*f.size, f.dilation)
     corner = f.roundness * min(f.size[:2]) / 2

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import dataclasses
 import keyword
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from partwright.approximation.change import Change
 from partwright.approximation.nearest import Approximation, compared
 from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node, Part
@@ -21,6 +22,7 @@ from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
 from partwright.export.instance_patterns import Poses, Row
+from partwright.export.profile_source import BUILD123D_SOURCE, build123d_loops, draws_loops
 from partwright.export.solid_source import (
     SourcePart,
     drawn,
@@ -28,7 +30,7 @@ from partwright.export.solid_source import (
     source_parts,
     superfrustum_source,
 )
-from partwright.fields import SuperFrustum
+from partwright.fields import Extrusion, SuperFrustum, Swept
 from partwright.shapes import canonical_unit
 
 _SOLIDS = {
@@ -48,7 +50,7 @@ _SOLIDS = {
     "superfrustum": "superfrustum({size}, {roundness}, {dilation}, {taper}, {bulge}, {onion})",
 }
 _OPERATORS = {"union": "+", "difference": "-", "intersection": "&"}
-_RESERVED = (*keyword.kwlist, "bd", "math", "path", "assembly", "print", "superfrustum")
+_RESERVED = (*keyword.kwlist, "bd", "math", "path", "assembly", "print", "superfrustum", "loop", "zip")
 _NEARLY = 0.01  # of a frame's width
 
 
@@ -61,9 +63,11 @@ def write(assembly: Assembly, path: str | Path) -> None:
         OutputError: the file cannot be written.
     """
     tree, changes = solid_tree(assembly, keep=_lofted, source=True)
+    changes += _sharpened(tree.parts)
     parts = source_parts(tree.parts, own_axes_angles, _RESERVED)
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     drawing = superfrustum_source(parts, "build123d_superfrustum.txt")
+    swept = [field for part in parts if isinstance(field := part.part.field, Swept)]
     lines = [
         f"# {comment(assembly.name) or 'Assembly'}: {len(parts)} parts. "
         f"Lengths in {unit or 'an unknown unit'}, angles in degrees.",
@@ -76,6 +80,7 @@ def write(assembly: Assembly, path: str | Path) -> None:
         *(line for part in parts for line in _table(part, unit)),
         "",
         *([*drawing, "", ""] if drawing else []),
+        *([*BUILD123D_SOURCE.splitlines(), "", ""] if draws_loops(swept) else []),
         *(line for part in parts for line in _function(part)),
         f"assembly = {_tree(plain_unions(tree), {p.part.name: p.function for p in parts}, '')}",
         "",
@@ -115,10 +120,28 @@ def _table(part: SourcePart, unit: str | None) -> Iterator[str]:
 def _function(part: SourcePart) -> Iterator[str]:
     names = {name: variable.upper() for name, variable in part.variables().items()}
     yield f"def {part.function}():"
-    yield f"    solid = {_SOLIDS[part.part.field.kind].format(**names)}"
+    field = part.part.field
+    solid = _swept(field, names) if isinstance(field, Swept) else _SOLIDS[field.kind].format(**names)
+    yield f"    solid = {solid}"
     yield f"    return {_placed(part, names)}"
     yield ""
     yield ""
+
+
+def _swept(field: Swept, names: dict[str, str]) -> str:
+    flat = " - ".join(build123d_loops(field, names))
+    if isinstance(field, Extrusion):
+        taper = f", taper={names['taper']}" if "taper" in names else ""
+        return f"bd.Pos(0, 0, -{names['height']} / 2) * bd.extrude({flat}, {names['height']}{taper})"
+    angle = f", {names['angle']}" if "angle" in names else ""
+    return f"bd.revolve(bd.Plane.XZ * ({flat}), bd.Axis.Z{angle})"
+
+
+def _sharpened(parts: Sequence[Part]) -> list[Change]:
+    """Extrusions with taper whose inner corners are rounded on their way up, which build123d keeps sharp."""
+    tapered = [(p.name, p.field) for p in parts if isinstance(p.field, Extrusion)]
+    rounded = (name for name, f in tapered if any(wall.below is None for loop in f.walls for wall in loop))
+    return [Change((name,), "extrusion", note="its inner corners stay sharp") for name in rounded]
 
 
 def _placed(part: SourcePart, names: dict[str, str]) -> str:

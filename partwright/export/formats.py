@@ -60,6 +60,8 @@ class Format:
     """The units that the file can say; None: any, or the file says none."""
     empty: bool = False
     """Whether a file may hold an assembly that encloses nothing."""
+    profiles: bool = False
+    """A drawing of the profiles that parts are swept of; an assembly without any is refused."""
     needs: tuple[str, str] | None = None
     """A module and the extra of this package that brings it: ("pxr", "usd")."""
 
@@ -167,6 +169,8 @@ FORMATS: Registry[Format] = Registry(
         ".mjcf": "partwright.export.mjcf:FORMAT",
         ".mjcf.xml": "partwright.export.mjcf:FORMAT",
         ".urdf": "partwright.export.urdf:FORMAT",
+        ".dxf": "partwright.export.dxf:FORMAT",
+        ".svg": "partwright.export.svg:FORMAT",
         ".3mf": "partwright.export.threemf:FORMAT",
         ".usda": "partwright.export.usd:FORMAT",
         ".usdc": "partwright.export.usd:FORMAT",

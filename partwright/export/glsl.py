@@ -1,8 +1,9 @@
 """GLSL: one self-contained `float sdf(vec3 p)`, for GLSL 3.30, GLSL ES 3.00 and later.
 
 The formulas (distance.glsl, by which the studio draws as well, superfrustum.glsl and, where there are
-quadrics, quadric.glsl, beside this file) are followed by a table of the parts, one constant each, and by the
-tree of operations. All lengths are in the assembly's own unit.
+any, quadric.glsl and profile.glsl, beside this file) are followed by a table of the parts, one constant each,
+or a function for what is swept of a profile, and by the tree of operations. All lengths are in the assembly's
+own unit.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.rows import as_superfrustum
 from partwright.atomic_io import write_bytes
 from partwright.export.formats import Format, Holds
+from partwright.export.glsl_profiles import swept_function
 from partwright.export.identifiers import comment, identifiers
+from partwright.fields import Swept
 from partwright.shapes import canonical_unit
 
 if TYPE_CHECKING:
@@ -29,7 +32,7 @@ def write(assembly: Assembly, path: str | Path) -> None:
     """Write the assembly's exact signed distance, blends and all.
 
     Raises:
-        ParameterError: a part is neither a SuperFrustum nor a quadric.
+        ParameterError: a part is no SuperFrustum, quadric, extrusion or revolution.
         OutputError: the file cannot be written.
     """
     write_bytes(path, to_glsl(assembly).encode())
@@ -50,8 +53,14 @@ def to_glsl(assembly: Assembly) -> str:
     ]
     if any(part.field.quadric() is not None for part in assembly.parts):
         head.append(_formula("quadric.glsl"))
-    table = [_constant(name, part) for name, part in zip(constants, assembly.parts, strict=True)]
-    functions: list[str] = []
+    if any(isinstance(part.field, Swept) for part in assembly.parts):
+        head.append(_formula("profile.glsl"))
+    table, functions = [], []
+    for name, part in zip(constants, assembly.parts, strict=True):
+        if isinstance(part.field, Swept):
+            functions += swept_function(name.lower(), part, _numbers)
+        else:
+            table.append(_constant(name, part))
     _function(assembly, "sdf", iter(constants), (f"group_{i}" for i in count(1)), functions)
     return "\n".join([*head, *table, "", *functions])
 
@@ -102,6 +111,8 @@ def _call(
 ) -> tuple[str, str]:
     if child.is_part:
         constant = next(constants)
+        if isinstance(child.field, Swept):
+            return f"{constant.lower()}_sdf(p)", _numbers([child.blend])
         function = "part_sdf" if child.field.quadric() is None else "quadric_sdf"
         return f"{function}(p, {constant})", f"{constant}.blend"
     group = next(groups)

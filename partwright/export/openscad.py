@@ -1,9 +1,9 @@
 """OpenSCAD source to go on with by hand: parameters on top, one module a part with a loop over its copies,
 the tree at the end.
 
-Named solids and SuperFrusta are exact, to the facets of `$fn`, and so are planes, cylinders, cones and
-spheres given as quadrics. Other quadrics are written as polyhedra, what `drawn` refuses becomes the nearest
-solid, and blends sharp edges: FILE.report.json lists them.
+Named solids and SuperFrusta are exact, to the facets of `$fn`, and so are extrusions, revolutions, planes,
+cylinders, cones and spheres (of quadrics). Other quadrics, and extrusions with taper, are polyhedra; what
+`drawn` refuses becomes the nearest solid, and blends sharp edges: FILE.report.json lists them.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
 from partwright.export.instance_patterns import Poses, Ring, Row
+from partwright.export.profile_source import SCAD_SOURCE, draws_loops, scad_loops
 from partwright.export.solid_source import (
     SourcePart,
     drawn,
@@ -34,9 +36,13 @@ from partwright.export.solid_source import (
     source_parts,
     superfrustum_source,
 )
-from partwright.fields import Quadric
+from partwright.fields import Extrusion, Field, Quadric, Swept
+from partwright.meshing.named_solids import named_solid
 from partwright.meshing.quadric_solids import quadric_solid
 from partwright.shapes import canonical_unit
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
 
 _SOLIDS = {
     "box": "cube({size}, center = true);",
@@ -69,7 +75,7 @@ _RESERVED = (
     "module function if else for let assert echo each true false undef include use union difference "
     "intersection translate rotate scale mirror hull minkowski cube sphere cylinder polyhedron circle "
     "square polygon text color offset resize render children import projection surface linear_extrude "
-    "rotate_extrude multmatrix intersection_for group version end superfrustum"
+    "rotate_extrude multmatrix intersection_for group version end superfrustum loop side_points"
 )
 
 
@@ -86,7 +92,7 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
         raise ParameterError(f"facets: expected at least 3 of a full circle, got {facets}")
     tree, changes = solid_tree(assembly, keep=_kept, source=True)
     ball = Ball.around(tree)
-    polyhedra = [part for part in tree.parts if part.field.quadric() is not None]
+    polyhedra = [part for part in tree.parts if part.field.quadric() is not None or _leans(part.field)]
     changes += [Change((part.name,), "mesh", note=f"{facets} facets to a full turn") for part in polyhedra]
     parts = source_parts(tree.parts, fixed_axes_angles, _RESERVED.split())
     unit = canonical_unit(assembly.unit) if assembly.unit else None
@@ -101,9 +107,14 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
         "",
         *(line for part in parts for line in _module(part, ball, facets)),
         *superfrustum_source(parts, "superfrustum.scad"),
+        *(SCAD_SOURCE.splitlines() if draws_loops(_drawn_swept(parts)) else []),
     ]
     write_bytes(path, ("\n".join(lines).rstrip() + "\n").encode())
     write_report(assembly, path, changes)
+
+
+def _drawn_swept(parts: list[SourcePart]) -> list[Swept]:
+    return [f for part in parts if isinstance(f := part.part.field, Swept) and not _leans(f)]
 
 
 def _table(part: SourcePart, unit: str | None) -> Iterator[str]:
@@ -121,11 +132,12 @@ def _kept(part: Part) -> Approximation | None:
 def _module(part: SourcePart, ball: Ball, facets: int) -> Iterator[str]:
     names, field = part.variables(), part.part.field
     quadric = field.quadric()
-    solid = (
-        _SOLIDS[field.kind].format(**names)
-        if quadric is None
-        else _polyhedron(quadric, part.part, ball, facets)
-    )
+    if quadric is not None:
+        solid = _polyhedron(quadric, part.part, ball, facets)
+    elif isinstance(field, Swept):
+        solid = _swept(field, names, facets)
+    else:
+        solid = _SOLIDS[field.kind].format(**names)
     yield f"module {part.function}() {{  // {part.title}"
     yield from (f"    {line}" for line in _loop(part, names))
     yield f"        {solid}"
@@ -155,7 +167,29 @@ def _polyhedron(quadric: Quadric, part: Part, ball: Ball, facets: int) -> str:
     centre = Similarity(1.0, part.rotation, part.translation).inverse()(ball.centre)
     chord = ball.radius * (1 - math.cos(math.pi / facets))
     box = centre + ball.radius * np.array([[-1.0], [1.0]])
-    mesh = quadric_solid(quadric, box, chord).to_mesh64()
+    return _faces(quadric_solid(quadric, box, chord))
+
+
+def _leans(field: Field) -> bool:
+    """An extrusion with taper, which OpenSCAD has no word for."""
+    return isinstance(field, Extrusion) and field.taper > 0
+
+
+def _swept(field: Swept, names: dict[str, str], facets: int) -> str:
+    if _leans(field):
+        return _faces(named_solid(field, field.profile.size / 2 * (1 - math.cos(math.pi / facets))))
+    outline, *holes = scad_loops(field, names)
+    flat = outline
+    if holes:
+        flat = "difference() {\n" + "".join(f"            {one}\n" for one in (outline, *holes)) + "        }"
+    if isinstance(field, Extrusion):
+        return f"linear_extrude(height = {names['height']}, center = true) {flat}"
+    angle = f"angle = {names['angle']}" if "angle" in names else ""
+    return f"rotate_extrude({angle}) {flat}"
+
+
+def _faces(solid: Manifold) -> str:
+    mesh = solid.to_mesh64()
     points = ", ".join(f"[{', '.join(map(number, p))}]" for p in np.asarray(mesh.vert_properties).tolist())
     faces = np.asarray(mesh.tri_verts)[:, ::-1].tolist()  # OpenSCAD's run clockwise
     return f"polyhedron(points = [{points}], faces = {faces});"

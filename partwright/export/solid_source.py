@@ -17,7 +17,8 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.similarity import rotation_matrix
 from partwright.export.identifiers import comment, identifiers
 from partwright.export.instance_patterns import Poses, Ring, Row, pattern
-from partwright.fields import Field, HollowBox, HollowFrustum, SuperFrustum
+from partwright.export.profile_source import meaning, swept_parameters
+from partwright.fields import Field, HollowBox, HollowFrustum, SuperFrustum, Swept
 
 MEANING = {
     "size": "full extents x, y, z",
@@ -38,8 +39,10 @@ MEANING = {
     "places": "where the origins of the copies lie",
     "poses": "where the origin of each copy lies, and its turn about x, y and z in degrees",
     "count": "copies, by equal turns",
+    "angle": "through which the profile is turned",
     "centre": "through which the axis of these turns runs",
 }
+_LEAN = "by which the walls lean inwards on their way up"
 _NO_UNIT = ("roundness", "taper", "bulge", "onion", "count", "poses")
 Value = float | tuple[Any, ...]
 
@@ -51,12 +54,15 @@ class Parameter:
     variable: str
     name: str
     value: Value
+    of_profile: bool = False
 
     def line(self, brackets: str, unit: str | None) -> tuple[str, str]:
         """The value in the language's brackets, and what is said of it."""
-        measure = None if self.name in _NO_UNIT else "degrees" if self.name == "turn" else unit
-        meaning = MEANING[self.name]
-        return literal(self.value, brackets), f"{measure}: {meaning}" if measure else meaning
+        angles = self.name in ("turn", "angle") or (self.name == "taper" and self.of_profile)
+        measure = "degrees" if angles else None if self.name in _NO_UNIT else unit
+        said = _LEAN if self.name == "taper" and self.of_profile else MEANING.get(self.name)
+        said = said or meaning(self.name) or self.name
+        return literal(self.value, brackets), f"{measure}: {said}" if measure else said
 
 
 @dataclass(frozen=True)
@@ -96,7 +102,13 @@ def source_parts(
     variables = iter(identifiers(wanted, [*reserved, *functions]))
     return [
         SourcePart(
-            f, part, tuple(Parameter(next(variables), name, value) for name, value in own.items()), copies
+            f,
+            part,
+            tuple(
+                Parameter(next(variables), name, value, isinstance(part.field, Swept))
+                for name, value in own.items()
+            ),
+            copies,
         )
         for f, part, own, copies in zip(functions, parts, values, patterns, strict=True)
     ]
@@ -129,6 +141,8 @@ def _tidy(place: tuple[float, ...]) -> tuple[float, ...]:
 
 def _parameters(field: Field) -> dict[str, Value]:
     """By name; a quadric's coefficients mean nothing to a reader."""
+    if isinstance(field, Swept):
+        return swept_parameters(field)
     if field.quadric() is not None:
         return {}
     return {entry.name: getattr(field, entry.name) for entry in dataclasses.fields(field)}  # type: ignore[arg-type]
@@ -142,11 +156,13 @@ def literal(value: Value, brackets: str) -> str:
 
 
 def drawn(part: Part) -> Approximation | None:
-    """A hollow solid, or a SuperFrustum as the sources' `superfrustum` draws it; None where a named solid is
-    the same, or where it does not: without volume, with a hole that the dilation closes at one end only, or
-    bent about a centre within itself."""
+    """A hollow solid, an extrusion or revolution, or a SuperFrustum as the sources' `superfrustum` draws it.
+
+    None where a named solid is the same, or where it does not: without volume, with a hole that the dilation
+    closes at one end only, or bent about a centre within itself.
+    """
     f = part.field
-    if isinstance(f, HollowBox | HollowFrustum):
+    if isinstance(f, HollowBox | HollowFrustum | Swept):
         return Approximation(f, part, 0.0, 0.0)
     if not isinstance(f, SuperFrustum) or exact_solid(f) is not None:
         return None

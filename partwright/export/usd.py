@@ -7,6 +7,7 @@ subtracted parts are there with the purpose "guide", which renderers leave out. 
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -195,12 +196,15 @@ def _place(prim: Any, pose: Similarity) -> None:
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """As USD's dictionaries take them: lists of numbers become arrays; what is empty is left out."""
+    """As USD's dictionaries take them: lists of numbers become arrays, lists of lists JSON; what is
+    empty is left out."""
     from pxr import Vt
 
     def one(value: Any) -> Any:
         if isinstance(value, Mapping):
             return _plain(value)
+        if isinstance(value, list) and any(isinstance(entry, list) for entry in value):
+            return json.dumps(value)  # no dictionary of USD holds rows of several lengths
         return Vt.DoubleArray(value) if isinstance(value, list) else value
 
     return {key.replace(":", "_"): one(value) for key, value in values.items() if value != {}}

@@ -1,8 +1,10 @@
-"""Signed-distance fields: the SuperFrustum, the solids it contains, and operations on distances."""
+"""Signed-distance fields: the SuperFrustum, the solids it contains, profiles extruded and turned, and
+operations on distances."""
 
 from __future__ import annotations
 
 from partwright.fields.base import Field
+from partwright.fields.extrusion import Extrusion
 from partwright.fields.operations import (
     difference,
     intersection,
@@ -11,9 +13,11 @@ from partwright.fields.operations import (
     smooth_union,
     union,
 )
+from partwright.fields.profile import Profile
 from partwright.fields.quadric import Quadric
 from partwright.fields.quadric_forms import NormalForm, normal_form
 from partwright.fields.registry import KINDS, from_dict
+from partwright.fields.revolution import Revolution
 from partwright.fields.solids import (
     Box,
     Capsule,
@@ -28,6 +32,7 @@ from partwright.fields.solids import (
     Tube,
 )
 from partwright.fields.superfrustum import SuperFrustum
+from partwright.fields.swept import Swept
 
 __all__ = [
     "KINDS",
@@ -35,15 +40,19 @@ __all__ = [
     "Capsule",
     "Cone",
     "Cylinder",
+    "Extrusion",
     "Field",
     "Frustum",
     "HollowBox",
     "HollowFrustum",
     "NormalForm",
+    "Profile",
     "Quadric",
+    "Revolution",
     "Solid",
     "Sphere",
     "SuperFrustum",
+    "Swept",
     "Torus",
     "Tube",
     "difference",

@@ -25,6 +25,8 @@ KINDS: Registry[type[Field]] = Registry(
         "torus": "partwright.fields.solids:Torus",
         "hollow_box": "partwright.fields.solids:HollowBox",
         "hollow_frustum": "partwright.fields.solids:HollowFrustum",
+        "extrusion": "partwright.fields.extrusion:Extrusion",
+        "revolution": "partwright.fields.revolution:Revolution",
         "quadric": "partwright.fields.quadric:Quadric",
         "neural": "partwright.partsdf.field:NeuralField",
     },

@@ -15,8 +15,8 @@ from partwright.assembly.placed import placed_quadric
 from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Node
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.fields import Field, Solid, normal_form
-from partwright.meshing.named_solids import named_solid
+from partwright.fields import Field, normal_form
+from partwright.meshing.named_solids import is_named, named_solid
 from partwright.meshing.quadric_solids import half_space, quadric_solid
 from partwright.meshing.small_components import components
 
@@ -39,7 +39,7 @@ def has_exact_mesh(node: Node) -> bool:
 
 
 def _is_exact(field: Field) -> bool:
-    return isinstance(field, Solid) or field.quadric() is not None
+    return is_named(field) or field.quadric() is not None
 
 
 def mesh_csg(node: Node, tolerance: float | None = None) -> trimesh.Trimesh:
@@ -115,7 +115,7 @@ class _Builder:
 
     def larger(self, node: Node, solid: Manifold, nudge: float) -> Manifold:
         """The solid of a node with every side further out by `nudge`: along a leaf's own axes."""
-        if not node.is_part or node.instances or not isinstance(node.field, Solid):
+        if not node.is_part or node.instances or not is_named(node.field):
             return _larger(solid, nudge)
         return _placed(_larger(named_solid(node.field, self.tolerance), nudge), node)
 
@@ -136,7 +136,6 @@ class _Builder:
         quadric = placed_quadric(part)
         if quadric is not None:
             return quadric_solid(quadric, self.box, self.tolerance)
-        assert isinstance(part.field, Solid)
         return _placed(named_solid(part.field, self.tolerance), part)
 
 

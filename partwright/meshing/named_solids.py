@@ -1,4 +1,4 @@
-"""Named solids as closed meshes whose chords are within a tolerance."""
+"""Named solids, extrusions and revolutions as closed meshes whose chords are within a tolerance."""
 
 from __future__ import annotations
 
@@ -13,19 +13,34 @@ from partwright.fields import (
     Capsule,
     Cone,
     Cylinder,
+    Extrusion,
+    Field,
     Frustum,
     HollowBox,
     HollowFrustum,
+    Revolution,
     Solid,
     Sphere,
+    Swept,
     Torus,
     Tube,
 )
 from partwright.meshing.revolve import corners_of_circle, revolve
+from partwright.meshing.swept_solids import extruded, revolved
 
 
-def named_solid(solid: Solid, tolerance: float) -> Manifold:
-    """The solid in its own frame."""
+def is_named(field: Field) -> bool:
+    """Whether `named_solid` makes it."""
+    return isinstance(field, Solid | Swept)
+
+
+def named_solid(solid: Field, tolerance: float) -> Manifold:
+    """A `Solid`, extrusion or revolution in its own frame."""
+    if isinstance(solid, Extrusion):
+        return extruded(solid, tolerance)
+    if isinstance(solid, Revolution):
+        return revolved(solid, tolerance)
+    assert isinstance(solid, Solid)
     angular = _ANGULAR.get(type(solid))
     if angular is not None:
         return angular(solid)

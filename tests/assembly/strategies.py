@@ -7,10 +7,21 @@ import math
 from hypothesis import strategies as st
 
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.fields import Box, Capsule, Cylinder, Sphere, SuperFrustum, Torus
+from partwright.fields import (
+    Box,
+    Capsule,
+    Cylinder,
+    Extrusion,
+    Profile,
+    Revolution,
+    Sphere,
+    SuperFrustum,
+    Torus,
+)
 
 UNIT = st.floats(0.0, 1.0)
 LENGTH = st.floats(0.05, 1.5)
+ANGLE = st.floats(30.0, 360.0)
 VECTOR = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
 ROTATION = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: math.hypot(*q) > 0.1)
 NAME = st.text(st.characters(categories=("L", "N", "P", "S")), max_size=8)
@@ -61,3 +72,14 @@ def assemblies_of(children: st.SearchStrategy) -> st.SearchStrategy:
 
 ASSEMBLIES = assemblies_of(st.recursive(PARTS, assemblies_of, max_leaves=8))
 SIMILARITIES = st.builds(Similarity, st.floats(0.1, 10.0), ROTATION, VECTOR)
+SWEPT = st.builds(
+    Part,
+    st.one_of(
+        st.builds(lambda w, h: Extrusion(Profile.rectangle(w, 1.0, 0.2), h), LENGTH, LENGTH),
+        st.builds(lambda r, a: Revolution(Profile.circle(0.4, (0.5 + r, 0.1)), a), LENGTH, ANGLE),
+    ),
+    VECTOR,
+    ROTATION,
+    st.floats(0.0, 0.2),
+    NAME,
+)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 
 from partwright.assembly import Assembly, Part
 from partwright.fields import Box, Cone, Cylinder, Sphere, SuperFrustum, Torus
-from tests.assembly.strategies import ASSEMBLIES, PARTS
+from tests.assembly.strategies import ASSEMBLIES, PARTS, SWEPT
 
 TURN = (0.8, 0.2, 0.5, -0.3)
 
@@ -44,7 +44,7 @@ def test_half_ring() -> None:
 
 
 @settings(max_examples=80)
-@given(PARTS | ASSEMBLIES)
+@given(PARTS | ASSEMBLIES | SWEPT)
 def test_nothing_lies_outside(node: Part | Assembly) -> None:
     lower, upper = node.bounds()
     margin = 0.5 * (upper - lower).max() + 0.1

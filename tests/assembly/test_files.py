@@ -15,13 +15,13 @@ from partwright.assembly.file_text import to_text
 from partwright.assembly.files import MAX_BYTES, from_text
 from partwright.errors import AssemblyFileError, NewerVersionError, OutputError, UnreadableFileError
 from partwright.fields import KINDS, Sphere
-from tests.assembly.strategies import ASSEMBLIES
+from tests.assembly.strategies import ASSEMBLIES, SWEPT
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "docs" / "assembly.schema.json").read_text())
 
 
 @settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(ASSEMBLIES)
+@given(ASSEMBLIES | SWEPT.map(lambda part: Assembly((part,))))
 def test_round_trip_is_exact_and_the_schema_holds(tmp_path: Path, assembly: Assembly) -> None:
     assembly.save(tmp_path / "a.json")
     loaded = load_assembly(tmp_path / "a.json")

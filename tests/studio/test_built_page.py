@@ -17,7 +17,10 @@ SOURCES = ROOT / "studio"
 def source_hash() -> str:
     """As `studio/vite.config.ts` computes it."""
     names = ["index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"]
-    names += [f"../partwright/export/{formula}.glsl" for formula in ("distance", "superfrustum", "quadric")]
+    names += [
+        f"../partwright/export/{formula}.glsl"
+        for formula in ("distance", "superfrustum", "quadric", "profile")
+    ]
     names += [path.relative_to(SOURCES).as_posix() for path in (SOURCES / "src").rglob("*") if path.is_file()]
     result = hashlib.sha256()
     for name in sorted(names):

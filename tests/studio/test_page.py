@@ -16,10 +16,13 @@ from partwright.fields import (
     Capsule,
     Cone,
     Cylinder,
+    Extrusion,
     Frustum,
     HollowBox,
     HollowFrustum,
+    Profile,
     Quadric,
+    Revolution,
     Sphere,
     SuperFrustum,
     Torus,
@@ -27,6 +30,7 @@ from partwright.fields import (
 )
 from tests.studio.conftest import Page
 
+PLATE = Profile([(-9, -6), (9, -6, 0.5), (9, 4), (-9, 4, -0.2)], [Profile.circle(2, (3, -1)).outline])
 SOLIDS = (
     Box((30, 20, 10)),
     Cylinder(8, 30),
@@ -38,6 +42,10 @@ SOLIDS = (
     Torus(12, 3),
     HollowBox((20, 24, 18), 3),
     HollowFrustum(12, 7, 2, 20),
+    Extrusion(PLATE, 5),
+    Extrusion(Profile.rectangle(20, 14, 4), 8, 12),
+    Revolution(PLATE.moved((14, 0))),
+    Revolution(Profile([(0, -8), (9, -8), (9, 0, 0.6), (0, 7)]), 230),
 )
 
 

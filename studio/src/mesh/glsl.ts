@@ -1,9 +1,11 @@
 /** One self-contained `float sdf(vec3 p)`, as `partwright export -o FILE.glsl` writes it. */
 
 import distanceFormula from "../../../partwright/export/distance.glsl?raw";
+import profileFormula from "../../../partwright/export/profile.glsl?raw";
 import quadricFormula from "../../../partwright/export/quadric.glsl?raw";
 import superfrustumFormula from "../../../partwright/export/superfrustum.glsl?raw";
 import { quadric, superfrustum } from "../model/fields";
+import { isSwept, type Side, swept } from "../model/profiles";
 import { type Group, type Node, type Part, isGroup, leaves, poses } from "../model/tree";
 
 const literal = (value: number): string => {
@@ -21,6 +23,28 @@ export function toGlsl(root: Group): string {
     const pose = poses(part)[copy];
     const [w, x, y, z] = pose.rotation;
     const place = `vec3(${numbers(pose.translation)}), vec4(${numbers([x, y, z, w])})`;
+    const profile = swept(part.field);
+    if (profile) {
+      const stem = `swept_${rows.length}`;
+      const end = [Math.sin(profile.angle), Math.cos(profile.angle)];
+      const body = [`float ${stem}(vec3 p) {  // ${comment(part.name)}`, `    vec3 v = into_frame(p, ${place});`];
+      functions.push(planar(`${stem}_profile`, profile.sides, !profile.turned));
+      if (!profile.turned) {
+        const up = `v.z + ${literal(profile.height / 2)}`;
+        body.push(`    return extruded(${stem}_profile(v.xy), ${up}, ${literal(profile.height)}, vec2(${numbers(end)}));`);
+      } else {
+        const side = `${stem}_profile(vec2(length(v.xy), v.z))`;
+        const [s, c] = end.map(literal);
+        if (profile.angle <= 6.2831) functions.push(planar(`${stem}_end`, profile.sides, true));
+        const first = `vec2(${stem}_end(v.xz), v.y)`;
+        const last = `vec2(${stem}_end(vec2(${c} * v.x + ${s} * v.y, v.z)), ${c} * v.y - ${s} * v.x)`;
+        const whole = profile.angle > 6.2831;
+        body.push(`    return ${whole ? side : `turned_partly(${side}, ${first}, ${last}, v.xy, ${literal(profile.angle)})`};`);
+      }
+      functions.push([...body, "}", ""].join("\n"));
+      rows.push(`// ${comment(part.name)}: ${stem}`);
+      return `${stem}(p)`;
+    }
     const surface = quadric(part.field);
     if (surface) {
       const s = surface.square;
@@ -62,10 +86,29 @@ export function toGlsl(root: Group): string {
     distanceFormula,
     superfrustumFormula,
     ...(parts.some((part) => part.field.kind === "quadric") ? [quadricFormula] : []),
+    ...(parts.some((part) => isSwept(part.field)) ? [profileFormula] : []),
     ...rows,
     "",
     ...functions,
   ].join("\n");
+}
+
+/** The function of a profile's signed distance; axis: whether sides on the axis count. */
+function planar(name: string, sides: Side[], axis: boolean): string {
+  const vec = (values: number[]) => `vec${values.length}(${numbers(values)})`;
+  const lines = sides
+    .filter((side) => axis || !side.onAxis)
+    .flatMap((side) => {
+      const ends = `${vec(side.start)}, ${vec(side.end)}`;
+      if (side.radius === 0) return [`profile_line(p, ${ends}, square, inside);`];
+      const circle = `${vec(side.centre)}, ${literal(side.radius)}`;
+      const pieces = side.pieces.map(
+        ([low, high, right]) => `profile_piece(p, ${vec([low, high])}, ${circle}, ${right ? "true" : "false"}, inside);`,
+      );
+      return [`profile_arc(p, ${ends}, ${circle}, ${vec([...side.middle, side.cosine])}, square);`, ...pieces];
+    });
+  const head = [`float ${name}(vec2 p) {`, "    float square = 1e30;", "    bool inside = false;"];
+  return [...head, ...lines.map((line) => `    ${line}`), "    return inside ? -sqrt(square) : sqrt(square);", "}", ""].join("\n");
 }
 
 const comment = (name: string): string => name.replace(/[^\x20-\x7e]|\\/g, "_");

@@ -1,5 +1,6 @@
 /** Signed distances in double precision: for picking, snapping and meshing. The shader does the pixels. */
 
+import { sweptDistance } from "./profiles";
 import type { Program } from "./program";
 import { INTERSECTION, POP, PUSH, UNION } from "./program";
 
@@ -121,6 +122,8 @@ export function leafDistance(program: Program, i: number, x: number, y: number, 
   const lx = poses[p] * x + poses[p + 1] * y + poses[p + 2] * z + poses[p + 3];
   const ly = poses[p + 4] * x + poses[p + 5] * y + poses[p + 6] * z + poses[p + 7];
   const lz = poses[p + 8] * x + poses[p + 9] * y + poses[p + 10] * z + poses[p + 11];
+  const profile = program.swept[i];
+  if (profile) return sweptDistance(profile, lx / program.frame.scale, ly / program.frame.scale, lz / program.frame.scale) * program.frame.scale;
   if (program.quadrics[i]) return quadricDistance(lx, ly, lz, rows, i * 12);
   return superfrustumDistance(lx, ly, lz, rows, i * 12);
 }

@@ -2,6 +2,7 @@
 
 import type { FieldData } from "./fields";
 import { superfrustum } from "./fields";
+import { isSwept, withLoops } from "./profiles";
 import {
   type Group,
   type Node,
@@ -178,6 +179,8 @@ export function stretched(field: FieldData, axis: number, factor: number): Field
     return { ...field, coefficients: c.map((v, i) => v / factor ** powers[i]) };
   }
   const along = axis === 2 && "height" in field;
+  // A profile keeps its arcs round: it grows along both of its axes.
+  if (isSwept(field) && !along) return withLoops(field, ([x, y, ...bulge]) => [x * factor, y * factor, ...bulge]);
   const names = along ? ["height"] : ["radius", "bottom_radius", "top_radius", "major_radius", "thickness"];
   const result: FieldData = { ...field };
   for (const name of names) if (typeof result[name] === "number") result[name] = (result[name] as number) * factor;

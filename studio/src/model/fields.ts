@@ -1,5 +1,6 @@
 /** The kinds of field: their parameters, and the one formula that most of them are (SuperFrusta, section 3.2). */
 
+import { isSwept, loops, swept, sweptBox, withLoops } from "./profiles";
 import { type Box, type Vec3, dot } from "./vectors";
 
 export type Value = number | string | boolean | null | Value[] | { [name: string]: Value };
@@ -60,6 +61,8 @@ export const PARAMETERS: Record<string, Parameter[]> = {
   hollow_box: [extents("full extents"), WALL],
   neural: [{ name: "half_lengths", label: "half length", sort: "extents", low: 1e-6, help: "of the part's cuboid; the others adapt" }],
   hollow_frustum: [BOTTOM, TOP, WALL, HEIGHT],
+  extrusion: [HEIGHT],
+  revolution: [fraction("angle", 360, "degrees through which the profile is turned")],
 };
 
 /** What the formula is told: sx, sy, sz, roundness, dilation, taper, bulge, onion. */
@@ -120,11 +123,12 @@ export function complaint(field: FieldData): string | null {
   const get = (name: string) => number(field, name);
   for (const parameter of PARAMETERS[field.kind] ?? []) {
     const given = field[parameter.name];
-    const values = parameter.sort === "extents" ? (given as number[]) : [given ?? (parameter.name === "taper" ? 1 : 0)];
+    const values = parameter.sort === "extents" ? (given as number[]) : [given ?? (parameter.name === "taper" ? 1 : parameter.name === "angle" ? 360 : 0)];
     const high = parameter.high ?? 1e12;
     const wrong = values.some((v) => typeof v !== "number" || !(v >= parameter.low && v <= high));
     if (wrong) return `${parameter.label} has to be from ${parameter.low} to ${high}`;
   }
+  if (isSwept(field) && !profileIsGood(field)) return "its profile is no outline of corners";
   if (/frustum$/.test(field.kind) && get("top_radius") > 2 * get("bottom_radius"))
     return "the top radius is at most twice the bottom radius: turn the part over instead";
   if (field.kind === "tube" && get("thickness") >= get("radius"))
@@ -136,6 +140,14 @@ export function complaint(field: FieldData): string | null {
   if (field.kind === "hollow_frustum" && get("thickness") >= get("bottom_radius"))
     return "the wall is thinner than the bottom radius";
   return null;
+}
+
+function profileIsGood(field: FieldData): boolean {
+  try {
+    return loops(field).every((loop) => loop.length > 1 && loop.flat().every(Number.isFinite));
+  } catch {
+    return false;
+  }
 }
 
 export interface Quadric {
@@ -212,6 +224,8 @@ export function symmetricEigen(given: Vec3[]): { values: number[]; vectors: Vec3
 /** Of the part in its own frame; infinite where it does not end or that is not known. */
 export function fieldBox(field: FieldData): Box {
   const given = superfrustum(field);
+  const profile = swept(field);
+  if (profile) return sweptBox(profile);
   if (field.kind === "neural") {
     // A learned surface may leave its cuboid by a little.
     const half = (field.half_lengths as number[]).map((v) => 1.1 * v) as Vec3;
@@ -243,7 +257,9 @@ export function scaledField(field: FieldData, factor: number): FieldData {
     const scaled = c.map((v, i) => (i < 3 || i > 6 ? v / factor : i === 6 ? v * factor : v));
     return { ...field, coefficients: scaled };
   }
-  const result: FieldData = { ...field };
+  const result: FieldData = isSwept(field)
+    ? withLoops(field, ([x, y, ...bulge]) => [x * factor, y * factor, ...bulge])
+    : { ...field };
   for (const parameter of PARAMETERS[field.kind] ?? []) {
     const value = field[parameter.name];
     if (parameter.sort === "length" && typeof value === "number") result[parameter.name] = value * factor;

@@ -8,6 +8,7 @@
 import { programDistance } from "./distance";
 import { fieldBox, quadric, superfrustum } from "./fields";
 import { isLearned } from "./learned";
+import { type Swept, sideTexels, swept } from "./profiles";
 import { type Group, type Node, type Part, isGroup, leaves, poses } from "./tree";
 import {
   type Box,
@@ -72,6 +73,8 @@ export interface Program {
   /** 4 an instruction: centre and radius of a ball around the leaf. */
   balls: Float64Array;
   quadrics: Uint8Array;
+  /** Of each instruction: the extrusion or revolution that it is, in own lengths. */
+  swept: (Swept | null)[];
   /** Of pushes: the operation by which the group is folded into what is around it. */
   roles: Uint8Array;
   /** How deep groups are nested. */
@@ -177,6 +180,7 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
   const balls: number[] = [];
   const quadrics: number[] = [];
   const bent: number[] = [];
+  const profiles: (Swept | null)[] = [];
   let infinite = false;
 
   const emit = (action: number, operation: number, blend: number, part = -1) => {
@@ -187,6 +191,7 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
       balls.push(0, 0, 0, HUGE);
       quadrics.push(0);
       bent.push(0);
+      profiles.push(null);
     }
     return instructions.length - 1;
   };
@@ -208,7 +213,7 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
       balls.push(0, 0, 0, HUGE);
       infinite = true;
     } else {
-      const row = superfrustum(part.field)!;
+      const row = superfrustum(part.field) ?? Array(8).fill(0);
       const k = frame.scale;
       rows.push(row[0] * k, row[1] * k, row[2] * k, row[3], row[4] * k, row[5], row[6], row[7], 0, 0, 0, 0);
       const box = fieldBox(part.field);
@@ -216,7 +221,8 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
       balls.push(...centre, (length(sub(box[1], box[0])) / 2) * k);
     }
     quadrics.push(surface ? 1 : 0);
-    bent.push(!surface && superfrustum(part.field)![6] > 0.03 ? 1 : 0);
+    profiles.push(swept(part.field));
+    bent.push((superfrustum(part.field)?.[6] ?? 0) > 0.03 ? 1 : 0);
     const hull = surface
       ? null
       : corners(fieldBox(part.field)).map((p) => toUnit(frame, add(apply(m, p), pose.translation)));
@@ -267,6 +273,7 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
     balls: Float64Array.from(balls),
     quadrics: Uint8Array.from(quadrics),
     bent: Uint8Array.from(bent),
+    swept: profiles,
     roles: new Uint8Array(instructions.length),
     depth: 0,
     scope,
@@ -357,9 +364,19 @@ function boxOf(scope: Scope): Box {
   ];
 }
 
-/** The table of the shader: TEXELS texels of four floats an instruction. layers: of the parts' images, or -1. */
+/**
+ * The table of the shader: TEXELS texels of four floats an instruction, and after those as many for each side of a
+ * profile. layers: of the parts' images, or -1.
+ */
 export function table(program: Program, layers: number[] = []): Float32Array {
-  const result = new Float32Array(program.count * TEXELS * 4);
+  const sides: number[] = [];
+  const begins = program.swept.map((profile) => {
+    const begin = program.count + sides.length / (TEXELS * 4);
+    if (profile) sides.push(...sideTexels(profile, program.frame.scale));
+    return begin;
+  });
+  const result = new Float32Array(program.count * TEXELS * 4 + sides.length);
+  result.set(sides, program.count * TEXELS * 4);
   program.instructions.forEach((instruction, i) => {
     const { action, operation, blend, part } = instruction;
     const at = i * TEXELS * 4;
@@ -367,11 +384,16 @@ export function table(program: Program, layers: number[] = []): Float32Array {
     // A push knows by what, and how softly, its group is folded in.
     const third = action === PUSH ? program.roles[i] : part;
     const layer = action === LEAF && !isQuadric ? (layers[part] ?? -1) + 1 : 0;
-    result.set([action * 16 + operation * 4 + isQuadric * 2, blend, third, layer], at);
+    const profile = program.swept[i];
+    result.set([action * 16 + operation * 4 + isQuadric * 2 + (profile ? 1 : 0), blend, third, layer], at);
     result.set(program.balls.subarray(i * 4, i * 4 + 4), at + 4);
     result.set(program.poses.subarray(i * 12, i * 12 + 12), at + 8);
     const row = program.rows.subarray(i * 12, i * 12 + 12);
-    if (action === LEAF && !isQuadric) result.set(derived(row), at + 20);
+    if (profile) {
+      const whole = profile.turned && profile.angle > 6.2831 ? 1 : 0;
+      const turn = [profile.turned ? 1 : 0, whole, profile.angle, Math.sin(profile.angle), Math.cos(profile.angle)];
+      result.set([begins[i], profile.sides.length, profile.height * program.frame.scale, ...turn], at + 20);
+    } else if (action === LEAF && !isQuadric) result.set(derived(row), at + 20);
     else result.set(row, at + 20);
   });
   return result;

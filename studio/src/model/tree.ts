@@ -2,6 +2,7 @@
 
 import type { FieldData, Value } from "./fields";
 import { complaint, PARAMETERS, scaledField } from "./fields";
+import { withLoops } from "./profiles";
 import { type Quat, type Vec3, add, mul, normalised, NO_ROTATION, product, rotate } from "./vectors";
 
 export type Operation = "union" | "intersection" | "difference";
@@ -277,8 +278,8 @@ export function mirrored(node: Node, axis: number, at: number): Node {
   return {
     ...node,
     translation: flip(node.translation),
-    rotation: mirroredRotation(node.rotation, axis),
-    field: node.field.kind === "quadric" ? mirroredQuadric(node.field) : node.field,
+    rotation: turnedBack(mirroredRotation(node.rotation, axis), node.field),
+    field: mirroredField(node.field),
     instances: node.instances.map((move) => ({
       // M T M with M: p -> flip(p): the rotation's axis is mirrored and its angle reversed.
       rotation: conjugatedByMirror(move.rotation, axis),
@@ -289,6 +290,20 @@ export function mirrored(node: Node, axis: number, at: number): Node {
       })(),
     })),
   };
+}
+
+/** At its own xz-plane. */
+function mirroredField(field: FieldData): FieldData {
+  if (field.kind === "quadric") return mirroredQuadric(field);
+  if (field.kind !== "extrusion") return field;
+  return withLoops(field, ([x, y, bulge]) => (bulge ? [x, -y, -bulge] : [x, -y]));
+}
+
+/** The mirror image of a part of a turn begins where that ends. */
+function turnedBack(rotation: Quat, field: FieldData): Quat {
+  if (field.kind !== "revolution") return rotation;
+  const half = -(Number(field.angle ?? 360) * Math.PI) / 360;
+  return product(rotation, [Math.cos(half), 0, 0, Math.sin(half)]);
 }
 
 function conjugatedByMirror(q: Quat, axis: number): Quat {

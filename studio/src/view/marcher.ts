@@ -6,6 +6,7 @@ import type { Vec3 } from "../model/vectors";
 import type { View } from "./camera";
 import type { Gpu, Shader, Target } from "./gpu";
 import distanceSource from "../../../partwright/export/distance.glsl?raw";
+import profileSource from "../../../partwright/export/profile.glsl?raw";
 import programSource from "./shaders/field.glsl?raw";
 import marchSource from "./shaders/march.frag?raw";
 import probeSource from "./shaders/probe.frag?raw";
@@ -14,7 +15,7 @@ import shadeSource from "./shaders/shade.frag?raw";
 import { cull, LISTED, wholeList } from "./tiles";
 
 /** The field of a program, for any shader to ask. */
-export const fieldSource = distanceSource + programSource;
+export const fieldSource = distanceSource + profileSource + programSource;
 
 const BLOCKS = 2; // a side of a tile: rays of one block start together
 
@@ -51,9 +52,10 @@ export class Marcher {
     this.program = program;
     this.layers = layers;
     const { gl } = this.gpu;
-    const rows = Math.max(1, Math.ceil(program.count / 64));
+    const numbers = table(program, layers);
+    const rows = Math.max(1, Math.ceil(numbers.length / (64 * TEXELS * 4)));
     const data = new Float32Array(rows * 64 * TEXELS * 4);
-    data.set(table(program, layers));
+    data.set(numbers);
     this.gpu.upload("uTable", gl.RGBA32F, 64 * TEXELS, rows, gl.RGBA, gl.FLOAT, data);
     this.uploads++;
     this.tilesDirty = true;

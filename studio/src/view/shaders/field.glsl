@@ -26,9 +26,42 @@ float quadric(vec3 v, int i) {
     return quadric_reach(dot(bent + linear, v) + c.y, length(2.0 * bent + linear), c.z, c.w);
 }
 
-float leaf(vec3 p, int i, bool isQuadric) {
+// Of a profile whose sides follow the instructions in the table; axis: whether those on the axis of turning count.
+float sides(vec2 p, int first, int count, bool axis) {
+    float square = 1e30;
+    bool inside = false;
+    for (int i = first; i < first + count; i++) {
+        vec4 ends = row(i, 0), circle = row(i, 1);
+        if (circle.w > 0.0 && !axis) continue;
+        if (circle.z == 0.0) {
+            profile_line(p, ends.xy, ends.zw, square, inside);
+            continue;
+        }
+        vec4 middle = row(i, 2);
+        profile_arc(p, ends.xy, ends.zw, circle.xy, circle.z, middle.xyz, square);
+        for (int k = 0; k < int(middle.w); k++) {
+            vec4 piece = row(i, 3 + k);
+            profile_piece(p, piece.xy, circle.xy, circle.z, piece.z > 0.0, inside);
+        }
+    }
+    return inside ? -sqrt(square) : sqrt(square);
+}
+
+float swept(vec3 v, int i) {
+    vec4 a = row(i, 5), b = row(i, 6);
+    int first = int(a.x), count = int(a.y);
+    if (a.w == 0.0) return extruded(sides(v.xy, first, count, true), v.z + a.z / 2.0, a.z, b.zw);
+    float side = sides(vec2(length(v.xy), v.z), first, count, false);
+    if (b.x > 0.0) return side;
+    vec2 start = vec2(sides(v.xz, first, count, true), v.y);
+    vec2 end = vec2(sides(vec2(b.w * v.x + b.z * v.y, v.z), first, count, true), b.w * v.y - b.z * v.x);
+    return turned_partly(side, start, end, v.xy, b.y);
+}
+
+float leaf(vec3 p, int i, bool isQuadric, bool isSwept) {
     vec4 q = vec4(p, 1.0);
     vec3 v = vec3(dot(row(i, 2), q), dot(row(i, 3), q), dot(row(i, 4), q));
+    if (isSwept) return swept(v, i);
     return isQuadric ? quadric(v, i) : superfrustum(v, i);
 }
 
@@ -73,7 +106,7 @@ float field(vec3 p, int start, int count, bool exact) {
         int code = int(head.x), action = code >> 4, operation = (code >> 2) & 3;
         if (action == LEAF) {
             if (exact || !beyond(p, i, operation, result, head.y))
-                result = fold(operation, result, leaf(p, i, (code & 2) != 0), head.y);
+                result = fold(operation, result, leaf(p, i, (code & 2) != 0, (code & 1) != 0), head.y);
         } else if (action == PUSH) {
             int length_ = listed(++n);
             // A push knows how its group will be folded in, so that one that lies far off is passed over.

@@ -88,7 +88,7 @@ vec3 colourAt(vec3 p, int start, int count, out int part) {
             if (beyond(p, i, operation, result, head.y)) continue;
             int index = int(head.z);
             nextColour = head.w > 0.5 ? mapped(p, i, int(head.w) - 1) : texelFetch(uColours, ivec2(index & 255, index >> 8), 0).rgb;
-            next = leaf(p, i, (code & 2) != 0);
+            next = leaf(p, i, (code & 2) != 0, (code & 1) != 0);
             nextOwner = head.z;
         }
         // Positive where the next one's surface is the nearer to what is seen.

@@ -1,0 +1,118 @@
+"""A profile's parallel curve within it: what is left of the profile at least so deep inside."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from partwright.errors import ParameterError
+from partwright.fields.profile import Corner, Profile, Side
+
+_SMOOTH = 1e-6  # radians: sides that turn by less run on smoothly
+
+
+class Wall(NamedTuple):
+    """What a side, or the corner before it, becomes: `below` on the profile, `above` on its parallel curve.
+
+    Of a corner that turns inwards, below is None: an arc about `start` grows out of it.
+    """
+
+    start: tuple[float, float]
+    below: Side | None
+    above: Side
+
+
+def offset(profile: Profile, depth: float) -> tuple[Profile, list[list[Wall]]]:
+    """The points at least `depth` > 0 inside of the profile, and how their boundary grows out of it.
+
+    Walls are listed loop by loop, side by side. Corners that turn outwards stay corners, those that turn
+    inwards become arcs. Every side has to be left.
+
+    Raises:
+        ParameterError: a side vanishes, parts of the outline meet, or a corner turns outwards where one of
+            its sides is an arc, whose parallel meets the other's on no straight line.
+    """
+    loops, walls = [], []
+    for sides in profile.sides:
+        corners: list[Corner] = []
+        grown: list[tuple[tuple[float, float], Side | None]] = []
+        count = len(sides)
+        begins = [_begin(sides[i - 1], sides[i], depth) for i in range(count)]
+        for i, side in enumerate(sides):
+            arrive, leave = begins[i]
+            if arrive is not leave:
+                turn = _turn(sides[i - 1], side)
+                corners.append((*arrive, math.tan(turn / 4)))
+                grown.append((side.start, None))
+            bulge = _kept(side, leave, begins[(i + 1) % count][0], depth)
+            corners.append((*leave, bulge))
+            grown.append((side.start, side))
+        loops.append(tuple(corners))
+        walls.append(grown)
+    try:
+        inner = Profile(loops[0], tuple(loops[1:]))
+    except ParameterError as error:
+        raise _too_deep(depth) from error
+    made = [
+        [Wall(start, below, above) for (start, below), above in zip(grown, sides, strict=True)]
+        for grown, sides in zip(walls, inner.sides, strict=True)
+    ]
+    if any(
+        a.above.start != (c[0], c[1])
+        for w, loop in zip(made, loops, strict=True)
+        for a, c in zip(w, loop, strict=True)
+    ):
+        raise _too_deep(depth)  # a loop has turned inside out
+    return inner, made
+
+
+def _too_deep(depth: float) -> ParameterError:
+    return ParameterError(f"profile: not every side of it is left {depth:.6g} further inside")
+
+
+Point = tuple[float, float]
+
+
+def _turn(before: Side, after: Side) -> float:
+    """Signed angle by which the way turns: positive to the left, at a corner that points outwards."""
+    a, b = before.direction(at_end=True), after.direction()
+    return math.atan2(a[0] * b[1] - a[1] * b[0], a @ b)
+
+
+def _begin(before: Side, after: Side, depth: float) -> tuple[Point, Point]:
+    """Where the parallel of `before` ends and that of `after` begins: one and the same point, unless an arc
+    lies between."""
+    corner = np.array(after.start)
+    a, b = (np.array([-d[1], d[0]]) for d in (before.direction(at_end=True), after.direction()))
+    turn = _turn(before, after)
+    if abs(turn) <= _SMOOTH:
+        x, y = (corner + depth * b).tolist()
+        return (point := (x, y)), point
+    if turn < 0:
+        (ax, ay), (bx, by) = (corner + depth * a).tolist(), (corner + depth * b).tolist()
+        return (ax, ay), (bx, by)
+    if before.centre is not None or after.centre is not None:
+        raise ParameterError(
+            f"profile: at ({after.start[0]:.6g}, {after.start[1]:.6g}) an arc meets a side at a corner, "
+            "which a taper cannot carry on; round the corner, or leave the taper 0"
+        )
+    x, y = (corner + depth * (a + b) / (1 + a @ b)).tolist()
+    return (point := (x, y)), point
+
+
+def _kept(side: Side, start: Point, end: Point, depth: float) -> float:
+    """The bulge of a side's parallel between two points. Raises ParameterError where nothing is left."""
+    way = np.subtract(end, start)
+    if side.centre is None:
+        if way @ side.direction() <= 1e-9 * depth:
+            raise _too_deep(depth)
+        return 0.0
+    if side.sweep > 0 and side.radius - depth <= 1e-9 * depth:
+        raise _too_deep(depth)
+    first, last = (np.subtract(p, side.centre) for p in (start, end))
+    sweep = math.atan2(first[0] * last[1] - first[1] * last[0], first @ last)
+    if abs(math.remainder(sweep - side.sweep, 2 * math.pi)) > 1e-3:
+        raise _too_deep(depth)
+    return side.bulge
