@@ -73,7 +73,7 @@ def fitted(shape: Shape, max_parts: int | None) -> Body:
     found, _ = geometries(local, GEOMS, TOLERANCE, 24, convex=True)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "body.mjcf.xml"
-        pw.export(assembly, path)
+        pw.export(assembly, path, visuals=False)
         seconds = time.perf_counter() - start
         spec = mujoco.MjSpec.from_file(str(path))
 

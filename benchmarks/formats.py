@@ -351,6 +351,9 @@ def main() -> int:
     option("folders", nargs="*", type=Path, metavar="FITS", help="each holds results of partwright fit")
     option("--rows", type=Path, required=True, help="measured rows, kept between runs")
     option("--learned", default="", metavar="A,B", help="MODEL:NAME, as `partwright parts edit` has them")
+    option(
+        "--target", type=Path, default=TARGET, metavar="FILE", help="the table (default: results/formats.md)"
+    )
     option("--formats", default=",".join(READERS), metavar="A,B", help="suffixes (default: all)")
     options = parser.parse_args()
     kept = options.rows.read_text().splitlines() if options.rows.exists() else []
@@ -371,7 +374,7 @@ def main() -> int:
             rows.append(row)
             with options.rows.open("a") as file:
                 file.write(json.dumps(dataclasses.asdict(row)) + "\n")
-            TARGET.write_text(document(rows), encoding="utf-8")
+            options.target.write_text(document(rows), encoding="utf-8")
             print(row, flush=True)
     print(document(rows))
     return 0

@@ -43,14 +43,28 @@ def segment_faces(
     within: Sequence[str] | Sequence[int] | NDArray | None = None,
 ) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     """`segment` of triangles, in the assembly's units and place."""
+    labels, paths = segment_paths(vertices, faces, assembly, within)
+    return labels, tuple("/".join(path) for path in paths)
+
+
+def segment_paths(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    assembly: Assembly,
+    within: Sequence[str] | Sequence[int] | NDArray | None = None,
+) -> tuple[NDArray[np.int64], list[tuple[str, ...]]]:
+    """`segment_faces` with each name as a path: (PART,), or (COARSE, PART)."""
     labels = _nearest_part(vertices, faces, assembly)
-    names = tuple(part.name for part in assembly.parts)
+    names = [part.name for part in assembly.parts]
     if within is None:
-        return labels, names
+        return labels, [(name,) for name in names]
     coarse_names, coarse = np.unique(check_within(within, len(labels)), return_inverse=True)
     pairs, crossed = np.unique(coarse * len(names) + labels, return_inverse=True)
-    crossed_names = (f"{coarse_names[pair // len(names)]}/{names[pair % len(names)]}" for pair in pairs)
-    return crossed.astype(np.int64), tuple(crossed_names)
+    paths: list[tuple[str, ...]] = [
+        (str(coarse_names[pair // len(names)]), names[pair % len(names)]) for pair in pairs
+    ]
+    divided: NDArray[np.int64] = crossed.astype(np.int64)
+    return divided, paths
 
 
 def node_labels(shape: Shape) -> list[str]:

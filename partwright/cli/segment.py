@@ -7,7 +7,7 @@ from pathlib import Path
 
 from partwright.cli.outputs import add_output, given
 
-NODES = "nodes"
+NODES, COLOURS, PROPERTY = "nodes", "colours", "face:"
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -15,7 +15,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "segment",
         help="label every face of a shape by its part",
         description="Labels every face of SHAPE by the part of ASSEMBLY that is nearest to it. Writes the "
-        "faces in a colour a part to FILE (.glb or .ply), and FILE.labels.json.",
+        "faces in a colour a part to FILE (.glb, .ply or .usd), and FILE.labels.json.",
     )
     command.add_argument("shape", metavar="SHAPE", type=Path, help="the mesh or scene to label")
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
@@ -23,9 +23,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.add_argument(
         "--within",
         metavar="LABELS",
-        type=Path,
         help="labels that parts must not cross: a file with one a face (.json, .npy or text), "
-        f"or {NODES!r} for the nodes of the scene",
+        f"{NODES!r} for the nodes of the scene, {COLOURS!r} for one colour a label, or {PROPERTY}NAME for a "
+        "property of a PLY's faces",
+    )
+    command.add_argument(
+        "--copies", action="store_true", help="each copy of a repeated part has a label of its own"
     )
     command.add_argument(
         "--split", action="store_true", help="cut faces along the borders between parts; their number grows"
@@ -34,7 +37,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def _reads(arguments: argparse.Namespace) -> list[Path]:
-    return given(arguments.shape, arguments.assembly, arguments.within)
+    within = arguments.within
+    named = within in (NODES, COLOURS) or (within or "").startswith(PROPERTY)
+    return given(arguments.shape, arguments.assembly, None if named else within)
 
 
 def _writes(arguments: argparse.Namespace) -> list[Path]:

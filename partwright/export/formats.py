@@ -106,7 +106,7 @@ class Format:
         cells = options.get("resolution", 1)
         if isinstance(cells, bool) or not isinstance(cells, int) or cells < 1:
             raise ParameterError(f"resolution: expected a number of cells, at least 1, got {cells!r}")
-        self._check_needs()
+        self.check_needs()
         self._check_unit(assembly)
         if Holds.LEARNED not in self.holds:
             self._check_learned(assembly)
@@ -117,7 +117,8 @@ class Format:
                 "or what is intersected does not overlap"
             )
 
-    def _check_needs(self) -> None:
+    def check_needs(self) -> None:
+        """Raises MissingDependencyError where a package is needed that is not installed."""
         if self.needs is None:
             return
         module, extra = self.needs

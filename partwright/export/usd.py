@@ -8,7 +8,6 @@ subtracted parts are there with the purpose "guide", which renderers leave out. 
 from __future__ import annotations
 
 import json
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from partwright.errors import NoSurfaceError
 from partwright.export.axes import to_metres_z_up
 from partwright.export.formats import Format, Holds
 from partwright.export.usd_physics import add_physics, body_of, check_physics
+from partwright.export.usd_prims import define_mesh, define_xform, exported, place, to_linear
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
 
@@ -68,16 +68,12 @@ def write(
     root = stage.GetPrimAtPath("/").GetAllChildren()[0]
     stage.SetDefaultPrim(root)
     if up not in _AXES:
-        _place(root, Similarity(rotation=to_metres_z_up(assembly).rotation))
+        place(root, Similarity(rotation=to_metres_z_up(assembly).rotation))
     if physics is not None:
         body = body_of(assembly, density, tolerance)
         add_physics(stage, root, body, free_joint)
         body.write_report(path)
-    # Where USD itself cannot write, it says so in errors of its own: our own file errors are clearer.
-    with tempfile.TemporaryDirectory() as folder:
-        whole = Path(folder) / f"stage{Path(path).suffix.lower()}"
-        stage.GetRootLayer().Export(str(whole))
-        write_bytes(path, whole.read_bytes())
+    write_bytes(path, exported(stage, Path(path).suffix.lower()))
 
 
 class _Writer:
@@ -86,8 +82,7 @@ class _Writer:
     def __init__(self, stage: Any, assembly: Assembly, resolution: int) -> None:
         self.stage, self.assembly, self.resolution = stage, assembly, resolution
         self.meshes = 0  # that are shown
-        srgb = palette(len(assembly)) / 255.0  # USD's colours are linear
-        linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+        linear = to_linear(palette(len(assembly)) / 255.0)
         self.colours = dict(zip((p.name for p in assembly.parts), linear, strict=True))
 
     def add(self, node: Node, parent: str, *, subtracted: bool) -> None:
@@ -95,7 +90,7 @@ class _Writer:
         if is_atomic(node) or is_operation(node, "intersection"):
             self._add_whole(node, parent, subtracted)
             return
-        prim = self._xform(parent, node.name or "assembly")
+        prim = define_xform(self.stage, parent, node.name or "assembly")
         if isinstance(node, Part):
             self._add_part(prim, node, parent, subtracted)
             return
@@ -119,7 +114,7 @@ class _Writer:
     def _add_whole(self, node: Node, parent: str, subtracted: bool) -> None:
         """One mesh in the assembly's own frame, in the colour of what is left of it or comes first."""
         parts = (node,) if isinstance(node, Part) else node.parts
-        prim = self._xform(parent, node.name or ("convex" if is_atomic(node) else "cut"))
+        prim = define_xform(self.stage, parent, node.name or ("convex" if is_atomic(node) else "cut"))
         about: dict[str, Any] = {} if isinstance(node, Part) else {"operation": node.operation}
         taken = subtracted_names(node)
         about["parts"] = {p.name: _about(p, (p.name in taken) != subtracted) for p in parts}
@@ -139,43 +134,22 @@ class _Writer:
         except NoSurfaceError:
             mesh, about["note"] = None, _NO_SURFACE
         prim.SetCustomData({"partwright": _plain(about)})
-        _place(prim, pose)
+        place(prim, pose)
         if mesh is None:
             return
         self._add_mesh(f"{prim.GetPath()}/mesh", mesh, self.colours[part.name], subtracted)
         for i, move in enumerate(part.instances, start=2):
-            copy = self._xform(parent, f"{part.name}_{i}")
+            copy = define_xform(self.stage, parent, f"{part.name}_{i}")
             copy.SetCustomData({"partwright": {"copy_of": part.name}})
-            _place(copy, move @ pose)
+            place(copy, move @ pose)
             again = self.stage.DefinePrim(copy.GetPath().AppendChild("mesh"))
             again.GetReferences().AddInternalReference(f"{prim.GetPath()}/mesh")
 
-    def _xform(self, parent: str, name: str) -> Any:
-        """An Xform under the name, or what of it USD allows, which its display name makes good."""
-        from pxr import Tf, UsdGeom
-
-        stem = plain = Tf.MakeValidIdentifier(name)
-        number = 1
-        while self.stage.GetPrimAtPath(f"{parent}/{plain}"):
-            number += 1
-            plain = f"{stem}_{number:02d}"
-        prim = UsdGeom.Xform.Define(self.stage, f"{parent}/{plain}").GetPrim()
-        if plain != name:
-            prim.SetDisplayName(name)
-        return prim
-
     def _add_mesh(self, path: str, mesh: Any, colour: np.ndarray, subtracted: bool) -> None:
-        from pxr import UsdGeom, Vt
+        from pxr import UsdGeom
 
         self.meshes += not subtracted
-        points, faces = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
-        prim = UsdGeom.Mesh.Define(self.stage, path)
-        prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-        prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, np.int32)))
-        prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.ravel()))
-        prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-        prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array([points.min(axis=0), points.max(axis=0)])))
-        prim.CreateDisplayColorAttr(Vt.Vec3fArray.FromNumpy(colour[None].astype(np.float32)))
+        prim = define_mesh(self.stage, path, mesh, colour)
         if subtracted:
             prim.CreatePurposeAttr(UsdGeom.Tokens.guide)
             prim.CreateVisibilityAttr(UsdGeom.Tokens.invisible)  # some viewers show guides
@@ -184,15 +158,6 @@ class _Writer:
 def _about(part: Part, subtracted: bool) -> dict[str, Any]:
     own = {"field": part.field.to_dict(), "blend": part.blend, "metadata": dict(part.metadata)}
     return own | ({"role": "subtracted"} if subtracted else {})
-
-
-def _place(prim: Any, pose: Similarity) -> None:
-    from pxr import Gf, UsdGeom
-
-    xform = UsdGeom.Xformable(prim)
-    double = UsdGeom.XformOp.PrecisionDouble
-    xform.AddTranslateOp(double).Set(Gf.Vec3d(*pose.translation))
-    xform.AddOrientOp(double).Set(Gf.Quatd(*pose.rotation))
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from partwright.errors import SettingError
 from partwright.export.collider_meshes import collider_mesh
 from partwright.export.gltf_physics import principal_inertia
 from partwright.export.rigid_body import DENSITY, Body
+from partwright.export.usd_prims import define_mesh
 from partwright.fields import Box, Capsule, Cone, Cylinder, Field, Frustum, Sphere
 from partwright.meshing.mass import check_density
 from partwright.shapes import METRES, canonical_unit
@@ -87,7 +88,7 @@ def define_collider(stage: Any, path: Any, part: Part | None, mesh: trimesh.Trim
     from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
     if part is None:
-        gprim = _mesh(stage, path, mesh)
+        gprim = define_mesh(stage, path, mesh)
         UsdPhysics.CollisionAPI.Apply(gprim.GetPrim())
         UsdPhysics.MeshCollisionAPI.Apply(gprim.GetPrim()).CreateApproximationAttr("convexHull")
         return
@@ -147,17 +148,4 @@ def _native(stage: Any, path: Any, field: Field) -> Any:
         getattr(gprim, f"Create{name}Attr")(value)
     if "Height" in numbers:
         gprim.CreateAxisAttr(UsdGeom.Tokens.z)
-    return gprim
-
-
-def _mesh(stage: Any, path: Any, mesh: Any) -> Any:
-    from pxr import UsdGeom, Vt
-
-    points, faces = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
-    gprim = UsdGeom.Mesh.Define(stage, path)
-    gprim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    gprim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, np.int32)))
-    gprim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.ravel()))
-    gprim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    gprim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array([points.min(axis=0), points.max(axis=0)])))
     return gprim

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Assembly, Part, Similarity
 from partwright.cleaning import segment
+from partwright.cleaning.coarse_labels import colour_labels, property_labels
 from partwright.cleaning.segmentation import node_labels
 from partwright.cli.main import main
-from partwright.errors import SettingError, UnreadableFileError
+from partwright.errors import LabelError, NoColoursError, SettingError, UnreadableFileError
 from partwright.fields import Box, Cylinder, Sphere
 from partwright.shapes import Shape, load_shape
 from partwright.shapes.labels import labels_path, read_labels
@@ -191,3 +192,105 @@ def test_a_missing_label_file_is_one_line(
     arguments = [*map(str, files), "-o", str(tmp_path / "o.ply"), "--within", str(tmp_path / "none.txt")]
     assert main(["segment", *arguments]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+RED, BLUE = (200, 30, 30, 255), (20, 20, 180, 255)
+
+
+def painted(path: Path) -> tuple[Path, np.ndarray]:
+    """The dumbbell with a red bar and blue balls, in a file; and which faces are red."""
+    shape, assembly, truth = dumbbell()
+    red = truth == 2
+    mesh = trimesh.Trimesh(shape.input_vertices, shape.input_faces, process=False)
+    mesh.visual.face_colors = np.where(red[:, None], RED, BLUE)
+    if path.suffix == ".glb":
+        scene = trimesh.Scene()
+        for colour, own in ((RED, red), (BLUE, ~red)):
+            piece = mesh.submesh([np.flatnonzero(own)], append=True)
+            material = trimesh.visual.material.PBRMaterial(baseColorFactor=colour)
+            piece.visual = trimesh.visual.TextureVisuals(material=material)
+            scene.add_geometry(piece)
+        scene.export(path)
+    else:
+        mesh.export(path)
+    assembly.save(path.with_name("assembly.json"))
+    return path, red
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".glb"])
+def test_one_colour_a_label(tmp_path: Path, suffix: str) -> None:
+    path, red = painted(tmp_path / f"shape{suffix}")
+    shape = load_shape(path)
+    labels = colour_labels(path, shape)
+    assert len(set(labels)) == 2
+    middles = shape.input_vertices[shape.input_faces].mean(axis=1)
+    on_bar = (np.abs(middles[:, 1:]) <= 0.0251).all(axis=1) & (np.abs(middles[:, 0] - 0.2) <= 0.751)
+    assert on_bar.sum() == red.sum()
+    assert len(set(labels[on_bar])) == len(set(labels[~on_bar])) == 1
+
+
+def test_coarse_labels_by_colour_or_property_divide_into_nested_nodes(tmp_path: Path) -> None:
+    path, _ = painted(tmp_path / "shape.ply")
+    out = tmp_path / "out.glb"
+    words = ["segment", str(path), str(tmp_path / "assembly.json"), "-o"]
+    assert main([*words, str(out), "--within", "colours"]) == 0
+    scene = trimesh.load_scene(out)
+    above = {name: scene.graph.transforms.parents[name] for name in scene.graph.nodes_geometry}
+    blue, red = "#1414b4", "#c81e1e"
+    assert above == {f"{blue}/left": blue, f"{blue}/right": blue, f"{red}/bar": red}
+    labelled, again = tmp_path / "labelled.ply", tmp_path / "again.ply"
+    assert main([*words, str(labelled)]) == 0
+    words[1] = str(labelled)
+    assert main([*words, str(again), "--within", "face:label"]) == 0
+    assert json.loads(labels_path(again).read_text())["names"] == ["0/left", "1/right", "2/bar"]
+
+
+def test_labels_in_usd_are_nested_and_valid(tmp_path: Path) -> None:
+    pytest.importorskip("pxr")
+    from pxr import Usd, UsdGeom, UsdValidation
+
+    path, _ = painted(tmp_path / "shape.ply")
+    out = tmp_path / "out.usda"
+    words = ["segment", str(path), str(tmp_path / "assembly.json"), "-o", str(out), "--within", "colours"]
+    assert main(words) == 0
+    stage = Usd.Stage.Open(str(out))
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    assert not UsdValidation.ValidationContext(validators).Validate(stage)
+    tree = {
+        coarse.GetDisplayName() or coarse.GetName(): [part.GetName() for part in coarse.GetChildren()]
+        for coarse in stage.GetDefaultPrim().GetChildren()
+    }
+    assert tree == {"#1414b4": ["left", "right"], "#c81e1e": ["bar"]}
+    meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    faces = sum(len(mesh.GetFaceVertexCountsAttr().Get()) for mesh in meshes)
+    assert faces == len(load_shape(path).input_faces)
+
+
+def test_copies_have_labels_of_their_own_where_that_is_asked_for(tmp_path: Path) -> None:
+    leg = Part(Box((1, 1, 1)), (-2, 0, 0), name="leg", instances=(Similarity(translation=(4, 0, 0)),))
+    Assembly((leg,)).save(tmp_path / "a.json")
+    pair = [trimesh.creation.box((1, 1, 1)).apply_translation((x, 0, 0)) for x in (-2, 2)]
+    trimesh.util.concatenate(pair).export(tmp_path / "pair.stl")
+    words = ["segment", str(tmp_path / "pair.stl"), str(tmp_path / "a.json"), "-o", str(tmp_path / "out.ply")]
+    for more, names in (([], {0}), (["--copies"], {0, 1})):
+        assert main([*words, *more]) == 0
+        assert set(json.loads(labels_path(tmp_path / "out.ply").read_text())["labels"]) == names
+
+
+def test_files_without_such_labels_are_told(tmp_path: Path) -> None:
+    path, _ = painted(tmp_path / "shape.ply")
+    shape = load_shape(path)
+    with pytest.raises(LabelError, match="no property 'label'; they have vertex_indices, red"):
+        property_labels(path, "label", len(shape.input_faces))
+    with pytest.raises(LabelError, match="faces have the property 'red', and 5 triangles"):
+        property_labels(path, "red", 5)
+    with pytest.raises(LabelError, match="only PLY"):
+        property_labels(tmp_path / "a.stl", "label", 5)
+    trimesh.creation.icosphere(2).export(tmp_path / "plain.stl")
+    with pytest.raises(NoColoursError):
+        colour_labels(tmp_path / "plain.stl", load_shape(tmp_path / "plain.stl"))
+    many = trimesh.creation.icosphere(3)
+    many.visual.face_colors = np.random.default_rng(0).integers(0, 255, (len(many.faces), 4))
+    many.export(tmp_path / "many.ply")
+    with pytest.raises(LabelError, match=r"1,\d+ colours; expected one colour a label, at most 256"):
+        colour_labels(tmp_path / "many.ply", load_shape(tmp_path / "many.ply"))

@@ -1,0 +1,66 @@
+"""What files of USD are made of: Xforms under names that USD takes, meshes, places."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from partwright.assembly import Similarity
+
+
+def define_xform(stage: Any, parent: str, name: str) -> Any:
+    """An Xform under the name, or what of it USD allows, which its display name makes good."""
+    from pxr import Tf, UsdGeom
+
+    stem = plain = Tf.MakeValidIdentifier(name)
+    number = 1
+    while stage.GetPrimAtPath(f"{parent}/{plain}"):
+        number += 1
+        plain = f"{stem}_{number:02d}"
+    prim = UsdGeom.Xform.Define(stage, f"{parent}/{plain}").GetPrim()
+    if plain != name:
+        prim.SetDisplayName(name)
+    return prim
+
+
+def define_mesh(stage: Any, path: Any, mesh: Any, colour: np.ndarray | None = None) -> Any:
+    """A Mesh of triangles, not subdivided; colour: (3,) linear, 0 to 1."""
+    from pxr import UsdGeom, Vt
+
+    points, faces = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
+    prim = UsdGeom.Mesh.Define(stage, path)
+    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, np.int32)))
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.ravel()))
+    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    prim.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.array([points.min(axis=0), points.max(axis=0)])))
+    if colour is not None:
+        prim.CreateDisplayColorAttr(Vt.Vec3fArray.FromNumpy(colour[None].astype(np.float32)))
+    return prim
+
+
+def place(prim: Any, pose: Similarity) -> None:
+    """Its translation and rotation."""
+    from pxr import Gf, UsdGeom
+
+    xform = UsdGeom.Xformable(prim)
+    double = UsdGeom.XformOp.PrecisionDouble
+    xform.AddTranslateOp(double).Set(Gf.Vec3d(*pose.translation))
+    xform.AddOrientOp(double).Set(Gf.Quatd(*pose.rotation))
+
+
+def to_linear(srgb: np.ndarray) -> np.ndarray:
+    """USD's colours are linear."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def exported(stage: Any, suffix: str) -> bytes:
+    """The root layer as a file. Where USD itself cannot write, it says so in errors of its own: our own file
+    errors are clearer."""
+    with tempfile.TemporaryDirectory() as folder:
+        whole = Path(folder) / f"stage{suffix}"
+        stage.GetRootLayer().Export(str(whole))
+        return whole.read_bytes()
