@@ -6,12 +6,13 @@ import hashlib
 import json
 import os
 import secrets
+from dataclasses import asdict
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from partwright.errors import OutputError
 from partwright.studio.images import Images
-from partwright.studio.messages import Step
+from partwright.studio.messages import Curve, Size, Step
 
 _KEPT = 500  # steps that the page is told of; the journal has all
 
@@ -39,6 +40,8 @@ class Journal:
         self.short, _ = self.images.taken_out(original)
         """The text without its images."""
         self.revision = 0
+        self.curve: Curve | None = None
+        """The last fit's assemblies of falling size, until another shape takes the place of the input."""
         self.note = ""
         self._saved = self.short
         name = hashlib.sha256(os.fsencode(file.absolute())).hexdigest()[:16]
@@ -90,6 +93,12 @@ class Journal:
         self._write({"action": "saved", "text": self.short})
         self._saved = self.short
 
+    def keep_curve(self, curve: Curve | None) -> None:
+        if curve == self.curve:
+            return
+        self._write({"action": "curve", "curve": asdict(curve) if curve is not None else None})
+        self.curve = curve
+
     def steps(self) -> tuple[list[Step], list[Step]]:
         """The last of what came before, and what was undone."""
         return self.past[-_KEPT:], self.future[-_KEPT:]
@@ -102,8 +111,11 @@ class Journal:
             self._write({"action": action})
             self._apply({"action": action})
 
-    def _apply(self, line: dict[str, str]) -> None:
+    def _apply(self, line: dict[str, Any]) -> None:
         action = line["action"]
+        if action == "curve":
+            self.curve = _curve(line["curve"])
+            return
         if action == "saved":
             self._saved = line["text"]
             return
@@ -121,7 +133,7 @@ class Journal:
             target.append(Step(step.label, self.short))
             self.short = step.text
 
-    def _write(self, line: dict[str, str]) -> None:
+    def _write(self, line: dict[str, Any]) -> None:
         try:
             self._out.write(json.dumps(line) + "\n")
             self._out.flush()
@@ -159,7 +171,7 @@ class Journal:
             self.note = "Your edits are here again."
 
     def _reset(self, original: str) -> None:
-        self.past, self.future, self.revision = [], [], 0
+        self.past, self.future, self.revision, self.curve = [], [], 0, None
         self.short = self._saved = self.images.taken_out(original)[0]
 
     def _put_aside(self, why: str) -> None:
@@ -178,3 +190,7 @@ class Journal:
             out.write("\n")
             out.flush()
         return out
+
+
+def _curve(kept: dict[str, Any] | None) -> Curve | None:
+    return Curve([Size(**size) for size in kept["sizes"]], kept["of"]) if kept else None

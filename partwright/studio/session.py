@@ -37,7 +37,6 @@ class Session:
         self, journal: Journal, file: Path, shape: Shape | None, colours: Colours | None = None
     ) -> None:
         self.journal, self.file, self.shape, self.colours = journal, file, shape, colours
-        self.curve: messages.Curve | None = None
         self._pages: set[Send] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._cancel: Cancellation | None = None
@@ -50,8 +49,8 @@ class Session:
         self._loop = asyncio.get_running_loop()
         self._pages.add(send)
         send(self.state(self.journal.note))
-        if self.curve is not None:
-            send(self.curve)
+        if self.journal.curve is not None:
+            send(self.journal.curve)
         self.score_soon()
 
     def leave(self, send: Send) -> None:
@@ -144,7 +143,8 @@ class Session:
 
     def replace_shape(self, shape: Shape, colours: Colours | None) -> None:
         """Another input beside the assembly."""
-        self.shape, self.colours, self.curve = shape, colours, None
+        self.journal.keep_curve(None)
+        self.shape, self.colours = shape, colours
         self.tell(self.state())
         self.score_soon()
 
@@ -200,12 +200,13 @@ class Session:
     def _fit_ended(self, label: str, done: fits.Done) -> None:
         try:
             self.journal.commit(label, to_text(done.assembly))
+            if done.curve is not None:
+                self.journal.keep_curve(done.curve)
         except PartwrightError as error:  # the disk is full
             self._fit_failed(str(error))
             return
         self._cancel = None
         if done.curve is not None:
-            self.curve = done.curve
             self.tell(done.curve)
         self.tell(done.told)
         self.tell(self.state())

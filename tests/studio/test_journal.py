@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from partwright.studio.journal import Journal
-from partwright.studio.messages import Step
+from partwright.studio.messages import Curve, Size, Step
 
 
 def opened(folder: Path, original: str = "a") -> Journal:
@@ -42,6 +42,17 @@ def test_a_file_that_was_changed_by_others_begins_anew_and_keeps_the_old_journal
     assert (journal.text, journal.past) == ("x", [])
     assert "kept as" in journal.note
     assert len(list((tmp_path / "state").glob("*.old"))) == 1
+
+
+def test_a_curve_outlives_the_server_until_it_is_put_away(tmp_path: Path) -> None:
+    curve = Curve([Size(1, 0.5, "a"), Size(2, 0.9, "b")], "mug by superfrusta")
+    journal = opened(tmp_path)
+    journal.keep_curve(curve)
+    journal.commit("one", "b")
+    again = opened(tmp_path)
+    assert (again.curve, again.revision) == (curve, 1)
+    again.keep_curve(None)
+    assert opened(tmp_path).curve is None
 
 
 def test_after_saving_the_file_is_the_journals_own(tmp_path: Path) -> None:
