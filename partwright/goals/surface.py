@@ -1,0 +1,44 @@
+"""The surface that objectives see: a closed mesh, nowhere much coarser than the resolution."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from partwright.assembly import Assembly
+from partwright.meshing import mesh_assembly
+from partwright.meshing.small_components import components
+from partwright.meshing.thin_parts import as_manifold
+from partwright.render.part_colours import surface_parts
+
+_COARSEST = 3.0  # cells: longer edges, as exact meshes have on flat faces, are cut
+
+
+def surface_of(assembly: Assembly, resolution: int) -> trimesh.Trimesh:
+    """The whole surface, watertight, own units, with edges of at most about three cells.
+
+    resolution: cells along the longest side, as of `mesh_assembly`, whose errors it raises.
+    """
+    mesh = mesh_assembly(assembly, resolution)
+    cell = float(np.ptp(assembly.bounds(), axis=0).max()) / resolution
+    if mesh.edges_unique_length.max() <= _COARSEST * cell:
+        return mesh
+    made = as_manifold(mesh).refine_to_length(_COARSEST * cell).to_mesh64()
+    vertices = np.asarray(made.vert_properties, dtype=np.float64)[:, :3]
+    return trimesh.Trimesh(vertices, np.asarray(made.tri_verts, dtype=np.int64), process=False)
+
+
+def face_labels(assembly: Assembly, mesh: trimesh.Trimesh) -> np.ndarray:
+    """(F,) which leaf's own surface each face runs along: an index into `assembly.parts`."""
+    return surface_parts(assembly, np.asarray(mesh.triangles_center), np.asarray(mesh.face_normals))
+
+
+def pieces(mesh: trimesh.Trimesh) -> int:
+    """How many separate closed surfaces there are that bound something from outside; hollows do not count."""
+    count, piece = components(np.asarray(mesh.faces), len(mesh.vertices))
+    if count == 1:
+        return 1
+    a, b, c = np.moveaxis(np.asarray(mesh.vertices)[mesh.faces], 1, 0)
+    six = np.einsum("ij,ij->i", a, np.cross(b, c))
+    volume = np.bincount(piece[mesh.faces[:, 0]], six, minlength=count)
+    return int((volume > 0).sum())
