@@ -10,7 +10,7 @@ DEMO_SHAPE := examples/shapes/watering_can.ply
 
 LOWEST_TESTS := tests/shapes tests/assembly tests/meshing tests/render tests/cli
 
-.PHONY: setup demo test test-lowest lint types docs page release bench clean
+.PHONY: setup demo test test-lowest lint types docs page release bench guard clean
 setup: $(INSTALLED)
 
 $(BIN)/python:
@@ -80,6 +80,10 @@ release: .venv/release
 
 bench: setup
 	$(BIN)/python benchmarks/fit.py
+
+# Quality and relative speed of a few fits against committed references; in .ci/run.
+guard: setup
+	$(BIN)/python benchmarks/guard.py
 
 clean:
 	rm -rf .venv .venv-lowest build dist demo-output .pytest_cache .hypothesis .mypy_cache .ruff_cache

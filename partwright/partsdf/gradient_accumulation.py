@@ -20,9 +20,18 @@ Drawn = tuple[Tensor, Tensor, Tensor]  # points (B, N, 3), their distances (B, N
 
 
 def backward(
-    fabric: Any, model: Any, shapes: Tensor, drawn: Drawn, poses: PoseTensors, config: Config, epoch: float
+    fabric: Any,
+    model: Any,
+    shapes: Tensor,
+    drawn: Drawn,
+    poses: PoseTensors,
+    config: Config,
+    epoch: float,
+    weight: float = 1.0,
 ) -> LossTerms:
     """Adds the gradients of eq. 6 to those of the model, and returns the terms.
+
+    Over several processes, whose gradients are averaged, both are those of the whole batch.
 
     Args:
         model: an `AutoDecoder`, set up by `fabric`.
@@ -31,6 +40,8 @@ def backward(
         poses: of the parts of each shape (B, P).
         config: `training.at_once` shapes go through the decoder together, all where it is 0.
         epoch: for the ramp of the latent term.
+        weight: of this process: its part of the batch times the number of processes; 0 if its shapes are
+            another's.
     """
     most, losses = config.training.at_once or len(shapes), config.losses
     found = LossTerms(*drawn[1].new_zeros(3))
@@ -42,14 +53,27 @@ def backward(
         each = terms(distances, sdf, part, losses, config.decoder)
         penalty = latent_penalty(latents, losses, epoch)
         share = len(points) / len(shapes)
-        if share == 1:
+        if share == 1 and fabric.world_size == 1:
             fabric.backward(each.total(losses) + penalty)
             return LossTerms(*(term.detach() for term in each))
+        if fabric.world_size > 1:
+            held = held_by_several(distances.detach()).sum() * (weight > 0)
+            inter = each.inter * (held / _mean(fabric, held).clamp(min=1 / fabric.world_size))
+            each = LossTerms(weight * each.whole, weight * each.part, inter)
+            # A sum over shapes, which an average over processes would divide.
+            fabric.backward(each.total(losses) + (fabric.world_size if weight else 0) * penalty)
+            return LossTerms(*_mean(fabric, torch.stack([term.detach() for term in each])))
         apart = each._replace(inter=torch.zeros_like(each.inter))
         fabric.backward(share * apart.total(losses) + penalty)
         found = LossTerms(*(sum_ + share * term.detach() for sum_, term in zip(found, apart, strict=True)))
         several[some] = held_by_several(distances.detach())
     return found._replace(inter=_inter(fabric, model, shapes, drawn[0], poses, config, several))
+
+
+def _mean(fabric: Any, value: Tensor) -> Tensor:
+    """Over all processes."""
+    mean: Tensor = fabric.all_reduce(value.float(), reduce_op="mean")
+    return mean
 
 
 def _inter(

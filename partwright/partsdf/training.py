@@ -108,7 +108,6 @@ class Trainer:
             self.state = load_checkpoint(
                 folder / CHECKPOINT, config, samples.names, self.plain, self.optimiser.optimizer
             )
-        self.share = self.settings.batch // fabric.world_size
         self.steps = -(-len(samples) // self.settings.batch)  # an epoch
 
     def run(self, report: Callable[[EpochReport], None] | None) -> Trained:
@@ -139,27 +138,30 @@ class Trainer:
         return self.state.step // self.steps
 
     def _step(self) -> None:
-        shapes = self._shapes()
-        step = self.state.step * self.fabric.world_size + self.fabric.global_rank
-        self.generator.manual_seed((self.settings.seed << 32) + step)
-        drawn = self.samples.draw(shapes, self.settings.points, self.generator)
+        batch = self._batch()
+        self.generator.manual_seed((self.settings.seed << 32) + self.state.step)
+        drawn = self.samples.draw(batch, self.settings.points, self.generator)
+        # Every process draws for the whole batch, so that their number changes nothing.
+        mine = slice(self.fabric.global_rank, None, self.fabric.world_size)
+        weight = len(batch[mine]) * self.fabric.world_size / len(batch)
+        if not len(batch[mine]):  # a last batch too small for all: this process only keeps the others company
+            mine = slice(0, 1)
+        shapes, (points, sdf, part) = batch[mine], drawn
         poses = self.samples.poses.map(lambda t: t[shapes])
         self.optimiser.zero_grad()
-        found = backward(self.fabric, self.model, shapes, drawn, poses, self.config, self.epoch)
+        own = points[mine], sdf[mine], part[mine]
+        found = backward(self.fabric, self.model, shapes, own, poses, self.config, self.epoch, weight)
         self.optimiser.step()
         self.plain.limit_latents()
         self.state.sums += torch.stack(found)
         self.state.step += 1
 
-    def _shapes(self) -> Tensor:
-        """This device's share of the step's shapes (B,): an epoch goes through all in an order of its own."""
+    def _batch(self) -> Tensor:
+        """The step's shapes (B,), over all processes: an epoch goes through all in an order of its own."""
         order = torch.Generator().manual_seed((self.settings.seed << 32) + self.epoch)
         shuffled = torch.randperm(len(self.samples), generator=order)
         place = self.state.step % self.steps
-        batch = shuffled[place * self.settings.batch :][: self.settings.batch]
-        mine = batch[self.fabric.global_rank :: self.fabric.world_size]
-        # A last batch that is too small for all devices is shared by them.
-        return (mine if len(mine) else batch[:1]).to(self.fabric.device)
+        return shuffled[place * self.settings.batch :][: self.settings.batch].to(self.fabric.device)
 
     def _set_rates(self) -> None:
         done = self.state.step / (self.settings.epochs * self.steps)

@@ -61,7 +61,7 @@ def test_gradients_and_terms_are_those_of_the_whole_batch(at_once: int) -> None:
     torch.testing.assert_close(expected.inter, intersection(distances, settings.losses.temperature))
     total = expected.total(settings.losses) + latent_penalty(latents, settings.losses, 50)
     wanted = torch.autograd.grad(total, list(model.parameters()))
-    fabric = SimpleNamespace(backward=lambda loss: loss.backward())
+    fabric = SimpleNamespace(backward=lambda loss: loss.backward(), world_size=1)
     found = backward(fabric, model, shapes, (points, sdf, part), poses, settings, 50)
     torch.testing.assert_close(torch.stack(found), torch.stack(expected).detach())
     for parameter, gradient in zip(model.parameters(), wanted, strict=True):
