@@ -1,14 +1,17 @@
-"""Collision bodies of one shape, side by side: fitted primitives, CoACD's hulls, and one box a hull.
+"""Collision bodies of one shape, side by side: fitted primitives, what `partwright collide` makes of the
+mesh, CoACD's hulls, and one box a hull.
 
-    python benchmarks/collision.py --shapes FOLDER --names parts/robot_arm/ur5e/forearm,toys/mug
+    python benchmarks/collision.py --shapes FOLDER --names toys/mug,toys/hammer --rows rows.jsonl
 
-Needs MuJoCo and CoACD: pip install mujoco coacd. Each body is dropped five times over onto a plane. The table
-goes to benchmarks/results/collision.md.
+Needs MuJoCo and CoACD: pip install mujoco coacd. Each body is dropped five times over onto a plane. What
+--rows holds is not measured again. The table goes to benchmarks/results/collision.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import json
 import os
 import sys
 import tempfile
@@ -27,10 +30,14 @@ from partwright.approximation.collision import TOLERANCE, geometries
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.atomic_io import write_bytes
 from partwright.export.axes import to_metres_z_up
-from partwright.export.mjcf import GEOMS
+from partwright.export.mjcf import GEOMS, geom_size
 from partwright.export.rigid_body import DENSITY
 from partwright.fields import Box
 from partwright.meshing.mass import MassProperties, mass_properties
+from partwright.robots import CollideOptions
+from partwright.robots.model import Link, MeshUse
+from partwright.robots.shaping import Wishes, shapes_for
+from partwright.robots.solids import Solids
 from partwright.shapes import Shape
 
 HERE = Path(__file__).parent
@@ -67,14 +74,14 @@ class Row:
 
 def fitted(shape: Shape, max_parts: int | None) -> Body:
     """Our parts, as the MJCF export has them."""
-    start = time.perf_counter()
+    start = time.process_time()
     assembly = pw.fit(shape, max_parts=max_parts, seed=0).assembly
     local = assembly.transformed(to_metres_z_up(assembly))
     found, _ = geometries(local, GEOMS, TOLERANCE, 24, convex=True)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "body.mjcf.xml"
         pw.export(assembly, path, visuals=False)
-        seconds = time.perf_counter() - start
+        seconds = time.process_time() - start
         spec = mujoco.MjSpec.from_file(str(path))
 
     def add(target: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
@@ -90,19 +97,50 @@ def fitted(shape: Shape, max_parts: int | None) -> Body:
     return Body("primitives", len(found), seconds, _any(tests), add)
 
 
+def covered(mesh: trimesh.Trimesh) -> Body:
+    """The shapes of `partwright collide`, by its defaults for a link."""
+    start = time.process_time()
+    options, use = CollideOptions(), MeshUse(Path("mesh"), np.eye(4), mesh)
+    link = Link("mesh", np.eye(4), None, (use,))
+    target = Solids().target(link, link.collisions)
+    tolerance = options.length(target.size, target.size)
+    wishes = Wishes(tolerance, GEOMS, True, options.max_parts, options.extra, options.mode)
+    shapes = shapes_for("mesh", target, wishes)
+    seconds = time.process_time() - start
+
+    def add(target: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
+        for i, shape in enumerate(shapes):
+            if shape.mesh is not None:
+                add_hull(target, body, f"cover{i}", shape.mesh)
+            else:
+                add_solid(body, shape.part)
+
+    tests = [_in_part(s.part) if s.part else _in_hull(s.mesh) for s in shapes]
+    return Body("collide", len(shapes), seconds, _any(tests), add)
+
+
+def add_hull(target: mujoco.MjSpec, body: mujoco.MjsBody, name: str, mesh: trimesh.Trimesh) -> None:
+    shell = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+    target.add_mesh(name=name, uservert=mesh.vertices.ravel(), userface=mesh.faces.ravel(), inertia=shell)
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name)
+
+
+def add_solid(body: mujoco.MjsBody, part: Part) -> None:
+    kind = getattr(mujoco.mjtGeom, f"mjGEOM_{part.field.kind.upper()}")
+    size = [*geom_size(part.field), 0.0, 0.0][:3]
+    body.add_geom(type=kind, size=size, pos=part.translation, quat=part.rotation)
+
+
 def hulls(mesh: trimesh.Trimesh) -> tuple[Body, list[trimesh.Trimesh]]:
     """CoACD's decomposition with its defaults."""
-    start = time.perf_counter()
+    start = time.process_time()
     pieces = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces))
     parts = [trimesh.Trimesh(*piece).convex_hull for piece in pieces]
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
 
     def add(target: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
         for i, part in enumerate(parts):
-            shell = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-            vertices, faces = part.vertices.ravel(), part.faces.ravel()
-            target.add_mesh(name=f"hull{i}", uservert=vertices, userface=faces, inertia=shell)
-            body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"hull{i}")
+            add_hull(target, body, f"hull{i}", part)
 
     body = Body("CoACD hulls", len(parts), seconds, _any([_in_hull(part) for part in parts]), add)
     return body, parts
@@ -110,14 +148,14 @@ def hulls(mesh: trimesh.Trimesh) -> tuple[Body, list[trimesh.Trimesh]]:
 
 def boxes(parts: list[trimesh.Trimesh], seconds: float) -> Body:
     """The smallest box around each hull."""
-    start = time.perf_counter()
+    start = time.process_time()
     placed = []
     for part in parts:
         to_origin, extents = trimesh.bounds.oriented_bounds(part)
         pose = Similarity.from_matrix(np.linalg.inv(to_origin))
         x, y, z = extents
         placed.append(Part(Box((x, y, z)), pose.translation, pose.rotation))
-    seconds += time.perf_counter() - start
+    seconds += time.process_time() - start
 
     def add(_: mujoco.MjSpec, body: mujoco.MjsBody) -> None:
         for box in placed:
@@ -172,11 +210,11 @@ def simulate(body: Body, properties: MassProperties, height: float) -> tuple[flo
         scene.attach(link.copy(), prefix=f"{i}/", frame=frame)
     model = scene.compile()
     data = mujoco.MjData(model)
-    contacts, start = 0, time.perf_counter()
+    contacts, start = 0, time.process_time()
     for _ in range(STEPS):
         mujoco.mj_step(model, data)
         contacts += data.ncon
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     if not np.isfinite(data.qpos).all():
         raise SystemExit(f"{body.kind}: the simulation blew up")
     return 1e6 * seconds / STEPS, contacts / STEPS
@@ -192,7 +230,7 @@ def measure(path: Path, name: str, unit: str, max_parts: int | None) -> Iterator
 
     ours, (decomposed, parts) = fitted(shape, max_parts), hulls(mesh)
     height = float(np.linalg.norm(mesh.extents))
-    for body in (ours, decomposed, boxes(parts, decomposed.seconds)):
+    for body in (ours, covered(mesh), decomposed, boxes(parts, decomposed.seconds)):
         missing, extra = volume_errors(body, target, mesh.bounds)
         step, contacts = simulate(body, mass_properties(mesh), height)
         solidity = mesh.volume / mesh.convex_hull.volume
@@ -207,7 +245,8 @@ def document(rows: list[Row], command: str) -> str:
         "",
         "Missing and extra: volume that the body lacks or adds, in % of the shape's own. Step time and",
         f"contacts: means over {STEPS} steps of {COPIES} copies that fall onto a plane and one another.",
-        "Seconds: to make the body from the mesh. Solidity: the shape's volume over its hull's.",
+        "Seconds: CPU seconds to make the body from the mesh; for primitives that is a fit. collide: the",
+        "shapes of `partwright collide`. Solidity: the shape's volume over its hull's.",
         "",
         "| shape | solidity | body | pieces | missing % | extra % | step us | contacts | seconds |",
         "|---|---:|---|---:|---:|---:|---:|---:|---:|",
@@ -227,6 +266,7 @@ def main() -> int:
     option("--shapes", type=Path, default=OWN_SHAPES, metavar="FOLDER", help="a folder of PLY meshes")
     option("--names", default="", metavar="A,B", help="paths within it, without suffix; all if not given")
     option("--unit", default="m", help="length unit of the meshes (default: %(default)s)")
+    option("--rows", type=Path, required=True, help="measured rows, kept between runs")
     option("--max-parts", type=int, metavar="N", help="of the fit")
     options = parser.parse_args()
     paths = {str(p.relative_to(options.shapes).with_suffix("")): p for p in options.shapes.rglob("*.ply")}
@@ -238,9 +278,15 @@ def main() -> int:
         ["python benchmarks/collision.py --shapes", options.shapes.name, "--names", ",".join(names)]
     )
     command += f" --max-parts {options.max_parts}" if options.max_parts else ""
-    rows: list[Row] = []
+    kept = options.rows.read_text().splitlines() if options.rows.exists() else []
+    rows = [Row(**json.loads(line)) for line in kept]
     for name in names:
-        rows += measure(paths[name], name, options.unit, options.max_parts)
+        if any(row.shape == name for row in rows):
+            continue
+        more = list(measure(paths[name], name, options.unit, options.max_parts))
+        rows += more
+        with options.rows.open("a") as file:
+            file.writelines(json.dumps(dataclasses.asdict(row)) + "\n" for row in more)
         target = HERE / "results" / "collision.md"
         write_bytes(target, document(rows, command).encode())
     print(document(rows, command))

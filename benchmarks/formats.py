@@ -6,7 +6,7 @@
 Readers: trimesh (GLB, OBJ, PLY, STL, 3MF), usd-core with all its validators, MuJoCo, yourdfpy, OpenCASCADE,
 openscad, build123d, blender, glslangValidator; a format whose program is not installed is written only. What
 --rows holds is not measured again, so a run may be cut off and go on. The table goes to
-benchmarks/results/formats.md.
+benchmarks/results/formats.md, or to --target: scenes.md there is of --formats .glb,.usdc,.mjcf.xml,.urdf.
 """
 
 from __future__ import annotations
@@ -295,15 +295,17 @@ def cells(rows: list[Row]) -> str:
     )
 
 
-def document(rows: list[Row]) -> str:
+def document(rows: list[Row], formats: str = ",".join(READERS)) -> str:
+    asked = "" if formats == ",".join(READERS) else f" --formats {formats}"
     lines = [
         "# Every format, written and read back",
         "",
-        f"`python benchmarks/formats.py`; {os.cpu_count()} cores. Medians over the assemblies, the worst in",
-        "brackets. Volume: of what the reader is shown, overlaps counted once, off the assembly's own (of",
-        f"formats that cannot hold blends: without them), by a mesh of {CELLS} cells along its longest",
-        "side. Changed: parts in FILE.report.json, dropped blends included; by: the most that one",
-        "part was changed by, in % of its volume. Seconds are CPU seconds, with the start of other programs.",
+        f"`python benchmarks/formats.py FITS{asked}`; {os.cpu_count()} cores. Medians over the assemblies,",
+        "the worst in brackets. Volume: of what the reader is shown, overlaps counted once, off the",
+        f"assembly's own (of formats that cannot hold blends: without them), by a mesh of {CELLS} cells",
+        "along its longest side. Changed: parts in FILE.report.json, dropped blends included; by: the most",
+        "that one part was changed by, in % of its volume. Seconds are CPU seconds, with the start of other",
+        "programs.",
     ]
     for method in dict.fromkeys(row.method for row in rows):
         names = sorted({row.name for row in rows if row.method == method})
@@ -374,9 +376,9 @@ def main() -> int:
             rows.append(row)
             with options.rows.open("a") as file:
                 file.write(json.dumps(dataclasses.asdict(row)) + "\n")
-            options.target.write_text(document(rows), encoding="utf-8")
+            options.target.write_text(document(rows, options.formats), encoding="utf-8")
             print(row, flush=True)
-    print(document(rows))
+    print(document(rows, options.formats))
     return 0
 
 

@@ -18,32 +18,38 @@ if TYPE_CHECKING:
 
     from partwright.robots.solids import Target
 
-_POINTS = 20_000
-_ROUNDS = 8
-_MARGIN = 1e-6  # of the size: room for rounding
+_POINTS, _MANY = 20_000, 100_000  # of the triangles: to grow by, and to be sure by
+_ROUNDS = 16
+_MARGIN = 1e-6  # of the size: room for rounding, twice as much in each round
+_BEYOND = 1.2  # times what sticks out: between two points that do, others may stick out more
 _SEGMENTS = 64
 
 
 def enclosed(shapes: Sequence[Shape], target: Target) -> list[Shape]:
     """The shapes, those grown out of which some of the target's surface sticks: each by what is nearest to
-    it."""
+    it. Triangles run from one shape into another, so corners are not enough: it ends when none of `_MANY`
+    fresh points is outside."""
     shapes = list(shapes)
-    room = _MARGIN * target.size
+    count = _POINTS
     for turn in range(_ROUNDS):
-        points = _left_out(shapes, target.samples(_POINTS, seed=turn))
-        if not len(points):
+        room = 2**turn * _MARGIN * target.size
+        points = _left_out(shapes, target.samples(count, seed=turn))
+        if not len(points) and count == _MANY:
             break
+        if not len(points):
+            count = _MANY
+            continue
         outside = np.stack([outside_of(shape, points) for shape in shapes])
         nearest, far = outside.argmin(axis=0), outside.min(axis=0)
         for i in np.unique(nearest):
-            shapes[i] = _larger(shapes[i], float(far[nearest == i].max()) + room)
+            shapes[i] = _larger(shapes[i], _BEYOND * float(far[nearest == i].max()) + room)
     return shapes
 
 
 def sticking_out(shapes: Sequence[Shape], target: Target, seed: int = 1_000) -> float:
     """How far the target's surface sticks out of the shapes, by fresh points and all its corners; 0 for not
     at all."""
-    points = _left_out(shapes, target.samples(5 * _POINTS, seed))
+    points = _left_out(shapes, target.samples(_MANY, seed))
     return float(np.min([outside_of(shape, points) for shape in shapes], axis=0).max(initial=0.0))
 
 

@@ -27,7 +27,7 @@ def check_gltf(path: Path) -> None:
         UnreadableFileError: nodes in a circle, with two parents or very deep below one another, elements
             without data or instances beyond measure, compressed buffers, or a buffer that is no file.
     """
-    tree = _tree(path)
+    tree = gltf_tree(path)
     if not isinstance(tree, dict):
         return
     compressed = {"EXT_meshopt_compression", "KHR_meshopt_compression"} & set(
@@ -61,8 +61,12 @@ def check_gltf(path: Path) -> None:
             check_file(path.parent / unquote(uri))
 
 
-def _tree(path: Path) -> Any:
-    """The JSON of a GLB or glTF file; None where there is none."""
+def gltf_tree(path: Path) -> Any:
+    """The JSON of a GLB or glTF file; None where there is none.
+
+    Raises:
+        UnreadableFileError: it is nested too deep.
+    """
     try:
         with path.open("rb") as file:
             data = file.read(20)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from partwright.errors import NoColoursError
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.loading import READ_BY_TRIMESH, load_scene
+from partwright.textures.images import check_images
 
 Floats = NDArray[np.float64]
 
@@ -69,11 +70,13 @@ def load_colours(path: str | Path) -> Colours:
 
     Raises:
         NoColoursError: it has none.
-        UnreadableFileError, UnsupportedFormatError: as `load_shape`.
+        UnreadableFileError, UnsupportedFormatError: as `load_shape`, or a picture is missing, damaged or
+            huge.
     """
     path = Path(path)
     if path.suffix.lower() not in READ_BY_TRIMESH:
         raise NoColoursError(f"{path.name}: colours are read from {', '.join(READ_BY_TRIMESH)}")
+    check_images(path)
     scene = load_scene(path, path.suffix.lower(), colours=True)
     images: list[NDArray[np.float32]] = []
     pieces: list[tuple[Any, ...]] = []

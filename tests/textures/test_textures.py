@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -170,6 +171,44 @@ def test_images_and_factors_of_materials(tmp_path: Path, suffix: str) -> None:
     square.export(tmp_path / f"a{suffix}")
     found = load_colours(tmp_path / f"a{suffix}").at(np.array([[0.5, 0.5, 0.3], [1.5, 0.5, -0.2]]))
     assert np.abs(found - [(200, 40, 30), (10, 90, 250)]).max() < 2
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".gltf", ".obj"])
+@pytest.mark.parametrize("harm", ["gone", "damaged", "huge"])
+def test_pictures_that_are_missing_damaged_or_huge_are_named(
+    tmp_path: Path, suffix: str, harm: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    picture = Image.fromarray(np.full((8, 8, 3), 90, np.uint8))
+    square = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], process=False)
+    material = (
+        trimesh.visual.material.SimpleMaterial(image=picture)
+        if suffix == ".obj"
+        else trimesh.visual.material.PBRMaterial(baseColorTexture=picture)
+    )
+    square.visual = trimesh.visual.TextureVisuals(uv=square.vertices[:, :2], material=material)
+    path = tmp_path / f"a{suffix}"
+    if suffix == ".gltf":  # pictures beside it
+        trimesh.Scene(square).export(path)
+        tree = json.loads(path.read_text())
+        picture.save(tmp_path / "p.png")
+        tree["images"][0] = {"uri": "p.png"}
+        path.write_text(json.dumps(tree))
+    else:
+        square.export(path)
+    assert load_colours(path)
+    if harm == "huge":
+        monkeypatch.setattr("partwright.textures.images.LARGEST", 10)
+    elif suffix == ".glb":
+        data = path.read_bytes()
+        path.write_bytes(data.replace(b"\x89PNG", b"\x00\x00\x00\x00"))
+    else:
+        (file,) = tmp_path.glob("*.png")
+        if harm == "gone":
+            file.unlink()
+        else:
+            file.write_bytes(b"no picture")
+    with pytest.raises(UnreadableFileError, match="8 x 8 pixels" if harm == "huge" else "png|picture"):
+        load_colours(path)
 
 
 def test_quadrics_get_one_colour_and_copies_share_a_map(tmp_path: Path) -> None:
