@@ -36,6 +36,7 @@ _PUBLIC = {
     "load_assembly": "partwright.assembly",
     "evaluate": "partwright.metrics",
     "clean": "partwright.cleaning",
+    "optimise": "partwright.goals",
 }
 _METHODS = ("capri", "partsdf")
 _MODULES = (
@@ -48,6 +49,7 @@ _MODULES = (
     "errors",
     "datasets",
     "textures",
+    "goals",
     *_METHODS,
 )
 

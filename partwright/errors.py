@@ -133,6 +133,10 @@ class GeneratorError(PartwrightError):
     """A generator failed, took too long, or answered with something that is no mesh."""
 
 
+class ObjectiveError(PartwrightError):
+    """An objective fails, or its number or derivative is missing or not finite."""
+
+
 class WorkerError(PartwrightError):
     """A worker process crashed, or was killed past its limit of time or memory."""
 

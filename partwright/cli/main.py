@@ -20,6 +20,7 @@ from partwright.cli import (
     evaluate,
     export,
     fit,
+    optimise,
     outputs,
     parts,
     segment,
@@ -34,6 +35,7 @@ from partwright.errors import CancelledError, PartwrightError
 COMMANDS = (
     fit,
     clean,
+    optimise,
     evaluate,
     describe,
     export,

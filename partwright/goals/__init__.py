@@ -10,9 +10,25 @@ except ImportError as error:
     raise MissingDependencyError('goals need PyTorch: pip install "partwright[torch]"') from error
 
 from partwright.goals.gradient import parameter_gradient
+from partwright.goals.objective import Objective, Start, by_torch
+from partwright.goals.optimising import Optimised, optimise
 from partwright.goals.parameters import Parameters
+from partwright.goals.problem import Options
+from partwright.goals.search import Step
+from partwright.goals.table import OBJECTIVES
+from partwright.goals.wanted import Bound, Wanted
 
 __all__ = [
+    "OBJECTIVES",
+    "Bound",
+    "Objective",
+    "Optimised",
+    "Options",
     "Parameters",
+    "Start",
+    "Step",
+    "Wanted",
+    "by_torch",
+    "optimise",
     "parameter_gradient",
 ]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import groupby
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import torch
@@ -14,6 +13,7 @@ from partwright.assembly.joint import is_joint
 from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.assembly.tree import Node
 from partwright.fields import smooth_difference, smooth_intersection, smooth_union
+from partwright.fields.joint import JointField
 from partwright.fields.operations import SHARP
 from partwright.goals.learned import decoded
 from partwright.goals.parameters import Parameters
@@ -34,6 +34,7 @@ class Composite:
         self._expanded = self.assembly.expanded()
         # Each copy: which part it is of, and the move that makes it.
         self._leaves = list(_leaves(self.assembly, {p.name: i for i, p in enumerate(self.assembly.parts)}))
+        self._groups = self._grouped()
 
     def distance(self, points: Tensor, theta: Tensor) -> Tensor:
         """(N,) float64 at points (N, 3) float64 for theta (D,) float64 that equals the parameters' values.
@@ -44,28 +45,62 @@ class Composite:
         values = torch.tensor(base, dtype=torch.float64)
         active = self._active(values)
         columns: list[Tensor] = []
-        for joint, group in groupby(enumerate(self._leaves), key=lambda item: self._joint(item[1])):
-            some = list(group)
-            if joint is not None:
-                columns += self._decoded(some, active, values, points, theta)
-                continue
-            for k, (index, move) in some:
-                where = active[k].nonzero().squeeze(1)
-                near = self._leaf(index, move, points[where], theta)
-                columns.append(values[k].index_put((where,), near))
+        for group in self._groups:
+            where = active[group].any(dim=0).nonzero().squeeze(1)
+            near = self._alone(group, points[where], theta)
+            columns += [values[k].index_put((where,), one) for k, one in zip(group, near, strict=True)]
         return self._folded(iter(columns), theta)
+
+    def part(self, index: int, points: Tensor, theta: Tensor) -> Tensor:
+        """(N,) of one part alone, the nearest of its copies; theta and points as in `distance`."""
+        columns = [
+            column
+            for group in self._groups
+            if any(self._leaves[k][0] == index for k in group)
+            for k, column in zip(group, self._alone(group, points, theta), strict=True)
+            if self._leaves[k][0] == index
+        ]
+        return torch.stack(columns).amin(dim=0)
+
+    def _alone(self, group: list[int], points: Tensor, theta: Tensor) -> Sequence[Tensor]:
+        """(N,) of each leaf of a group."""
+        if self._key(group[0]) is None:
+            return [self._leaf(*self._leaves[group[0]], points, theta)]
+        leaves = []
+        for k in group:
+            index, _ = self._leaves[k]
+            part, own = self.assembly.parts[index], theta[self.parameters.slices[index]]
+            leaves.append((part, own[: len(own) - (part.blend > SHARP)]))
+        return decoded(leaves, points).unbind(0)
+
+    def _key(self, leaf: int) -> object:
+        """What a leaf shares with those that are decoded beside it; None for one by itself."""
+        index, move = self._leaves[leaf]
+        part = self.assembly.parts[index]
+        return part.field.shape_key if is_joint(part) and move == Similarity() else None
+
+    def _grouped(self) -> list[list[int]]:
+        """Leaves in runs that are evaluated in one go: the parts of one learned shape, or one by itself."""
+        groups: list[list[int]] = []
+        roles: set[str] = set()
+        for k, (index, _) in enumerate(self._leaves):
+            field, key = self.assembly.parts[index].field, self._key(k)
+            if not isinstance(field, JointField) or key is None:
+                groups.append([k])
+            elif groups and self._key(groups[-1][0]) == key and field.role not in roles:
+                groups[-1].append(k)
+                roles.add(field.role)
+            else:
+                groups.append([k])
+                roles = {field.role}
+        return groups
 
     def _active(self, values: Tensor) -> Tensor:
         """(K, N) bool: copies on whose distance the whole's depends, or may."""
         apart = values.clone().requires_grad_()
         whole = self._folded(iter(apart.unbind(0)), torch.tensor(self.parameters.values))
         (slope,) = torch.autograd.grad(whole.sum(), apart)
-        near = (values.abs() < _TIE * self.parameters.longest) & (whole.detach().abs() < self._cell)
-        return (slope.abs() > 0) | near
-
-    @property
-    def _cell(self) -> float:
-        return 1e-2 * self.parameters.longest
+        return (slope.abs() > 0) | (values.abs() < _TIE * self.parameters.longest)
 
     def _leaf(self, index: int, move: Similarity, points: Tensor, theta: Tensor) -> Tensor:
         part = self.assembly.parts[index]
@@ -76,27 +111,6 @@ class Composite:
         local = local - torch.linalg.cross(own[3:6].expand_as(local), local)
         form = own[6 : len(own) - (part.blend > SHARP)]
         return self.parameters.forms[index].distance(local, form)
-
-    def _joint(self, leaf: tuple[int, Similarity]) -> Any:
-        part = self.assembly.parts[leaf[0]]
-        return part.field.shape_key if is_joint(part) and leaf[1] == Similarity() else None
-
-    def _decoded(
-        self,
-        some: list[tuple[int, tuple[int, Similarity]]],
-        active: Tensor,
-        values: Tensor,
-        points: Tensor,
-        theta: Tensor,
-    ) -> list[Tensor]:
-        """Columns of neighbouring leaves of one learned shape."""
-        where = active[[k for k, _ in some]].any(dim=0).nonzero().squeeze(1)
-        leaves = []
-        for _, (index, _) in some:
-            part, own = self.assembly.parts[index], theta[self.parameters.slices[index]]
-            leaves.append((part, own[: len(own) - (part.blend > SHARP)]))
-        near = decoded(leaves, points[where])
-        return [values[k].index_put((where,), row) for (k, _), row in zip(some, near, strict=True)]
 
     def _folded(self, columns: Iterator[Tensor], theta: Tensor) -> Tensor:
         result, _ = self._node(self.assembly, columns, theta, iter(self._leaves))

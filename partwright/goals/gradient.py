@@ -22,16 +22,16 @@ _FLAT = 1e-6  # a slope of the field below this has no direction
 def parameter_gradient(
     parameters: Parameters, vertices: np.ndarray, faces: np.ndarray, sensitivity: np.ndarray
 ) -> np.ndarray:
-    """(D,) derivative of a loss by the parameters, in their own units.
+    """(D,) derivative of a loss by the parameters, in their own units; (L, D) of L losses.
 
     vertices (V, 3), faces (F, 3): the assembly's surface, as `mesh_assembly` makes it. sensitivity: (V, 3)
-    derivative of the loss by each vertex.
+    derivative of the loss by each vertex, or (L, V, 3).
 
     Raises:
         ParameterError: the sensitivity has another shape, or is not finite.
     """
     vertices, sensitivity = np.asarray(vertices, np.float64), np.asarray(sensitivity, np.float64)
-    if sensitivity.shape != vertices.shape or not np.isfinite(sensitivity).all():
+    if sensitivity.shape[-2:] != vertices.shape or sensitivity.ndim > 3 or not np.isfinite(sensitivity).all():
         raise ParameterError(
             f"sensitivity: expected finite numbers of shape {vertices.shape}, got {sensitivity.shape}"
         )
@@ -43,7 +43,10 @@ def parameter_gradient(
     (slope,) = torch.autograd.grad(value.sum(), points, retain_graph=True)
     steepness = np.linalg.norm(slope.numpy(), axis=1)
     normals = slope.numpy() / np.maximum(steepness, _FLAT)[:, None]
-    shares = felt.shares(normals, sensitivity)
-    weight = np.where(steepness > _FLAT, -shares / np.maximum(steepness, _FLAT), 0.0)
-    (gradient,) = torch.autograd.grad(value @ torch.tensor(weight), theta)
-    return np.asarray(gradient.numpy())
+    rows = []
+    for one in sensitivity.reshape(-1, *vertices.shape):
+        shares = felt.shares(normals, one)
+        weight = np.where(steepness > _FLAT, -shares / np.maximum(steepness, _FLAT), 0.0)
+        (gradient,) = torch.autograd.grad(value @ torch.tensor(weight), theta, retain_graph=True)
+        rows.append(gradient.numpy())
+    return np.array(rows).reshape(*sensitivity.shape[:-2], len(parameters))

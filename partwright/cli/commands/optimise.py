@@ -1,0 +1,77 @@
+"""What `partwright optimise` does."""
+
+from __future__ import annotations
+
+import argparse
+
+from partwright.assembly import load_assembly
+from partwright.cli.interrupts import INTERRUPTED, stopping
+from partwright.cli.progress import Count
+from partwright.cli.terminal import counted, say, warn
+from partwright.errors import ObjectiveError
+from partwright.goals import Optimised, Options, Step, optimise
+from partwright.methods import Cancellation
+
+_ENDINGS = {
+    "converged": "converged",
+    "budget_reached": "all steps done",
+    "interrupted": "interrupted",
+    "left_trained_region": "stopped at the edge of what the model was trained on",
+    "failed": "stopped by an objective",
+}
+
+
+def run(arguments: argparse.Namespace) -> int:
+    assembly = load_assembly(arguments.assembly)
+    options = Options(
+        steps=arguments.steps,
+        resolution=arguments.resolution,
+        reach=arguments.reach,
+        change=arguments.change,
+        anchor=arguments.anchor,
+        neighbours=arguments.neighbours,
+        contacts=not arguments.no_contacts,
+    )
+    cancel = Cancellation()
+    with Count("optimising") as count, stopping(cancel.request):
+        result = optimise(
+            assembly,
+            arguments.objective,
+            bounds=arguments.bound,
+            freeze=arguments.freeze,
+            options=options,
+            progress=lambda step: count.show(step.number, step.of, _shown(step)),
+            cancel=cancel,
+        )
+    result.save(arguments.output)
+    return _finish(result, arguments)
+
+
+def _finish(result: Optimised, arguments: argparse.Namespace) -> int:
+    wide = max(map(len, result.numbers))
+    for name, (before, after) in result.numbers.items():
+        change = f"  {100 * (after / before - 1):+.1f} %" if before else ""
+        say(f"{name:{wide}}  {before:.5g} -> {after:.5g}{change}")
+    if any(want.name.startswith("newtonian_drag") for want in result.problem.wanted):
+        say("newtonian_drag is a pressure by angle, no flow simulation: compare with one before you build")
+    same = sum(a == b for a, b in zip(result.start.parts, result.assembly.parts, strict=True))
+    accepted = len(result.found.points) - 1
+    tried = counted(len(result.found.steps) - 1, "step")
+    unchanged = f"{same} of {counted(len(result.assembly), 'part')} unchanged"
+    say(f"{_ENDINGS[result.ending]}: {tried}, {accepted} accepted, {unchanged}")
+    say(f"written to {arguments.output}")
+    if not result.kept:
+        warn(["a bound is not kept: see report.json; give more steps, more reach, or another bound"])
+    if result.ending == "failed":
+        raise ObjectiveError(f"{result.found.reason}; {arguments.output} holds the best so far")
+    if result.ending == "interrupted":
+        warn([f"interrupted: {arguments.output} holds the best assembly so far"])
+        return INTERRUPTED
+    return 0
+
+
+def _shown(step: Step) -> str:
+    if not step.numbers:
+        return "nothing there"
+    numbers = "  ".join(f"{name} {value:.4g}" for name, value in step.numbers.items())
+    return numbers + ("" if step.accepted else "  (refused)")

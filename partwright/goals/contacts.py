@@ -1,0 +1,81 @@
+"""Parts that touch, and by how much each number brings them apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from partwright.assembly import Assembly
+from partwright.errors import NoSurfaceError
+from partwright.goals.composite import Composite
+from partwright.goals.parameters import Parameters
+from partwright.meshing import mesh_part
+
+_CELLS = 24  # along a part, of the surface on which another is looked for
+_TOUCH = 2e-3  # of the longest side: parts this near touch
+_KEPT = 0.25  # of the depth at the start by which parts reach into one another: what is left at least
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Leaves a, b. depth: signed distance of b where a's surface reaches deepest into it, `point` (3,)."""
+
+    a: int
+    b: int
+    depth: float
+    point: np.ndarray
+
+
+def contacts(assembly: Assembly, pairs: list[tuple[int, int]] | None = None) -> list[Contact]:
+    """Pairs of parts with how deep one reaches into the other; without `pairs` those that touch."""
+    needed = set(range(len(assembly))) if pairs is None else {i for pair in pairs for i in pair}
+    nothing = np.zeros((0, 3))
+    surfaces = [_surface(assembly, i) if i in needed else nothing for i in range(len(assembly))]
+    if not any(map(len, surfaces)):
+        return []
+    ends = np.cumsum([0, *map(len, surfaces)])
+    distance = assembly.part_distances(np.concatenate(surfaces))
+    near = _TOUCH * float(np.ptp(assembly.bounds(), axis=0).max())
+    everyone = [(i, j) for i in range(len(assembly)) for j in range(i + 1, len(assembly))]
+    found = []
+    for i, j in everyone if pairs is None else pairs:
+        sides = []
+        for a, b in ((i, j), (j, i)):
+            some = distance[b, ends[a] : ends[a + 1]]
+            if len(some):
+                k = int(some.argmin())
+                sides.append(Contact(a, b, float(some[k]), surfaces[a][k]))
+        if sides and (pairs is not None or min(s.depth for s in sides) < near):
+            found.append(min(sides, key=lambda side: side.depth))
+    return found
+
+
+def allowed(contact: Contact, longest: float) -> float:
+    """The depth that is to be kept of a contact at the start."""
+    return _KEPT * contact.depth if contact.depth < 0 else contact.depth + 1e-4 * longest
+
+
+def contact_gradients(parameters: Parameters, found: list[Contact]) -> np.ndarray:
+    """(K, D) derivative of each depth: of b's distance, and of the place, which a's surface takes along."""
+    if not found:
+        return np.zeros((0, len(parameters)))
+    points = torch.tensor(np.array([contact.point for contact in found]), requires_grad=True)
+    theta = torch.tensor(parameters.values, requires_grad=True)
+    composite = Composite(parameters)
+    rows = []
+    for k, contact in enumerate(found):
+        each = [composite.part(index, points[k : k + 1], theta) for index in (contact.a, contact.b)]
+        slopes = [torch.autograd.grad(d.sum(), points, retain_graph=True)[0][k].numpy() for d in each]
+        along = -(slopes[1] @ slopes[0]) / max(float(slopes[0] @ slopes[0]), 1e-12)
+        (row,) = torch.autograd.grad((each[1] + along * each[0]).sum(), theta, retain_graph=True)
+        rows.append(row.numpy())
+    return np.array(rows)
+
+
+def _surface(assembly: Assembly, index: int) -> np.ndarray:
+    try:
+        return np.asarray(mesh_part(assembly.parts[index], _CELLS).vertices)
+    except NoSurfaceError:
+        return np.zeros((0, 3))

@@ -1,0 +1,1 @@
+"""The objectives that ship, a file each."""

@@ -1,0 +1,116 @@
+"""`pw.optimise`: an assembly improved for goals, and its files."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import trimesh
+
+from partwright.assembly import Assembly
+from partwright.atomic_io import replacing_files
+from partwright.goals.curves import curves
+from partwright.goals.pictures import before_and_after, trajectory
+from partwright.goals.problem import Options, Point, Problem
+from partwright.goals.report import report
+from partwright.goals.search import Ending, Found, Step, search
+from partwright.goals.wanted import Bound, Wanted
+from partwright.methods import Cancellation, interruptible
+
+FILES = ("assembly.json", "surface.ply", "report.json", "before_after.png", "trajectory.gif", "curves.png")
+
+
+@dataclass(frozen=True)
+class Optimised:
+    """What came out: the best assembly, its surface, how it ended, and all that was tried."""
+
+    problem: Problem
+    found: Found
+    seconds: float
+
+    @property
+    def start(self) -> Assembly:
+        return self.problem.parameters.assembly
+
+    @property
+    def assembly(self) -> Assembly:
+        return self._best.assembly
+
+    @property
+    def surface(self) -> trimesh.Trimesh:
+        return self._best.surface
+
+    @property
+    def ending(self) -> Ending:
+        return self.found.ending
+
+    @property
+    def numbers(self) -> dict[str, tuple[float, float]]:
+        """Of each objective and bound: before and after."""
+        first = self.found.points[0].numbers
+        return {name: (first[name], self._best.numbers[name]) for name in first}
+
+    @property
+    def kept(self) -> bool:
+        """Whether all bounds and contacts are."""
+        return bool((self._best.broken <= KEPT_WITHIN).all())
+
+    @property
+    def _best(self) -> Point:
+        return self.found.points[-1]
+
+    def to_dict(self) -> dict[str, Any]:
+        return report(self.problem, self.found, self.seconds, self.kept)
+
+    def save(self, folder: str | Path) -> None:
+        """Write assembly, surface, report and pictures into a folder, all or none.
+
+        Raises:
+            OutputError: they cannot be written.
+        """
+        import json
+
+        with replacing_files(folder) as staging:
+            self.assembly.save(staging / FILES[0])
+            self.surface.export(staging / FILES[1])
+            (staging / FILES[2]).write_text(json.dumps(self.to_dict(), indent=1) + "\n", encoding="utf-8")
+            before_and_after(self.found.points, self.problem.wanted[0].name, staging / FILES[3])
+            trajectory(self.found.points, staging / FILES[4])
+            curves(self.problem, self.found.steps, staging / FILES[5])
+
+
+KEPT_WITHIN = 2e-3  # of a bound: what a step of the search may leave of it
+
+
+def optimise(
+    assembly: Assembly,
+    objective: str | Wanted | Sequence[str | Wanted],
+    *,
+    bounds: Sequence[str | Bound] = (),
+    freeze: Sequence[str] = (),
+    options: Options | None = None,
+    progress: Callable[[Step], None] | None = None,
+    cancel: Cancellation | None = None,
+) -> Optimised:
+    """The assembly with its free parts changed so that the weighted sum of the objectives is less.
+
+    objective: NAME[@ARGUMENT][=TARGET][:WEIGHT], one or several. bounds: NAME<=VALUE or
+    PART.PARAMETER>=VALUE. freeze: PART or PART:GROUP, as patterns;
+    frozen parts keep their bits. progress: told of each step.
+
+    Raises:
+        SettingError: a name that does not exist, everything frozen, bounds that the start does not keep.
+        ObjectiveError: an objective without a finite number and derivative at the start.
+    """
+    given = [objective] if isinstance(objective, str | Wanted) else list(objective)
+    wanted = [Wanted.of(one) if isinstance(one, str) else one for one in given]
+    limits = [Bound.of(one) if isinstance(one, str) else one for one in bounds]
+    cancel = cancel or Cancellation()
+    begun = time.perf_counter()
+    problem = Problem(assembly, wanted, limits, freeze, options or Options())
+    with interruptible(cancel):
+        found = search(problem, progress, cancel)
+    return Optimised(problem, found, time.perf_counter() - begun)
