@@ -117,7 +117,8 @@ def fit_once(entry: Entry, name: str, seed: int, threads: int) -> Run:
     shape = pw.load_shape(entry.path)
     wall, cpu = time.perf_counter(), time.process_time()
     try:
-        settings = METHODS[row.method].settings(**row.changes)
+        counted = {"named": False} if row.method == "capri" else {}  # #P and #C are of quadrics
+        settings = METHODS[row.method].settings(**row.changes, **counted)
         fitted = FitRequest(GIVEN[row.given](shape), settings, MethodRun(seed, threads=threads)).fitted()
         cost = {"seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}
         measured = cad_scores(fitted.assembly.expanded(), shape, seed=seed).to_dict()

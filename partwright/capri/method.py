@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from partwright.approximation.named_convexes import with_named_convexes
 from partwright.assembly import Assembly
 from partwright.capri.csg_tree import CsgTree
 from partwright.capri.repeated_quadrics import with_repeats
@@ -76,6 +77,11 @@ class Found:
         """In the shape's own units."""
         return assembly_of(self.shape, self.settings, self.tree)
 
+    @cached_property
+    def quadrics(self) -> Assembly:
+        """The same as quadrics alone, which is what the paper counts."""
+        return assembly_of(self.shape, replace(self.settings, named=False), self.tree)
+
     @property
     def outcome(self) -> Outcome:
         return "interrupted" if self.interrupted else self.searches[0].outcome
@@ -89,9 +95,10 @@ class Found:
             "start": ORIGINS[best.origin],
             "costs": {ORIGINS[one.origin]: round(one.cost(), 5) for one in self.searches},
             "candidates": len(best.pool.rows),
-            "primitives": primitives(self.assembly),
-            "convexes": convexes(self.assembly),
-            "distinct_primitives": distinct_primitives(self.assembly),
+            "primitives": primitives(self.quadrics),
+            "convexes": convexes(self.quadrics),
+            "distinct_primitives": distinct_primitives(self.quadrics),
+            "solids": sum(part.field.quadric() is None for part in self.assembly.parts),
         }
 
     def fitted(self) -> Fitted:
@@ -113,7 +120,7 @@ def found(request: FitRequest[Settings]) -> Found:
             checkpoint,
             origin,
             (i, len(origins)),
-            lambda tree: assembly_of(shape, settings, tree),
+            lambda tree: assembly_of(shape, replace(settings, named=False), tree),
         )
         for i, origin in enumerate(origins)
     ]
@@ -144,6 +151,9 @@ def found(request: FitRequest[Settings]) -> Found:
 
 
 def assembly_of(shape: Shape, settings: Settings, tree: CsgTree) -> Assembly:
-    """A tree of the unit frame in the shape's own units; alike holes are one leaf with copies."""
+    """A tree of the unit frame in the shape's own units; alike holes are one leaf with copies, and convexes
+    the solids that they are."""
     whole = with_repeats(tree.assembly()) if settings.symmetry else tree.assembly()
+    if settings.named:
+        whole = with_named_convexes(whole)
     return replace(whole, unit=shape.unit).scaled(1 / shape.frame.scale).translated(shape.frame.centre)

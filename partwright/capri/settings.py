@@ -77,6 +77,9 @@ class Settings:
     """File of a pre-trained network (`python -m partwright.capri`), in place of the one that ships."""
     symmetry: bool = True
     """Holes of one size and direction become one leaf with copies."""
+    named: bool = True
+    """Convexes that are boxes, cylinders, cones, frusta, spheres, prisms or turned profiles become these
+    solids; the others stay intersections of quadrics, as all are without it."""
 
     def __post_init__(self) -> None:
         for name in ("surface", "near", "uniform"):

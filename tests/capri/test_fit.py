@@ -56,8 +56,10 @@ def test_known_parts_get_their_tree(
     fitted = quick(load_shape(mesh))
     assert fitted.tree.primitives <= primitives
     assert fitted.tree.convexes <= convexes
-    assert len(fitted.assembly) == fitted.details["primitives"]
-    assert len(fitted.assembly.expanded()) == fitted.tree.primitives
+    assert len(fitted.quadrics) == fitted.details["primitives"]
+    assert len(fitted.quadrics.expanded()) == fitted.tree.primitives
+    assert fitted.details["solids"] == len(fitted.assembly)  # each of these convexes has a name
+    assert len(fitted.assembly.expanded()) == fitted.tree.convexes
     made = solid(fitted.assembly)
     assert made.volume == pytest.approx(mesh.volume, rel=0.01)
     assert made.euler_number == 2 - 2 * genus
@@ -92,6 +94,9 @@ def test_the_assembly_is_the_tree(plate: Shape) -> None:
     sure = np.abs(distance) > 1e-3
     np.testing.assert_array_equal((distance < 0)[sure], fitted.tree.occupancy(points)[sure])
     assert fitted.assembly.unit == plate.unit
+    plain = quick(plate, named=False)
+    assert plain.assembly == fitted.quadrics
+    assert {part.field.kind for part in plain.assembly.parts} == {"quadric"}
 
 
 def test_nothing_can_be_removed_for_free(plate: Shape) -> None:
@@ -117,7 +122,7 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path) -> None:
 
 def test_a_budget_of_primitives(plate: Shape) -> None:
     fitted = quick(plate, max_parts=7)
-    assert len(fitted.assembly) <= 7
+    assert len(fitted.quadrics) <= 7
     assert fitted.outcome == "budget_reached"
     assert solid(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.15)
 
@@ -130,7 +135,7 @@ def test_a_budget_that_holds_nothing_says_how_many_do() -> None:
 def test_a_target_takes_the_cheapest_tree_that_reaches_it(plate: Shape) -> None:
     fitted = quick(plate, min_iou=0.85)
     assert fitted.outcome == "target_reached"
-    assert len(fitted.assembly) <= 6
+    assert len(fitted.quadrics) <= 6
 
 
 def test_progress_and_interruption(plate: Shape) -> None:
@@ -164,7 +169,7 @@ def test_points_and_grids_come_in_as_well() -> None:
         fitted = quick(shape, price=1e-3)
         made = solid(fitted.assembly)
         assert made.volume == pytest.approx(shape.volume, rel=0.05)
-        assert len(fitted.assembly) <= 14
+        assert len(fitted.quadrics) <= 14
 
 
 def test_a_closed_cavity_stays() -> None:

@@ -100,7 +100,11 @@ def test_what_repeats_further_down_is_left_as_it_is() -> None:
 
 def test_a_fit_drills_equal_holes_once(plate) -> None:  # noqa: F811
     fitted, apart = quick(plate), quick(plate, symmetry=False)
-    assert sorted(copies(fitted.assembly)) == [1] * 6 + [2]
+    assert sorted(copies(fitted.quadrics)) == [1] * 6 + [2]
+    assert [(part.field.kind, len(part.copies)) for part in fitted.assembly.parts] == [
+        ("box", 1),
+        ("cylinder", 2),
+    ]
     assert set(copies(apart.assembly)) == {1}
     assert fitted.details["primitives"] == 7
     assert fitted.details["convexes"] == 2
