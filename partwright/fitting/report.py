@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from partwright import __version__
 from partwright.assembly import Assembly, Similarity
 from partwright.errors import SettingError
+from partwright.fitting.structure_warnings import structure_warnings
 from partwright.methods import Fitted, Run
 from partwright.shapes import METRES, Shape
 from partwright.tolerances import Bounded, bounds_report, bounds_warnings
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from partwright.metrics import Scores
 
 POOR_IOU = 0.85
-POOR_DEVIATION = 0.05  # of the longest side
+POOR_DEVIATION = 0.03  # of the longest side
 UNSURE = 0.5
 MUCH_MISSING = 0.02  # of the surface
 SAME_VOLUME = 0.01  # of the input's triangles and of its inside: then no surface runs through it twice
@@ -53,7 +54,11 @@ def report(
         "instances": sum(len(part.copies) for part in assembly.parts),
         "scores": scores.to_dict(),
         "mass_properties": masses(surface, shape, None),
-        "warnings": warnings(shape, scores) + (bounds_warnings(enforced, shape) if enforced else []),
+        "warnings": [
+            *warnings(shape, scores),
+            *structure_warnings(shape, assembly, surface),
+            *(bounds_warnings(enforced, shape) if enforced else []),
+        ],
     }
     for name in dict.fromkeys(name for one in fitted for name in one.details):
         told[name] = [one.details[name] for one in fitted]
@@ -115,9 +120,12 @@ def warnings(shape: Shape, scores: Scores) -> list[str]:
     side = float((shape.vertices.max(axis=0) - shape.vertices.min(axis=0)).max())
     if scores.iou < POOR_IOU or scores.max_deviation > POOR_DEVIATION * side:
         unit = f" {shape.unit}" if shape.unit else ""
+        out = scores.max_protrusion >= scores.max_deviation
+        how = "where it sticks out of the shape" if out else "where it does not reach the shape"
         result.append(
             f"the fit is poor in places: IoU {scores.iou:.3f}; it is furthest off, by "
-            f"{scores.max_deviation:.3g}{unit}, at the {scores.worst_place}; try --quality high or more parts"
+            f"{scores.max_deviation:.3g}{unit}, at the {scores.worst_place}, {how}; "
+            "try --quality high or more parts"
         )
     if shape.openings.share > MUCH_MISSING:
         result.append(_about_openings(shape))
