@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import coacd
 import mujoco
@@ -41,6 +42,7 @@ from partwright.robots.solids import Solids
 from partwright.shapes import Shape
 
 HERE = Path(__file__).parent
+TARGET = HERE / "results" / "collision.md"
 OWN_SHAPES = HERE.parent / "examples" / "shapes"
 COPIES, STEPS, POINTS = 5, 1000, 200_000
 Inside = Callable[[np.ndarray], np.ndarray]  # points (N, 3), metres -> (N,) bool
@@ -72,10 +74,10 @@ class Row:
     solidity: float
 
 
-def fitted(shape: Shape, max_parts: int | None) -> Body:
-    """Our parts, as the MJCF export has them."""
+def fitted(shape: Shape, method: str, options: dict[str, Any]) -> Body:
+    """Our parts, as the MJCF export has them; options: of the fit."""
     start = time.process_time()
-    assembly = pw.fit(shape, max_parts=max_parts, seed=0).assembly
+    assembly = pw.fit(shape, method, seed=0, **options).assembly
     local = assembly.transformed(to_metres_z_up(assembly))
     found, _ = geometries(local, GEOMS, TOLERANCE, 24, convex=True)
     with tempfile.TemporaryDirectory() as folder:
@@ -220,7 +222,7 @@ def simulate(body: Body, properties: MassProperties, height: float) -> tuple[flo
     return 1e6 * seconds / STEPS, contacts / STEPS
 
 
-def measure(path: Path, name: str, unit: str, max_parts: int | None) -> Iterator[Row]:
+def measure(path: Path, name: str, unit: str, method: str, options: dict[str, Any]) -> Iterator[Row]:
     shape = pw.load_shape(path, unit=unit, up="z")
     frame = to_metres_z_up(Assembly((Part(Box((1, 1, 1))),), unit=unit, up="z"))
     mesh = trimesh.Trimesh(frame(shape.vertices), shape.faces, process=False)
@@ -228,7 +230,7 @@ def measure(path: Path, name: str, unit: str, max_parts: int | None) -> Iterator
     def target(points: np.ndarray) -> np.ndarray:
         return shape.signed_distance(frame.inverse()(points)) < 0
 
-    ours, (decomposed, parts) = fitted(shape, max_parts), hulls(mesh)
+    ours, (decomposed, parts) = fitted(shape, method, options), hulls(mesh)
     height = float(np.linalg.norm(mesh.extents))
     for body in (ours, covered(mesh), decomposed, boxes(parts, decomposed.seconds)):
         missing, extra = volume_errors(body, target, mesh.bounds)
@@ -268,6 +270,9 @@ def main() -> int:
     option("--unit", default="m", help="length unit of the meshes (default: %(default)s)")
     option("--rows", type=Path, required=True, help="measured rows, kept between runs")
     option("--max-parts", type=int, metavar="N", help="of the fit")
+    option("--method", default="superfrusta", metavar="NAME", help="of the fit (default: %(default)s)")
+    option("--clean", action="store_true", help="of the fit")
+    option("--target", type=Path, default=TARGET, metavar="FILE", help="the table")
     options = parser.parse_args()
     paths = {str(p.relative_to(options.shapes).with_suffix("")): p for p in options.shapes.rglob("*.ply")}
     names = options.names.split(",") if options.names else sorted(paths)
@@ -278,17 +283,19 @@ def main() -> int:
         ["python benchmarks/collision.py --shapes", options.shapes.name, "--names", ",".join(names)]
     )
     command += f" --max-parts {options.max_parts}" if options.max_parts else ""
+    command += f" --method {options.method}" if options.method != "superfrusta" else ""
+    command += " --clean" if options.clean else ""
+    about = {"clean": options.clean} | ({"max_parts": options.max_parts} if options.max_parts else {})
     kept = options.rows.read_text().splitlines() if options.rows.exists() else []
     rows = [Row(**json.loads(line)) for line in kept]
     for name in names:
         if any(row.shape == name for row in rows):
             continue
-        more = list(measure(paths[name], name, options.unit, options.max_parts))
+        more = list(measure(paths[name], name, options.unit, options.method, about))
         rows += more
         with options.rows.open("a") as file:
             file.writelines(json.dumps(dataclasses.asdict(row)) + "\n" for row in more)
-        target = HERE / "results" / "collision.md"
-        write_bytes(target, document(rows, command).encode())
+        write_bytes(options.target, document(rows, command).encode())
     print(document(rows, command))
     return 0
 

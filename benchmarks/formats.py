@@ -123,7 +123,7 @@ def read_usd(path: Path) -> float:
     if errors:
         raise RuntimeError(errors[0].GetMessage()[:80])
     meshes = []
-    for prim in stage.Traverse():
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         mesh = UsdGeom.Mesh(prim)
         if mesh and mesh.ComputePurpose() != UsdGeom.Tokens.guide:
             matrix = np.array(mesh.ComputeLocalToWorldTransform(0))

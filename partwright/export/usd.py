@@ -142,8 +142,8 @@ class _Writer:
             copy = define_xform(self.stage, parent, f"{part.name}_{i}")
             copy.SetCustomData({"partwright": {"copy_of": part.name}})
             place(copy, move @ pose)
-            again = self.stage.DefinePrim(copy.GetPath().AppendChild("mesh"))
-            again.GetReferences().AddInternalReference(f"{prim.GetPath()}/mesh")
+            copy.GetReferences().AddInternalReference(prim.GetPath())
+            copy.SetInstanceable(True)
 
     def _add_mesh(self, path: str, mesh: Any, colour: np.ndarray, subtracted: bool) -> None:
         from pxr import UsdGeom

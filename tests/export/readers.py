@@ -136,7 +136,7 @@ def _usd(path: Path) -> Read:
 
     stage = Usd.Stage.Open(str(path))
     meshes = []
-    for prim in stage.Traverse():
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         mesh = UsdGeom.Mesh(prim)
         if not mesh or mesh.ComputePurpose() == UsdGeom.Tokens.guide:
             continue

@@ -86,12 +86,14 @@ def test_every_up_axis_is_up(tmp_path: Path, axis: str, told: str) -> None:
 
 
 def test_subtracted_parts_are_guides_and_copies_are_in_place(tmp_path: Path) -> None:
-    from pxr import UsdGeom
+    from pxr import Usd, UsdGeom
 
     block = Part(Box((2, 2, 2)), name="block") - Part(Sphere(0.5), name="hole")
     leg = Part(Cylinder(0.2, 1.0), (3, 0, 0), name="leg", instances=(Similarity(translation=(1, 0, 0)),))
     stage = opened(Assembly((block, leg), unit="m", up="z"), tmp_path / "a.usda")
-    meshes = {str(p.GetPath()): UsdGeom.Mesh(p) for p in stage.Traverse() if p.IsA(UsdGeom.Mesh)}
+    every = list(stage.Traverse(Usd.TraverseInstanceProxies()))
+    assert [prim.GetName() for prim in every if prim.IsInstance()] == ["leg_2"]
+    meshes = {str(p.GetPath()): UsdGeom.Mesh(p) for p in every if p.IsA(UsdGeom.Mesh)}
     purposes = {path.split("/")[-2]: mesh.GetPurposeAttr().Get() for path, mesh in meshes.items()}
     assert purposes == {"block": "default", "hole": "guide", "leg": "default", "leg_2": "default"}
     shown = {path.split("/")[-2]: mesh.ComputeVisibility() for path, mesh in meshes.items()}
