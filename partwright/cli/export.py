@@ -29,12 +29,17 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         metavar="NAME",
         help="colliders, too: khr (GLB: rigid bodies), usd (USD), or by names: unreal, godot (GLB, OBJ)",
     )
-    option("--links", action="store_true", default=None, help="each child of the root a link (MJCF, URDF)")
+    option(
+        "--links",
+        action="store_true",
+        default=None,
+        help="each child of the root a link (MJCF, URDF, SDFormat)",
+    )
     option(
         "--visuals",
         action=argparse.BooleanOptionalAction,
         default=None,
-        help="what collides as something else is seen as it is (MJCF, URDF; default: on)",
+        help="what collides as something else is seen as it is (MJCF, URDF, SDFormat; default: on)",
     )
     option("--by-part", action="store_true", default=None, help="each part by itself (OBJ, PLY, STL, 3MF)")
     option("--resolution", metavar="N", type=int, help="cells along the longest side of what is meshed")

@@ -170,6 +170,7 @@ FORMATS: Registry[Format] = Registry(
         ".mjcf": "partwright.export.mjcf:FORMAT",
         ".mjcf.xml": "partwright.export.mjcf:FORMAT",
         ".urdf": "partwright.export.urdf:FORMAT",
+        ".sdf": "partwright.export.sdf:FORMAT",
         ".dxf": "partwright.export.dxf:FORMAT",
         ".svg": "partwright.export.svg:FORMAT",
         ".3mf": "partwright.export.threemf:FORMAT",

@@ -61,7 +61,7 @@ def write(
         meshes += [(link.name, g.name, g.mesh) for g in body.geometries if g.mesh is not None]
         seen[link.name] = body.visuals(resolution) if visuals else []
         meshes += [(link.name, name, mesh) for name, _, mesh in seen[link.name]]
-    files = _write_meshes(meshes, Path(path), several=len(made) > 1)
+    files = write_meshes(meshes, Path(path), several=len(made) > 1)
     taken = {link.name for link, _ in made}  # readers keep links and shapes in one table of names
     for link, body in made:
         element = xml.SubElement(root, "link", name=link.name)
@@ -165,7 +165,7 @@ def _shapes(geometry: Geometry, files: dict[str, str]) -> list[Shape]:
     raise AssertionError(f"{geometry.part.field.kind} is not among SOLIDS")
 
 
-def _write_meshes(
+def write_meshes(
     meshes: list[tuple[str, str, trimesh.Trimesh]], path: Path, several: bool
 ) -> dict[tuple[str, str], str]:
     """STL files beside `path`: link and name of the piece -> the name of its file. several: links."""

@@ -130,6 +130,44 @@ def _urdf(path: Path) -> Read:
     return Read(np.asarray(robot.collision_scene.bounds), mass / 1000, 1.0)
 
 
+def _sdf(path: Path) -> Read:
+    """What collides, placed by the link's and its own poses; the mass, of water, is the blended surface's."""
+    model = xml.parse(path).getroot().find("model")
+    assert model is not None
+    corners, mass = [], 0.0
+    for link in model.findall("link"):
+        assert link.find("pose") is None  # one link, at the model's own origin
+        mass += float(link.findtext("inertial/mass", ""))
+        for shape in link.findall("collision"):
+            x, y, z, *angles = map(float, shape.findtext("pose", "0 0 0 0 0 0").split())
+            pose = trimesh.transformations.euler_matrix(*angles)
+            pose[:3, 3] = x, y, z
+            corners.append(trimesh.transform_points(_sdf_points(shape, path), pose))
+    places = np.concatenate(corners)
+    return Read(np.array([places.min(axis=0), places.max(axis=0)]), mass / 1000, 1.0)
+
+
+def _sdf_points(shape: xml.Element, path: Path) -> np.ndarray:
+    (solid,) = shape.findall("geometry/*")
+    sizes = {child.tag: [float(x) for x in child.text.split()] for child in solid if child.tag != "uri"}
+    match solid.tag:
+        case "mesh":
+            return np.asarray(trimesh.load_mesh(path.with_name(solid.findtext("uri", ""))).vertices)
+        case "box":
+            return np.asarray(trimesh.creation.box(sizes["size"]).vertices)
+        case "cylinder":
+            return np.asarray(trimesh.creation.cylinder(*sizes["radius"], *sizes["length"]).vertices)
+        case "sphere":
+            return np.asarray(trimesh.creation.icosphere(4, *sizes["radius"]).vertices)
+        case "capsule":
+            half = np.array([0, 0, sizes["length"][0] / 2])
+            ball = np.asarray(trimesh.creation.icosphere(4, *sizes["radius"]).vertices)
+            return np.concatenate([ball - half, ball + half])
+        case "ellipsoid":
+            return np.asarray(trimesh.creation.icosphere(4).vertices) * sizes["radii"]
+    raise AssertionError(solid.tag)
+
+
 def _usd(path: Path) -> Read:
     """What is shown: guides are not."""
     from pxr import Usd, UsdGeom
@@ -160,6 +198,7 @@ READERS: dict[str, tuple[str, Callable[[Path], Read]]] = {
     ".build123d.py": ("build123d", _build123d),
     ".mjcf.xml": ("mujoco", _mjcf),
     ".urdf": ("yourdfpy", _urdf),
+    ".sdf": ("", _sdf),
     ".usda": ("pxr", _usd),
     ".usdc": ("pxr", _usd),
     ".usd": ("pxr", _usd),

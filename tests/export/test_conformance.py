@@ -157,7 +157,7 @@ def check_contents(path: Path, suffix: str, form: Format, assembly: Assembly) ->
     found = read(path, suffix)
     if found is None:
         return
-    weighs = suffix in (".mjcf.xml", ".urdf")  # by the blended surface, whatever the geometries are
+    weighs = suffix in (".mjcf.xml", ".urdf", ".sdf")  # by the blended surface, whatever the geometries are
     own = assembly if weighs or Holds.BLENDS in form.holds else sharp(assembly)
     turn = {"y": to_gltf, "z": to_metres_z_up, None: lambda _: Similarity()}[form.up](assembly)
     mesh = mesh_assembly(own, 128)

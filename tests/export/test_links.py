@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import xml.etree.ElementTree as xml
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from partwright.errors import ParameterError, SettingError
 from partwright.export import export
 from partwright.fields import Box, Sphere, Tube
 from partwright.meshing.mass import mass_properties
+from partwright.robots import open_robot
 
 HINGE = {
     "joint": "revolute",
@@ -55,6 +57,22 @@ def test_two_nodes_are_two_urdf_links_with_a_joint(tmp_path: Path) -> None:
     assert masses == pytest.approx(
         [1000 * mass_properties(part).volume * 1e-9 for part in chest().children], rel=1e-5
     )
+
+
+def test_two_nodes_are_two_sdf_links_with_a_joint(tmp_path: Path) -> None:
+    path = tmp_path / "chest.sdf"
+    export(chest(), path, free_joint=True)
+    robot = open_robot(path)
+    body, lid = robot.links
+    assert (body.parent, lid.parent) == (None, "body")
+    assert np.allclose(lid.pose[:3, 3], (-0.05, 0, 0.02))
+    assert [part.field for part in body.natives] == [Box((0.1, 0.06, 0.04)), Sphere(0.005)]
+    assert np.allclose(lid.natives[0].translation, (0.05, 0, 0.002))
+    model = xml.parse(path).getroot().find("model")
+    assert model is not None
+    assert model.findtext("static") == "false"
+    assert model.findtext("joint/axis/xyz") == "0 1 0"
+    assert [float(model.findtext(f"joint/axis/limit/{end}", "")) for end in ("lower", "upper")] == [-1.5, 0]
 
 
 def test_two_nodes_are_two_mjcf_bodies_with_a_joint(tmp_path: Path) -> None:
