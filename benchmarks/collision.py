@@ -206,6 +206,7 @@ def simulate(body: Body, properties: MassProperties, height: float) -> tuple[flo
     root.fullinertia = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
     body.add(link, root)
     scene = mujoco.MjSpec()
+    scene.memory = 1 << 29  # boxes around hulls overlap in thousands of contacts
     scene.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 0.1])
     for i in range(COPIES):
         frame = scene.worldbody.add_frame(pos=[0.1 * height * (i % 2), 0, 0.1 + (i + 0.6) * height])
