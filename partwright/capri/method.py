@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from partwright.approximation.named_convexes import with_named_convexes
+from partwright.approximation.part_roles import with_role_names
 from partwright.assembly import Assembly
 from partwright.capri.csg_tree import CsgTree
 from partwright.capri.repeated_quadrics import with_repeats
@@ -155,5 +156,5 @@ def assembly_of(shape: Shape, settings: Settings, tree: CsgTree) -> Assembly:
     the solids that they are."""
     whole = with_repeats(tree.assembly()) if settings.symmetry else tree.assembly()
     if settings.named:
-        whole = with_named_convexes(whole)
+        whole = with_role_names(with_named_convexes(whole))
     return replace(whole, unit=shape.unit).scaled(1 / shape.frame.scale).translated(shape.frame.centre)

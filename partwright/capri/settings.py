@@ -79,7 +79,8 @@ class Settings:
     """Holes of one size and direction become one leaf with copies."""
     named: bool = True
     """Convexes that are boxes, cylinders, cones, frusta, spheres, prisms or turned profiles become these
-    solids; the others stay intersections of quadrics, as all are without it."""
+    solids, called after what they are for (base_plate, hole, pocket); the others stay intersections of
+    quadrics, as all are without it."""
 
     def __post_init__(self) -> None:
         for name in ("surface", "near", "uniform"):

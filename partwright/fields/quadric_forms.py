@@ -46,7 +46,7 @@ class NormalForm:
     @property
     def radii(self) -> np.ndarray:
         """(3,) semi-axes sqrt(|level / k|), infinite along axes without curvature."""
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             return np.sqrt(np.abs(self.level) / np.abs(self.curvature))
 
     @property

@@ -1,0 +1,138 @@
+"""Names that say what parts of a tree of solids are: a base plate, a boss, a hole, a pocket; and their order,
+the base first, then from large to small."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from partwright.assembly import Assembly, Node, Part
+from partwright.assembly.names import unique_names
+from partwright.assembly.similarity import rotation_matrix
+from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Frustum, Revolution, Sphere
+
+_FLAT = 0.3  # a plate's thickness over its next longer side, at most
+_LONG = 3.0  # a bar's length over its next shorter side, at least
+_BORE = 0.5  # of the narrowest side of what it is in: a hole that is wider is its bore
+_BEYOND = 1e-3  # of its height: how far outside a hole's ends have to lie
+
+
+def with_role_names(assembly: Assembly) -> Assembly:
+    """The same solid: parts are renamed, and children of unions put in order. Quadrics keep their names."""
+    ordered = _ordered(assembly)
+    assert isinstance(ordered, Assembly)
+    roles: dict[str, str] = {}
+    _name(ordered, None, roles)
+    added = [part for part in ordered.parts if roles.get(part.name) not in (None, *_CUTS)]
+    if added:
+        base = max(added, key=_bulk)
+        noun = "cylinder" if isinstance(base.field, Cylinder) else roles[base.name]
+        roles[base.name] = f"base_{noun}"
+    parts = ordered.parts
+    names = unique_names([roles.get(p.name, p.name) for p in parts], [p.field.stem for p in parts])
+    fresh = dict(zip((p.name for p in parts), names, strict=True))
+
+    def renamed(node: Node) -> Node:
+        if isinstance(node, Part):
+            return dataclasses.replace(node, name=fresh[node.name])
+        children = tuple(map(renamed, node.children))
+        first = children[0]
+        after = f"{first.name}_cut" if node.operation == "difference" and first.is_part else node.name
+        return dataclasses.replace(node, children=children, name=after)
+
+    result = renamed(ordered)
+    assert isinstance(result, Assembly)
+    return result
+
+
+def _ordered(node: Node) -> Node:
+    """Children of unions without blends from large to small, those of which that is not known last."""
+    if isinstance(node, Part):
+        return node
+    children = tuple(map(_ordered, node.children))
+    if node.operation == "union" and not any(child.blend for child in children):
+        children = tuple(sorted(children, key=lambda child: -_bulk(child)))
+    return dataclasses.replace(node, children=children)
+
+
+def _bulk(node: Node) -> float:
+    """Of the box around what a node begins with; 0 where that has no end."""
+    while isinstance(node, Assembly):
+        node = node.children[0]
+    lower, upper = node.field.bounds()
+    return float(np.prod(upper - lower)) if np.isfinite([lower, upper]).all() else 0.0
+
+
+_CUTS = ("hole", "blind_hole", "bore", "countersink", "dimple", "groove", "opening", "pocket", "island")
+
+
+def _name(node: Node, cut_from: Node | None, roles: dict[str, str]) -> None:
+    if isinstance(node, Part):
+        if _is_solid(node):
+            roles[node.name] = _cut(node, cut_from) if cut_from else _added(node.field)
+        return
+    first, *others = node.children
+    if node.operation == "difference" and cut_from is not None:
+        _name(first, cut_from, roles)  # what is left standing in a cut is an island
+        roles.update({part.name: "island" for child in others for part in child.parts if _is_solid(part)})
+        return
+    if node.operation != "difference":
+        for child in node.children:
+            _name(child, cut_from, roles)
+        return
+    _name(first, None, roles)
+    for child in others:
+        _name(child, first, roles)
+
+
+def _is_solid(part: Part) -> bool:
+    return part.field.quadric() is None
+
+
+def _added(field: Field) -> str:
+    low, high = field.bounds()
+    short, middle, long = np.sort(high - low).tolist()
+    if isinstance(field, Sphere):
+        return "ball"
+    if isinstance(field, Cone | Frustum):
+        return "cone"
+    if isinstance(field, Cylinder):
+        return "disc" if field.height < _FLAT * 2 * field.radius else _upright(field)
+    if isinstance(field, Revolution):
+        return "turned"
+    if short < _FLAT * middle:
+        return "plate"
+    return "bar" if long > _LONG * middle else "block"
+
+
+def _upright(field: Cylinder) -> str:
+    return "shaft" if field.height > _LONG * 2 * field.radius else "boss"
+
+
+def _cut(part: Part, cut_from: Node) -> str:
+    field = part.field
+    if isinstance(field, Cone | Frustum):
+        return "countersink"
+    if isinstance(field, Sphere):
+        return "dimple"
+    if isinstance(field, Revolution):
+        return "groove"
+    through = _goes_through(part, cut_from)
+    if not isinstance(field, Cylinder):
+        return "opening" if through and isinstance(field, Box | Extrusion) else "pocket"
+    axis = rotation_matrix(part.rotation)[:, 2]
+    sides = np.ptp(cut_from.bounds(), axis=0)[np.abs(axis) < math.sqrt(0.5)]
+    if through and len(sides) and 2 * field.radius > _BORE * float(sides.min()):
+        return "bore"
+    return "hole" if through else "blind_hole"
+
+
+def _goes_through(part: Part, cut_from: Node) -> bool:
+    """Whether both of its ends lie outside of what it cuts."""
+    lower, upper = part.field.bounds()
+    axis = rotation_matrix(part.rotation)[:, 2]
+    inset = _BEYOND * float(upper[2] - lower[2])
+    ends = np.array([part.translation + (z * axis) for z in (lower[2] + inset, upper[2] - inset)])
+    return bool((cut_from.distance(ends) > 0).all())
