@@ -10,7 +10,7 @@ DEMO_SHAPE := examples/shapes/watering_can.ply
 
 LOWEST_TESTS := tests/shapes tests/assembly tests/meshing tests/render tests/cli
 
-.PHONY: setup demo test test-lowest lint types docs page release bench guard clean
+.PHONY: setup demo test test-lowest lint types docs page release bench benchmarks guard clean
 setup: $(INSTALLED)
 
 $(BIN)/python:
@@ -80,6 +80,11 @@ release: .venv/release
 
 bench: setup
 	$(BIN)/python benchmarks/fit.py
+
+# Every table of the documentation: quick ones of our own shapes, or, with FULL=1 DATA=FOLDER, as they are committed.
+benchmarks: setup
+	$(BIN)/pip install --quiet -e ".[bench]"
+	$(BIN)/python benchmarks/tables.py $(if $(FULL),--full --data $(DATA))
 
 # Quality and relative speed of a few fits against committed references; in .ci/run.
 guard: setup

@@ -12,7 +12,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from typing import Any
 from partwright.atomic_io import write_bytes
 from partwright.batch.items import Item, items_of
 from partwright.batch.manifest import DONE, Entry, Manifest, appending, latest
+from partwright.batch.on_ray import Cluster
 from partwright.batch.pool import Answer, Limits, Pool
 from partwright.errors import OutputError, SettingError
 from partwright.methods import METHODS, Cancellation
@@ -110,6 +111,7 @@ def fit_folder(
     limits: Limits | None = None,
     told: Callable[[Entry, int], None] | None = None,
     cancel: Cancellation | None = None,
+    ray: str | None = None,
 ) -> bool:
     """Fits what has no result yet; says whether it came to the end of its share.
 
@@ -122,11 +124,14 @@ def fit_folder(
         at_once: worker processes; 0: one a core. Each has its share of the cores.
         told: of each item that has ended, and how many items were found so far.
         cancel: ends the workers; what they were at is lost.
+        ray: address of a Ray cluster ("auto": the one that this machine is part of), whose nodes share the
+            disk; `at_once` is then over all of them, one thread each.
 
     Raises:
         SettingError: an unknown method, another batch in the folder, the folder with the shapes itself, or a
             value that cannot be used.
-        OutputError: the folder cannot be written, or another process is at work there.
+        OutputError: the folder cannot be written, another process is at work there, or no cluster answers.
+        MissingDependencyError: Ray is not installed.
     """
     if plan.method not in METHODS:
         raise SettingError(f"method: expected one of {', '.join(METHODS)}, got {plan.method!r}")
@@ -135,14 +140,16 @@ def fit_folder(
     share, limits = share or Share(), limits or Limits()
     if output.resolve() == plan.source.resolve():
         raise SettingError(f"{output}: the folder with the shapes; give another to write into with -o")
-    plan.save(output)
-    cores = os.cpu_count() or 1
-    at_once = at_once or cores
     cancel = cancel or Cancellation()
-    with appending(output / share.manifest) as manifest:
-        work = _Work(plan, output, share, manifest, max(1, cores // at_once), told)
-        Pool[Item](at_once, limits, cancel).run(work.jobs(), work.done)
-        shutil.rmtree(work.staging, ignore_errors=True)
+    with Cluster(ray) if ray else nullcontext() as cluster:
+        plan.save(output)
+        cores = cluster.cores if cluster else os.cpu_count() or 1
+        at_once = at_once or cores
+        threads = 1 if cluster else max(1, cores // at_once)
+        with appending(output / share.manifest) as manifest:
+            work = _Work(plan, output, share, manifest, threads, told)
+            Pool[Item](at_once, limits, cancel, cluster=cluster).run(work.jobs(), work.done)
+            shutil.rmtree(work.staging, ignore_errors=True)
     return not cancel.requested
 
 
@@ -191,8 +198,8 @@ class _Work:
             yield (
                 item,
                 {
-                    "path": str(self._plan.source / item.file),
-                    "folder": str(self.staging / item.name),
+                    "path": str((self._plan.source / item.file).absolute()),
+                    "folder": str((self.staging / item.name).absolute()),
                     "method": self._plan.method,
                     "options": self._options,
                     "unit": self._plan.unit,

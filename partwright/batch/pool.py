@@ -15,13 +15,16 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import psutil
 
 from partwright.batch.worker import STOP
 from partwright.errors import SettingError
 from partwright.methods import Cancellation
+
+if TYPE_CHECKING:
+    from partwright.batch.on_ray import Cluster, RayWorker
 
 _POLL = 0.1  # seconds between looks at a worker
 _START = 60.0  # seconds that a process has to begin, which count for no item
@@ -62,7 +65,7 @@ class Worker:
     command = (sys.executable, "-m", "partwright.batch.worker")
 
     def __init__(self, limits: Limits, cancel: Cancellation, gently: bool, given_up: threading.Event) -> None:
-        self._limits, self._cancel, self._gently, self._given_up = limits, cancel, gently, given_up
+        self.limits, self._cancel, self._gently, self._given_up = limits, cancel, gently, given_up
         self._process: subprocess.Popen[str] | None = None
 
     def do(self, job: dict[str, Any], told: Callable[[dict[str, Any]], None]) -> Answer | None:
@@ -158,22 +161,35 @@ class Worker:
             words = " ".join(self._words.read().split())[-_LAST_WORDS:]
             how = f"signal {-code}" if code < 0 else f"exit code {code}"
             return "crashed", f"the worker died by {how}" + (f": {words}" if words else "")
-        if spent > self._limits.seconds:
-            return "time", f"took more than {self._limits.seconds:g} s"
-        if memory > self._limits.memory:
-            return "memory", f"took more than {self._limits.memory / 1e9:.3g} GB"
+        if spent > self.limits.seconds:
+            return "time", f"took more than {self.limits.seconds:g} s"
+        if memory > self.limits.memory:
+            return "memory", f"took more than {self.limits.memory / 1e9:.3g} GB"
         return "", ""
 
 
 class Pool(Generic[Key]):
     """`at_once` workers, and jobs that are asked for only when one is free, so that none pile up.
 
-    A cancellation kills what is running; gently, it lets that end with its best so far.
+    A cancellation kills what is running; gently, it lets that end with its best so far. The workers are of
+    this machine, or of a cluster.
     """
 
-    def __init__(self, at_once: int, limits: Limits, cancel: Cancellation, gently: bool = False) -> None:
+    def __init__(
+        self,
+        at_once: int,
+        limits: Limits,
+        cancel: Cancellation,
+        gently: bool = False,
+        cluster: Cluster | None = None,
+    ) -> None:
         self._cancel, self._given_up = cancel, threading.Event()
-        self._workers = [Worker(limits, cancel, gently, self._given_up) for _ in range(at_once)]
+        self._workers = [
+            cluster.worker(limits, cancel, self._given_up)
+            if cluster
+            else Worker(limits, cancel, gently, self._given_up)
+            for _ in range(at_once)
+        ]
 
     def run(
         self,
@@ -182,7 +198,8 @@ class Pool(Generic[Key]):
         told: Callable[[Key, dict[str, Any]], None] = lambda key, step: None,
     ) -> None:
         """Does all jobs; `done` is called in this thread, in the order of their ends, `told` in others."""
-        idle, running = list(self._workers), dict[Future[Answer | None], tuple[Key, Worker]]()
+        idle = list(self._workers)
+        running: dict[Future[Answer | None], tuple[Key, Worker | RayWorker]] = {}
         try:
             with ThreadPoolExecutor(len(idle)) as threads:
                 try:
@@ -204,8 +221,8 @@ class Pool(Generic[Key]):
 
     def _collect(
         self,
-        running: dict[Future[Answer | None], tuple[Key, Worker]],
-        idle: list[Worker],
+        running: dict[Future[Answer | None], tuple[Key, Worker | RayWorker]],
+        idle: list[Worker | RayWorker],
         done: Callable[[Key, Answer], None],
     ) -> None:
         ended, _ = wait(running, return_when=FIRST_COMPLETED)

@@ -85,6 +85,11 @@ def _add_retry(subcommands: Any) -> None:
 def _add_running(group: argparse._ActionsContainer) -> None:
     option = group.add_argument
     option("--at-once", metavar="N", type=int, default=0, help="worker processes (default: one per core)")
+    option(
+        "--ray",
+        metavar="ADDRESS",
+        help="by the nodes of a Ray cluster that share the disk; auto: the one this machine is part of",
+    )
     option("--limit", metavar="N", type=int, help="begin at most N shapes this time")
     option(
         "--time-limit",

@@ -41,7 +41,9 @@ def go_on(plan: Plan, arguments: argparse.Namespace, again: bool = False, only_f
             if entry.status != DONE:
                 note(f"{entry.file}: {entry.reason}")
 
-        whole = fit_folder(plan, arguments.output, share, arguments.at_once, limits, told, cancel)
+        whole = fit_folder(
+            plan, arguments.output, share, arguments.at_once, limits, told, cancel, arguments.ray
+        )
     found = write_index(arguments.output)
     say(f"{summary(found)}; look at {arguments.output / 'index.html'}")
     if not whole:

@@ -1,0 +1,148 @@
+"""All tables of the documentation: which script makes which, with which arguments, in how many minutes.
+
+    make benchmarks                                 # quick: shapes of our own, into build/benchmarks
+    make benchmarks FULL=1 DATA=FOLDER              # as committed, into benchmarks/results: days
+    python benchmarks/tables.py [--full --data FOLDER] [--only A,B] [--list]
+
+Quick says whether everything runs and roughly agrees; its numbers are of few small shapes, and go to a copy
+of benchmarks/ in build/. Full needs the shapes that the committed tables name: a folder with an index.json (a
+list of {"name", "set", "file"}). Minutes are of two idle cores, and estimated. A script that fails does not
+stop the rest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+QUICK = ROOT / "build" / "benchmarks"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A file of benchmarks/results. quick, full: arguments, or why there are none; minutes of both."""
+
+    output: str
+    script: str
+    quick: str | None
+    quick_minutes: float
+    full: str | None
+    full_minutes: float
+    needs: str = ""
+    """What must be there besides, for the full mode."""
+
+
+TABLES = (
+    Table("guard.json", "guard.py", "", 0.5, "--record", 0.5),
+    Table("fit.md", "fit.py", "--quality draft", 2, "--shapes {data} --sets toys,cad", 45),
+    Table("ablations.md", "ablations.py", "--names mug --rows default,cuboid", 2, "--shapes {data}", 240),
+    Table("solids.md", "solids.py", "--shapes examples/shapes --sets shapes --names bracket", 2,
+          "--shapes {data} --sets cad", 90),
+    Table("capri.md", "capri.py", "--names bracket --rows mesh,planes", 2,
+          "--shapes {data} --sets cad --rows mesh,voxels,points,solids,superfrusta,planes,weights,auto,union,"
+          "flat,aligned,seven,first,cheap,double,dear,paper,tenth,whole", 600),
+    Table("partsdf-reconstruct-cars.md", "partsdf.py", None, 0,
+          "reconstruct --family families/cars --model cars --config configs/cars.toml --shapes 3 "
+          "--iterations 200 --resolution 128 --threads 1", 90, "families/, made by partwright parts prepare"),
+    Table("partsdf-reconstruct-chairs.md", "partsdf.py", None, 0,
+          "reconstruct --family families/chairs --model chairs --config configs/chairs.toml --shapes 3 "
+          "--iterations 200 --resolution 128 --threads 1", 90, "families/"),
+    Table("partsdf-reconstruct-mixers.md", "partsdf.py", None, 0,
+          "reconstruct --family families/mixers --model mixers --config configs/mixers.toml --shapes 3 "
+          "--iterations 200 --resolution 192 --threads 1", 120, "families/"),
+    Table("partsdf-ablations-cars.md", "partsdf.py", None, 0,
+          "ablations --family families/cars-small --epochs 84 --width 96 --shapes 4 --iterations 150 "
+          "--points 1024 --resolution 128 --threads 1", 900, "families/"),
+    Table("partsdf-robots.md", "partsdf.py", None, 0,
+          "robots --parts {data}/parts/robot_arm --held ur5,ur10e --epochs 400 --iterations 200 "
+          "--resolution 128 --threads 1", 120),
+    Table("partsdf-speed.md", "partsdf.py", None, 0, "speed --model chairs", 60),
+    Table("anchors.md", "anchors.py", "--names bracket --peers coacd", 2, "", 20, "the peers"),
+    Table("batch.md", "batch.py", "--shapes 8 --kills 4", 3, "--shapes 200 --kills 20", 30),
+    Table("throughput.md", "throughput.py", "--names mug,bracket", 2, "--shapes {data}", 20),
+    Table("scaling.md", "scaling.py", None, 0, "--shapes {data} --name bunny", 15),
+    Table("stability.md", "stability.py", "--names mug --turns 1 --seeds 2 --quality draft", 2,
+          "--shapes {data} --names mug,bunny --turns 2 --seeds 3 --quality normal", 30),
+    Table("inputs.md", "inputs.py", "--quality draft mug", 2,
+          "--shapes {data} --seeds 0,1,2 bunny chair_kk f360_crank_web ttt_angle_bracket", 60),
+    Table("semantics.md", "semantics.py", None, 0, "--shapes {data}", 60),
+    Table("enrichment.md", "enrichment.py", None, 0, "--shapes {data} --rows build/enrichment.csv", 60),
+    Table("textures.md", "textures.py", None, 0,
+          "--shapes {data} --output benchmarks/results/textures.md", 30),
+    Table("round_trips.md", "round_trips.py", "", 3, "", 3, "the extra cad"),
+    Table("fuzz.md", "fuzz.py", "--files 100 --commands 60", 2, "--files 500 --commands 500 --seed 0", 15),
+    Table("kernel.md", "kernel.py", "--turns 3", 1, "", 3),
+    Table("startup.md", "startup.py", "now={root} --runs 5", 0.5,
+          "now={root} --output benchmarks/results/startup.md", 2),
+)  # fmt: skip
+
+
+def run(table: Table, full: bool, data: str) -> tuple[str, float]:
+    """How it ended, "made" or "failed", and the minutes it took; says its last lines where it failed."""
+    arguments = (table.full if full else table.quick) or ""
+    place = ROOT if full else QUICK
+    words = arguments.format(data=data, root=ROOT).split()
+    started = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, f"benchmarks/{table.script}", *words],
+        cwd=place, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+    )  # fmt: skip
+    if done.returncode:
+        print("\n".join((done.stdout + done.stderr).splitlines()[-5:]), file=sys.stderr)
+    return "failed" if done.returncode else "made", (time.monotonic() - started) / 60
+
+
+def listing() -> str:
+    """The tables in Markdown."""
+    lines = ["| table | script | quick, minutes | full, minutes |", "|---|---|---|---|"]
+    for table in TABLES:
+        quick = "-" if table.quick is None else f"`{table.quick}` {table.quick_minutes:g}"
+        needs = f" (needs {table.needs})" if table.needs else ""
+        lines.append(
+            f"| {table.output} | {table.script} | {quick} | `{table.full}` {table.full_minutes:g}{needs} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    option = parser.add_argument
+    option("--full", action="store_true", help="as committed, into benchmarks/results")
+    option("--data", default="", metavar="FOLDER", help="the shapes of the full mode")
+    option("--only", default="", metavar="A,B", help="only these tables, by their script's name")
+    option("--list", action="store_true", help="say what there is, and run nothing")
+    given = parser.parse_args()
+    if given.list:
+        print(listing())
+        return 0
+    if given.full and not Path(given.data, "index.json").is_file():
+        parser.error("--full: --data FOLDER has to hold an index.json")
+    if not given.full:
+        shutil.rmtree(QUICK, ignore_errors=True)
+        shutil.copytree(ROOT / "benchmarks", QUICK / "benchmarks", ignore=shutil.ignore_patterns("*.csv"))
+        shutil.copytree(ROOT / "examples", QUICK / "examples")
+    only = set(filter(None, given.only.split(",")))
+    failed = 0
+    for table in TABLES:
+        if only and table.script.removesuffix(".py") not in only:
+            continue
+        if (table.full if given.full else table.quick) is None:
+            print(f"{table.output}: only in the full mode")
+            continue
+        how, minutes = run(table, given.full, given.data)
+        failed += how == "failed"
+        print(f"{table.output}: {how} in {minutes:.1f} minutes", flush=True)
+    return min(failed, 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
