@@ -134,7 +134,7 @@ def collide(
     solids = Solids()
     before = {link.name: solids.target(link, link.collisions) for link in links}
     wanted = {
-        link.name: solids.target(link, link.visuals)
+        link.name: solids.target(link, link.visuals, sheets=True)
         if options.enclose and link.visuals
         else before[link.name]
         for link in links

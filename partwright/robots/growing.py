@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _POINTS, _MANY = 20_000, 100_000  # of the triangles: to grow by, and to be sure by
 _ROUNDS = 16
 _MARGIN = 1e-6  # of the size: room for rounding, twice as much in each round
-_BEYOND = 1.2  # times what sticks out: between two points that do, others may stick out more
+_BEYOND = 0.2  # of what sticks out, more in each round: between two points that do, others may stick out more
 _SEGMENTS = 64
 
 
@@ -40,9 +40,10 @@ def enclosed(shapes: Sequence[Shape], target: Target) -> list[Shape]:
             count = _MANY
             continue
         outside = np.stack([outside_of(shape, points) for shape in shapes])
+        more = 1 + _BEYOND * (1 + turn)
         nearest, far = outside.argmin(axis=0), outside.min(axis=0)
         for i in np.unique(nearest):
-            shapes[i] = _larger(shapes[i], _BEYOND * float(far[nearest == i].max()) + room)
+            shapes[i] = _larger(shapes[i], more * float(far[nearest == i].max()) + room)
     return shapes
 
 

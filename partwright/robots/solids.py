@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.errors import (
+    FlatShapeError,
     MissingDependencyError,
     OpenShellError,
     PartwrightError,
@@ -72,17 +73,19 @@ class Solids:
     """Reads each mesh file once."""
 
     def __init__(self) -> None:
-        self._read: dict[Path, Target] = {}
+        self._read: dict[tuple[Path, bool], Target] = {}
 
-    def target(self, link: Link, uses: Sequence[MeshUse]) -> Target:
+    def target(self, link: Link, uses: Sequence[MeshUse], sheets: bool = False) -> Target:
         """All of these meshes as one.
+
+        sheets: those without thickness are wrapped, as what is seen often has them, for a label say.
 
         Raises:
             PartwrightError: one of them cannot be read, or encloses nothing; the message names the link.
         """
         from manifold3d import Manifold, OpType
 
-        read = [self._of(link, use) for use in uses]
+        read = [self._of(link, use, sheets) for use in uses]
         solid, wrap = (
             Manifold.batch_boolean(
                 [one.transform(use.matrix[:3]) for one, use in zip(kind, uses, strict=True)], OpType.Add
@@ -97,24 +100,29 @@ class Solids:
         notes = dict.fromkeys(note for one in read for note in one.notes)
         return Target(solid, wrap, np.concatenate(vertices), np.concatenate(faces), tuple(notes))
 
-    def _of(self, link: Link, use: MeshUse) -> Target:
+    def _of(self, link: Link, use: MeshUse, sheets: bool) -> Target:
         if not np.isfinite(use.matrix).all() or abs(np.linalg.det(use.matrix[:3, :3])) < 1e-30:
             raise RobotError(f"link {link.name!r}: the scale of {use.source.name} leaves nothing of it")
-        if use.source not in self._read:
+        key = use.source, sheets
+        if key not in self._read:
             try:
-                self._read[use.source] = _read(use)
+                self._read[key] = _read(use, sheets)
             except PartwrightError as error:
                 raise type(error)(f"link {link.name!r}: {use.source.name}: {error}") from error
-        return self._read[use.source]
+        return self._read[key]
 
 
-def _read(use: MeshUse) -> Target:
-    """The file's own triangles, and the solid that they bound: as they are, repaired, or wrapped."""
+def _read(use: MeshUse, sheets: bool) -> Target:
+    """The file's own triangles, and the solid that they bound: as they are, repaired, or wrapped.
+
+    Raises:
+        FlatShapeError: they bound none, and are no `sheets` that are to be wrapped.
+    """
     source = source_of(use.inline) if use.inline is not None else _source(use.source)
     vertices = np.concatenate([piece.vertices for piece in source.pieces])
     starts = np.cumsum([0, *(len(piece.vertices) for piece in source.pieces)])
     faces = np.concatenate([p.faces + start for p, start in zip(source.pieces, starts, strict=False)])
-    with suppress(OpenShellError):
+    with suppress(OpenShellError, *((FlatShapeError,) if sheets else ())):
         shape = InputShape(source)
         solid = _manifold(shape.vertices, shape.faces)
         if solid is not None:
