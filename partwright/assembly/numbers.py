@@ -1,0 +1,206 @@
+"""Numbers of parts by name, and edits of them that take along what depended on them.
+
+`with_numbers(assembly, {"base_plate.height": 12, "hole*.diameter": 6})` sets numbers; what stood flush on a
+face that moves goes with it, cuts that went through still do, and cuts of one face keep their depth.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.tree import Assembly, Node, Part
+from partwright.errors import ParameterError
+
+_FLUSH = 2e-3  # of the assembly's longest side: faces that are nearer touch
+_ALONG = 1e-3  # radians: axes that differ by less are parallel
+_STRETCHED = ("cylinder", "tube", "extrusion", "capsule")
+
+
+@dataclass(frozen=True)
+class Edited:
+    """The assembly with its new numbers, and what was changed because of them, a sentence each."""
+
+    assembly: Assembly
+    changed: tuple[str, ...]
+    followed: tuple[str, ...]
+
+
+def numbers_of(part: Part) -> dict[str, float]:
+    """The part's numbers by name: those of its field ("radius", "diameter", "size.x") and its place ("x")."""
+    found: dict[str, float] = {}
+    for entry in dataclasses.fields(part.field):  # type: ignore[arg-type]
+        value = getattr(part.field, entry.name)
+        if isinstance(value, float):
+            found[entry.name] = value
+            if entry.name.endswith("radius"):
+                found[entry.name.replace("radius", "diameter")] = 2 * value
+        elif entry.name == "size":
+            found |= {f"size.{axis}": v for axis, v in zip("xyz", value, strict=True)}
+    return found | dict(zip("xyz", part.translation, strict=True))
+
+
+def with_numbers(assembly: Assembly, values: Mapping[str, float]) -> Edited:
+    """The assembly with these numbers.
+
+    values: by "part.number", lengths in the assembly's unit and angles in degrees; the part's name may be a
+    pattern ("hole*.diameter"). Copies of a part change with it.
+
+    Raises:
+        ParameterError: no part or number has the name, or a field does not allow its number.
+    """
+    changed: list[str] = []
+    followed: list[str] = []
+    for name, value in values.items():
+        wanted, number = _split(assembly, name)
+        for part_name in wanted:
+            before = assembly[part_name]
+            after = _with_number(before, number, value)
+            old = numbers_of(before)[number]
+            changed.append(f"{part_name}.{number}: {old:.6g} to {value:.6g}")
+            moves = list(_moves(before, after))
+            assembly = assembly.replace_part(part_name, after)
+            if number not in ("x", "y", "z"):
+                assembly = _follow(assembly, before, moves, followed)
+    return Edited(assembly, tuple(changed), tuple(followed))
+
+
+def _split(assembly: Assembly, name: str) -> tuple[list[str], str]:
+    """Names of the parts and the number that are meant."""
+    known = [part.name for part in assembly.parts]
+    for i in range(len(name)):
+        if name[i] != ".":
+            continue
+        wanted = [one for one in known if one == name[:i] or fnmatchcase(one, name[:i])]
+        if wanted:
+            for one in wanted:
+                numbers = numbers_of(assembly[one])
+                if name[i + 1 :] not in numbers:
+                    raise ParameterError(
+                        f"{one!r} is a {assembly[one].field.kind} and has no number {name[i + 1 :]!r}; "
+                        f"it has {', '.join(numbers)}"
+                    )
+            return wanted, name[i + 1 :]
+    raise ParameterError(
+        f"{name!r}: expected PART.NUMBER, and the parts are {', '.join(known[:20])}"
+        + (" ..." if len(known) > 20 else "")
+    )
+
+
+def _with_number(part: Part, number: str, value: float) -> Part:
+    if number in ("x", "y", "z"):
+        place = list(part.translation)
+        place["xyz".index(number)] = value
+        return dataclasses.replace(part, translation=(place[0], place[1], place[2]))
+    if "diameter" in number:
+        number, value = number.replace("diameter", "radius"), value / 2
+    new: dict[str, Any] = {number: value}
+    if number.startswith("size."):
+        size = list(part.field.size)  # type: ignore[attr-defined]
+        size["xyz".index(number[-1])] = value
+        new = {"size": tuple(size)}
+    return dataclasses.replace(part, field=dataclasses.replace(part.field, **new))  # type: ignore[type-var]
+
+
+@dataclass(frozen=True)
+class _Move:
+    """The two faces of a part along one of its axes: where they were, and where they are."""
+
+    axis: np.ndarray
+    before: tuple[float, float]
+    after: tuple[float, float]
+
+
+def _extent(part: Part, axis: np.ndarray) -> tuple[float, float]:
+    """From where to where the part, not its copies, reaches along a direction (3,)."""
+    local = np.stack([-axis, axis]) @ rotation_matrix(part.rotation)
+    low, high = part.field.support(local)
+    at = float(np.array(part.translation) @ axis)
+    return at - float(low), at + float(high)
+
+
+def _moves(before: Part, after: Part) -> Iterator[_Move]:
+    for axis in rotation_matrix(before.rotation).T:
+        old, new = _extent(before, axis), _extent(after, axis)
+        if old != new:
+            yield _Move(axis, old, new)
+
+
+def _follow(assembly: Assembly, part: Part, moves: list[_Move], told: list[str]) -> Assembly:
+    """What depended on the part's faces, moved with them."""
+    near = _FLUSH * float(np.ptp(assembly.bounds(), axis=0).max())
+
+    def visited(node: Node, cut: bool) -> Node:
+        """cut: whether the node is taken away from what holds the part."""
+        if isinstance(node, Part):
+            return node if node.name == part.name else _moved(node, part, moves, near, cut, told)
+        holds = any(leaf.name == part.name for leaf in node.children[0].parts)
+        if any(leaf.name == part.name for leaf in node.parts) or cut:
+            inner = node.operation == "difference" and holds
+            children = [visited(c, cut or (inner and i > 0)) for i, c in enumerate(node.children)]
+            return dataclasses.replace(node, children=tuple(children))
+        first = node.parts[0]
+        shift = sum((_shift(first, move, near) * move.axis for move in moves), np.zeros(3))
+        if not shift.any():
+            return node
+        told.append(f"{first.name} and what is cut from it moved with {part.name}, on whose face it stands")
+        return node.translated(shift.tolist())
+
+    result = visited(assembly, False)
+    assert isinstance(result, Assembly)
+    return result
+
+
+def _shift(other: Part, move: _Move, near: float) -> float:
+    """How far a part that stands on a face moves with it."""
+    low, high = _extent(other, move.axis)
+    if not np.isfinite([low, high]).all():
+        return 0.0
+    if abs(low - move.before[1]) <= near:
+        return move.after[1] - move.before[1]
+    return move.after[0] - move.before[0] if abs(high - move.before[0]) <= near else 0.0
+
+
+def _moved(other: Part, part: Part, moves: list[_Move], near: float, cut: bool, told: list[str]) -> Part:
+    for move in moves:
+        low, high = _extent(other, move.axis)
+        if not np.isfinite([low, high]).all():
+            continue
+        rise, fall = move.after[1] - move.before[1], move.after[0] - move.before[0]
+        below, above = low <= move.before[0] + near, high >= move.before[1] - near
+        if not cut:
+            shift = _shift(other, move, near)
+            if shift:
+                told.append(
+                    f"{other.name} moved by {shift:.6g} with the face of {part.name} that it stands on"
+                )
+                other = other.translated((shift * move.axis).tolist())
+        elif below and above:
+            longer = _stretched(other, move.axis, rise - fall)
+            if longer is not None:
+                told.append(f"{other.name} goes through {part.name} as before")
+                other = longer.translated(((rise + fall) / 2 * move.axis).tolist())
+        elif (above and low < move.before[1]) or (below and high > move.before[0]):
+            shift = rise if above else fall
+            told.append(f"{other.name} moved by {shift:.6g} with the face of {part.name}: its depth is kept")
+            other = other.translated((shift * move.axis).tolist())
+    return other
+
+
+def _stretched(part: Part, axis: np.ndarray, by: float) -> Part | None:
+    """Longer along the direction; None where no number of it is its length that way."""
+    local = np.abs(axis @ rotation_matrix(part.rotation))
+    k = int(local.argmax())
+    if local[k] < 1 - _ALONG:
+        return None
+    if part.field.kind == "box":
+        return _with_number(part, f"size.{'xyz'[k]}", numbers_of(part)[f"size.{'xyz'[k]}"] + by)
+    if k == 2 and part.field.kind in _STRETCHED:
+        return _with_number(part, "height", numbers_of(part)["height"] + by)
+    return None

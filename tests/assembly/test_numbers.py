@@ -1,0 +1,95 @@
+"""Numbers set by name, and what follows: parts on a face, cuts through it, cuts of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from partwright.assembly import Assembly, Part, Similarity, load_assembly
+from partwright.assembly.numbers import numbers_of, with_numbers
+from partwright.cli.main import main
+from partwright.errors import ParameterError
+from partwright.fields import Box, Cylinder
+from partwright.meshing import mesh_assembly
+
+
+def bracket() -> Assembly:
+    """A plate 5 thick from z = 0, two holes through it, a pocket 2 deep in its top, a foot under it, and a
+    boss on it with a hole of its own."""
+    hole = Part(Cylinder(2, 7), (15, 0, 2.5), name="hole", instances=(Similarity(translation=(-30, 0, 0)),))
+    pocket = Part(Box((6, 6, 3)), (8, 0, 4.5), name="pocket")
+    plate = Assembly((Part(Box((40, 20, 5)), (0, 0, 2.5), name="base_plate"), hole, pocket), "difference")
+    boss = Assembly(
+        (Part(Cylinder(4, 10), (0, 0, 10), name="boss"), Part(Cylinder(1, 30), name="bore")), "difference"
+    )
+    foot = Part(Box((4, 4, 3)), (0, 0, -1.5), name="foot")
+    return Assembly((plate, boss, foot), unit="mm")
+
+
+def test_a_thicker_plate_takes_along_what_it_carries() -> None:
+    edited = with_numbers(bracket(), {"base_plate.size.z": 9.0})
+    after = edited.assembly
+    assert edited.changed == ("base_plate.size.z: 5 to 9",)
+    assert after["hole"].field == Cylinder(2, 11)
+    assert after["hole"].translation == (15, 0, 2.5)
+    assert after["pocket"].translation[2] == pytest.approx(6.5)
+    assert after["boss"].translation[2] == pytest.approx(12)
+    assert after["foot"].translation[2] == pytest.approx(-3.5)
+    assert len(edited.followed) == 4
+    assert "hole goes through base_plate as before" in edited.followed
+    mesh, before = mesh_assembly(after), mesh_assembly(bracket())
+    assert mesh.euler_number == before.euler_number
+    holes = 2 * 3.1416 * 4 * 4
+    assert mesh.volume - before.volume == pytest.approx(40 * 20 * 4 - holes - 3.1416 * 4, rel=0.01)
+
+
+def test_copies_change_together_and_patterns_name_several() -> None:
+    after = with_numbers(bracket(), {"hole.diameter": 6.0}).assembly
+    assert after["hole"].field == Cylinder(3, 7)
+    assert len(after["hole"].copies) == 2
+    wider = with_numbers(bracket(), {"bo*.radius": 1.5})
+    assert [after.radius for name in ("boss", "bore") if (after := wider.assembly[name].field)] == [1.5, 1.5]
+    assert len(wider.changed) == 2
+    assert with_numbers(bracket(), {"foot.x": 3}).assembly["foot"].translation == (3, 0, -1.5)
+    assert numbers_of(bracket()["hole"])["diameter"] == 4
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("lid.radius", 1.0, "the parts are base_plate, hole"),
+        ("hole", 1.0, "expected PART.NUMBER"),
+        ("hole.size.x", 1.0, "has no number 'size.x'; it has radius, diameter, height, x, y, z"),
+        ("hole.radius", -1.0, "radius"),
+    ],
+)
+def test_what_cannot_be_set_is_named(name: str, value: float, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        with_numbers(bracket(), {name: value})
+
+
+def test_the_command_takes_units_and_says_what_followed(tmp_path: Path, capsys: Any) -> None:
+    source, target = tmp_path / "a.json", tmp_path / "b.json"
+    bracket().save(source)
+    words = [
+        "edit",
+        str(source),
+        "--set",
+        "base_plate.size.z=0.9cm",
+        "--set",
+        "hole.diameter = 6mm",
+        "-o",
+        str(target),
+    ]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert (
+        "base_plate.size.z: 5 to 9\nhole.diameter: 4 to 6\n  hole goes through base_plate as before" in said
+    )
+    assert load_assembly(target)["hole"].field == Cylinder(3, 11)
+    for bad in ("hole.diameter=", "hole.radius=3parsecs", "lid.radius=2"):
+        assert main(["edit", str(source), "--set", bad, "-o", str(tmp_path / "c.json")]) == 2
+    assert main(["edit", str(source), "--set", "hole.radius=1", "-o", str(tmp_path / "c.stl")]) == 2
+    assert not (tmp_path / "c.json").exists()
