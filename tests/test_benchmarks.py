@@ -22,7 +22,7 @@ for name in sys.argv[1:]:
     try:
         importlib.import_module(name)
     except ModuleNotFoundError as error:
-        if error.name not in ("coacd", "fast_simplification"):
+        if error.name not in ("coacd", "fast_simplification", "ray"):
             raise
 """
 
