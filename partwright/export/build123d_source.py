@@ -113,6 +113,7 @@ def _table(part: SourcePart, unit: str | None) -> Iterator[str]:
     yield f"# {part.title}: {part.part.field.kind}"
     for parameter in part.parameters:
         text, meaning = parameter.line("()", unit)
+        text = parameter.same_as.upper() if parameter.same_as else text
         yield f"{parameter.variable.upper()} = {text}  # {meaning}"
     yield ""
 

@@ -44,17 +44,22 @@ MEANING = {
 }
 _LEAN = "by which the walls lean inwards on their way up"
 _NO_UNIT = ("roundness", "taper", "bulge", "onion", "count", "poses")
+_SHARED = ("radius", "height", "thickness", "bottom_radius", "top_radius", "major_radius", "minor_radius")
 Value = float | tuple[Any, ...]
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One line of the table on top: `variable` = `value`, a number, three, or a list of such."""
+    """One line of the table on top: `variable` = `value`, a number, three, or a list of such.
+
+    same_as: the variable of an earlier part's parameter of this name and value, which stands in its place.
+    """
 
     variable: str
     name: str
     value: Value
     of_profile: bool = False
+    same_as: str | None = None
 
     def line(self, brackets: str, unit: str | None) -> tuple[str, str]:
         """The value in the language's brackets, and what is said of it."""
@@ -62,7 +67,8 @@ class Parameter:
         measure = "degrees" if angles else None if self.name in _NO_UNIT else unit
         said = _LEAN if self.name == "taper" and self.of_profile else MEANING.get(self.name)
         said = said or meaning(self.name) or self.name
-        return literal(self.value, brackets), f"{measure}: {said}" if measure else said
+        value = self.same_as or literal(self.value, brackets)
+        return value, f"{measure}: {said}" if measure else said
 
 
 @dataclass(frozen=True)
@@ -100,7 +106,7 @@ def source_parts(
     functions = identifiers([part.name for part in parts], reserved)
     wanted = [f"{f}_{name}" for f, own in zip(functions, values, strict=True) for name in own]
     variables = iter(identifiers(wanted, [*reserved, *functions]))
-    return [
+    found = [
         SourcePart(
             f,
             part,
@@ -112,6 +118,22 @@ def source_parts(
         )
         for f, part, own, copies in zip(functions, parts, values, patterns, strict=True)
     ]
+    return _each_length_once(found)
+
+
+def _each_length_once(parts: list[SourcePart]) -> list[SourcePart]:
+    """Lengths of one name that are equal are typed once: a change of the first changes all."""
+    first: dict[tuple[str, str], str] = {}
+    result = []
+    for part in parts:
+        own = []
+        for parameter in part.parameters:
+            key = parameter.name, literal(parameter.value, "()")
+            shared = first.get(key) if parameter.name in _SHARED else None
+            own.append(dataclasses.replace(parameter, same_as=shared))
+            first.setdefault(key, parameter.variable)
+        result.append(dataclasses.replace(part, parameters=tuple(own)))
+    return result
 
 
 def _placed(
