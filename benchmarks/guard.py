@@ -3,7 +3,7 @@
     python benchmarks/guard.py             # exits with 1 where a fit became worse or slower than its noise
     python benchmarks/guard.py --record    # writes benchmarks/results/guard.json anew; say why in the commit
 
-Quality is the IoU and the number of parts: the same bytes on one machine, nearly so on others, hence small
+Quality is the IoU and the number of parts: the same bytes on one machine, nearly so on others, hence the
 margins. Speed is the fit's CPU time over that of a fixed computation with NumPy, which runs between the fits:
 what makes the machine slower makes both slower. The cheapest of a few turns counts.
 """
@@ -25,9 +25,9 @@ from partwright.atomic_io import write_bytes
 
 REFERENCE = Path(__file__).parent / "results" / "guard.json"
 TURNS = 2
-LOST_IOU = 0.004
-MORE_PARTS = 0.1  # of the parts, and one at least
-SLOWER = 1.8  # times: on one machine, idle and crowded, runs differ by up to 1.4
+LOST_IOU = 0.01  # another processor rounds otherwise, and a search may then end elsewhere, as by another seed
+MORE_PARTS = 0.2  # of the parts, and two at least
+SLOWER = 3.0  # times: idle or crowded, one machine differs by 1.4; narrow vectors cost a fit more
 
 
 def mallet() -> trimesh.Trimesh:
@@ -103,7 +103,7 @@ def worse(now: dict[str, dict[str, float]], before: dict[str, dict[str, float]])
         got = now[name]
         if got["iou"] < was["iou"] - LOST_IOU:
             lines.append(f"{name}: IoU {got['iou']:.4f}, was {was['iou']:.4f}")
-        if got["parts"] > was["parts"] + max(1, MORE_PARTS * was["parts"]):
+        if got["parts"] > was["parts"] + max(2, MORE_PARTS * was["parts"]):
             lines.append(f"{name}: {got['parts']:g} parts, was {was['parts']:g}")
         if got["time"] > SLOWER * was["time"]:
             lines.append(f"{name}: {got['time']:g} times the yardstick, was {was['time']:g}")
