@@ -15,6 +15,7 @@ without reading and scoring.
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 import threading
 import time
@@ -107,7 +108,10 @@ def ours(
 def runs_of(entry: Entry, name: str, where: Path | None, keep: Path | None) -> list[Run]:
     """The peer on the shape, and ours beside it."""
     peer, shape = PEERS[name], pw.load_shape(entry.path)
-    made = [(peer.run(shape, where), "")]
+    try:
+        made = [(peer.run(shape, where), "")]
+    except subprocess.TimeoutExpired as error:
+        made = [(Made(0, error.timeout, None, "stopped: no result in so many seconds of the clock"), "")]
     if made[0][0].parts:
         made.append(ours(shape, peer.beside, parts=made[0][0].parts))
         made.append(ours(shape, peer.beside, seconds=made[0][0].cpu_seconds))
