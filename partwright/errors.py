@@ -137,6 +137,10 @@ class ObjectiveError(PartwrightError):
     """An objective fails, or its number or derivative is missing or not finite."""
 
 
+class SimulationError(PartwrightError):
+    """A flow simulation failed, diverged, or did not end in its time."""
+
+
 class WorkerError(PartwrightError):
     """A worker process crashed, or was killed past its limit of time or memory."""
 

@@ -74,6 +74,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         default=64,
         help="cells along the longest side (default: %(default)s)",
     )
+    option(
+        "--simulate",
+        metavar="AXIS",
+        help="at the end, the drag before and after by OpenFOAM, the air moving along x, -y ... (minutes)",
+    )
     limits = command.add_argument_group("how far parts may go").add_argument
     limits(
         "--reach",

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from partwright.assembly import Assembly
+from partwright.assembly import Assembly, Similarity
 from partwright.errors import NoSurfaceError
+from partwright.fields.joint import JointField
 from partwright.goals.composite import Composite
 from partwright.goals.parameters import Parameters
 from partwright.meshing import mesh_part
@@ -53,8 +54,8 @@ def contacts(assembly: Assembly, pairs: list[tuple[int, int]] | None = None) -> 
 
 
 def allowed(contact: Contact, longest: float) -> float:
-    """The depth that is to be kept of a contact at the start."""
-    return _KEPT * contact.depth if contact.depth < 0 else contact.depth + 1e-4 * longest
+    """The depth that is to be kept of a contact at the start; of a shallow one, that it touches."""
+    return _KEPT * contact.depth if _KEPT * contact.depth < -_TOUCH * longest else _TOUCH * longest
 
 
 def contact_gradients(parameters: Parameters, found: list[Contact]) -> np.ndarray:
@@ -76,6 +77,9 @@ def contact_gradients(parameters: Parameters, found: list[Contact]) -> np.ndarra
 
 def _surface(assembly: Assembly, index: int) -> np.ndarray:
     try:
-        return np.asarray(mesh_part(assembly.parts[index], _CELLS).vertices)
+        part = assembly.parts[index]
+        if isinstance(part.field, JointField):  # a coarse mesh that all parts of its shape share
+            return Similarity(1.0, part.rotation, part.translation)(part.field.preview().vertices)
+        return np.asarray(mesh_part(part, _CELLS).vertices)
     except NoSurfaceError:
         return np.zeros((0, 3))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 POSITION, ROTATION, FORM, BLEND, LATENT = "position", "rotation", "form", "blend", "latent"
 GROUPS = (POSITION, ROTATION, FORM, BLEND, LATENT)
+MOST = 5.0  # unit of a share or an angle: what is small turns and bends by no more in a step
 
 
 @dataclass(frozen=True)

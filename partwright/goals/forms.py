@@ -11,7 +11,7 @@ from torch import Tensor
 
 from partwright.errors import ParameterError
 from partwright.fields import Field, Solid, SuperFrustum, reference
-from partwright.goals.entry import FORM, Entry
+from partwright.goals.entry import FORM, MOST, Entry
 
 _STEP = 1e-6  # of a number, for differences of rational functions in double precision
 _LEAST = 5e-3  # of the longest side: no length shrinks below
@@ -49,7 +49,8 @@ class FrustumForm:
 
     def entries(self, longest: float) -> list[Entry]:
         half = max(min(self.own.size[:2]) / 2, _LEAST * longest)
-        share, least = longest / half, _LEAST * longest
+        share, least = min(longest / half, MOST), _LEAST * longest
+        bend = min(2 * longest / max(self.own.size[2], least), MOST)
         values = self.own.parameters()
         result = [
             Entry(f"size_{axis}", FORM, value, longest, min(value, least))
@@ -60,7 +61,7 @@ class FrustumForm:
             Entry("roundness", FORM, values[3], share, 0.0, 1.0),
             Entry("dilation", FORM, values[4], longest, 0.0),
             Entry("taper", FORM, values[5], share, 0.0, 2.0),
-            Entry("bulge", FORM, values[6], share, 0.0, 1.0),
+            Entry("bulge", FORM, values[6], bend, 0.0, 1.0),
             Entry("onion", FORM, values[7], share, 0.0, 1.0),
         ]
         return result

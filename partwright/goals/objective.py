@@ -34,10 +34,12 @@ class Objective:
 
     prepare: from its argument (what follows "@"; "" where nothing does) and the start to the measure. Raises
     SettingError for an argument that it cannot use. power: of length, in which it is measured (a volume: 3).
+    labelled: whether it asks which part a face is of. Labels are all 0 where no objective does.
     """
 
     prepare: Callable[[str, Start], Measure]
     power: int
+    labelled: bool = True
 
 
 @dataclass(frozen=True)

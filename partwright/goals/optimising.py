@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,15 @@ import trimesh
 from partwright.assembly import Assembly
 from partwright.atomic_io import replacing_files
 from partwright.goals.curves import curves
+from partwright.goals.objectives.axes import axis
+from partwright.goals.openfoam import Air, simulate
 from partwright.goals.pictures import before_and_after, trajectory
 from partwright.goals.problem import Options, Point, Problem
 from partwright.goals.report import report
 from partwright.goals.search import Ending, Found, Step, search
 from partwright.goals.wanted import Bound, Wanted
 from partwright.methods import Cancellation, interruptible
+from partwright.shapes import METRES
 
 FILES = ("assembly.json", "surface.ply", "report.json", "before_after.png", "trajectory.gif", "curves.png")
 
@@ -30,6 +34,23 @@ class Optimised:
     problem: Problem
     found: Found
     seconds: float
+    simulated: dict[str, Any] = field(default_factory=dict)
+    """What a flow simulation of the start and the result says, where one was asked for."""
+
+    def with_simulation(self, axis_name: str, air: Air | None = None) -> Optimised:
+        """The same, with the drag of both ends by OpenFOAM, the air moving along an axis ("x", "-y" ...).
+
+        Raises:
+            MissingDependencyError: OpenFOAM is not installed.
+            SimulationError: a simulation failed, diverged or took too long.
+        """
+        flow, metres = axis(axis_name, "x", "simulate"), METRES.get(self.start.unit or "m", 1.0)
+        ends = {"before": self.found.points[0], "after": self._best}
+        found: dict[str, Any] = {"program": "OpenFOAM, simpleFoam, k-omega SST", "flow": axis_name}
+        with tempfile.TemporaryDirectory(prefix="partwright-") as folder:
+            for name, point in ends.items():
+                found[name] = simulate(point.surface, flow, Path(folder, name), air, metres).to_dict()
+        return replace(self, simulated=found)
 
     @property
     def start(self) -> Assembly:
@@ -63,7 +84,8 @@ class Optimised:
         return self.found.points[-1]
 
     def to_dict(self) -> dict[str, Any]:
-        return report(self.problem, self.found, self.seconds, self.kept)
+        simulated = {"simulated": self.simulated} if self.simulated else {}
+        return report(self.problem, self.found, self.seconds, self.kept) | simulated
 
     def save(self, folder: str | Path) -> None:
         """Write assembly, surface, report and pictures into a folder, all or none.

@@ -15,7 +15,7 @@ from partwright.fields import Field
 from partwright.fields.joint import JointField
 from partwright.fields.operations import SHARP
 from partwright.fields.superfrustum import SuperFrustum, tightest_bulge
-from partwright.goals.entry import BLEND, POSITION, ROTATION, Entry
+from partwright.goals.entry import BLEND, MOST, POSITION, ROTATION, Entry
 from partwright.goals.forms import Form, form_of
 from partwright.goals.learned import LearnedForm
 
@@ -110,7 +110,7 @@ def _pose_entries(part: Part, longest: float) -> list[Entry]:
         Entry(f"t{axis}", POSITION, value, longest)
         for axis, value in zip("xyz", part.translation, strict=True)
     ]
-    return places + [Entry(f"w{axis}", ROTATION, 0.0, longest / reach) for axis in "xyz"]
+    return places + [Entry(f"w{axis}", ROTATION, 0.0, min(longest / reach, MOST)) for axis in "xyz"]
 
 
 def _allowed(form: Form, old: np.ndarray, new: np.ndarray) -> Field:

@@ -16,9 +16,13 @@ from partwright.goals.gradient import parameter_gradient
 from partwright.goals.objective import Measure, Measured, Start, measured
 from partwright.goals.parameters import Parameters
 from partwright.goals.regions import TrainedRegion
-from partwright.goals.surface import face_labels, pieces, surface_of
-from partwright.goals.wanted import Bound, Wanted, bounded, frozen_entries, measure_of
+from partwright.goals.surface import face_labels, pieces, surface_of, thin_parts
+from partwright.goals.wanted import Bound, Wanted, asks_for_labels, bounded, frozen_entries, measure_of
 from partwright.methods import check_count, check_number
+
+# What counts as the size of a share that is small, and of a length that is 0, as a share of the longest side.
+_SHARE, _LENGTH = 0.2, 0.05
+_THIN = 1.3  # cells: walls at the start that leave a part no room to become thinner
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,14 @@ class Problem:
             raise SettingError("there is no objective; give at least one")
         self.options, self.wanted = options, list(wanted)
         self.parameters = Parameters(assembly)
-        self.free = ~frozen_entries(self.parameters, tuple(freeze))
+        frozen = frozen_entries(self.parameters, tuple(freeze))
+        self.cell = self.parameters.longest / options.resolution
+        self.thin = thin_parts(assembly, _THIN * self.cell)
+        for i in self.thin:
+            frozen[self.parameters.slices[i]] = True
+        if frozen.all():
+            raise SettingError("every part that is free is thinner than a cell: give a higher resolution")
+        self.free = ~frozen
         self.lower, self.upper = self._limits([b for b in bounds if b.of_parameter])
         self.bounds = [b for b in bounds if not b.of_parameter]
         self.region = TrainedRegion(self.parameters)
@@ -95,7 +106,9 @@ class Problem:
         start = Start(assembly, surface, self.parameters.longest)
         self.measures: dict[str, Measure] = {}
         self.terms: dict[str, tuple[Measured, float]] = {}  # at the start, and a natural size of its numbers
+        self.labelled = False
         for name in dict.fromkeys([w.name for w in self.wanted] + [b.name for b in self.bounds]):
+            self.labelled |= asks_for_labels(name)
             self.measures[name], power = measure_of(name, start)
             self.terms[name] = (self._measured(name, assembly, surface), start.longest**power)
         touching = contacts(assembly) if options.contacts else []
@@ -119,14 +132,21 @@ class Problem:
         if entry.group == LATENT:
             return np.inf
         if entry.group in (FORM, BLEND):
-            return max(self.options.change * abs(entry.value), self.options.change * 0.05 * entry.unit)
+            own = abs(entry.value)
+            if entry.upper < np.inf:
+                return self.options.change * max(own, _SHARE)
+            return self.options.change * (own or _LENGTH * entry.unit)
         return self.options.reach * entry.unit
 
     def _measured(self, name: str, assembly: Assembly, surface: trimesh.Trimesh) -> Measured:
-        return measured(name, self.measures[name], surface, face_labels(assembly, surface))
+        return measured(name, self.measures[name], surface, self._labels(assembly, surface))
+
+    def _labels(self, assembly: Assembly, surface: trimesh.Trimesh) -> np.ndarray:
+        return face_labels(assembly, surface) if self.labelled else np.zeros(len(surface.faces), np.int64)
 
     def at(self, change: np.ndarray) -> Point | None:
-        """What a change (D,) of the variables makes; None where nothing is left, or something has come loose.
+        """What a change (D,) of the variables makes; None where nothing is left, something has come loose, or
+        a part has become thinner than a cell.
 
         Raises:
             ObjectiveError: an objective has no number there.
@@ -134,13 +154,15 @@ class Problem:
         p = self.parameters
         values = np.where(self.free & (change != 0), p.values + change * p.units, p.values)
         assembly = p.with_values(values)
+        if not set(thin_parts(assembly, self.cell)) <= set(self.thin):
+            return None
         try:
             surface = surface_of(assembly, self.options.resolution)
         except NoSurfaceError:
             return None
         if pieces(surface) > self.pieces:
             return None
-        labels = face_labels(assembly, surface)
+        labels = self._labels(assembly, surface)
         found = {name: measured(name, m, surface, labels) for name, m in self.measures.items()}
         value, sensitivity = 0.0, np.zeros_like(surface.vertices)
         for want in self.wanted:

@@ -46,6 +46,7 @@ def report(problem: Problem, found: Found, seconds: float, kept: bool) -> dict[s
         "bounds_kept": kept,
         "contacts": len(problem.touching),
         "unchanged_parts": same,
+        "too_thin_to_change": [assembly.parts[i].name for i in problem.thin],
         "free_parameters": int(problem.free.sum()),
         "parameters": _changes(problem, found),
         "triangles": len(best.surface.faces),

@@ -28,9 +28,17 @@ def surface_of(assembly: Assembly, resolution: int) -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices, np.asarray(made.tri_verts, dtype=np.int64), process=False)
 
 
+def thin_parts(assembly: Assembly, wall: float) -> list[int]:
+    """Leaves with walls thinner than this. Those thinner than a cell are meshed apart, without their blends,
+    so that the surface does not follow their numbers smoothly."""
+    return [i for i, part in enumerate(assembly.parts) if part.field.wall < wall]
+
+
 def face_labels(assembly: Assembly, mesh: trimesh.Trimesh) -> np.ndarray:
     """(F,) which leaf's own surface each face runs along: an index into `assembly.parts`."""
-    return surface_parts(assembly, np.asarray(mesh.triangles_center), np.asarray(mesh.face_normals))
+    normals = np.array(mesh.face_normals)
+    normals[~normals.any(axis=1), 2] = 1.0  # faces without area
+    return surface_parts(assembly, np.asarray(mesh.triangles_center), normals)
 
 
 def pieces(mesh: trimesh.Trimesh) -> int:

@@ -82,6 +82,11 @@ class Bound:
         return "." in self.name and _FILE.fullmatch(self.name) is None and "@" not in self.name
 
 
+def asks_for_labels(name: str) -> bool:
+    """Whether an objective of that name does; a user's function may."""
+    return _FILE.fullmatch(name) is not None or OBJECTIVES[name.partition("@")[0]].labelled
+
+
 def measure_of(name: str, start: Start) -> tuple[Measure, int]:
     """The measure of a name of the table (NAME[@ARGUMENT]) or of a user's file (FILE.py:FUNCTION), and the
     power of length in which it is measured.

@@ -7,9 +7,11 @@ import argparse
 from partwright.assembly import load_assembly
 from partwright.cli.interrupts import INTERRUPTED, stopping
 from partwright.cli.progress import Count
-from partwright.cli.terminal import counted, say, warn
-from partwright.errors import ObjectiveError
+from partwright.cli.terminal import counted, note, say, warn
+from partwright.errors import ObjectiveError, SimulationError
 from partwright.goals import Optimised, Options, Step, optimise
+from partwright.goals.objectives.axes import axis
+from partwright.goals.openfoam import check_installed
 from partwright.methods import Cancellation
 
 _ENDINGS = {
@@ -32,6 +34,9 @@ def run(arguments: argparse.Namespace) -> int:
         neighbours=arguments.neighbours,
         contacts=not arguments.no_contacts,
     )
+    if arguments.simulate is not None:
+        axis(arguments.simulate, "x", "simulate")
+        check_installed()
     cancel = Cancellation()
     with Count("optimising") as count, stopping(cancel.request):
         result = optimise(
@@ -43,6 +48,13 @@ def run(arguments: argparse.Namespace) -> int:
             progress=lambda step: count.show(step.number, step.of, _shown(step)),
             cancel=cancel,
         )
+    if arguments.simulate is not None and result.ending not in ("failed", "interrupted"):
+        note("simulating before and after")
+        try:
+            result = result.with_simulation(arguments.simulate)
+        except SimulationError:
+            result.save(arguments.output)
+            raise
     result.save(arguments.output)
     return _finish(result, arguments)
 
@@ -52,7 +64,14 @@ def _finish(result: Optimised, arguments: argparse.Namespace) -> int:
     for name, (before, after) in result.numbers.items():
         change = f"  {100 * (after / before - 1):+.1f} %" if before else ""
         say(f"{name:{wide}}  {before:.5g} -> {after:.5g}{change}")
-    if any(want.name.startswith("newtonian_drag") for want in result.problem.wanted):
+    if result.simulated:
+        before, after = (result.simulated[end] for end in ("before", "after"))
+        change = f"{100 * (after['drag_area'] / before['drag_area'] - 1):+.1f} %"
+        swing = f"the force still swings by {before['swing']:.2g} and {after['swing']:.2g}"
+        say(
+            f"OpenFOAM: drag area {before['drag_area']:.4g} -> {after['drag_area']:.4g} m2, {change}; {swing}"
+        )
+    elif any(want.name.startswith("newtonian_drag") for want in result.problem.wanted):
         say("newtonian_drag is a pressure by angle, no flow simulation: compare with one before you build")
     same = sum(a == b for a, b in zip(result.start.parts, result.assembly.parts, strict=True))
     accepted = len(result.found.points) - 1
@@ -60,6 +79,9 @@ def _finish(result: Optimised, arguments: argparse.Namespace) -> int:
     unchanged = f"{same} of {counted(len(result.assembly), 'part')} unchanged"
     say(f"{_ENDINGS[result.ending]}: {tried}, {accepted} accepted, {unchanged}")
     say(f"written to {arguments.output}")
+    if result.problem.thin:
+        names = ", ".join(result.start.parts[i].name for i in result.problem.thin)
+        warn([f"thinner than a cell and left as they are: {names}; --resolution has smaller cells"])
     if not result.kept:
         warn(["a bound is not kept: see report.json; give more steps, more reach, or another bound"])
     if result.ending == "failed":

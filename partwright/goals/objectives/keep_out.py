@@ -47,4 +47,4 @@ def _keep_out(argument: str, start: Start) -> Measure:
     return measure
 
 
-KEEP_OUT = Objective(_keep_out, power=3)
+KEEP_OUT = Objective(_keep_out, power=3, labelled=False)

@@ -54,5 +54,5 @@ def _inertia(argument: str, start: Start) -> Measure:
     return by_torch(lambda x, faces, labels: along @ moments(x, faces)[2] @ along)
 
 
-VOLUME, MASS = Objective(_volume, power=3), Objective(_mass, power=3)
-CENTRE, INERTIA = Objective(_centre, power=1), Objective(_inertia, power=5)
+VOLUME, MASS = Objective(_volume, power=3, labelled=False), Objective(_mass, power=3, labelled=False)
+CENTRE, INERTIA = Objective(_centre, power=1, labelled=False), Objective(_inertia, power=5, labelled=False)

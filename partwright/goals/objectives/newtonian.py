@@ -49,4 +49,4 @@ def _newtonian(argument: str, start: Start) -> Measure:
     return measure
 
 
-NEWTONIAN_DRAG = Objective(_newtonian, power=2)
+NEWTONIAN_DRAG = Objective(_newtonian, power=2, labelled=False)

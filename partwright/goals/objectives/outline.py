@@ -102,4 +102,7 @@ def _inside(points: np.ndarray, rings: list[np.ndarray], width: float) -> tuple[
     return inside, edge
 
 
-FRONTAL_AREA, SILHOUETTE = Objective(_frontal_area, power=2), Objective(_silhouette, power=2)
+FRONTAL_AREA, SILHOUETTE = (
+    Objective(_frontal_area, power=2, labelled=False),
+    Objective(_silhouette, power=2, labelled=False),
+)

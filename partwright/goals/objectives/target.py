@@ -48,4 +48,4 @@ def to_mesh(target: np.ndarray, triangles: np.ndarray) -> Measure:
     return measure
 
 
-DISTANCE = Objective(_distance, power=1)
+DISTANCE = Objective(_distance, power=1, labelled=False)

@@ -63,4 +63,4 @@ def _cross(x: torch.Tensor, faces: torch.Tensor) -> torch.Tensor:
     return torch.linalg.cross(b - a, c - a)
 
 
-WALL_THICKNESS = Objective(_wall_thickness, power=1)
+WALL_THICKNESS = Objective(_wall_thickness, power=1, labelled=False)
