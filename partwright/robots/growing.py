@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from partwright.robots.solids import Target
 
 _POINTS, _MANY = 20_000, 100_000  # of the triangles: to grow by, and to be sure by
-_ROUNDS = 16
+_ROUNDS, _CLEAN = 24, 5  # at most so many draws; it ends after so many in turn with nothing outside
 _MARGIN = 1e-6  # of the size: room for rounding, twice as much in each round
 _BEYOND = 0.2  # of what sticks out, more in each round: between two points that do, others may stick out more
 _SEGMENTS = 64
@@ -27,18 +27,20 @@ _SEGMENTS = 64
 
 def enclosed(shapes: Sequence[Shape], target: Target) -> list[Shape]:
     """The shapes, those grown out of which some of the target's surface sticks: each by what is nearest to
-    it. Triangles run from one shape into another, so corners are not enough: it ends when none of `_MANY`
-    fresh points is outside."""
+    it. Triangles run from one shape into another, so corners are not enough: it ends when
+    `_CLEAN` draws of `_MANY` points have none outside."""
     shapes = list(shapes)
-    count = _POINTS
+    count, clean = _POINTS, 0
     for turn in range(_ROUNDS):
-        room = 2**turn * _MARGIN * target.size
+        room = 2 ** min(turn, 10) * _MARGIN * target.size
         points = _left_out(shapes, target.samples(count, seed=turn))
-        if not len(points) and count == _MANY:
-            break
         if not len(points):
+            clean += count == _MANY
             count = _MANY
+            if clean == _CLEAN:
+                break
             continue
+        clean = 0
         outside = np.stack([outside_of(shape, points) for shape in shapes])
         more = 1 + _BEYOND * (1 + turn)
         nearest, far = outside.argmin(axis=0), outside.min(axis=0)
