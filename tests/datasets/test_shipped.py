@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from partwright.datasets.shipped import truck, write
+from partwright.robots import open_robot
 
 SHIPPED = Path(__file__).parents[2] / "examples" / "shapes"
 NAMES = ("watering_can.ply", "mug.ply", "bracket.stl", "truck.glb")
@@ -18,13 +19,19 @@ def test_the_files_are_what_the_script_makes(tmp_path: Path) -> None:
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         write(tmp_path / folder)
-    assert sorted(path.name for path in SHIPPED.iterdir()) == sorted(NAMES)
+    assert sorted(path.name for path in SHIPPED.iterdir()) == sorted((*NAMES, "hinge.urdf"))
     for name in NAMES:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
         shipped, made = (trimesh.load_scene(folder / name).to_mesh() for folder in (SHIPPED, tmp_path / "a"))
         assert np.allclose(shipped.bounds, made.bounds)
         assert shipped.volume == pytest.approx(made.volume, rel=1e-6)
         assert (SHIPPED / name).stat().st_size < 300_000
+
+
+def test_the_robot_is_two_brackets_on_a_hinge() -> None:
+    robot = open_robot(SHIPPED / "hinge.urdf")
+    assert [link.name for link in robot.links] == ["base", "arm"]
+    assert [len(link.collisions) for link in robot.links] == [1, 1]
 
 
 def test_the_truck_stands_on_four_wheels_in_metres_with_y_up() -> None:
