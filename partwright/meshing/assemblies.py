@@ -15,7 +15,7 @@ from partwright.fields.base import LIPSCHITZ
 from partwright.meshing.csg import has_exact_mesh, mesh_csg
 from partwright.meshing.marching import mesh_field
 from partwright.meshing.small_components import without_small_components
-from partwright.meshing.thin_parts import separate, united
+from partwright.meshing.thin_parts import thin_solids, united
 
 if TYPE_CHECKING:
     import trimesh
@@ -39,8 +39,8 @@ def mesh_assembly(
     where all leaves are quadrics or named solids without blends. Otherwise by marching cubes:
 
     resolution: cells along the longest side; up to twice as many where that is enough to put two cells across
-    a thin wall. Parts that are thinner still are meshed along their own axes and united with the others by a
-    boolean, without their blend (see `thin_parts`). Where thin ones are subtracted or intersected, holes may
+    a thin wall. Parts that are thinner still are meshed along their own axes and united with the whole by a
+    boolean (see `thin_parts`). Where thin ones are subtracted or intersected, holes may
     be left (the mesh is closed all the same); crumbs that are shorter than three cells are left out.
 
     Raises NoSurfaceError where nothing is left of the assembly, as when a difference takes all away, or where
@@ -49,10 +49,13 @@ def mesh_assembly(
     if exact or (exact is None and has_exact_mesh(assembly)):
         return _exact(assembly, resolution)
     cell = float(np.ptp(assembly.bounds(), axis=0).max()) / resolution
-    rest, solids = separate(assembly, lambda part: _is_thin(part, cell), partial(_alone, cell, sharp))
+    solids = thin_solids(assembly, lambda part: _is_thin(part, cell), partial(_alone, cell, sharp))
     if not solids:
         return _marched(assembly, cell, sharp)
-    return united(None if rest is None else _marched(rest, cell, sharp), solids)
+    try:
+        return united(_marched(assembly, cell, sharp), solids)
+    except NoSurfaceError:  # nothing but sheets, all of which slipped through the cells
+        return united(None, solids)
 
 
 def _is_thin(part: Part, cell: float) -> bool:

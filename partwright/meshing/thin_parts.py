@@ -1,13 +1,12 @@
 """Parts too thin for the cells of a whole: meshed along their own axes, and joined by booleans (manifold3d).
 
 Marching cubes at any affordable resolution leaves holes in a plate of a five-hundredth of the longest side,
-or nothing of it. Such a part is meshed alone, cut by what cuts it, and united with the mesh of all others,
-but without its blend: a sheet has no room for a fillet that would show.
+or nothing of it. Such a part is meshed alone, cut by what cuts it, and united with the mesh of the whole. A
+blend only adds to what it joins, so nothing comes in that does not belong there.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -27,38 +26,32 @@ Mesher = Callable[[Node], "trimesh.Trimesh"]
 Thin = Callable[[Part], bool]
 
 
-def separate(node: Node, thin: Thin, mesh: Mesher) -> tuple[Node | None, list[Manifold]]:
-    """The node without its thin parts, None where nothing else is left, and what of them the whole contains.
+def thin_solids(node: Node, thin: Thin, mesh: Mesher) -> list[Manifold]:
+    """Thin parts of a node, each copy by itself, less what is subtracted from them.
 
-    Parts that are subtracted, intersected with others, or cut by what does not end stay, however thin.
+    None that is subtracted, intersected with others, or cut by what does not end, however thin.
 
     mesh: of a part, or of what is subtracted from one.
     """
     if node.is_part:
-        if not thin(node):
-            return node, []
         # Cells across its wall make a great many triangles of its flat sides.
-        return None, [one.simplify(node.field.wall / _OF_WALL) for one in _solids(node, mesh)]
+        return [one.simplify(node.field.wall / _OF_WALL) for one in _solids(node, mesh)] if thin(node) else []
     cut = node.operation == "difference"
     if node.operation == "intersection" or (cut and not np.isfinite(_bounds(node.children[1:])).all()):
-        return node, []
-    kept: list[Node] = []
-    solids: list[Manifold] = []
-    for child in node.children[:1] if cut else node.children:
-        rest, found = separate(child, thin, mesh)
-        kept += [rest] if rest is not None else []
-        solids += found
-    cutters = node.children[1:] if cut else ()
-    if solids and cutters:
-        taken = [one for cutter in cutters for one in _solids(cutter, mesh)]
-        solids = [_without(solid, taken) for solid in solids]
-    if not kept:
-        return None, solids
-    return dataclasses.replace(node, children=(*kept, *cutters)) if solids else node, solids
+        return []
+    found = [
+        one
+        for child in (node.children[:1] if cut else node.children)
+        for one in thin_solids(child, thin, mesh)
+    ]
+    if not (found and cut):
+        return found
+    taken = [one for cutter in node.children[1:] for one in _solids(cutter, mesh)]
+    return [_without(solid, taken) for solid in found]
 
 
 def united(mesh: trimesh.Trimesh | None, solids: list[Manifold]) -> trimesh.Trimesh:
-    """A closed mesh and solids as one closed mesh.
+    """A closed mesh, if there is one, and solids as one closed mesh.
 
     Raises:
         NoSurfaceError: nothing is left of any.
