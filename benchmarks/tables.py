@@ -67,7 +67,7 @@ TABLES = (
     Table("anchors.md", "anchors.py", "--names bracket --peers coacd", 2, "", 20, "the peers"),
     Table("batch.md", "batch.py", "--shapes 8 --kills 4", 3,
           "--shapes 200 --kills 20 --output benchmarks/results/batch.md", 30),
-    Table("batch-ray.md", "batch_ray.py", None, 0, 
+    Table("batch-ray.md", "batch_ray.py", None, 0,
           "--shapes 12 --losses 3 --output benchmarks/results/batch-ray.md", 5, "the extra ray"),
     Table("throughput.md", "throughput.py", "--names mug,bracket", 2, "--shapes {data}", 20),
     Table("scaling.md", "scaling.py", None, 0, "--shapes {data} --name bunny", 15),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.convex_cover import Piece, faces_of
+from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -50,8 +51,7 @@ def balanced_hull(piece: Piece, deepest: float) -> Manifold:
 
 def _large_faces(hull: Manifold) -> tuple[np.ndarray, np.ndarray]:
     """Normals (F, 3) and offsets (F,) of the largest faces, the largest first."""
-    mesh = hull.to_mesh64()
-    corners, faces = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64)
+    corners, faces = surface_of(hull)
     a, b, c = corners[faces.T]
     cross = np.cross(b - a, c - a)
     normals, offsets = faces_of(hull)

@@ -22,6 +22,7 @@ from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.fields import Box, Field, Solid
 from partwright.meshing import mesh_part
+from partwright.meshing.manifolds import surface_of
 from partwright.shapes import MeshDistance
 
 if TYPE_CHECKING:
@@ -161,9 +162,8 @@ def _covered(node: Node, kinds: Sequence[type[Field]], allowed: float) -> list[P
         if fits and fits[0].volume_error_ratio <= _AS_GOOD and fits[0].deviation * side <= allowed:
             forms.append(fits[0].part.transformed(frame))
         else:
-            light = light_hull(hull, _LIGHT * allowed / side)[0].to_mesh64()
-            corners = frame(np.asarray(light.vert_properties)[:, :3])
-            forms.append(trimesh.Trimesh(corners, np.asarray(light.tri_verts, np.int64), process=False))
+            corners, faces = surface_of(light_hull(hull, _LIGHT * allowed / side)[0])
+            forms.append(trimesh.Trimesh(frame(corners), faces, process=False))
     return forms
 
 

@@ -24,6 +24,7 @@ from partwright.approximation.cutting_planes import (
     beside_concave_edges,
     candidates,
 )
+from partwright.meshing.manifolds import surface_of
 from partwright.shapes import MeshDistance
 
 if TYPE_CHECKING:
@@ -71,12 +72,10 @@ class Piece:
 
     def deviation(self, limit: float) -> float:
         """How far the hull's surface lies from the solid's at most, by points dense enough for the limit."""
-        mesh, hull = self.solid.to_mesh64(), self.hull
-        vertices = np.asarray(mesh.vert_properties)[:, :3]
+        vertices, faces = surface_of(self.solid)
         side = float(np.ptp(vertices, axis=0).max())
         spacing = float(np.clip(_SAMPLES * limit, side / _DENSEST, side / _FEWEST))
-        fine = hull.refine_to_length(spacing).to_mesh()
-        faces = np.asarray(mesh.tri_verts, dtype=np.int64)
+        fine = self.hull.refine_to_length(spacing).to_mesh()
         points = np.asarray(fine.vert_properties)[:, :3]
         middle, scale = vertices.mean(axis=0), 1.0 / side
         there = MeshDistance((vertices - middle) * scale, faces, faces, True)
@@ -105,7 +104,7 @@ def covering(pieces: list[Piece], solid: Manifold) -> list[Manifold]:
     out = []
     for hull in hulls:
         near = left ^ grown(hull, 0.02 * size)
-        points = np.asarray(near.to_mesh64().vert_properties)[:, :3]
+        points = surface_of(near)[0]
         beyond = _beyond(hull, points).max(initial=0.0) if len(points) else 0.0
         out.append(grown(hull, float(beyond) + 1e-7 * size) if beyond > 0 else hull)
     return out
@@ -136,9 +135,8 @@ def faces_of(hull: Manifold) -> tuple[np.ndarray, np.ndarray]:
     Each plane is moved out to the farthest corner, so that slivers, whose normals are rounding, cut nothing
     off.
     """
-    mesh = hull.to_mesh64()
-    corners = np.asarray(mesh.vert_properties)[:, :3]
-    a, b, c = corners[np.asarray(mesh.tri_verts, dtype=np.int64).T]
+    corners, faces = surface_of(hull)
+    a, b, c = corners[faces.T]
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals[length[:, 0] > 0] / length[length[:, 0] > 0]

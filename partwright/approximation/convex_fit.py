@@ -20,6 +20,7 @@ from partwright.approximation.convex_cover import faces_of
 from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.assembly import Part, Similarity
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
+from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -56,8 +57,7 @@ class _Body:
 
     @classmethod
     def of(cls, hull: Manifold) -> _Body:
-        mesh = hull.to_mesh64()
-        corners, faces = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64)
+        corners, faces = surface_of(hull)
         normals, offsets = faces_of(hull)
         origin = corners.mean(axis=0)
         a, b, c = (corners - origin)[faces.T]

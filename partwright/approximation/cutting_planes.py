@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.meshing.manifolds import surface_of
+
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
@@ -32,9 +34,7 @@ class Corners:
 
     @classmethod
     def of(cls, solid: Manifold) -> Corners:
-        mesh = solid.to_mesh64()
-        vertices = np.asarray(mesh.vert_properties)[:, :3]
-        faces = np.asarray(mesh.tri_verts, dtype=np.int64)
+        vertices, faces = surface_of(solid)
         directed = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
         owner = np.repeat(np.arange(len(faces)), 3)
         forward = directed[:, 0] < directed[:, 1]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.convex_cover import faces_of
+from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -21,7 +22,7 @@ def light_hull(hull: Manifold, by: float, most: int = _MOST) -> tuple[Manifold, 
     the others sticks out of it: no more than `by`, unless that would take more than `most` corners."""
     from manifold3d import Manifold
 
-    corners = np.asarray(hull.to_mesh64().vert_properties)[:, :3]
+    corners = surface_of(hull)[0]
     if len(corners) <= _FEW:
         return hull, 0.0
     middle = corners.mean(axis=0)

@@ -15,6 +15,7 @@ from partwright.assembly.placed import placed_quadric
 from partwright.errors import NoSurfaceError
 from partwright.fields import Box, Quadric
 from partwright.meshing.csg import solid_of
+from partwright.meshing.manifolds import surface_of
 
 SAME_VOLUME = 3e-3
 """Of a convex's volume, which may lie in one of the two only."""
@@ -90,7 +91,7 @@ def _same_solid(alone: Node, quadrics: list[Quadric], points: Room, ends: float,
     """Of the solids that the convex may be, the first that is the same within the box."""
     whole = Assembly((box, alone), "intersection")
     rough = solid_of(whole)
-    corners = np.asarray(rough.to_mesh64().vert_properties)[:, :3]
+    corners = surface_of(rough)[0]
     size = float(np.ptp(corners, axis=0).max())
     kept = [q for q in quadrics if (np.abs(q(corners)) <= _TOUCHED * size).sum() > 2]
     if not kept:

@@ -11,7 +11,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.errors import NoSurfaceError
 from partwright.meshing import mesh_assembly, mesh_part
 from partwright.meshing.csg import has_exact_mesh, solid_of
-from partwright.meshing.thin_parts import as_manifold
+from partwright.meshing.manifolds import as_manifold
 
 if TYPE_CHECKING:
     from manifold3d import Manifold

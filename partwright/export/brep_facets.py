@@ -8,6 +8,7 @@ import numpy as np
 
 from partwright.errors import NoSurfaceError
 from partwright.meshing.csg import solid_of
+from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -36,10 +37,9 @@ def faceted(node: Assembly) -> TopoDS_Shape:
     from OCP.TopoDS import TopoDS
 
     longest = float(np.ptp(np.array(node.bounds()), axis=0).max())
-    mesh = solid_of(node, CHORD * longest).simplify(SHORTEST * longest).to_mesh64()
-    places = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]
+    places, triangles = surface_of(solid_of(node, CHORD * longest).simplify(SHORTEST * longest))
     sewing = BRepBuilderAPI_Sewing(SHORTEST / 10 * longest)
-    for triangle in np.asarray(mesh.tri_verts, dtype=np.int64):
+    for triangle in triangles:
         outline = BRepBuilderAPI_MakePolygon(*(gp_Pnt(*places[i].tolist()) for i in triangle), True)
         face = BRepBuilderAPI_MakeFace(outline.Wire(), True)
         if face.IsDone():  # a needle has no plane; sewing closes the slit that it leaves

@@ -11,6 +11,7 @@ from partwright.approximation.light_hull import light_hull
 from partwright.assembly import Similarity
 from partwright.errors import NoSurfaceError
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
+from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
     import trimesh
@@ -61,8 +62,7 @@ def _hull(places: np.ndarray) -> trimesh.Trimesh:
     if not side > 0:
         raise NoSurfaceError("a collider has no size")
     whole = Manifold.hull_points((places - middle) / side)
-    mesh = light_hull(whole, _LOST, MOST_CORNERS)[0].to_mesh64()
-    corners = np.asarray(mesh.vert_properties)[:, :3] * side + middle
+    corners, faces = surface_of(light_hull(whole, _LOST, MOST_CORNERS)[0])
     if whole.volume() <= 0:
         raise NoSurfaceError("a collider is flat")
-    return trimesh.Trimesh(corners, np.asarray(mesh.tri_verts, np.int64), process=False)
+    return trimesh.Trimesh(corners * side + middle, faces, process=False)

@@ -37,6 +37,7 @@ from partwright.export.solid_source import (
     superfrustum_source,
 )
 from partwright.fields import Extrusion, Field, Quadric, Swept
+from partwright.meshing.manifolds import surface_of
 from partwright.meshing.named_solids import named_solid
 from partwright.meshing.quadric_solids import quadric_solid
 from partwright.shapes import canonical_unit
@@ -189,10 +190,10 @@ def _swept(field: Swept, names: dict[str, str], facets: int) -> str:
 
 
 def _faces(solid: Manifold) -> str:
-    mesh = solid.to_mesh64()
-    points = ", ".join(f"[{', '.join(map(number, p))}]" for p in np.asarray(mesh.vert_properties).tolist())
-    faces = np.asarray(mesh.tri_verts)[:, ::-1].tolist()  # OpenSCAD's run clockwise
-    return f"polyhedron(points = [{points}], faces = {faces});"
+    vertices, faces = surface_of(solid)
+    points = ", ".join(f"[{', '.join(map(number, p))}]" for p in vertices.tolist())
+    clockwise = faces[:, ::-1].tolist()  # as OpenSCAD has them
+    return f"polyhedron(points = [{points}], faces = {clockwise});"
 
 
 def _tree(node: Node, modules: dict[str, str], indent: str) -> Iterator[str]:

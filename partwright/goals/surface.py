@@ -7,8 +7,8 @@ import trimesh
 
 from partwright.assembly import Assembly
 from partwright.meshing import mesh_assembly
+from partwright.meshing.manifolds import as_manifold, as_mesh
 from partwright.meshing.small_components import components
-from partwright.meshing.thin_parts import as_manifold
 from partwright.render.part_colours import surface_parts
 
 _COARSEST = 3.0  # cells: longer edges, as exact meshes have on flat faces, are cut
@@ -23,14 +23,12 @@ def surface_of(assembly: Assembly, resolution: int) -> trimesh.Trimesh:
     cell = float(np.ptp(assembly.bounds(), axis=0).max()) / resolution
     if mesh.edges_unique_length.max() <= _COARSEST * cell:
         return mesh
-    made = as_manifold(mesh).refine_to_length(_COARSEST * cell).to_mesh64()
-    vertices = np.asarray(made.vert_properties, dtype=np.float64)[:, :3]
-    return trimesh.Trimesh(vertices, np.asarray(made.tri_verts, dtype=np.int64), process=False)
+    return as_mesh(as_manifold(mesh).refine_to_length(_COARSEST * cell))
 
 
 def thin_parts(assembly: Assembly, wall: float) -> list[int]:
-    """Leaves with walls thinner than this. Those thinner than a cell are meshed apart, without their blends,
-    so that the surface does not follow their numbers smoothly."""
+    """Leaves with walls thinner than this. Those thinner than a cell are meshed by themselves, too, so
+    that the surface does not follow their numbers smoothly."""
     return [i for i, part in enumerate(assembly.parts) if part.field.wall < wall]
 
 

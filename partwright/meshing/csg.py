@@ -16,6 +16,7 @@ from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Node
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.fields import Field, normal_form
+from partwright.meshing.manifolds import as_mesh
 from partwright.meshing.named_solids import is_named, named_solid
 from partwright.meshing.quadric_solids import half_space, quadric_solid
 from partwright.meshing.small_components import components
@@ -52,11 +53,7 @@ def mesh_csg(node: Node, tolerance: float | None = None) -> trimesh.Trimesh:
         NoSurfaceError: nothing is left, or the solid does not end.
         ParameterError: a leaf is neither a quadric nor a named solid, or is blended.
     """
-    import trimesh
-
-    mesh = solid_of(node, tolerance).to_mesh64()
-    vertices = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]
-    return trimesh.Trimesh(vertices, np.asarray(mesh.tri_verts, dtype=np.int64), process=False)
+    return as_mesh(solid_of(node, tolerance))
 
 
 def solid_of(node: Node, tolerance: float | None = None) -> Manifold:

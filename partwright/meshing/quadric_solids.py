@@ -10,7 +10,8 @@ import numpy as np
 from manifold3d import Manifold, OpType
 
 from partwright.fields import NormalForm, Quadric, normal_form
-from partwright.meshing.revolve import closed, corners_of_circle, revolve, subdivided, under_graph
+from partwright.meshing.manifolds import closed
+from partwright.meshing.revolve import corners_of_circle, revolve, subdivided, under_graph
 
 _ROOM = 1.05  # what is cut off beyond the box, in boxes
 _CUBE = 1.5  # half the side of the cube in which graphs are sought, in half diagonals of the box

@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from manifold3d import Manifold, Mesh64
+from manifold3d import Manifold
+
+from partwright.meshing.manifolds import closed
 
 _FEWEST, _MOST = 12, 720  # corners of a full circle
 _ROUNDS = 12  # halvings of a curve's pieces
@@ -79,10 +81,6 @@ def subdivided(curve: Callable[[np.ndarray], np.ndarray], start: np.ndarray, tol
         parameter = np.insert(parameter, coarse + 1, middle[coarse])
         points = np.insert(points, coarse + 1, between[coarse], axis=0)
     return points
-
-
-def closed(vertices: np.ndarray, faces: np.ndarray) -> Manifold:
-    return Manifold(Mesh64(np.ascontiguousarray(vertices, dtype=np.float64), faces.astype(np.uint64)))
 
 
 def _quads(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:

@@ -7,7 +7,8 @@ from manifold3d import CrossSection, FillRule, Manifold, triangulate
 
 from partwright.fields import Extrusion, Revolution
 from partwright.fields.profile import Side, arc_chords
-from partwright.meshing.revolve import closed, corners_of_circle
+from partwright.meshing.manifolds import closed
+from partwright.meshing.revolve import corners_of_circle
 
 _SIDE = 1e3  # of a profile that is turned: manifold3d keeps eight digits behind the point
 

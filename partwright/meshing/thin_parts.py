@@ -15,6 +15,7 @@ import numpy as np
 from partwright.assembly import Part
 from partwright.assembly.tree import Node
 from partwright.errors import NoSurfaceError
+from partwright.meshing.manifolds import as_manifold, as_mesh
 
 if TYPE_CHECKING:
     import trimesh
@@ -56,24 +57,13 @@ def united(mesh: trimesh.Trimesh | None, solids: list[Manifold]) -> trimesh.Trim
     Raises:
         NoSurfaceError: nothing is left of any.
     """
-    import trimesh
     from manifold3d import Manifold, OpType
 
     thick = [] if mesh is None else [as_manifold(mesh)]
     whole = Manifold.batch_boolean(thick + solids, OpType.Add)
     if whole.is_empty():
         raise NoSurfaceError("Nothing is left of the assembly: what it subtracts takes all away.")
-    made = whole.to_mesh64()
-    vertices = np.asarray(made.vert_properties, dtype=np.float64)[:, :3]
-    return trimesh.Trimesh(vertices, np.asarray(made.tri_verts, dtype=np.int64), process=False)
-
-
-def as_manifold(mesh: trimesh.Trimesh) -> Manifold:
-    """A closed mesh as the solid that it bounds."""
-    from manifold3d import Manifold, Mesh64
-
-    vertices, faces = np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.uint64)
-    return Manifold(Mesh64(vertices, faces))
+    return as_mesh(whole)
 
 
 def _solids(node: Node, mesh: Mesher) -> list[Manifold]:

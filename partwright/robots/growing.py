@@ -11,6 +11,7 @@ from partwright.approximation.convex_cover import faces_of, grown
 from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
+from partwright.meshing.manifolds import as_mesh
 from partwright.robots.model import Shape
 
 if TYPE_CHECKING:
@@ -127,12 +128,8 @@ def _larger(shape: Shape, by: float) -> Shape:
     """Every point of its surface further out by at least a length."""
     import dataclasses
 
-    import trimesh
-
     if shape.part is None:
-        mesh = grown(shape_solid(shape), by).to_mesh64()
-        vertices = np.asarray(mesh.vert_properties)[:, :3]
-        return Shape(shape.name, mesh=trimesh.Trimesh(vertices, np.asarray(mesh.tri_verts), process=False))
+        return Shape(shape.name, mesh=as_mesh(grown(shape_solid(shape), by)))
     return Shape(shape.name, dataclasses.replace(shape.part, field=_larger_field(shape.part.field, by)))
 
 

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly.palette import palette
+from partwright.meshing.manifolds import surface_of
 from partwright.render import Camera, render_mesh, sheet, write_png
 from partwright.robots.growing import shape_solid
 from partwright.robots.model import RobotFile, Shape
-from partwright.robots.solids import Solids, surface_of
+from partwright.robots.solids import Solids
 
 if TYPE_CHECKING:
     from manifold3d import Manifold

@@ -19,9 +19,10 @@ from partwright.approximation.convex_cover import (
 )
 from partwright.approximation.convex_fit import ConvexFit, Mode, convex_fits
 from partwright.approximation.light_hull import light_hull
+from partwright.meshing.manifolds import as_mesh, surface_of
 from partwright.robots.growing import enclosed, shape_solid
 from partwright.robots.model import Shape
-from partwright.robots.solids import Target, surface_of
+from partwright.robots.solids import Target
 from partwright.shapes import MeshDistance
 
 if TYPE_CHECKING:
@@ -177,6 +178,5 @@ def _scaled(shape: Shape, centre: np.ndarray, scale: float) -> Shape:
 
 
 def _mesh(hull: Manifold):  # type: ignore[no-untyped-def]  # trimesh
-    import trimesh
 
-    return trimesh.Trimesh(*surface_of(hull), process=False)
+    return as_mesh(hull)

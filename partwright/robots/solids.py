@@ -17,6 +17,7 @@ from partwright.errors import (
     RobotError,
     UnreadableFileError,
 )
+from partwright.meshing.manifolds import closed, surface_of
 from partwright.robots.model import Link, MeshUse, mirrored
 from partwright.robots.wrapping import wrapped
 from partwright.shapes import MeshDistance
@@ -152,16 +153,10 @@ def _source(path: Path) -> Source:
 
 
 def _manifold(vertices: np.ndarray, faces: np.ndarray) -> Manifold | None:
-    from manifold3d import Error, Manifold, Mesh64
+    from manifold3d import Error
 
-    solid = Manifold(Mesh64(np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.uint64)))
+    solid = closed(vertices, faces)
     return solid if solid.status() == Error.NoError and solid.volume() > 0 else None
-
-
-def surface_of(solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (V, 3) and faces (F, 3)."""
-    mesh = solid.to_mesh64()
-    return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64)
 
 
 def largest_deviation(a: Manifold, b: Manifold) -> float:

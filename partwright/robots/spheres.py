@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.convex_fit import smallest_ball
-from partwright.robots.solids import Target, surface_of
+from partwright.meshing.manifolds import surface_of
+from partwright.robots.solids import Target
 from partwright.shapes import MeshDistance
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ import numpy as np
 
 from partwright.errors import FlatShapeError, NoSurfaceError
 from partwright.meshing import mesh_field
+from partwright.meshing.manifolds import closed
 from partwright.shapes import MeshDistance, UnitFrame
 
 if TYPE_CHECKING:
@@ -60,7 +61,6 @@ def wrapped(vertices: np.ndarray, faces: np.ndarray) -> tuple[Manifold, Manifold
 
 def _level(values: np.ndarray, counts: np.ndarray, cell: float, frame: UnitFrame) -> Manifold | None:
     """The zero level of values on the lattice; None where it has none."""
-    from manifold3d import Manifold, Mesh64
     from scipy.ndimage import map_coordinates
 
     def level(places: np.ndarray) -> np.ndarray:
@@ -72,6 +72,5 @@ def _level(values: np.ndarray, counts: np.ndarray, cell: float, frame: UnitFrame
         mesh = mesh_field(level, -reach, reach, 2 * (counts - 1), lipschitz=3.0, sharp=False)
     except NoSurfaceError:
         return None
-    corners = np.array(frame.from_unit(mesh.vertices), np.float64)
-    solid = Manifold(Mesh64(corners, np.array(mesh.faces, np.uint64)))
+    solid = closed(frame.from_unit(mesh.vertices), mesh.faces)
     return None if solid.is_empty() or solid.volume() <= 0 else solid
