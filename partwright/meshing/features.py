@@ -17,6 +17,9 @@ _HALF_SHARP = ((1 + _SHARP) / 2) ** 0.5 + 1e-6  # of half that angle, and roundi
 _FLAT = 0.06  # directions with a smaller share of the largest eigenvalue are left to the mean
 _PROJECTIONS = 4  # between the cell and the line or point where the planes meet
 _BETTER = 0.5  # of the distance that the polygon's middle has, what a feature may have
+_REACH = 2.0  # cells beyond its own in which the rim of a wedge that is thinner than a cell may lie
+_ON = 0.15  # of a cell, how far from the zero level such a rim may be
+_TURNED = 0.1  # of a fan's area, what may have its back to the normals
 _STEP = 0.02  # finite differences, in cells
 _TETRAHEDRON = np.array([(1, -1, -1), (-1, -1, 1), (-1, 1, -1), (1, 1, 1)], dtype=np.float64)
 
@@ -63,8 +66,10 @@ def _feature_points(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The polygons that keep a feature, and its place: the least-squares meeting point of the tangent planes.
 
-    A point is kept to its cell, so that fans of neighbours do not overlap, and dropped where it lies farther
-    from the zero level than the polygon's middle does (the normals belonged to a ripple, not to a feature).
+    A rim thinner than a cell passes between the lattice's corners: its place may lie beyond the polygon's
+    cell, as long as it is on the zero level and the fan around it does not fold. Else it is kept to the cell,
+    so that fans of neighbours do not overlap, and dropped where it lies farther from the zero level than the
+    polygon's middle does (the normals belonged to a ripple, not to a feature).
     """
     index, used = polygons.index[candidates], polygons.used[candidates][:, :, None]
     points, around = polygons.vertices[index], normals[index] * used
@@ -73,13 +78,41 @@ def _feature_points(
     inverse = np.where(values > _FLAT * values[:, -1:], 1 / np.maximum(values, 1e-12), 0.0)
     solve = np.einsum("pde,pe,pfe->pdf", axes, inverse, axes, optimize=True)
     corner = grid.origin + polygons.cell[candidates] * grid.cell
-    place = middle
-    for _ in range(_PROJECTIONS):
-        offsets = ((points - place[:, None]) * around).sum(axis=-1)
-        place = place + np.einsum("pdf,pif,pi->pd", solve, around, offsets, optimize=True)
-        place = np.clip(place, corner, corner + grid.cell)
+
+    def meeting(reach: float) -> np.ndarray:
+        place = middle
+        for _ in range(_PROJECTIONS):
+            offsets = ((points - place[:, None]) * around).sum(axis=-1)
+            place = place + np.einsum("pdf,pif,pi->pd", solve, around, offsets, optimize=True)
+            place = np.clip(place, corner - reach * grid.cell, corner + (1 + reach) * grid.cell)
+        return place
+
+    far = meeting(_REACH)
+    outside = np.flatnonzero(((far < corner) | (far > corner + grid.cell)).any(axis=1))
+    on = np.abs(evaluate(distance, far[outside])) < _ON * float(grid.cell.min())
+    outside = outside[
+        on & ~_folds(points[outside], around[outside], polygons.length[candidates][outside], far[outside])
+    ]
+    place = meeting(0.0)
+    place[outside] = far[outside]
     better = np.abs(evaluate(distance, place)) < _BETTER * np.abs(evaluate(distance, middle))
     return candidates[better], place[better]
+
+
+def _folds(points: np.ndarray, normals: np.ndarray, length: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Whether much of the fan around a centre (P, 3) turns its back on the normals at its triangles' corners.
+
+    points, normals: (P, K, 3) of the polygons' corners, of which the first length (P,) count.
+    """
+    place = np.arange(points.shape[1])
+    following = np.where(place + 1 < length[:, None], place + 1, 0)[:, :, None]
+    end = np.take_along_axis(points, following, axis=1)
+    up = np.cross(end - points, centre[:, None] - points)
+    at_start = np.einsum("pid,pid->pi", up, normals)
+    at_end = np.einsum("pid,pid->pi", up, np.take_along_axis(normals, following, axis=1))
+    area = np.linalg.norm(up, axis=-1) * (place < length[:, None])
+    turned = np.maximum(at_start, at_end) < 0
+    return (area * turned).sum(axis=1) > _TURNED * area.sum(axis=1)
 
 
 def _fans(polygons: Polygons, chosen: np.ndarray) -> np.ndarray:

@@ -104,6 +104,28 @@ def test_box_keeps_its_edges_and_corners() -> None:
     assert abs(mesh.volume - 8 * np.prod(half)) < 0.2 * abs(blunt.volume - 8 * np.prod(half))
 
 
+@pytest.mark.parametrize("turn", [0, 1, 2, 3])
+def test_a_rim_thinner_than_a_cell_is_not_serrated(turn: int) -> None:
+    """A funnel's acute rim passes between the corners of the lattice: its vertices lie beyond their cells."""
+    frame = trimesh.transformations.random_rotation_matrix(np.random.default_rng(turn).random(3))[:3, :3]
+    radius, slope = 0.7, np.tan(np.radians(35))
+
+    def funnel(points: np.ndarray) -> np.ndarray:
+        x, y, z = (points @ frame).T
+        side = (slope * (np.hypot(x, y) - radius) - z) * np.cos(np.arctan(slope))
+        return np.maximum(z, side)
+
+    mesh = mesh_field(funnel, LOW, HIGH, 40)
+    assert_closed(mesh)
+    angle = np.linspace(0, 2 * np.pi, 300, endpoint=False)
+    rim = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) @ frame.T
+    off = trimesh.proximity.closest_point(mesh, rim)[1] / (2 / 40)
+    assert off.max() < 0.6
+    assert off.mean() < 0.06
+    assert mesh.volume == pytest.approx(np.pi * radius**3 * slope / 3, rel=4e-3)
+    assert mesh.area == pytest.approx(np.pi * radius**2 * (1 + np.hypot(1, slope)), rel=0.02)
+
+
 def test_faces_exactly_on_the_lattice() -> None:
     """A box whose faces fall on corners of a lattice over the same bounds, with values of exactly zero."""
     mesh = mesh_field(box((0.5, 0.5, 0.5)), LOW, HIGH, 16)
