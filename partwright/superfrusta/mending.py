@@ -140,7 +140,10 @@ class Mending:
         changes = [(self.trial(rows), changed) for rows, changed in self.changes(best, part, moving)]
         changes = sorted(changes, key=lambda one: -one[0].value)[:_REFITTED]
         refits = [partial(self.refitted, trial, changed, best) for trial, changed in changes]
-        tried = self.at_once([lambda: [self.firmed(best, moving)], *refits])
+        # The change that promises most is mostly the best; another is only tried where it does not help.
+        tried = self.at_once([lambda: [self.firmed(best, moving)], *refits[:1]])
+        if all(trial.value <= best.value for trials in tried for trial in trials):
+            tried = self.at_once(refits[1:])
         return [trial for trials in tried for trial in trials]
 
     def at_once(self, jobs: Sequence[Callable[[], list[Trial]]]) -> list[list[Trial]]:
