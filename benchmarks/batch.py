@@ -63,8 +63,12 @@ def timed(words: list[str]) -> float:
     return time.perf_counter() - start
 
 
-def killed(words: list[str], times: int) -> tuple[float, int]:
-    """Runs the command until it ends by itself; seconds, and how many runs that took."""
+def killed(words: list[str], times: int, apart: float) -> tuple[float, int]:
+    """Runs the command until it ends by itself; seconds, and how many runs that took.
+
+    The moments are ``apart`` seconds from one another on average, and at least 4, which a start takes.
+    """
+    apart = max(apart, 8.0)
     generator = random.Random(0)
     start, runs, left = time.perf_counter(), 0, times
     while True:
@@ -72,7 +76,7 @@ def killed(words: list[str], times: int) -> tuple[float, int]:
         process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         while left:
             try:
-                process.wait(generator.uniform(4.0, 12.0))
+                process.wait(generator.uniform(4.0, 2.0 * apart - 4.0))
                 break
             except subprocess.TimeoutExpired:
                 left -= 1
@@ -103,7 +107,9 @@ def main() -> None:
         make(place / "in", arguments.shapes)
         alone = timed(command(place / "in", place / "alone", "--at-once", "1", "--limit", str(_ALONE)))
         whole = timed(command(place / "in", place / "whole"))
-        again, runs = killed(command(place / "in", place / "killed"), arguments.kills)
+        again, runs = killed(
+            command(place / "in", place / "killed"), arguments.kills, whole / (arguments.kills + 1)
+        )
         lines = list(entries(place / "killed" / "manifest.jsonl"))
         done = Counter(entry.item for entry in lines if entry.status == DONE)
         first, second = digests(place / "whole"), digests(place / "killed")

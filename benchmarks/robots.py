@@ -1,7 +1,7 @@
 """Whole robots with simple collision shapes: how many, how far off, whether they contain, and what a step
 costs.
 
-    python benchmarks/robots.py --rows rows.jsonl NAME=PATH ...
+    python benchmarks/robots.py --rows rows.jsonl NAME=PATH ... [--ways nearest enclose CoACD]
 
 PATH is a robot's file (URDF or MJCF), as packages on PyPI ship them: airo-models, gym-ignition-models,
 gymnasium-robotics, robosuite, example-robot-data. Each is done three times: nearest; containing the visual
@@ -173,10 +173,11 @@ def main() -> int:
     )
     parser.add_argument("robots", nargs="+", metavar="NAME=PATH")
     parser.add_argument("--rows", type=Path, required=True, help="measured rows, kept between runs")
+    parser.add_argument("--ways", nargs="+", choices=[*WAYS, COACD], default=[*WAYS, COACD])
     options = parser.parse_args()
     kept = options.rows.read_text().splitlines() if options.rows.exists() else []
     rows = [Row(**json.loads(line)) for line in kept]
-    for way in (*WAYS, COACD):
+    for way in options.ways:
         for name, _, path in (robot.partition("=") for robot in options.robots):
             if any((row.robot, row.way) == (name, way) for row in rows):
                 continue

@@ -85,11 +85,34 @@ class Piece:
 def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
     """Pieces whose hulls together cover the solid: as few as keep the limits, as far as they are found.
 
-    solid: closed, of any number of bodies; a piece that ends up thinner than rounding is left out.
+    solid: closed, of any number of bodies. Slivers are left out, but none that reaches farther than the
+    allowed deviation from all the rest: a speck may be all that there is at its place.
     """
     coarse = _simplified(solid, _COARSE * limits.deviation)
     pieces = _cut_up(coarse, limits)
+    pieces += _far_off(solid, pieces, limits.deviation)
     return _joined(pieces, coarse.volume(), limits)
+
+
+def _far_off(solid: Manifold, pieces: list[Piece], deviation: float) -> list[Piece]:
+    """What no hull has and is farther than a length from all of them."""
+    from manifold3d import Manifold, OpType
+
+    hulls = Manifold.batch_boolean([piece.hull for piece in pieces], OpType.Add)
+    left = [part for part in (solid - hulls).decompose() if part.volume() > 0]
+    if hulls.is_empty():
+        return [Piece(part) for part in left]
+    mesh = hulls.to_mesh64()
+    vertices = np.asarray(mesh.vert_properties)[:, :3]
+    faces = np.asarray(mesh.tri_verts, dtype=np.int64)
+    middle, scale = vertices.mean(axis=0), 1.0 / float(np.ptp(vertices, axis=0).max())
+    there = MeshDistance((vertices - middle) * scale, faces, faces, True)
+
+    def reach(part: Manifold) -> float:
+        points = np.asarray(part.to_mesh64().vert_properties)[:, :3]
+        return float(there.unsigned((points - middle) * scale).max()) / scale
+
+    return [Piece(part) for part in left if reach(part) > deviation]
 
 
 def covering(pieces: list[Piece], solid: Manifold) -> list[Manifold]:

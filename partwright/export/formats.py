@@ -60,6 +60,8 @@ class Format:
     """The units that the file can say; None: any, or the file says none."""
     empty: bool = False
     """Whether a file may hold an assembly that encloses nothing."""
+    most: int | None = None
+    """Parts, copies counted, that can be written within minutes; None: any number."""
     profiles: bool = False
     """A drawing of the profiles that parts are swept of; an assembly without any is refused."""
     needs: tuple[str, str] | None = None
@@ -94,6 +96,7 @@ class Format:
             SettingError: it has no such option.
             ParameterError: a resolution is no number of cells.
             MissingDependencyError: a package is needed that is not installed.
+            ParameterError: it takes fewer parts.
             UnitError: it cannot say the assembly's unit.
             UnsupportedFormatError: it cannot hold one of the parts.
             NothingToExportError: nothing is inside of the assembly.
@@ -107,6 +110,7 @@ class Format:
         if isinstance(cells, bool) or not isinstance(cells, int) or cells < 1:
             raise ParameterError(f"resolution: expected a number of cells, at least 1, got {cells!r}")
         self.check_needs()
+        self._check_count(assembly)
         self._check_unit(assembly)
         if Holds.LEARNED not in self.holds:
             self._check_learned(assembly)
@@ -115,6 +119,14 @@ class Format:
             raise NothingToExportError(
                 f"{self.name}: nothing is inside of the assembly; its parts have no size, "
                 "or what is intersected does not overlap"
+            )
+
+    def _check_count(self, assembly: Assembly) -> None:
+        count = sum(1 + len(part.instances) for part in assembly.parts)
+        if self.most is not None and count > self.most:
+            raise ParameterError(
+                f"{self.name}: {count:,} parts, copies counted; at most {self.most:,} are written: take "
+                "pieces of the assembly by themselves, or GLB, where copies that are not cut stay copies"
             )
 
     def check_needs(self) -> None:

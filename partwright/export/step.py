@@ -101,5 +101,10 @@ def _write(document: TDocStd_Document, path: Path, unit: str, wanted: Path) -> N
 
 
 FORMAT = Format(
-    "STEP", write, frozenset({Holds.EXACT, Holds.LEARNED}), units=tuple(_UNITS), needs=("OCP.TopoDS", "cad")
+    "STEP",
+    write,
+    frozenset({Holds.EXACT, Holds.LEARNED}),
+    units=tuple(_UNITS),
+    most=1000,  # the time of OpenCASCADE's unions grows with the square
+    needs=("OCP.TopoDS", "cad"),
 )

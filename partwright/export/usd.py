@@ -179,5 +179,6 @@ FORMAT = Format(
     "USD",
     write,
     frozenset({Holds.NAMES, Holds.GROUPS, Holds.COPIES, Holds.PARAMETERS, Holds.LEARNED}),
+    most=10_000,
     needs=("pxr", "usd"),
 )

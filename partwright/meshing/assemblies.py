@@ -12,7 +12,7 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.errors import NoSurfaceError
 from partwright.fields import SuperFrustum, Swept
 from partwright.fields.base import LIPSCHITZ
-from partwright.meshing.csg import has_exact_mesh, mesh_csg
+from partwright.meshing.csg import check_count, has_exact_mesh, mesh_csg
 from partwright.meshing.marching import mesh_field
 from partwright.meshing.small_components import without_small_components
 from partwright.meshing.thin_parts import thin_solids, united
@@ -44,8 +44,10 @@ def mesh_assembly(
     be left (the mesh is closed all the same); crumbs that are shorter than three cells are left out.
 
     Raises NoSurfaceError where nothing is left of the assembly, as when a difference takes all away, or where
-    it does not end; ParameterError where it has no exact mesh, but one is asked for.
+    it does not end; ParameterError where it has no exact mesh, but one is asked for, or where it has more
+    than 10,000 parts, copies counted.
     """
+    check_count(assembly)
     if exact or (exact is None and has_exact_mesh(assembly)):
         return _exact(assembly, resolution)
     cell = float(np.ptp(assembly.bounds(), axis=0).max()) / resolution

@@ -27,8 +27,19 @@ if TYPE_CHECKING:
 
 TOLERANCE = 2.5e-4  # of the longest side
 _NUDGE = 5e-7  # of the longest side
+MOST_PARTS = 10_000  # copies counted: these take a minute, and gigabytes where they are curved
 _STEP = 3  # by which a node's nudge outdoes those within it
 _ROOM = 0.02  # of the longest side, around the bounds
+
+
+def check_count(node: Node) -> None:
+    """Raises ParameterError for more parts than are joined into one surface, before any work."""
+    count = sum(1 + len(part.instances) for part in node.parts)
+    if count > MOST_PARTS:
+        raise ParameterError(
+            f"{count:,} parts, copies counted; at most {MOST_PARTS:,} are joined into one surface: "
+            "take pieces of the assembly by themselves, or GLB, where copies that are not cut stay copies"
+        )
 
 
 def has_exact_mesh(node: Node) -> bool:
@@ -51,7 +62,7 @@ def mesh_csg(node: Node, tolerance: float | None = None) -> trimesh.Trimesh:
 
     Raises:
         NoSurfaceError: nothing is left, or the solid does not end.
-        ParameterError: a leaf is neither a quadric nor a named solid, or is blended.
+        ParameterError: a leaf is neither a quadric nor a named solid, or is blended, or there are too many.
     """
     return as_mesh(solid_of(node, tolerance))
 
@@ -60,6 +71,7 @@ def solid_of(node: Node, tolerance: float | None = None) -> Manifold:
     """As `mesh_csg`, the manifold3d solid; it knows its volume, area and genus."""
     if not has_exact_mesh(node):
         raise ParameterError("the exact mesh needs leaves that are quadrics or named solids, without blends")
+    check_count(node)
     box = node.bounds()
     if not np.isfinite(box).all():
         axes = ", ".join(axis for axis, low, high in zip("xyz", *box, strict=True) if not high - low < np.inf)

@@ -155,7 +155,7 @@ def _binvox_header(file: IO[bytes]) -> tuple[tuple[int, int, int], NDArray[np.fl
         elif words[0] == "translate":
             place = np.array([float(w) for w in words[1:]])
         elif words[0] == "scale":
-            scale = float(words[1])
+            (scale,) = (float(w) for w in words[1:])
     if min(sides) < 1 or math.prod(sides) > _LARGEST // 8:
         raise ValueError(f"its sides are {sides}; expected 1 or more and at most {_LARGEST // 8} voxels")
     if place.shape != (3,) or not np.isfinite(place).all() or not 0 < scale < math.inf:

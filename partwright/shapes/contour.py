@@ -23,7 +23,7 @@ def contour(
     import igl
 
     inside = values < 0
-    crossed = _crossed_cells(inside)
+    crossed = np.argwhere(crossed_cells(inside))
     if len(crossed) == 0:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     corner = np.ravel_multi_index(tuple(np.moveaxis(crossed[:, None] + _CORNERS, -1, 0)), values.shape)
@@ -36,11 +36,11 @@ def contour(
     return np.asarray(origin) + np.asarray(spacing) * vertices, np.asarray(faces, dtype=np.int64)
 
 
-def _crossed_cells(inside: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Lowest corners (C, 3) of the cells that have corners of both kinds."""
+def crossed_cells(inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which cells (nx - 1, ny - 1, nz - 1) have corners of both kinds."""
     every, some = inside, inside
     for axis in range(3):
         low = tuple(slice(None, -1) if k == axis else slice(None) for k in range(3))
         high = tuple(slice(1, None) if k == axis else slice(None) for k in range(3))
         every, some = every[low] & every[high], some[low] | some[high]
-    return np.argwhere(some & ~every)
+    return some & ~every

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from partwright.errors import GridError, NotFiniteError
-from partwright.shapes.contour import contour
+from partwright.shapes.contour import contour, crossed_cells
 from partwright.shapes.source import Piece, Source
 
 MOST_CELLS = 1 << 27
+_MOST_CROSSED = 1 << 21  # cells that the surface passes; each takes a kilobyte while it is repaired
 _PAD = 4  # voxels around what is inside
 _WIDTH = 1.0  # voxels: the Gaussian's
 _LEAST = 0.02  # how far a voxel's centre stays on its own side, where the step is from -1 to 1
@@ -47,6 +48,12 @@ def source_of_grid(
         raise GridError(
             f"{name}: {'every' if inside.any() else 'no'} voxel of the {_size(grid)} {kind} grid is inside; "
             "a shape with empty space around it was expected"
+        )
+    crossed = int(crossed_cells(inside).sum())
+    if crossed > _MOST_CROSSED:
+        raise GridError(
+            f"{name}: the surface passes {crossed:,} cells of the {_size(grid)} grid, as noise does; at most "
+            f"{_MOST_CROSSED:,} are drawn. Smooth the grid, or make it coarser"
         )
     if _border(inside).any():
         notes.append("the shape reaches the border of its grid and was closed there")

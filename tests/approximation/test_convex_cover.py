@@ -72,6 +72,17 @@ def test_limits_are_kept_and_hulls_cover() -> None:
         assert (solid - union(hulls)).volume() < 1e-6 * solid.volume()
 
 
+def test_a_speck_far_from_all_else_is_covered_and_one_beside_it_is_not() -> None:
+    speck = box(3, 0, 0, 3.01, 0.01, 0.05)  # 5e-7 of the volume, 2 away
+    for place, count in ((0.0, 2), (-1.97, 1)):
+        body = union([box(0, 0, 0, 1, 2, 5), speck.translate((place, 0, 0))])
+        assert len(body.decompose()) == 2
+        pieces = convex_cover(body, Limits(0.05, most=8))
+        assert len(pieces) == count
+    body = union([box(0, 0, 0, 1, 2, 5), speck])
+    assert (body - union([piece.hull for piece in convex_cover(body, Limits(0.05))])).volume() < 1e-9
+
+
 def test_no_more_pieces_than_asked_for() -> None:
     pieces = convex_cover(hollow_box(), Limits(0.05, most=2))
     assert len(pieces) == 2

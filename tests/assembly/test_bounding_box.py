@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cone, Cylinder, Sphere, SuperFrustum, Torus
 from tests.assembly.strategies import ASSEMBLIES, PARTS, SWEPT
 
@@ -35,6 +36,23 @@ def test_a_turned_sphere_and_cylinder_stay_tight() -> None:
     assert np.allclose(quarter, [[-0.5, -1, -0.5], [0.5, 1, 0.5]])
     about_axis = Part(Cylinder(0.5, 2), rotation=(2, 0, 0, 1)).bounds()
     assert np.allclose(about_axis, [[-0.5, -0.5, -1], [0.5, 0.5, 1]])
+
+
+def test_copies_are_bounded_as_parts_of_their_own() -> None:
+    """Also where blends let a union grow with every part that melts into it."""
+    turned = Similarity(1.0, TURN, (3.0, 0.5, -1.0))
+    leg = Part(Cylinder(0.2, 2), (1, 0, 0), TURN, blend=0.3, instances=(turned, turned @ turned))
+    for assembly in (Assembly((leg,)), Assembly((Part(Box((1, 1, 1))), leg)), Assembly((leg, leg))):
+        apart = Assembly(tuple(copy for part in assembly.parts for copy in part.copies))
+        assert np.allclose(assembly.bounds(), apart.bounds(), atol=1e-12)
+    assert np.allclose(leg.bounds(), Assembly(leg.copies).bounds(), atol=1e-12)
+
+
+def test_a_hundred_thousand_copies_are_bounded_at_once() -> None:
+    row = Part(Sphere(0.4), instances=tuple(Similarity(translation=(i, 0, 0)) for i in range(1, 99_000)))
+    start = time.process_time()
+    assert np.allclose(row.bounds(), [[-0.4] * 3, [98_999.4, 0.4, 0.4]], atol=0.005)
+    assert time.process_time() - start < 5.0  # one by one they took half a minute
 
 
 def test_half_ring() -> None:

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import trimesh
 
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Assembly, Part, Similarity
 from partwright.cli.main import main
 from partwright.errors import ParameterError
 from partwright.export.formats import FORMATS
@@ -101,6 +102,20 @@ def test_a_unit_that_the_format_cannot_say(capsys: Any, folder: Path) -> None:
     assert "3MF cannot say km" in error(capsys, kilometres, folder, "a.3mf")
     micrometres = Assembly(CUBE.children, unit="um", up="z")
     assert "too small for MuJoCo" in error(capsys, micrometres, folder, "a.mjcf.xml")
+
+
+def test_more_parts_than_end_within_minutes(capsys: Any, folder: Path, monkeypatch: Any) -> None:
+    moves = tuple(Similarity(translation=(3 * i, 0, 0)) for i in range(1, 1002))
+    row = Assembly((Part(Sphere(1.0), name="ball", instances=moves),), unit="mm", up="z")
+    pytest.importorskip("OCP.TopoDS")
+    assert "1,002 parts, copies counted; at most 1,000 are written" in error(capsys, row, folder, "a.step")
+    monkeypatch.setattr("partwright.meshing.csg.MOST_PARTS", 1000)
+    assert "at most 1,000 are joined into one surface" in error(capsys, row, folder, "a.stl")
+    shape = folder.parent / "ball.ply"
+    trimesh.creation.icosphere(1).export(shape)
+    assert main(["evaluate", str(folder.parent / "source.json"), str(shape)]) == 2
+    assert "at most 1,000 are joined into one surface" in capsys.readouterr().err
+    assert main(["export", str(folder.parent / "source.json"), "-o", str(folder / "a.glb")]) == 0
 
 
 APART = Assembly(

@@ -153,6 +153,10 @@ def test_other_broken_grids_are_named(monkeypatch):
         load_shape(np.zeros((1, 8, 8)))
     with pytest.raises(GridError, match="complex"):
         load_shape(BALL.astype(complex))
+    with monkeypatch.context() as patch:
+        patch.setattr("partwright.shapes.voxels._MOST_CROSSED", 100)
+        with pytest.raises(GridError, match=r"passes [0-9,]+ cells of the .* grid, as noise does"):
+            load_shape(BALL)
     monkeypatch.setattr("partwright.shapes.voxels.MOST_CELLS", 1000)
     with pytest.raises(GridError, match="too large"):
         load_shape(BALL)
@@ -214,6 +218,7 @@ def test_npz_bombs_are_refused_before_they_unpack(tmp_path, monkeypatch):
         b"#binvox 1\ndim 4 4 4\ntranslate 0 0 nan\nscale 1\ndata\n" + b"\x01\x40",
         b"#binvox 1\ndim 4 4 4\nscale -1\ndata\n" + b"\x01\x40",
         b"#binvox 1\ndim 0 4 4\ndata\n",
+        b"#binvox 1\ndim 4 4 4\nscale\ndata\n" + b"\x01\x40",
         b"#binvox 1\ndim a b\ndata\n",
         b"#binvox 1\n",
         b"\xff" * 2000,
