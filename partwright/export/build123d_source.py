@@ -22,7 +22,7 @@ from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
 from partwright.export.instance_patterns import Poses, Row
-from partwright.export.profile_source import BUILD123D_SOURCE, build123d_loops, draws_loops
+from partwright.export.profile_source import BUILD123D, BUILD123D_SOURCE, draws_loops, loops
 from partwright.export.solid_source import (
     SourcePart,
     drawn,
@@ -130,7 +130,7 @@ def _function(part: SourcePart) -> Iterator[str]:
 
 
 def _swept(field: Swept, names: dict[str, str]) -> str:
-    flat = " - ".join(build123d_loops(field, names))
+    flat = " - ".join(loops(field, names, BUILD123D))
     if isinstance(field, Extrusion):
         taper = f", taper={names['taper']}" if "taper" in names else ""
         return f"bd.Pos(0, 0, -{names['height']} / 2) * bd.extrude({flat}, {names['height']}{taper})"

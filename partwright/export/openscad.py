@@ -27,7 +27,7 @@ from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
 from partwright.export.instance_patterns import Poses, Ring, Row
-from partwright.export.profile_source import SCAD_SOURCE, draws_loops, scad_loops
+from partwright.export.profile_source import SCAD, SCAD_SOURCE, draws_loops, loops
 from partwright.export.solid_source import (
     SourcePart,
     drawn,
@@ -179,7 +179,7 @@ def _leans(field: Field) -> bool:
 def _swept(field: Swept, names: dict[str, str], facets: int) -> str:
     if _leans(field):
         return _faces(named_solid(field, field.profile.size / 2 * (1 - math.cos(math.pi / facets))))
-    outline, *holes = scad_loops(field, names)
+    outline, *holes = loops(field, names, SCAD)
     flat = outline
     if holes:
         flat = "difference() {\n" + "".join(f"            {one}\n" for one in (outline, *holes)) + "        }"

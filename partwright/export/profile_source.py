@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -102,28 +103,31 @@ def _rectangle(loop: Loop) -> tuple[tuple[float, float], tuple[float, float]] | 
     return (width, height), ((low[0] + high[0]) / 2, (low[1] + high[1]) / 2)
 
 
-def scad_loops(field: Swept, names: dict[str, str]) -> Iterator[str]:
-    """An OpenSCAD expression for each loop of the field; names: parameter -> variable."""
-    for name in _names(field.profile):
-        moved = f"translate({names[f'{name}_centre']}) " if f"{name}_centre" in names else ""
-        if f"{name}_radius" in names:
-            yield f"{moved}circle(r = {names[f'{name}_radius']});"
-        elif f"{name}_size" in names:
-            yield f"{moved}square({names[f'{name}_size']}, center = true);"
-        else:
-            yield f"polygon(loop({names[name]}));"
+@dataclass(frozen=True)
+class LoopSyntax:
+    """How a language writes a loop: patterns around a variable; `moved` comes before, {} is the centre."""
+
+    moved: str
+    circle: str
+    rectangle: str
+    corners: str
 
 
-def build123d_loops(field: Swept, names: dict[str, str]) -> Iterator[str]:
-    """A build123d sketch for each loop of the field; names: parameter -> variable."""
+SCAD = LoopSyntax("translate({}) ", "circle(r = {});", "square({}, center = true);", "polygon(loop({}));")
+BUILD123D = LoopSyntax("bd.Pos(*{}) * ", "bd.Circle({})", "bd.Rectangle(*{})", "loop(*{})")
+
+
+def loops(field: Swept, names: dict[str, str], syntax: LoopSyntax) -> Iterator[str]:
+    """An expression for each loop of the field; names: parameter -> variable."""
     for name in _names(field.profile):
-        moved = f"bd.Pos(*{names[f'{name}_centre']}) * " if f"{name}_centre" in names else ""
+        centre = names.get(f"{name}_centre")
+        moved = syntax.moved.format(centre) if centre else ""
         if f"{name}_radius" in names:
-            yield f"{moved}bd.Circle({names[f'{name}_radius']})"
+            yield moved + syntax.circle.format(names[f"{name}_radius"])
         elif f"{name}_size" in names:
-            yield f"{moved}bd.Rectangle(*{names[f'{name}_size']})"
+            yield moved + syntax.rectangle.format(names[f"{name}_size"])
         else:
-            yield f"loop(*{names[name]})"
+            yield syntax.corners.format(names[name])
 
 
 def draws_loops(fields: list[Swept]) -> bool:

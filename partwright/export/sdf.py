@@ -18,15 +18,14 @@ from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.assembly.similarity import rotation_matrix
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import free_name
+from partwright.export.link_meshes import write_link_meshes
 from partwright.export.links import Joint
 from partwright.export.rigid_body import DENSITY, bodies, document, numbers, write_document
-from partwright.export.urdf import roll_pitch_yaw, write_meshes
+from partwright.export.urdf import roll_pitch_yaw
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.mass import MassProperties
 
 if TYPE_CHECKING:
-    import trimesh
-
     from partwright.assembly import Assembly
 
 VERSION = "1.9"
@@ -49,13 +48,7 @@ def write(
     The options are those of URDF; without free_joint the model is static.
     """
     made = bodies(assembly, links, SOLIDS, density, tolerance, resolution, convex=False)
-    meshes: list[tuple[str, str, trimesh.Trimesh]] = []  # link, piece, mesh
-    seen = {}
-    for link, body in made:
-        meshes += [(link.name, g.name, g.mesh) for g in body.geometries if g.mesh is not None]
-        seen[link.name] = body.visuals(resolution) if visuals else []
-        meshes += [(link.name, name, mesh) for name, _, mesh in seen[link.name]]
-    files = write_meshes(meshes, Path(path), several=len(made) > 1)
+    meshes = write_link_meshes(made, Path(path), resolution, visuals)
     root = document("sdf", assembly, density, version=VERSION)
     model = xml.SubElement(root, "model", name=assembly.name or "assembly")
     _say(model, "static", "false" if free_joint else "true")
@@ -66,15 +59,16 @@ def write(
             places[link.name] = places[link.joint.parent] + link.joint.origin
             _say(element, "pose", numbers([*places[link.name], 0.0, 0.0, 0.0]))
         _add_inertial(element, body.properties, density)
-        apart, taken = {name for name, _, _ in seen[link.name]}, set[str]()
+        seen, files = meshes.seen[link.name], meshes.files[link.name]
+        apart, taken = {name for name, _ in seen}, set[str]()
         for geometry in body.geometries:
             name = free_name(geometry.name, taken)
             both = geometry.piece not in apart
             for role in ("visual", "collision") if both else ("collision",):
-                _add_shape(element, role, name, geometry, files.get((link.name, geometry.name), ""))
-        for name, colour, _ in seen[link.name]:
+                _add_shape(element, role, name, geometry, files.get(geometry.name, ""))
+        for name, colour in seen:
             made_of = Geometry(name, colour, None, None, name, ())
-            _add_shape(element, "visual", free_name(name, taken), made_of, files[link.name, name])
+            _add_shape(element, "visual", free_name(name, taken), made_of, files[name])
     for link, _ in made:
         if link.joint:
             _add_joint(model, link.name, link.joint)

@@ -7,7 +7,6 @@ spheres. Blends cannot be held and are dropped. Mass and inertia are those of th
 from __future__ import annotations
 
 import math
-import re
 import xml.etree.ElementTree as xml
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,19 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.collision import TOLERANCE, Geometry
-from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import rotation_matrix
-from partwright.atomic_io import write_bytes
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import free_name
+from partwright.export.link_meshes import write_link_meshes
 from partwright.export.links import Joint
 from partwright.export.rigid_body import DENSITY, bodies, document, numbers, write_document
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.mass import MassProperties
 
 if TYPE_CHECKING:
-    import trimesh
-
     from partwright.assembly import Assembly
 
 SOLIDS: tuple[type[Field], ...] = (Box, Cylinder, Sphere, Capsule)
@@ -55,25 +51,19 @@ def write(
     """
     made = bodies(assembly, links, SOLIDS, density, tolerance, resolution, convex=False)
     root = document("robot", assembly, density, name=assembly.name or "assembly")
-    meshes: list[tuple[str, str, trimesh.Trimesh]] = []  # link, piece, mesh
-    seen = {}
-    for link, body in made:
-        meshes += [(link.name, g.name, g.mesh) for g in body.geometries if g.mesh is not None]
-        seen[link.name] = body.visuals(resolution) if visuals else []
-        meshes += [(link.name, name, mesh) for name, _, mesh in seen[link.name]]
-    files = write_meshes(meshes, Path(path), several=len(made) > 1)
+    meshes = write_link_meshes(made, Path(path), resolution, visuals)
     taken = {link.name for link, _ in made}  # readers keep links and shapes in one table of names
     for link, body in made:
         element = xml.SubElement(root, "link", name=link.name)
         _add_inertial(element, body.properties, density)
-        own = {name: file for (of, name), file in files.items() if of == link.name}
-        apart = {name for name, _, _ in seen[link.name]}
+        seen, files = meshes.seen[link.name], meshes.files[link.name]
+        apart = {name for name, _ in seen}
         for geometry in body.geometries:
-            shapes = _shapes(geometry, own)
+            shapes = _shapes(geometry, files)
             name = free_name(geometry.name, taken)
             _add_shapes(element, geometry, shapes, name, both=geometry.piece not in apart)
-        for name, colour, _ in seen[link.name]:
-            shape = ("mesh", {"filename": own[name]}, np.zeros(3), np.eye(3))
+        for name, colour in seen:
+            shape = ("mesh", {"filename": files[name]}, np.zeros(3), np.eye(3))
             _add_shape(element, "visual", free_name(f"{name} visual", taken), shape, name, colour)
     for link, _ in made:
         if link.joint:
@@ -163,21 +153,6 @@ def _shapes(geometry: Geometry, files: dict[str, str]) -> list[Shape]:
             ends = [("sphere", ball, centre + side * half, rotation) for side in (1, -1)]
             return [("cylinder", sizes, centre, rotation), *ends]
     raise AssertionError(f"{geometry.part.field.kind} is not among SOLIDS")
-
-
-def write_meshes(
-    meshes: list[tuple[str, str, trimesh.Trimesh]], path: Path, several: bool
-) -> dict[tuple[str, str], str]:
-    """STL files beside `path`: link and name of the piece -> the name of its file. several: links."""
-    from trimesh.exchange.stl import export_stl
-
-    keys = [f"{link}_{name}" if several else name for link, name, _ in meshes]
-    plain = [re.sub(r"[^\w.-]", "_", key, flags=re.ASCII) for key in keys]
-    files = {}
-    for (link, piece, mesh), name in zip(meshes, unique_names(plain, plain), strict=True):
-        files[link, piece] = f"{path.stem}_{name}.stl"
-        write_bytes(path.with_name(files[link, piece]), export_stl(mesh))
-    return files
 
 
 def _add_free_joint(root: xml.Element, name: str) -> None:

@@ -21,21 +21,10 @@ from partwright.batch import Limits, Plan, Share, fit_folder, write_index
 from partwright.batch.directory import item_folder
 from partwright.batch.items import content_name, items_of
 from partwright.batch.manifest import Entry, appending, entries, latest
-from partwright.batch.pool import Worker
 from partwright.cli.main import main
 from partwright.errors import OutputError, SettingError
 from partwright.methods import Cancellation
-
-FAKE = (sys.executable, str(Path(__file__).with_name("fake_worker.py")))
-
-
-@pytest.fixture
-def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The log of what fake workers were given."""
-    monkeypatch.setattr(Worker, "command", FAKE)
-    monkeypatch.setenv("PYTHONPATH", str(Path(pw.__file__).parents[1]))
-    monkeypatch.setenv("FAKE_LOG", str(tmp_path / "log"))
-    return tmp_path / "log"
+from tests.batch.conftest import FAKE
 
 
 def shapes(folder: Path, *names: str) -> Path:

@@ -11,14 +11,10 @@ from typing import Any
 
 import pytest
 
-import partwright as pw
 from partwright.batch import Limits, Plan, fit_folder, on_ray
 from partwright.batch.manifest import latest
-from partwright.batch.pool import Worker
 from partwright.cli.main import main
 from partwright.methods import Cancellation
-
-FAKE = (sys.executable, str(Path(__file__).with_name("fake_worker.py")))
 
 
 class RayError(Exception):
@@ -69,13 +65,10 @@ class StandIn:
 
 
 @pytest.fixture
-def ray(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
+def ray(fake: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StandIn]:
     stand_in = StandIn()
     monkeypatch.setitem(sys.modules, "ray", stand_in)
     monkeypatch.setattr(on_ray, "_here", None)
-    monkeypatch.setattr(Worker, "command", FAKE)
-    monkeypatch.setenv("PYTHONPATH", str(Path(pw.__file__).parents[1]))
-    monkeypatch.setenv("FAKE_LOG", str(tmp_path / "log"))
     yield stand_in
     if on_ray._here is not None:
         on_ray._here.close()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pickle
 import signal
-import sys
 from collections import Counter
 from pathlib import Path
 
@@ -15,12 +14,9 @@ import trimesh
 
 import partwright as pw
 from partwright.batch import Limits, fit_many
-from partwright.batch.pool import Worker
 from partwright.errors import EmptyShapeError, SettingError, UnreadableFileError, WorkerError
 from partwright.fitting import Result, fit
 from partwright.methods import Cancellation, Progress
-
-FAKE = (sys.executable, str(Path(__file__).with_name("fake_worker.py")))
 
 SHAPES = [
     trimesh.creation.box((2, 1, 0.6)),
@@ -43,15 +39,6 @@ def test_the_assemblies_are_those_of_single_fits(tmp_path: Path) -> None:
         alone = fit(shape, quality="draft", threads=1)
         assert result.assembly == alone.assembly
         assert result.scores.iou == alone.scores.iou
-
-
-@pytest.fixture
-def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The log of what fake workers were given."""
-    monkeypatch.setattr(Worker, "command", FAKE)
-    monkeypatch.setenv("PYTHONPATH", str(Path(pw.__file__).parents[1]))
-    monkeypatch.setenv("FAKE_LOG", str(tmp_path / "log"))
-    return tmp_path / "log"
 
 
 def test_a_worker_that_falls_or_hangs_costs_its_own_shape(fake: Path) -> None:
