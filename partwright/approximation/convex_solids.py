@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from partwright.approximation.convex_region import ConvexRegion, Disc
-from partwright.assembly import Part, Similarity
+from partwright.approximation.profile_parts import extruded_part, revolved_part
+from partwright.assembly import Part
 from partwright.errors import ParameterError
 from partwright.fields import (
     Box,
     Cone,
     Cylinder,
     Extrusion,
-    Field,
     Frustum,
     NormalForm,
     Profile,
@@ -29,7 +29,6 @@ from partwright.fields import (
     Sphere,
     normal_form,
 )
-from partwright.fields.profile import Loop, circle_of
 
 PARALLEL = 0.01
 """Radians: directions that differ by less are the same."""
@@ -169,7 +168,7 @@ def _prism(convex: Convex, axis: np.ndarray, ends: float) -> Part | None:
     if loop is None:
         return None
     angle = math.degrees(math.asin(leaning))
-    return _extruded(loop, frame, low, high, angle)
+    return extruded_part(Profile(loop), frame, low, high, angle)
 
 
 def _parallel(a: np.ndarray, b: np.ndarray) -> bool:
@@ -179,42 +178,6 @@ def _parallel(a: np.ndarray, b: np.ndarray) -> bool:
 def _disc(form: NormalForm, frame: np.ndarray) -> Disc:
     x, y = (form.centre @ frame[:, :2]).tolist()
     return Disc(x, y, float(form.radii[0]))
-
-
-def _extruded(loop: Loop, frame: np.ndarray, low: float, high: float, taper: float) -> Part:
-    """By its name where it has one."""
-    height, middle = high - low, (low + high) / 2
-    round_ = circle_of(loop)
-    if round_ is not None and not taper:
-        radius, (x, y) = round_
-        return _placed(Cylinder(radius, height), frame, frame @ (x, y, middle))
-    box = _rectangle(loop)
-    if box is not None and not taper:
-        (width, depth), along, (x, y) = box
-        turned = frame @ np.array([[along[0], -along[1], 0], [along[1], along[0], 0], [0, 0, 1]])
-        return _placed(Box((width, depth, height)), turned, frame @ (x, y, middle))
-    profile = Profile(loop)
-    lower, upper = profile.bounds()
-    x, y = ((lower + upper) / 2).tolist()
-    return _placed(Extrusion(profile.moved((-x, -y)), height, taper), frame, frame @ (x, y, middle))
-
-
-def _rectangle(loop: Loop) -> tuple[tuple[float, float], np.ndarray, tuple[float, float]] | None:
-    """Width, depth, direction of the width and centre of a loop of four square corners."""
-    if len(loop) != 4 or any(abs(b) > 1e-9 for _, _, b in loop):
-        return None
-    corners = np.array(loop)[:, :2]
-    sides = np.roll(corners, -1, axis=0) - corners
-    lengths = np.linalg.norm(sides, axis=1)
-    if any(
-        abs(sides[i] @ sides[(i + 1) % 4]) > PARALLEL * lengths[i] * lengths[(i + 1) % 4] for i in range(4)
-    ):
-        return None
-    first = int(np.abs(sides[:, 0] / lengths).argmax())
-    along = sides[first] / lengths[first] * (1 if sides[first, 0] > 0 else -1)
-    width, depth = (lengths[i] + lengths[(i + 2) % 4] for i in (first, first - 1))
-    x, y = corners.mean(axis=0).tolist()
-    return (float(width / 2), float(depth / 2)), along, (x, y)
 
 
 def _turned(convex: Convex, axis: np.ndarray, ends: float) -> Part | None:
@@ -256,51 +219,4 @@ def _turned(convex: Convex, axis: np.ndarray, ends: float) -> Part | None:
     if loop is None:
         return None
     frame = _frame(axis, normals)
-    return _revolved(loop, frame, frame.T @ foot)
-
-
-def _revolved(loop: Loop, frame: np.ndarray, foot: np.ndarray) -> Part:
-    """By its name where it has one. foot: (3,) of the axis, in the frame."""
-    size = max(max(abs(x), abs(y)) for x, y, _ in loop)
-    loop = tuple((0.0 if abs(x) < _SAME * size else x, y, b) for x, y, b in loop)
-    heights = [y for _, y, _ in loop]
-    low, high = min(heights), max(heights)
-    named = _named(loop, low, high)
-    if named is not None:
-        field, middle, over = named
-        turned = frame @ np.diag([1.0, -1.0, -1.0]) if over else frame
-        return _placed(field, turned, frame @ (foot[0], foot[1], middle))
-    middle = (low + high) / 2
-    profile = Profile(loop).moved((0.0, -middle))
-    return _placed(Revolution(profile), frame, frame @ (foot[0], foot[1], middle))
-
-
-def _named(loop: Loop, low: float, high: float) -> tuple[Field, float, bool] | None:
-    """The solid, the height of its middle, and whether it stands on its head."""
-    arcs = [b for _, _, b in loop if abs(b) > 1e-9]
-    middle, height = (low + high) / 2, high - low
-    same = _SAME * max(height, max(x for x, _, _ in loop))
-    if arcs:
-        whole = len(arcs) == 1 and len(loop) == 2 and abs(arcs[0] - 1) < 1e-4
-        return (Sphere(height / 2), middle, False) if whole else None
-    bottom = max(x for x, y, _ in loop if y <= low + same)
-    top = max(x for x, y, _ in loop if y >= high - same)
-    on_axis = sum(x == 0 for x, _, _ in loop)
-    if on_axis != 2 or len(loop) != 2 + (bottom > same) + (top > same):
-        return None
-    if abs(bottom - top) <= same:
-        return Cylinder((bottom + top) / 2, height), middle, False
-    wide, narrow, over = (bottom, top, False) if bottom > top else (top, bottom, True)
-    if narrow <= same:
-        return Cone(wide, height), middle, over
-    return Frustum(wide, narrow, height), middle, over
-
-
-def _placed(field: Field, frame: np.ndarray, place: np.ndarray) -> Part:
-    """frame: (3, 3) local to world. place: (3,) of the field's origin."""
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = frame, place
-    move = Similarity.from_matrix(pose)
-    tidy = [0.0 if abs(v) < 1e-12 else v for v in move.rotation]
-    x, y, z = place.tolist()
-    return Part(field, (x, y, z), (tidy[0], tidy[1], tidy[2], tidy[3]))
+    return revolved_part(Profile(loop), frame, frame.T @ foot)

@@ -208,6 +208,11 @@ class Shape:
             ("samples", near, uniform, seed, widths), lambda: self._sample(near, uniform, seed, widths)
         )
 
+    @property
+    def unit_mesh(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Vertices (V, 3) in the unit frame and faces (F, 3) of the repaired outer surface."""
+        return self._surface.vertices, self._surface.faces
+
     def _own(self, openings: Openings) -> Openings:
         if openings.largest is None:
             return openings

@@ -13,10 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Assembly, Part
-from partwright.assembly.rows import rows as rows_of
 from partwright.assembly.tree import Node
 from partwright.errors import SettingError
-from partwright.fields import kernel
 
 _PER_SIDE = 20  # lattice points along each side of a box in which two parts may meet
 _MEETS = -1e-4  # unit lengths: shallower than this, two parts only touch
@@ -86,7 +84,7 @@ def _meet(a: Part, b: Part, low: NDArray[np.float64], high: NDArray[np.float64])
     steps = (np.arange(_PER_SIDE) + 0.5) / _PER_SIDE
     lattice = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
     points = (low + lattice * (high - low)).astype(np.float32)
-    return bool((np.maximum(*(kernel.evaluate(rows_of([part]), points) for part in (a, b))) < _MEETS).any())
+    return bool((np.maximum(a.distance(points), b.distance(points)) < _MEETS).any())
 
 
 def _groups(added: Sequence[bool], meets: NDArray[np.bool_]) -> list[list[int]]:

@@ -17,6 +17,8 @@ from partwright.assembly import Assembly
 from partwright.errors import CancelledError, EmptyShapeError
 from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outcome, Progress, timed
 from partwright.shapes import Shape
+from partwright.superfrusta.feature_search import FeatureTree
+from partwright.superfrusta.featured import SURE, assembly, feature_tree, wants_features
 from partwright.superfrusta.growing import grow
 from partwright.superfrusta.hull_start import convex_hull_start
 from partwright.superfrusta.mending import Mending
@@ -57,6 +59,12 @@ def fit(request: FitRequest[Settings]) -> Fitted:
     checkpoint = Checkpoint(run.cancel)
     with timed(seconds, "prepare"):
         samples = FitSamples.of(shape, settings, run, checkpoint)
+    features: FeatureTree | None = None
+    if wants_features(request):
+        with timed(seconds, "features"):
+            features = feature_tree(request, samples, checkpoint)
+        if features is not None and (features.score >= SURE or settings.min_iou is not None):
+            return Fitted(assembly(shape, features), "converged", seconds, [])
     assembled = partial(assembly_of, shape, settings=settings, fixed=fixed)
     search = ResidualFit(samples, settings, run.told, len(fixed), assembled, checkpoint, seconds=seconds)
     try:
@@ -75,13 +83,15 @@ def fit(request: FitRequest[Settings]) -> Fitted:
             "can see. Check its thickness, or use --quality high"
         )
     leaves = search.leaves or [RepeatedPart(row) for row in search.best]
-    assembly = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
+    if features is not None and features.objective >= search.objective(search.best, len(leaves)):
+        return Fitted(assembly(shape, features), outcome, search.seconds, search.history)
+    whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
     curve: list[CurvePoint] = []
     for step in search.curve:
         smaller = curve[-1].assembly if curve else None
         one = assembled(step.rows, smaller=smaller)
         curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
-    return Fitted(assembly, outcome, search.seconds, search.history, tuple(reversed(curve)))
+    return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)))
 
 
 @dataclass
@@ -324,8 +334,10 @@ class ResidualFit:
             self.best_objective = self.objective(self.best)
         return True
 
-    def objective(self, rows: Rows) -> float:
-        return score(self.samples, rows) - self.settings.price * len(rows)
+    def objective(self, rows: Rows, parts: int | None = None) -> float:
+        """parts: to be paid for, if not all rows are."""
+        count = len(rows) if parts is None else parts
+        return score(self.samples, rows) - self.settings.price * count
 
     def better(self, rows: Rows) -> bool:
         """Whether these rows take the place of the best so far."""

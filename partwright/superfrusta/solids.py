@@ -31,6 +31,9 @@ class Settings(settings.Settings):
     alpha: float = 2e-3
     """Less than for SuperFrusta: a hole is a part and moves R by less than a part of the body does."""
 
+    profiles: bool = True
+    """Begins with features read off the surface: extrusions, turned profiles, holes (docs/solids.md)."""
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.family != "solid" or self.smooth:
@@ -46,7 +49,7 @@ class Settings(settings.Settings):
             SettingError: the preset or a change is unknown or out of range.
         """
         preset = asdict(settings.Settings.for_quality(quality))
-        unknown = set(changes) - set(preset)
+        unknown = set(changes) - set(preset) - {"profiles"}
         if unknown:
             raise SettingError(f"unknown settings: {', '.join(sorted(unknown))}")
         own = ("family", "smooth", "subtract", "alpha")

@@ -1,0 +1,90 @@
+"""Directions along which a person would have drawn a part: across its flat faces, along its round ones."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+_SAME = math.cos(math.radians(1.5))
+_LEAST = 0.01  # of the area, that faces across a direction, or round ones along it, have
+_MOST = 4
+_CELL = 0.02
+_SMOOTH = (math.radians(1.0), math.radians(40))  # turns from face to face on a round wall
+
+
+def frames(vertices: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
+    """Rotations (3, 3), the direction the third column, the most telling first.
+
+    vertices (V, 3), faces (F, 3) of a closed mesh.
+    """
+    corners = vertices[faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1) / 2
+    kept = area > 1e-12
+    normal = np.zeros_like(cross)
+    normal[kept] = cross[kept] / (2 * area[kept, None])
+    around, weight = _round_axes(faces, normal, area)
+    votes = np.concatenate([normal[kept], around])
+    weights = np.concatenate([area[kept], weight])
+    found = _clusters(votes, weights, _LEAST * float(area.sum()))[:_MOST]
+    found = found or list(np.eye(3))
+    return [_frame(direction, found) for direction in found]
+
+
+def _round_axes(faces: np.ndarray, normal: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of faces that share an edge and turn a little there: the axis about which, and half their area."""
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    order = np.lexsort(edges.T[::-1])
+    pairs = (edges[order[1:]] == edges[order[:-1]]).all(axis=1)
+    one, two = order[:-1][pairs] // 3, order[1:][pairs] // 3
+    axis = np.cross(normal[one], normal[two])
+    sine = np.linalg.norm(axis, axis=1)
+    round_ = (sine > math.sin(_SMOOTH[0])) & (sine < math.sin(_SMOOTH[1]))
+    round_ &= (normal[one] * normal[two]).sum(axis=1) > 0
+    return axis[round_] / sine[round_, None], ((area[one] + area[two]) / 4)[round_]
+
+
+def _clusters(votes: np.ndarray, weights: np.ndarray, least: float) -> list[np.ndarray]:
+    """Directions (3,), signs aside, that the most weight agrees on."""
+    largest = np.take_along_axis(votes, np.abs(votes).argmax(axis=1)[:, None], axis=1)
+    cells, cell = np.unique(
+        np.round(votes * np.sign(largest) / _CELL).astype(int), axis=0, return_inverse=True
+    )
+    totals = np.bincount(cell.ravel(), weights, minlength=len(cells))
+    seeds = [
+        int(np.argmax(np.where(cell.ravel() == k, weights, 0))) for k in np.argsort(-totals)[: 4 * _MOST]
+    ]
+    left = np.ones(len(votes), bool)
+    found: list[tuple[float, np.ndarray]] = []
+    for seed in seeds:
+        if not left[seed]:
+            continue
+        near = np.abs(votes @ votes[seed]) > _SAME
+        near &= left
+        left &= ~near
+        total = float(weights[near].sum())
+        if total < least:
+            continue
+        signed = votes[near] * np.sign(votes[near] @ votes[seed])[:, None]
+        # The middle of the largest votes: small faces of a fillet lean to one side.
+        heavy = weights[near] >= 0.2 * weights[near].max()
+        mean = (signed[heavy] * weights[near][heavy, None]).sum(axis=0)
+        found.append((total, _snapped(mean / np.linalg.norm(mean))))
+    return [direction for _, direction in sorted(found, key=lambda f: -f[0])]
+
+
+def _snapped(direction: np.ndarray) -> np.ndarray:
+    """Upwards, and along a coordinate axis where it is within rounding of one."""
+    axis = int(np.abs(direction).argmax())
+    direction = direction * np.sign(direction[axis])
+    return np.eye(3)[axis] if direction[axis] > 1 - 1e-7 else direction
+
+
+def _frame(direction: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
+    """The direction as z; x along another one across it, or along the coordinate axis that is most across."""
+    across = [d for d in (*np.eye(3), *others) if abs(float(d @ direction)) < 1e-4]
+    x = across[0] if across else np.eye(3)[int(np.abs(direction).argmin())]
+    x = x - direction * (x @ direction)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(direction, x), direction])

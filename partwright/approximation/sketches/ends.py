@@ -1,0 +1,69 @@
+"""Where a part ends in the open, a cut in the air, a boss within what it stands on: there it goes on."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from partwright.assembly import Part
+from partwright.assembly.similarity import rotation_matrix
+from partwright.fields import Box, Cylinder, Extrusion, Field
+
+BEYOND = 0.03
+"""Unit lengths: how far an open end goes on."""
+_STEPS = (0.004, 0.012, 0.02, BEYOND + 0.004)  # beyond an end, where it has to be open
+_LATTICE = 24
+_EDGE = 0.004  # unit lengths: so near to its edge an end is not looked at
+
+
+def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.ndarray]) -> Part:
+    """The part, longer where all beyond its end is empty (of a cut) or solid (of what is added).
+
+    So no skin is left over a hole and no slit under a boss, whatever moves a little. distance: (N,) of the
+    shape at points (N, 3), unit lengths like the part, negative inside. Only ends along
+    z of a box, a cylinder or an extrusion without taper; all copies have to agree.
+    """
+    field = part.field
+    if not isinstance(field, Box | Cylinder | Extrusion) or (isinstance(field, Extrusion) and field.taper):
+        return part
+    low, high = field.bounds()
+    flat = _interior(field, low, high)
+    if not len(flat):
+        return part
+    sign = -1.0 if added else 1.0
+
+    def is_open(side: float) -> bool:
+        end = high[2] if side > 0 else low[2]
+        for copy in part.copies:
+            frame = rotation_matrix(copy.rotation)
+            for step in _STEPS:
+                points = np.column_stack([flat, np.full(len(flat), end + side * step)])
+                if (sign * distance(points @ frame.T + copy.translation) < 0).any():
+                    return False
+        return True
+
+    up, down = BEYOND * is_open(1.0), BEYOND * is_open(-1.0)
+    if not up and not down:
+        return part
+    axis = rotation_matrix(part.rotation)[:, 2]
+    x, y, z = (np.array(part.translation) + axis * (up - down) / 2).tolist()
+    return dataclasses.replace(part, field=_longer(field, up + down), translation=(x, y, z))
+
+
+def _interior(field: Field, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(K, 2) points of its middle section, away from the edge where there are such."""
+    steps = (np.arange(_LATTICE) + 0.5) / _LATTICE
+    grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    flat = low[:2] + grid * (high - low)[:2]
+    deep = field(np.column_stack([flat, np.zeros(len(flat))]))
+    within = flat[deep < -min(_EDGE, 0.4 * float(high[2]))]
+    return within if len(within) else flat[deep < 0]
+
+
+def _longer(field: Box | Cylinder | Extrusion, more: float) -> Field:
+    if isinstance(field, Box):
+        x, y, z = field.size
+        return Box((x, y, z + more))
+    return dataclasses.replace(field, height=field.height + more)

@@ -1,0 +1,71 @@
+"""Rigid moves that take one piece of a part to others like it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from manifold3d import Manifold
+
+from partwright.assembly import Similarity
+
+_ALIKE = 0.15  # of the volume, that pieces may differ by; whether a copy fits is told by what it gains
+_NEAR = 8e-3  # unit lengths: how far the move may miss the other piece's middle
+_MOST = 200
+
+
+def moves_between(
+    body: Manifold, pieces: Sequence[Manifold], frames: Sequence[np.ndarray], whole: Manifold
+) -> Iterator[Similarity]:
+    """For each piece that is like the one that `body` stands for, the moves that may take that to it: along a
+    line, or about an axis through the middle of the whole."""
+    own = min(pieces, key=lambda piece: _apart(body, piece), default=None)
+    if own is None:
+        return
+    centre, volume, sides = _middle(own), own.volume(), _sides(own)
+    about = _middle(whole)
+    for other in pieces[:_MOST]:
+        if other is own or abs(other.volume() - volume) > _ALIKE * volume:
+            continue
+        target = _middle(other)
+        if np.abs(_sides(other) - sides).max() < _NEAR * 2:
+            x, y, z = (target - centre).tolist()
+            yield Similarity(translation=(x, y, z))
+            continue
+        for frame in frames:
+            move = _turn(centre, target, frame[:, 2], about)
+            if move is not None and np.linalg.norm(move(centre) - target) < _NEAR * 2:
+                yield move
+                break
+
+
+def _turn(start: np.ndarray, end: np.ndarray, axis: np.ndarray, about: np.ndarray) -> Similarity | None:
+    """The turn about an axis that takes one point to another; None where none does."""
+    a, b = start - about, end - about
+    if abs(float((a - b) @ axis)) > _NEAR:
+        return None
+    a, b = a - axis * (a @ axis), b - axis * (b @ axis)
+    if (
+        min(np.linalg.norm(a), np.linalg.norm(b)) < _NEAR
+        or abs(np.linalg.norm(a) - np.linalg.norm(b)) > _NEAR
+    ):
+        return None
+    angle = math.atan2(float(np.cross(a, b) @ axis), float(a @ b))
+    c, s = math.cos(angle / 2), math.sin(angle / 2)
+    x, y, z = (s * axis).tolist()
+    turn = Similarity(rotation=(c, x, y, z))
+    dx, dy, dz = (about - turn(about)).tolist()
+    return Similarity(rotation=turn.rotation, translation=(dx, dy, dz))
+
+
+def _apart(one: Manifold, other: Manifold) -> float:
+    return float(np.linalg.norm(_middle(one) - _middle(other))) + abs(one.volume() - other.volume())
+
+
+def _middle(body: Manifold) -> np.ndarray:
+    return np.reshape(body.bounding_box(), (2, 3)).mean(axis=0)
+
+
+def _sides(body: Manifold) -> np.ndarray:
+    return np.ptp(np.reshape(body.bounding_box(), (2, 3)), axis=0)

@@ -1,0 +1,138 @@
+"""A closed surface seen along a direction: where it is flat, and what lies between, as profiles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from manifold3d import CrossSection, FillRule, Manifold
+
+from partwright.approximation.sketches.outlines import fitted_loop
+from partwright.errors import ParameterError
+from partwright.fields.profile import Loop, Profile
+
+FINE, COARSE = 4e-4, 4e-3  # unit lengths: how far outlines may lie from sections
+_MANY = 24  # sides, from which on fewer are looked for at the coarse tolerance
+_FEWER = 0.5  # of the sides, that the coarse outline may have at most
+_FLAT = math.cos(math.radians(0.6))
+_LEAST_FLAT = 2e-4  # of the bounding rectangle: area of a level
+_SAME_LEVEL = 2e-3
+_MOST_LEVELS = 24
+_ROUNDING = 2e-5  # unit lengths
+_SLIVER = 3e-5  # unit areas
+
+
+@dataclass(frozen=True)
+class Region:
+    """A connected piece of a section. area: of it, holes taken off."""
+
+    section: CrossSection
+    area: float
+
+    @cached_property
+    def filled(self) -> CrossSection:
+        """Without its holes."""
+        return CrossSection([max(self.section.to_polygons(), key=_loop_area)], FillRule.Positive)
+
+    @cached_property
+    def profile(self) -> Profile | None:
+        return profile_of(self.section)
+
+
+@dataclass
+class View:
+    """A body turned so that `frame`'s third column is z: its points are frame @ points of the view."""
+
+    body: Manifold
+    frame: np.ndarray
+    _sections: dict[float, list[Region]] = field(default_factory=dict)
+
+    @classmethod
+    def along(cls, body: Manifold, frame: np.ndarray) -> View:
+        return cls(body.transform(np.column_stack([frame.T, np.zeros(3)])), frame)
+
+    @cached_property
+    def mesh(self) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (V, 3) and faces (F, 3), in the view."""
+        mesh = self.body.to_mesh64()
+        return np.asarray(mesh.vert_properties, float)[:, :3], np.asarray(mesh.tri_verts, np.int64)
+
+    @cached_property
+    def levels(self) -> list[float]:
+        """Heights of flat faces, from the lowest point to the highest."""
+        vertices, faces = self.mesh
+        corners = vertices[faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(normal, axis=1) / 2
+        flat = np.abs(normal[:, 2]) > 2 * area * _FLAT
+        height, weight = corners[flat, :, 2].mean(axis=1), area[flat]
+        low, high = float(vertices[:, 2].min()), float(vertices[:, 2].max())
+        least = _LEAST_FLAT * float(np.prod(np.ptp(vertices[:, :2], axis=0)))
+        found: list[tuple[float, float]] = []
+        order = np.argsort(height)
+        start = 0
+        for i in range(1, len(order) + 1):
+            if i == len(order) or height[order[i]] - height[order[i - 1]] > _SAME_LEVEL:
+                group = order[start:i]
+                total = float(weight[group].sum())
+                if total > least:
+                    found.append((total, float(np.average(height[group], weights=weight[group]))))
+                start = i
+        found = sorted(found, reverse=True)[:_MOST_LEVELS]
+        inner = [z for _, z in found if low + _SAME_LEVEL < z < high - _SAME_LEVEL]
+        return [low, *sorted(inner), high]
+
+    @property
+    def slabs(self) -> Iterator[tuple[float, float]]:
+        """Between levels."""
+        return zip(self.levels[:-1], self.levels[1:], strict=True)
+
+    def regions(self, height: float) -> list[Region]:
+        """Connected pieces of the section at a height, the largest first."""
+        if height not in self._sections:
+            pieces = [Region(p, p.area()) for p in self.body.slice(height).simplify(_ROUNDING).decompose()]
+            pieces = [p for p in pieces if p.area > _SLIVER]
+            self._sections[height] = sorted(pieces, key=lambda p: -p.area)
+        return self._sections[height]
+
+
+def profile_of(section: CrossSection) -> Profile | None:
+    """Of a connected section, at the finest tolerance that does not follow every chord."""
+    fine = _profile(section, FINE)
+    if fine is None or len(fine.corners) <= _MANY:
+        return fine
+    coarse = _profile(section, COARSE)
+    if coarse is not None and len(coarse.corners) <= _FEWER * len(fine.corners):
+        return coarse
+    return fine
+
+
+def _profile(section: CrossSection, tolerance: float) -> Profile | None:
+    polygons = [np.asarray(p) for p in section.to_polygons()]
+    if not polygons:
+        return None
+    polygons.sort(key=_loop_area, reverse=True)
+    loops = [fitted_loop(p, tolerance) for p in polygons]
+    if loops[0] is None:
+        return None
+    holes = [
+        loop
+        for loop, p in zip(loops[1:], polygons[1:], strict=True)
+        if loop is not None and abs(_loop_area(p)) > _SLIVER
+    ]
+    return _valid(loops[0], holes)
+
+
+def _valid(outline: Loop, holes: Sequence[Loop]) -> Profile | None:
+    try:
+        return Profile(outline, tuple(holes))
+    except ParameterError:
+        return None
+
+
+def _loop_area(polygon: np.ndarray) -> float:
+    x, y = np.asarray(polygon, dtype=np.float64).T
+    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)

@@ -1,0 +1,286 @@
+"""A tree of features read off a closed surface: a base body, then what is added to it and cut from it.
+
+The surface's own sections and half sections are the bodies to choose from. What the chosen ones miss, and
+what they have too much, is known exactly as a body of its own, and falls into pieces: a hole, a boss, a
+pocket. Each piece is again a body whose sections can be extruded or turned. Whichever candidate raises R
+most beyond its price joins, with as many copies as stand for other pieces, until none pays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from manifold3d import Manifold, Mesh
+from numpy.typing import NDArray
+
+from partwright.approximation.sketches.bodies import bodies
+from partwright.approximation.sketches.candidates import Candidate, candidates
+from partwright.approximation.sketches.directions import frames
+from partwright.approximation.sketches.repeats import moves_between
+from partwright.assembly import Part, Similarity
+from partwright.assembly.similarity import rotation_matrix
+from partwright.methods import Checkpoint
+from partwright.shapes import Shape
+from partwright.superfrusta.samples import FitSamples
+
+_FREE_SIDES = 4
+_SIDE_PRICE = 1 / 25  # of a feature's
+_LEAST_PIECE = 2e-5  # of the volume
+_THIN = 2.5e-3  # unit lengths: twice the volume over the area of a skin between a wall and its chords
+_PIECES = 10  # of what is missed, and of what is too much, that are looked at in one step
+_BASES = 3
+_RIVAL = 0.8  # of the best base's objective, that another has to have
+_BEHIND, _PATIENT = 0.03, 3  # of the objective, after so many steps
+_COMPLEX = 20_000  # triangles of a piece that is no feature
+_MOST = 30
+_COPY = 0.4  # of what the first gains, that a copy has to
+_BATCH = 64
+_EVERY = 2  # samples that the search looks at
+_FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
+_HOPELESS = 1.0  # of its price, that a feature can gain at most
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One step of the tree. covers: (N,) the samples within any copy."""
+
+    added: bool
+    part: Part
+    covers: NDArray[np.bool_]
+    sides: int
+
+
+@dataclass
+class FeatureTree:
+    """Features in order, and the samples (N,) within their fold.
+
+    inner, outer: the fold as a body, within its surface and around it: what of the shape lies outside of
+    the outer one is missed, what of the inner one lies outside of the shape is too much; skins are neither.
+    """
+
+    features: list[Feature] = field(default_factory=list)
+    covered: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+    inner: Manifold = field(default_factory=Manifold)
+    outer: Manifold = field(default_factory=Manifold)
+    score: float = 0.0
+    price: float = 0.0
+    objectives: tuple[float, ...] = ()
+
+    def at(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """(N,) whether points (N, 3) lie within the fold."""
+        covered = np.zeros(len(points), bool)
+        for feature in self.features:
+            within = covers(feature.part, points)
+            covered = covered | within if feature.added else covered & ~within
+        return covered
+
+    def first(self, count: int) -> FeatureTree:
+        """The tree of the first features; its scores are not known."""
+        return FeatureTree(self.features[:count])
+
+    @property
+    def objective(self) -> float:
+        return self.score - self.price
+
+
+class FeatureSearch:
+    """The search for one shape. alpha: price of a feature. most: features. told: of each tree on the way."""
+
+    def __init__(
+        self,
+        shape: Shape,
+        samples: FitSamples,
+        alpha: float,
+        checkpoint: Checkpoint | None = None,
+        most: int | None = None,
+        told: Callable[[FeatureTree], None] | None = None,
+    ) -> None:
+        self.alpha, self.checkpoint, self.told = alpha, checkpoint, told
+        self.most = min(most or _MOST, _MOST)
+        vertices, faces = shape.unit_mesh
+        self.body = Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
+        self.frames = frames(vertices, faces)
+        self.volume = float(self.body.volume())
+        self.points = samples.points[::_EVERY]
+        self.weights = _weights(samples)[::_EVERY]
+        self.inside = samples.inside[::_EVERY]
+        self._masks: dict[int, tuple[Candidate, NDArray[np.bool_]]] = {}
+        self._of_piece: dict[tuple[float, ...], list[Candidate]] = {}
+
+    def run(self) -> FeatureTree | None:
+        """The best tree; None where the surface encloses nothing to take sections of."""
+        if self.body.is_empty() or self.volume <= 0:
+            return None
+        own = candidates(self.body, self.frames, holes=True)
+        if not own:
+            return None
+        empty = FeatureTree(covered=np.zeros(len(self.inside), bool))
+        gains = self._gains(empty, own, True)
+        order = np.argsort(-gains)[:_BASES]
+        best: FeatureTree | None = None
+        for index in order:
+            if best is not None and gains[index] < _RIVAL * gains[order[0]]:
+                break
+            tree = self._grown(self._with(empty, own[index], True), own, best)
+            if best is None or tree.objective > best.objective:
+                best = tree
+        return best
+
+    def _grown(self, tree: FeatureTree, own: Sequence[Candidate], best: FeatureTree | None) -> FeatureTree:
+        """Until nothing pays, or it is well behind where the best so far was after as many steps."""
+        while len(tree.features) < self.most:
+            if self.checkpoint is not None:
+                self.checkpoint()
+            step = self._step(tree, own)
+            if step is None:
+                break
+            tree = step
+            if self.told is not None:
+                self.told(tree)
+            if best is not None and self._behind(tree, best):
+                break
+        return tree
+
+    @staticmethod
+    def _behind(tree: FeatureTree, best: FeatureTree) -> bool:
+        count = len(tree.objectives) - 1
+        rival = best.objectives[min(count, len(best.objectives) - 1)]
+        return count >= _PATIENT and tree.objective < rival - _BEHIND
+
+    def _step(self, tree: FeatureTree, own: Sequence[Candidate]) -> FeatureTree | None:
+        missed = self._pieces(self.body - tree.outer, self.inside & ~tree.covered)
+        excess = self._pieces(tree.inner - self.body, ~self.inside & tree.covered)
+        adding = [*own, *(c for piece in missed for c in self._candidates(piece))]
+        cutting = [c for piece in excess for c in self._candidates(piece)]
+        best: tuple[float, Candidate, bool] | None = None
+        for pool, added in ((adding, True), (cutting, False)):
+            if not pool:
+                continue
+            gains = self._gains(tree, pool, added)
+            index = int(gains.argmax())
+            if best is None or gains[index] > best[0]:
+                best = (float(gains[index]), pool[index], added)
+        if best is None or best[0] <= 0:
+            return None
+        _, chosen, added = best
+        return self._with(tree, chosen, added, missed if added else excess)
+
+    def _with(
+        self, tree: FeatureTree, chosen: Candidate, added: bool, pieces: Sequence[Manifold] = ()
+    ) -> FeatureTree:
+        """The tree and a candidate, with the copies that stand for other pieces."""
+        within = self._mask(chosen)
+        covered = tree.covered | within if added else tree.covered & ~within
+        reached = self._score(covered)
+        gain = reached - tree.score
+        inner, outer = chosen.bodies
+        instances = []
+        for move in moves_between(inner, pieces, self.frames, self.body):
+            copy = chosen.part.transformed(move)
+            mask = covers(copy, self.points)
+            more = covered | mask if added else covered & ~mask
+            better = self._score(more)
+            if better - reached < _COPY * gain:
+                continue
+            covered, reached, within = more, better, within | mask
+            instances.append(move)
+            inner, outer = (
+                body + own.transform(_matrix(move))
+                for body, own in zip((inner, outer), chosen.bodies, strict=True)
+            )
+        part = replace(chosen.part, instances=tuple(instances))
+        feature = Feature(added, part, within, chosen.sides)
+        if added:
+            inner, outer = tree.inner + inner, tree.outer + outer
+        else:
+            inner, outer = tree.inner - outer, tree.outer - inner
+        for body in (inner, outer):
+            body.num_tri()  # now, and not with every later step again
+        features = [*tree.features, feature]
+        price = tree.price + self._price(chosen.sides)
+        steps = (*tree.objectives, reached - price)
+        return FeatureTree(features, covered, inner, outer, reached, price, steps)
+
+    def _price(self, sides: int) -> float:
+        return self.alpha * (1 + _SIDE_PRICE * max(0, sides - _FREE_SIDES))
+
+    def _pieces(self, residual: Manifold, wrong: NDArray[np.bool_]) -> list[Manifold]:
+        """Connected pieces of more than a skin, the largest first. wrong: the samples that they hold."""
+        points, weight = self.points[wrong], self.weights[wrong]
+        total = self.weights[self.inside].sum(axis=0)
+        pieces = []
+        for volume, piece in bodies(residual, _LEAST_PIECE * self.volume, _THIN):
+            if piece.num_tri() > _COMPLEX:
+                continue
+            low, high = np.reshape(piece.bounding_box(), (2, 3))
+            within = ((points > low) & (points < high)).all(axis=1)
+            if float((weight[within].sum(axis=0) / total).mean()) > _HOPELESS * self.alpha:
+                pieces.append((volume, piece if piece.num_tri() < _FINE else piece.simplify(_SKIN)))
+        return [piece for _, piece in sorted(pieces, key=lambda p: -p[0])[:_PIECES]]
+
+    def _candidates(self, piece: Manifold) -> list[Candidate]:
+        low, high = np.reshape(piece.bounding_box(), (2, 3))
+        key = tuple(np.round([*low, *high, piece.volume()], 5).tolist())
+        if key not in self._of_piece:
+            self._of_piece[key] = candidates(piece, self.frames, holes=True)
+        return self._of_piece[key]
+
+    def _mask(self, candidate: Candidate) -> NDArray[np.bool_]:
+        known = self._masks.get(id(candidate))
+        if known is None:
+            known = candidate, covers(candidate.part, self.points)
+            self._masks[id(candidate)] = known
+        return known[1]
+
+    def _gains(self, tree: FeatureTree, pool: Sequence[Candidate], added: bool) -> NDArray[np.float64]:
+        """(C,) by how much each raises R beyond its price."""
+        inside, outside = self.weights * self.inside[:, None], self.weights * ~self.inside[:, None]
+        both = (inside * tree.covered[:, None]).sum(axis=0)
+        either = inside.sum(axis=0) + (outside * tree.covered[:, None]).sum(axis=0)
+        changes = ~tree.covered if added else tree.covered
+        columns = np.hstack([inside, outside])[changes].astype(np.float32)
+        sign = 1.0 if added else -1.0
+        scores = []
+        for start in range(0, len(pool), _BATCH):
+            masks = np.stack([self._mask(c)[changes] for c in pool[start : start + _BATCH]])
+            change = sign * (masks.astype(np.float32) @ columns)
+            ratio = (both + change[:, :2]) / np.maximum(either + change[:, 2:], 1e-9)
+            scores.append(ratio.mean(axis=1))
+        price = np.array([self._price(c.sides) for c in pool])
+        return np.concatenate(scores) - tree.score - price
+
+    def scored(self, tree: FeatureTree) -> FeatureTree:
+        """The tree with its score and price."""
+        price = sum(self._price(feature.sides) for feature in tree.features)
+        return replace(tree, score=self._score(tree.at(self.points)), price=price)
+
+    def _score(self, covered: NDArray[np.bool_]) -> float:
+        both = self.weights[covered & self.inside].sum(axis=0)
+        either = self.weights[covered | self.inside].sum(axis=0)
+        return float((both / np.maximum(either, 1e-9)).mean())
+
+
+def _weights(samples: FitSamples) -> NDArray[np.float64]:
+    """(N, 2): of the samples near the surface, and of the others."""
+    weights = np.zeros((len(samples.points), 2))
+    weights[: samples.near, 0] = samples.weight[: samples.near]
+    weights[samples.near :, 1] = samples.weight[samples.near :]
+    return weights
+
+
+def _matrix(move: Similarity) -> NDArray[np.float64]:
+    return np.column_stack([rotation_matrix(move.rotation), move.translation])
+
+
+def covers(part: Part, points: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """(N,) whether points (N, 3) lie within the part or one of its copies."""
+    result = np.zeros(len(points), bool)
+    for copy in part.copies:
+        low, high = copy.bounds()
+        near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
+        if len(near):
+            local = (points[near] - copy.translation) @ rotation_matrix(copy.rotation)
+            result[near] |= copy.field(local) < 0
+    return result

@@ -1,0 +1,88 @@
+"""A fit of solids that begins with features read off the surface, and the assembly of them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from partwright.approximation.part_roles import with_role_names
+from partwright.approximation.sketches.ends import with_open_ends
+from partwright.approximation.sketches.holes import holes_apart
+from partwright.assembly import Assembly
+from partwright.methods import Checkpoint, FitRequest, Progress
+from partwright.shapes import Shape
+from partwright.superfrusta.feature_search import Feature, FeatureSearch, FeatureTree
+from partwright.superfrusta.flat_tree import nested
+from partwright.superfrusta.samples import FitSamples
+from partwright.superfrusta.settings import Settings
+
+SURE = 0.95
+"""R from which on a tree of features is the result, and no other is looked for."""
+
+
+def wants_features(request: FitRequest[Settings]) -> bool:
+    """Whether the fit may begin with features: from nothing, with cuts, and not down to every size."""
+    settings = request.settings
+    allowed = getattr(settings, "profiles", False) and settings.subtract and not settings.curve
+    return bool(allowed and request.start is None)
+
+
+def feature_tree(
+    request: FitRequest[Settings], samples: FitSamples, checkpoint: Checkpoint
+) -> FeatureTree | None:
+    """The best tree of features within the part budget; none where the surface has no sections, or where it
+    misses the IoU that is asked for."""
+    settings = request.settings
+
+    def told(tree: FeatureTree) -> None:
+        iou, count = volume_iou(tree, samples), len(tree.features)
+        run = request.run
+        run.told(Progress("features", count, count, count, iou, 0.3, lambda: assembly(request.shape, tree)))
+
+    search = FeatureSearch(request.shape, samples, settings.alpha, checkpoint, settings.max_parts, told)
+    tree = search.run()
+    if tree is None or settings.min_iou is None:
+        return tree
+    for count in range(1, len(tree.features) + 1):
+        shorter = tree.first(count)
+        if volume_iou(shorter, samples) >= settings.min_iou:
+            return search.scored(shorter)
+    return None
+
+
+def volume_iou(tree: FeatureTree, samples: FitSamples) -> float:
+    """Over the samples that fill the box."""
+    rest = slice(samples.near, None)
+    covered, inside, weight = tree.at(samples.points[rest]), samples.inside[rest], samples.weight[rest]
+    return float(weight[covered & inside].sum() / max(float(weight[covered | inside].sum()), 1e-9))
+
+
+def assembly(shape: Shape, tree: FeatureTree) -> Assembly:
+    """The features as a tree of unions and differences, named, in the shape's own units."""
+    features = _numbered(tree.features, shape)
+    parts = [feature.part for feature in features]
+    whole = nested(parts, [feature.added for feature in features], plain=True)
+    whole = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
+    return with_role_names(dataclasses.replace(whole, unit=shape.unit))
+
+
+def _numbered(features: Sequence[Feature], shape: Shape) -> list[Feature]:
+    """Round holes of profiles apart, each size once; ends that are open further out; names until they say
+    more."""
+    result: list[Feature] = []
+    for feature in features:
+        part, holes = holes_apart(feature.part) if feature.added else (feature.part, ())
+        result.append(dataclasses.replace(feature, part=part))
+        none = np.zeros(0, bool)
+        result += [Feature(False, hole, none, 0) for hole in holes]
+    result = [
+        dataclasses.replace(f, part=with_open_ends(f.part, f.added, shape.unit_distance)) if i else f
+        for i, f in enumerate(result)
+    ]
+    stems = {True: "part", False: "cut"}
+    return [
+        dataclasses.replace(f, part=dataclasses.replace(f.part, name=f"{stems[f.added]}_{i:02d}"))
+        for i, f in enumerate(result, start=1)
+    ]

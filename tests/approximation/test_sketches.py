@@ -1,0 +1,157 @@
+"""Outlines, directions, holes and open ends read off closed surfaces."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+from partwright.approximation.sketches.candidates import candidates
+from partwright.approximation.sketches.directions import frames
+from partwright.approximation.sketches.ends import BEYOND, with_open_ends
+from partwright.approximation.sketches.holes import holes_apart
+from partwright.approximation.sketches.outlines import fitted_loop
+from partwright.assembly import Part, Similarity
+from partwright.fields import Box, Cylinder, Extrusion, Revolution
+from partwright.fields.profile import Profile, circle, circle_of
+from partwright.meshing.named_solids import named_solid
+
+TOLERANCE = 4e-4
+
+
+def chords(profile: Profile, count: int) -> np.ndarray:
+    """Corners (K, 2) of the outline with `count` chords an arc."""
+    found = []
+    for side in profile.sides[0]:
+        if side.centre is None:
+            found.append(side.start)
+            continue
+        x, y = np.subtract(side.start, side.centre)
+        for angle in np.arange(count) * side.sweep / count:
+            c, s = math.cos(angle), math.sin(angle)
+            found.append((side.centre[0] + c * x - s * y, side.centre[1] + s * x + c * y))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("count", [2, 3, 8, 20])
+@pytest.mark.parametrize("shift", [0, 1, 5])
+def test_a_rounded_rectangle_is_four_lines_and_four_arcs(count: int, shift: int) -> None:
+    polygon = np.roll(chords(Profile.rectangle(1.0, 0.6, corner=0.15), count), shift, axis=0)
+    loop = fitted_loop(polygon, TOLERANCE)
+    assert loop is not None
+    sides = Profile(loop).sides[0]
+    assert sorted(side.centre is not None for side in sides) == [False] * 4 + [True] * 4
+    assert [s.radius for s in sides if s.centre is not None] == pytest.approx([0.15] * 4, abs=1e-9)
+
+
+@pytest.mark.parametrize("sides", [3, 4, 6, 8])
+def test_a_regular_polygon_stays_one(sides: int) -> None:
+    loop = fitted_loop(np.array(Profile.regular(sides, 0.5).outline)[:, :2], TOLERANCE)
+    assert loop is not None
+    assert len(loop) == sides
+    assert not any(bulge for _, _, bulge in loop)
+
+
+@pytest.mark.parametrize("count", [9, 12, 64])
+def test_a_circle_is_one(count: int) -> None:
+    loop = fitted_loop(np.array(Profile.regular(count, 0.5).outline)[:, :2] + (0.1, 0.2), TOLERANCE)
+    assert loop is not None
+    found = circle_of(loop)
+    assert found is not None
+    radius, centre = found
+    assert (radius, *centre) == pytest.approx((0.5, 0.1, 0.2), abs=1e-9)
+
+
+def test_corners_within_a_wall_are_no_corners() -> None:
+    square = np.array([(0, 0), (0.3, 1e-6), (1, 0), (1, 0.5), (1, 1), (0, 1)])
+    loop = fitted_loop(square, TOLERANCE)
+    assert loop is not None
+    assert len(loop) == 4
+
+
+def test_what_is_flat_is_no_outline() -> None:
+    assert fitted_loop(np.array([(0, 0), (1e-6, 0), (0, 1e-6)]), TOLERANCE) is None
+
+
+def test_directions_of_a_turned_part_begin_with_its_axis() -> None:
+    body = named_solid(Revolution(Profile([(0.2, 0), (0.6, 0), (0.6, 0.2), (0.2, 0.8)])), 1e-3)
+    turned = body.rotate((30, 40, 0))
+    mesh = turned.to_mesh64()
+    found = frames(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
+    tip = named_solid(Cylinder(0.01, 1.0), 1e-3).rotate((30, 40, 0))
+    axis = np.ptp(np.reshape(tip.bounding_box(), (2, 3)), axis=0)
+    assert np.abs(found[0][:, 2]) == pytest.approx(axis / np.linalg.norm(axis), abs=0.02)
+    for frame in found:
+        assert frame.T @ frame == pytest.approx(np.eye(3), abs=1e-9)
+        assert np.linalg.det(frame) == pytest.approx(1.0)
+
+
+def test_a_plate_with_pockets_is_one_of_its_own_candidates() -> None:
+    octagons = [
+        tuple((x + px, y, b) for px, y, b in Profile.regular(8, 0.12).outline) for x in (-0.5, 0.0, 0.5)
+    ]
+    wanted = Profile(Profile.rectangle(1.6, 0.6, corner=0.1).outline, tuple(octagons))
+    body = named_solid(Extrusion(wanted, 0.1), 1e-4)
+    found = candidates(body, [np.eye(3)], holes=True)
+    parts = [one.part.field for one in found if isinstance(one.part.field, Extrusion)]
+    best = max(parts, key=lambda field: len(field.profile.holes))
+    assert best.height == pytest.approx(0.1, abs=1e-6)
+    assert [len(loop) for loop in best.profile.loops] == [8, 8, 8, 8]
+    assert best.profile.area == pytest.approx(wanted.area, rel=1e-4)
+
+
+def test_a_knob_is_turned() -> None:
+    outline = [(0, 0), (0.5, 0), (0.5, 0.2), (0.2, 0.3), (0.2, 0.8), (0, 0.8)]
+    body = named_solid(Revolution(Profile(outline)), 1e-4).translate((0.1, 0.2, 0.0))
+    found = [c.part for c in candidates(body, [np.eye(3)], holes=True)]
+    knob = next(part for part in found if isinstance(part.field, Revolution))
+    assert knob.field.profile.area == pytest.approx(Profile(outline).area, rel=2e-3)
+    assert knob.translation[:2] == pytest.approx((0.1, 0.2), abs=1e-3)
+
+
+def test_round_holes_come_apart_by_size() -> None:
+    holes = [
+        circle(0.1, (-0.5, 0)),
+        circle(0.1, (0.5, 0)),
+        circle(0.2),
+        Profile.regular(6, 0.1).moved((0, 0.3)).outline,
+    ]
+    profile = Profile(Profile.rectangle(1.6, 1.0).outline, tuple(holes))
+    turned = Similarity(rotation=(math.cos(0.3), 0.0, math.sin(0.3), 0.0), translation=(0.1, 0.2, 0.3))
+    plate = Part(Extrusion(profile, 0.2), name="plate").transformed(turned)
+    body, cuts = holes_apart(plate)
+    assert isinstance(body.field, Extrusion)
+    assert len(body.field.profile.holes) == 1
+    assert sorted((round(cut.field.radius, 9), len(cut.copies)) for cut in cuts) == [(0.1, 2), (0.2, 1)]
+    points = np.random.default_rng(0).uniform(-1, 1, (4000, 3)).astype(np.float32)
+    inside = body.distance(points) < 0
+    for cut in cuts:
+        inside &= cut.distance(points) > 0
+    assert (inside == (plate.distance(points) < 0)).all()
+
+
+def test_a_plate_with_one_round_hole_is_a_box() -> None:
+    body, (hole,) = holes_apart(
+        Part(Extrusion(Profile(Profile.rectangle(1.0, 0.6).outline, (circle(0.1),)), 0.2))
+    )
+    assert body.field == Box((1.0, 0.6, 0.2))
+    assert hole.field.radius == pytest.approx(0.1)
+
+
+def test_ends_in_the_open_go_on() -> None:
+    plate = Part(Box((1.0, 1.0, 0.2)))
+    through, blind = Part(Cylinder(0.1, 0.2)), Part(Cylinder(0.1, 0.1), (0, 0, 0.05))
+    assert with_open_ends(through, False, plate.distance).field.height == pytest.approx(0.2 + 2 * BEYOND)
+    longer = with_open_ends(blind, False, lambda p: np.maximum(plate.distance(p), -blind.distance(p)))
+    assert longer.field.height == pytest.approx(0.1 + BEYOND)
+    assert longer.translation[2] - longer.field.height / 2 == pytest.approx(0.0)
+    boss = Part(Cylinder(0.2, 0.3), (0, 0, 0.25))
+    stood = with_open_ends(boss, True, (plate | boss).distance)
+    assert stood.translation[2] + stood.field.height / 2 == pytest.approx(0.4)
+    assert stood.field.height == pytest.approx(0.3 + BEYOND)
+
+
+def test_nothing_has_no_candidates() -> None:
+    assert candidates(Manifold(), [np.eye(3)], holes=True) == []

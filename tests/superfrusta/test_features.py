@@ -1,0 +1,94 @@
+"""Fits of solids that begin with features: what a person drew comes back, exact."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import partwright as pw
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution
+from partwright.meshing import mesh_assembly
+from partwright.shapes import Shape, load_shape
+
+OCTAGON = Profile.regular(8, 8.0)
+
+
+def shape_of(assembly: Assembly) -> Shape:
+    return load_shape(mesh_assembly(assembly), unit="mm")
+
+
+def around(count: int) -> tuple[Similarity, ...]:
+    turns = np.arange(1, count) * (math.pi / count)
+    return tuple(Similarity(rotation=(math.cos(t), 0.0, 0.0, math.sin(t))) for t in turns)
+
+
+def fitted(assembly: Assembly, **settings: object) -> pw.Result:
+    return pw.fit(shape_of(assembly), "solids", quality="draft", **settings)
+
+
+def test_a_plate_with_octagonal_pockets_is_drawn_once() -> None:
+    pockets = tuple(OCTAGON.moved((x, y)).outline for x in (-30, 0, 30) for y in (-12, 12))
+    whole = Extrusion(Profile(Profile.rectangle(100, 60, corner=6).outline, pockets), 8)
+    result = fitted(Assembly((Part(whole),)))
+    plate, pocket = result.assembly.parts
+    assert (plate.name, pocket.name, len(pocket.copies)) == ("base_plate", "opening", 6)
+    assert isinstance(plate.field, Extrusion)
+    assert isinstance(pocket.field, Extrusion)
+    assert plate.field.height == pytest.approx(8, rel=1e-4)
+    assert len(pocket.field.profile.outline) == 8
+    assert pocket.field.profile.area == pytest.approx(OCTAGON.area, rel=1e-3)
+    radii = [s.radius for s in plate.field.profile.sides[0] if s.centre is not None]
+    assert radii == pytest.approx([6] * 4, rel=1e-3)
+    assert result.scores.iou > 0.998
+
+
+def test_a_flange_is_turned_and_drilled_once() -> None:
+    hub = Revolution(Profile([(6, 0), (30, 0), (30, 5), (12, 5), (12, 20), (6, 20)]))
+    hole = Part(Cylinder(2.5, 20), (22, 0, 2), instances=around(6))
+    result = fitted(Assembly((Part(hub), hole), operation="difference"))
+    holes = [part for part in result.assembly.parts if len(part.copies) == 6]
+    assert [type(part.field) for part in holes] == [Cylinder]
+    assert holes[0].field.radius == pytest.approx(2.5, rel=2e-3)
+    assert holes[0].name == "hole"
+    assert len(result.assembly) <= 3
+    assert result.surface.volume == pytest.approx(result.shape.volume, rel=2e-3)
+
+
+def test_an_angle_with_holes_has_exact_numbers() -> None:
+    outline = Profile([(0, 0), (40, 0), (40, 5), (5, 5), (5, 30), (0, 30)])
+    angle = Part(Extrusion(outline, 24))
+    hole = Part(Cylinder(3, 20), (25, 2, 6), (math.sqrt(0.5), math.sqrt(0.5), 0, 0))
+    moved = Similarity(translation=(0, 0, -12))
+    result = fitted(
+        Assembly((angle, Part(hole.field, hole.translation, hole.rotation, instances=(moved,))), "difference")
+    )
+    base, *cuts = result.assembly.parts
+    assert isinstance(base.field, Extrusion)
+    assert len(base.field.profile.outline) == 6
+    assert base.field.profile.area == pytest.approx(outline.area, rel=1e-4)
+    (cut,) = cuts
+    assert len(cut.copies) == 2
+    assert cut.field.radius == pytest.approx(3, rel=2e-3)
+    assert result.scores.iou > 0.997
+
+
+def test_bounds_and_cleaning_get_named_solids_alone() -> None:
+    profile = Profile([(0, 0), (4, 0), (4, 1), (1, 1), (1, 3), (0, 3)])
+    result = fitted(Assembly((Part(Extrusion(profile, 2)),)), clean=True)
+    assert all(part.field.superfrustum() is not None for part in result.assembly.parts)
+
+
+def test_the_budget_and_the_target_are_kept() -> None:
+    steps = Assembly(tuple(Part(Box((10.0 - 3 * i, 10.0, 2.0)), (1.5 * i, 0, 2.0 * i)) for i in range(3)))
+    whole = Assembly((steps, Part(Cylinder(1, 20), (-3.5, 0, 0))), operation="difference")
+    assert len(fitted(whole, max_parts=1).assembly) == 1
+    assert len(fitted(whole, min_iou=0.7).assembly) == 1
+
+
+def test_the_same_seed_gives_the_same_features() -> None:
+    whole = Assembly((Part(Box((4.0, 3.0, 1.0))), Part(Cylinder(0.5, 3), (1, 0, 0))), operation="difference")
+    first, second = (fitted(whole).assembly for _ in range(2))
+    assert first == second
