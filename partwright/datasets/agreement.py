@@ -58,7 +58,8 @@ def agreed(shapes: Sequence[Sequence[PrimitiveFit]]) -> list[PrimitiveFit]:
     reference = min((_reference([fit]) for fit in starts), key=lambda r: _total(good, r))
     chosen = [_best(fits, reference) for fits in good]
     for _ in range(_ROUNDS):
-        again = [_best(fits, _reference(chosen)) for fits in good]
+        reference = _reference(chosen)
+        again = [_best(fits, reference) for fits in good]
         if all(np.array_equal(a.rotation, b.rotation) for a, b in zip(chosen, again, strict=True)):
             break
         chosen = again
@@ -89,27 +90,36 @@ def _reference(fits: Sequence[PrimitiveFit]) -> _Reference:
 
 
 def _total(good: Sequence[Sequence[PrimitiveFit]], reference: _Reference) -> float:
-    return sum(_cost(_best(fits, reference), reference) for fits in good)
+    return sum(float(_costs(*_named(fits, reference), reference).min()) for fits in good)
 
 
-def _cost(fit: PrimitiveFit, reference: _Reference, turn_only: bool = False) -> float:
-    cosine = (np.sum(fit.rotation * reference.rotation) - 1) / 2
+def _costs(rotations: Array, log_scales: Array, reference: _Reference, turn_only: bool = False) -> Array:
+    """(K,) of rotations (K, 3, 3) and logarithms of half-lengths (K, 3)."""
+    cosine = (np.sum(rotations * reference.rotation, axis=(1, 2)) - 1) / 2
     angle = np.arccos(np.clip(cosine, -1, 1))
-    return float(angle**2 + (0 if turn_only else np.sum((np.log(fit.scale) - reference.log_scale) ** 2)))
+    apart = 0.0 if turn_only else np.sum((log_scales - reference.log_scale) ** 2, axis=1)
+    return np.asarray(angle**2 + apart)
 
 
 def _best(fits: Sequence[PrimitiveFit], reference: _Reference, turn_only: bool = False) -> PrimitiveFit:
     """The fit and naming nearest to the reference, or to its rotation alone."""
-    named = [other for fit in fits for other in _renamed(fit, reference)]
-    return min(named, key=lambda fit: _cost(fit, reference, turn_only))
+    rotations, log_scales = _named(fits, reference)
+    best = int(_costs(rotations, log_scales, reference, turn_only).argmin())
+    fit = fits[best // (len(rotations) // len(fits))]
+    return replace(fit, rotation=rotations[best], scale=np.exp(log_scales[best]))
 
 
-def _renamed(fit: PrimitiveFit, reference: _Reference) -> list[PrimitiveFit]:
-    """The same solid, its axes named in every way; a cylinder turned as near to the reference as may be."""
-    if fit.kind == CUBOID:
-        return [replace(fit, rotation=fit.rotation @ m, scale=np.abs(m.T) @ fit.scale) for m in _NAMINGS]
-    ends = (fit.rotation[:, 2], -fit.rotation[:, 2])
-    return [replace(fit, rotation=_swung(reference.rotation, axis)) for axis in ends]
+def _named(fits: Sequence[PrimitiveFit], reference: _Reference) -> tuple[Array, Array]:
+    """Rotations (K, 3, 3) and logarithms of half-lengths (K, 3) of the same solids, their axes named in every
+    way; a cylinder turned as near to the reference as may be. As many of each fit, one fit after the other."""
+    sizes = np.log([fit.scale for fit in fits])
+    if fits[0].kind == CUBOID:
+        turned = np.stack([fit.rotation for fit in fits])[:, None] @ _NAMINGS
+        named = (np.abs(_NAMINGS).transpose(0, 2, 1) @ sizes[:, None, :, None])[..., 0]
+        return turned.reshape(-1, 3, 3), named.reshape(-1, 3)
+    ends = [(fit.rotation[:, 2], -fit.rotation[:, 2]) for fit in fits]
+    swung = [_swung(reference.rotation, axis) for pair in ends for axis in pair]
+    return np.stack(swung), np.repeat(sizes, 2, axis=0)
 
 
 def _swung(rotation: Array, axis: Array) -> Array:
