@@ -110,8 +110,10 @@ def _best(fits: Sequence[PrimitiveFit], reference: _Reference, turn_only: bool =
 
 
 def _named(fits: Sequence[PrimitiveFit], reference: _Reference) -> tuple[Array, Array]:
-    """Rotations (K, 3, 3) and logarithms of half-lengths (K, 3) of the same solids, their axes named in every
-    way; a cylinder turned as near to the reference as may be. As many of each fit, one fit after the other."""
+    """Rotations (K, 3, 3) and logarithms of half-lengths (K, 3) of the same solids, axes named in every way.
+
+    A cylinder is turned as near to the reference as may be. As many of each fit, one fit after the other.
+    """
     sizes = np.log([fit.scale for fit in fits])
     if fits[0].kind == CUBOID:
         turned = np.stack([fit.rotation for fit in fits])[:, None] @ _NAMINGS

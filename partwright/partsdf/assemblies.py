@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-import torch
 
 from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.similarity import quaternion_product
 from partwright.errors import SettingError
 from partwright.partsdf.field import NeuralField
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.poses import PoseTensors
 from partwright.shapes import UnitFrame
 
+Quaternion = tuple[float, float, float, float]
+UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)
 UNIT_FRAME = UnitFrame((0.0, 0.0, 0.0), 1.0)
 
 
@@ -21,16 +22,21 @@ def to_assembly(
     unit: str | None = None,
     up: str | None = None,
     source: str = "",
+    turn: Quaternion = UPRIGHT,
 ) -> Assembly:
-    """The parts that are there, as an assembly in the units and place of `frame`."""
+    """The parts that are there, as an assembly in the units and place of `frame`.
+
+    turn: from how the model's family stands to how the assembly does, a unit quaternion (w, x, y, z).
+    """
     poses, model = shape.poses.numpy(), shape.model
     length = 1.0 / frame.scale
-    places = frame.from_unit(poses.translation)
+    upright = Similarity(1.0, turn)
+    places = frame.from_unit(upright(poses.translation.astype(np.float64)))
     parts = []
     for i in np.flatnonzero(shape.present.numpy()).tolist():
-        rotation = tuple(poses.rotation[i].tolist())
+        rotation = quaternion_product(turn, tuple(poses.rotation[i].tolist()))
         pose = Similarity(1.0, rotation, tuple(places[i].tolist()))
-        origin = pose.inverse() @ Similarity(1.0, translation=frame.centre)
+        origin = pose.inverse() @ Similarity(1.0, turn, frame.centre)
         field = NeuralField(
             model.name,
             model.hash,
@@ -48,11 +54,10 @@ def to_assembly(
     )
 
 
-def from_assembly(assembly: Assembly) -> tuple[NeuralShape, UnitFrame]:
-    """The neural shape of an assembly of neural parts, and the frame that it lies in.
+def from_assembly(assembly: Assembly) -> tuple[NeuralShape, UnitFrame, Quaternion]:
+    """What `to_assembly` takes: the neural shape of an assembly of neural parts, its frame and its turn.
 
-    An assembly that was turned comes back upright: the frame only moves and scales, so the turn goes into the
-    poses. Raises SettingError where the leaves are not the parts of one neural shape.
+    Raises SettingError where the leaves are not the parts of one neural shape.
     """
     fields = [part.field for part in assembly.children if isinstance(part, Part)]
     first = fields[0] if fields else None
@@ -64,19 +69,5 @@ def from_assembly(assembly: Assembly) -> tuple[NeuralShape, UnitFrame]:
     if not all(isinstance(f, NeuralField) for f in fields) or len(first.members) != len(fields):
         raise SettingError("the assembly mixes neural parts with others; edit its neural parts by themselves")
     part = assembly.parts[0]
-    own = Similarity(1.0, part.rotation, part.translation)
-    origin = own @ Similarity(1.0, first.frame_rotation, first.frame_translation)
-    frame = UnitFrame(origin.translation, 1.0 / first.unit)
-    local = first.shape
-    # From the first part's frame to the world's, in unit lengths.
-    translation, rotation = [], []
-    for t, q in zip(local.poses.translation.tolist(), local.poses.rotation.tolist(), strict=True):
-        pose = own @ Similarity(1.0, tuple(q), tuple(first.unit * v for v in t))
-        translation.append(frame.to_unit(np.array([pose.translation]))[0])
-        rotation.append(pose.rotation)
-    poses = PoseTensors(
-        torch.tensor(np.array(translation), dtype=torch.float32),
-        torch.tensor(rotation, dtype=torch.float32),
-        local.poses.scale,
-    )
-    return NeuralShape(local.model, local.latents, poses, local.present), frame
+    origin = Similarity(1.0, part.rotation, part.translation) @ first.unit_frame
+    return first.shape, UnitFrame(origin.translation, 1.0 / first.unit), origin.rotation

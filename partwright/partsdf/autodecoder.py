@@ -22,7 +22,7 @@ class AutoDecoder(nn.Module):
     def forward(self, shapes: Tensor, points: Tensor, poses: PoseTensors) -> tuple[Tensor, Tensor]:
         """Distances (B, P, N) and latents (B, P, Z) of shapes (B,) at world points (B, N, 3)."""
         latents = self.latents[shapes]
-        return self.decoder(latents, local_points(points, poses)), latents
+        return self.decoder(latents, local_points(points, poses), poses), latents
 
     @torch.no_grad()
     def limit_latents(self) -> None:

@@ -16,7 +16,7 @@ from torch import Tensor
 from partwright.atomic_io import write_bytes
 from partwright.errors import ModelError, SettingError
 from partwright.input_files import check_file
-from partwright.partsdf.config import Config
+from partwright.partsdf.config import Config, config_from
 from partwright.partsdf.model import about_file
 
 FORMAT = "partwright-checkpoint"
@@ -89,7 +89,7 @@ def load_checkpoint(
             f"{about['shapes'][0]!r} on, these are {len(shapes)} from {shapes[0]!r} on; "
             "write elsewhere with -o"
         )
-    _check_settings(path, about["config"], asdict(config))
+    _check_settings(path, asdict(config_from(about["config"])), asdict(config))
     device = next(model.parameters()).device
     model.load_state_dict(_with_prefix(tensors, "model."))
     step = torch.tensor(float(about["step"]))

@@ -12,7 +12,7 @@ from typing import Any, TypeVar, get_type_hints
 from partwright.errors import SettingError, UnreadableFileError
 from partwright.input_files import check_file
 
-ARCHITECTURES = ("mlp", "transformer")
+ARCHITECTURES = ("mlp", "transformer", "local")
 AGGREGATIONS = ("min", "softmin")
 PRECISIONS = ("32-true", "bf16-mixed", "16-mixed")
 ACCELERATORS = ("auto", "cpu", "cuda")
@@ -35,16 +35,21 @@ class DecoderSettings:
     cross_part: bool = True
     """Layers across the parts, eq. 4 (Table 3, "h_cp")."""
     architecture: str = "mlp"
-    """"mlp", or "transformer" (Table 7)."""
+    """"mlp", "transformer" (Table 7), or "local", which is ours: parts talk once a shape, and each is then a
+    small network near its own cuboid."""
     heads: int = 4
-    """Attention heads over the parts; of a transformer."""
+    """Attention heads over the parts; of a transformer, and of local's tokens."""
+    token: int = 128
+    """Width of the tokens by which the parts of "local" talk."""
+    blocks: int = 2
+    """Transformer blocks over those tokens."""
     aggregation: str = "min"
     """How parts make up the whole: "min", or "softmin" (Table 7)."""
     softness: float = 0.01
     """Width of the softmin, unit lengths; the paper gives none."""
     octaves: int = 0
-    """Of sines and cosines of the local point that the first layer of an MLP also sees, so that fine and
-    winding parts are learned in fewer steps; the paper's decoder has none."""
+    """Of sines and cosines of the local point that the first layer of "mlp" or "local" also sees, so that
+    fine and winding parts are learned in fewer steps; the paper's decoder has none."""
 
     def __post_init__(self) -> None:
         _at_least("decoder.latent", self.latent, 1)
@@ -52,16 +57,21 @@ class DecoderSettings:
         _at_least("decoder.layers", self.layers, 2)
         _at_least("decoder.heads", self.heads, 1)
         _at_least("decoder.octaves", self.octaves, 0)
+        _at_least("decoder.token", self.token, 1)
+        _at_least("decoder.blocks", self.blocks, 0)
         _positive("decoder.softness", self.softness)
         _one_of("decoder.architecture", self.architecture, ARCHITECTURES)
         _one_of("decoder.aggregation", self.aggregation, AGGREGATIONS)
         if self.architecture == "transformer" and self.octaves:
             raise SettingError(
-                f'decoder.octaves is {self.octaves}, but only architecture "mlp" has them; take 0, or "mlp"'
+                f"decoder.octaves is {self.octaves}, but a transformer has none; take 0, or architecture "
+                '"mlp" or "local"'
             )
-        if self.architecture == "transformer" and self.width % self.heads:
+        name = {"transformer": "width", "local": "token"}.get(self.architecture)
+        if name and getattr(self, name) % self.heads:
             raise SettingError(
-                f"decoder.width is {self.width}, which {self.heads} heads cannot share; take a multiple"
+                f"decoder.{name} is {getattr(self, name)}, which {self.heads} heads cannot share; "
+                "take a multiple"
             )
 
 
@@ -109,6 +119,9 @@ class TrainingSettings:
     same gradient."""
     points: int = 8192
     """Points a shape and step, half of them inside."""
+    balance: float = 0.0
+    """Share of the points that all parts of a shape share alike, however small they are; the paper's go to
+    parts as samples do."""
     samples: int = 0
     """Points of each shape that are kept in memory, 0 for all."""
     shapes: int = 0
@@ -121,6 +134,9 @@ class TrainingSettings:
     """Adam's learning rate of the latents."""
     decay: float = 0.35
     """Factor on both rates at 80 % and at 90 % of the epochs."""
+    anneal: float = 0.0
+    """Share of the epochs, the last ones, over which both rates fall to nothing along a cosine; 0 for the two
+    drops of `decay` instead."""
     accelerator: str = "auto"
     """"auto", "cpu" or "cuda", as Lightning Fabric has them."""
     devices: int = 1
@@ -143,6 +159,9 @@ class TrainingSettings:
             _at_least(f"training.{name}", getattr(self, name), 1)
         for name in ("at_once", "samples", "shapes", "threads", "validate", "checkpoint", "seed"):
             _at_least(f"training.{name}", getattr(self, name), 0)
+        for name in ("balance", "anneal"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise SettingError(f"training.{name} is {getattr(self, name)}; expected 0 to 1")
         for name in ("rate", "latent_rate", "decay"):
             _positive(f"training.{name}", getattr(self, name))
         _one_of("training.accelerator", self.accelerator, ACCELERATORS)

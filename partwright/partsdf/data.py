@@ -12,7 +12,7 @@ from torch import Tensor
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import FamilyError
 from partwright.partsdf.config import Config
-from partwright.partsdf.poses import PoseTensors, identity
+from partwright.partsdf.poses import PoseTensors, identity, local_points
 
 WHOLE = "whole"  # the name of the one part of "Ours-1P"
 
@@ -20,13 +20,15 @@ WHOLE = "whole"  # the name of the one part of "Ours-1P"
 @dataclass(frozen=True)
 class FamilySamples:
     """Samples of S shapes, N each, unit frame: points (S, N, 3), sdf (S, N), part (S, N) uint8 the nearest
-    part. Of each shape the first `inside` (S,) lie inside. poses (S, P, ...); present (S, P) bool."""
+    part. Of each shape the first `inside` (S,) lie inside; both sides are sorted by part, and `ends`
+    (S, 2 P + 1) says where each part's begin, first those inside. poses (S, P, ...); present (S, P) bool."""
 
     names: tuple[str, ...]
     points: Tensor
     sdf: Tensor
     part: Tensor
     inside: Tensor
+    ends: Tensor
     poses: PoseTensors
     present: Tensor
 
@@ -37,17 +39,47 @@ class FamilySamples:
         moved: dict[str, Any] = {k: v.to(device) for k, v in vars(self).items() if isinstance(v, Tensor)}
         return replace(self, **moved, poses=self.poses.map(lambda t: t.to(device)))
 
-    def draw(self, shapes: Tensor, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor]:
-        """Points (B, count, 3), sdf and part (B, count) of shapes (B,): half inside, half outside."""
-        total, half = self.points.shape[1], count // 2
-        chance = torch.rand(len(shapes), count, generator=generator, device=self.points.device)
-        inside = self.inside[shapes][:, None]
-        chosen = torch.cat([chance[:, :half] * inside, inside + chance[:, half:] * (total - inside)], dim=1)
+    def draw(
+        self, shapes: Tensor, count: int, generator: torch.Generator, balance: float = 0.0
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Points (B, count, 3), sdf and part (B, count) of shapes (B,): half inside, half outside.
+
+        balance: the share of either half that all parts of a shape share alike, however small they are.
+        """
+        half, device = count // 2, self.points.device
+        chance = torch.rand(len(shapes), count, generator=generator, device=device)
+        side = (torch.arange(count, device=device) >= half).long()  # 0 inside, 1 outside
+        ends = self.ends[shapes]  # (B, 2 P + 1)
+        parts = self.present.shape[1]
+        low, high = ends[:, side * parts], ends[:, side * parts + parts]
+        fair = round(balance * half)
+        if fair:
+            some = torch.cat([torch.arange(fair, device=device), half + torch.arange(fair, device=device)])
+            low[:, some], high[:, some] = self._of_one_part(ends, side[some], generator)
         # float32 may round up to the end of a range.
-        end = torch.where(torch.arange(count, device=chance.device) < half, inside, total)
-        row = torch.minimum(chosen.long(), end - 1)
+        row = torch.minimum(low + (chance * (high - low)).long(), high - 1)
         shape = shapes[:, None]
         return self.points[shape, row], self.sdf[shape, row], self.part[shape, row]
+
+    def _of_one_part(self, ends: Tensor, side: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
+        """Where the samples of a part begin and end (B, C), of one drawn for each of the sides (C,), of those
+        parts that have any there."""
+        parts, counts = self.present.shape[1], ends.diff(dim=1)
+        any_there = (counts > 0).float().unflatten(1, (2, parts))[:, side]  # (B, C, P)
+        drawn = torch.multinomial(any_there.flatten(0, 1), 1, generator=generator).view(len(ends), -1)
+        place = side * parts + drawn
+        return ends.gather(1, place), ends.gather(1, place + 1)
+
+
+def needed_room(samples: FamilySamples) -> Tensor:
+    """(P, 3) how far samples inside lie along the axes of their parts, in half-lengths of its cuboid."""
+    needed = torch.zeros(samples.present.shape[1], 3)
+    for i, inside in enumerate(samples.inside.tolist()):
+        local = local_points(samples.points[i, :inside], samples.poses.map(lambda t, i=i: t[i])).abs()
+        for p, owner in enumerate(samples.part[i, :inside] == torch.arange(len(needed))[:, None]):
+            if owner.any():
+                needed[p] = torch.maximum(needed[p], local[p, owner].amax(dim=0))
+    return needed
 
 
 def part_names(family: PreparedFamily, config: Config) -> tuple[str, ...]:
@@ -75,6 +107,7 @@ def load_samples(family: PreparedFamily, indices: list[int], config: Config) -> 
         sdf=torch.stack([torch.from_numpy(shape.sdf[row]) for shape, row in found]),
         part=torch.stack([_labels(shape, row, config) for shape, row in found]),
         inside=torch.tensor([int((shape.sdf[row] < 0).sum()) for shape, row in found]),
+        ends=torch.stack([_ends(shape, row, config) for shape, row in found]),
         poses=PoseTensors(*(torch.stack(ts) for ts in zip(*poses, strict=True))),
         present=torch.stack([present_parts(shape, config) for shape in shapes]),
     )
@@ -118,7 +151,16 @@ def _rows(shape: PreparedShape, config: Config) -> np.ndarray:
     if 0 < wanted < len(kept):
         kept = np.random.default_rng(config.training.seed).permutation(len(kept))[:wanted]
         kept.sort()
-    return kept[np.argsort(shape.sdf[kept] >= 0, kind="stable")]
+    part = np.zeros(len(kept)) if config.one_part else shape.part[kept]
+    return kept[np.lexsort((part, shape.sdf[kept] >= 0))]
+
+
+def _ends(shape: PreparedShape, row: np.ndarray, config: Config) -> Tensor:
+    """(2 P + 1,) where the samples of each part begin, first those inside, in the order of `row`."""
+    parts = 1 if config.one_part else len(shape.present)
+    part = np.zeros(len(row), np.int64) if config.one_part else shape.part[row].astype(np.int64)
+    counts = np.bincount(part + parts * (shape.sdf[row] >= 0), minlength=2 * parts)
+    return torch.from_numpy(np.concatenate([[0], np.cumsum(counts)]))
 
 
 def _labels(shape: PreparedShape, row: np.ndarray, config: Config) -> Tensor:

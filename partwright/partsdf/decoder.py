@@ -16,6 +16,7 @@ from torch import Tensor, nn
 
 from partwright.partsdf.checkpointed_linear import cross_linear, linear, working_type
 from partwright.partsdf.config import DecoderSettings
+from partwright.partsdf.poses import PoseTensors
 
 
 class Conditioned(Protocol):
@@ -91,12 +92,13 @@ class Decoder(nn.Module):
         crossing = last if settings.cross_part else 0
         self.cross = nn.ModuleList(CrossPart(parts) for _ in range(crossing))
 
-    def condition(self, latents: Tensor) -> Conditioned:
-        """Weight norm folded and latents (B, P, Z) taken in, once for any number of points."""
+    def condition(self, latents: Tensor, poses: PoseTensors | None = None) -> Conditioned:
+        """Weight norm folded and latents (B, P, Z) taken in, once for any number of points; poses are told by
+        the points alone."""
         layers = tuple(layer.folded(latents) for layer in self.single)  # type: ignore[operator]
         return _Layers(layers, tuple(self.cross), self.settings.octaves)  # type: ignore[arg-type]
 
-    def forward(self, latents: Tensor, local: Tensor) -> Tensor:
+    def forward(self, latents: Tensor, local: Tensor, poses: PoseTensors | None = None) -> Tensor:
         """Distances (B, P, N) of latents (B, P, Z) at local points (B, P, N, 3)."""
         return self.condition(latents)(local)
 

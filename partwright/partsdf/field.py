@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import torch
+from torch import Tensor
 
-from partwright.assembly.similarity import Similarity
+from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.errors import NoSurfaceError, ParameterError, SettingError
 from partwright.fields.base import LARGEST, number, scale_lengths, vector
 from partwright.fields.joint import JointField, Member
@@ -20,7 +21,6 @@ from partwright.fields.operations import is_tensor
 from partwright.partsdf.meshing import mesh_shape, resolution_for_wall
 from partwright.partsdf.model import Model, find_model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.poses import PoseTensors
 
 if TYPE_CHECKING:
     import trimesh
@@ -28,9 +28,11 @@ if TYPE_CHECKING:
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
-# The box around a part is looked for in so many cells an axis, twice, within its cuboid times _BOX_REACH.
-_BOX_CELLS, _BOX_REACH = 12, 1.5
+# The box around a part is looked for in so many cells an axis, twice, within its room.
+_BOX_CELLS = 12
 _COARSE, _PREVIEWED = 64, 128  # cells along the whole shape of a mesh that is only looked at
+# Two frames are one if these places, unit lengths, are that near to one another in both.
+_MARKS, _SAME = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), 1e-3
 _FINER = 3  # times the cells along one part are those along the whole shape
 
 
@@ -40,8 +42,8 @@ class NeuralField(JointField):
 
     model, hash: which; opening a field raises ModelError where it is not found. part: its name there. latent:
     Z numbers. half_lengths: of the pose, along the part's own axes (eq. 1's s). unit: the length of 1 in the
-    unit frame. frame_translation, frame_rotation: where the unit frame lies, seen from the part; the average
-    pose of parts that the shape has not is taken there. members: the other parts, set by the assembly.
+    unit frame. frame_translation, frame_rotation: where the unit frame lies, seen from the part. members: the
+    other parts, set by the assembly.
 
     Raises ParameterError where a number cannot be used.
     """
@@ -129,14 +131,13 @@ class NeuralField(JointField):
 
     def _surfaces(self, cells: Callable[[float], int]) -> dict[str, trimesh.Trimesh]:
         """The members' meshes in this part's own frame, without those that have none."""
-        frame = Similarity(1.0, self.frame_rotation, self.frame_translation)
-        shape = _seen_from(self.shape, frame, self.unit)
         try:
-            meshes = mesh_shape(shape, cells(float(shape.walls().min(initial=np.inf)))).parts
+            resolution = cells(float(self.shape.walls().min(initial=np.inf)))
+            meshes = mesh_shape(self.shape, resolution).parts
         except NoSurfaceError:
             return {}
         for mesh in meshes.values():
-            mesh.vertices = frame(self.unit * mesh.vertices)
+            mesh.vertices = self.unit_frame(self.unit * mesh.vertices)
         return meshes
 
     def among(self, members: Sequence[Member], shared: dict[Any, Any]) -> Self:
@@ -145,51 +146,57 @@ class NeuralField(JointField):
         return told
 
     @cached_property
+    def unit_frame(self) -> Similarity:
+        """Where the shape's unit frame lies, seen from this part, in own lengths.
+
+        Every part says where; a part that was moved by itself has taken its own along, so what most agree on
+        holds, and the first of those.
+        """
+        seen = [
+            Similarity(1.0, m.rotation, m.translation)
+            @ Similarity(1.0, m.field.frame_rotation, m.field.frame_translation)
+            for m in self.members
+            if isinstance(m.field, NeuralField)
+        ]
+        if not seen:
+            return Similarity(1.0, self.frame_rotation, self.frame_translation)
+        marks = np.stack([frame(self.unit * _MARKS) for frame in seen])
+        apart = np.abs(marks[:, None] - marks).max(axis=(2, 3))
+        return seen[int((apart < _SAME * self.unit).sum(axis=1).argmax())]
+
+    @cached_property
     def shape(self) -> NeuralShape:
-        """The whole shape in this part's frame, lengths in those of the unit frame."""
+        """The whole shape in its unit frame."""
         model = self.network
         members = self.members or (Member(self, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),)
-        fields = [m.field for m in members]
-        assert all(isinstance(field, NeuralField) for field in fields)
+        back = self.unit_frame.inverse()
         present = torch.zeros(len(model.parts), dtype=torch.bool)
-        latents, poses = model.absent_latent.clone(), self._absent_poses(members[0])
+        latents, poses = model.absent_latent.clone(), model.average_pose.map(Tensor.clone)
         for member in members:
             field = member.field
             assert isinstance(field, NeuralField)
             index = model.index(field.part)
+            pose = back @ Similarity(1.0, member.rotation, member.translation)
             present[index] = True
             latents[index] = torch.tensor(field.latent)
-            poses.translation[index] = torch.tensor(member.translation) / self.unit
-            poses.rotation[index] = torch.tensor(member.rotation)
+            poses.translation[index] = torch.tensor(pose.translation) / self.unit
+            poses.rotation[index] = torch.tensor(pose.rotation)
             poses.scale[index] = torch.tensor(field.half_lengths) / self.unit
         return NeuralShape(model, latents, poses, present)
 
-    def _absent_poses(self, first: Member) -> PoseTensors:
-        """Average poses of all parts, in the unit frame as the shape's first part sees it."""
-        field = first.field
-        assert isinstance(field, NeuralField)
-        seen = Similarity(1.0, first.rotation, first.translation)
-        frame = seen @ Similarity(1.0, field.frame_rotation, field.frame_translation)
-        average = self.network.average_pose.numpy()
-        poses = [
-            frame @ Similarity(1.0, tuple(q), tuple(self.unit * t))
-            for t, q in zip(average.translation.tolist(), average.rotation.tolist(), strict=True)
-            for t in [np.array(t)]
-        ]
-        translation = torch.tensor([p.translation for p in poses], dtype=torch.float32) / self.unit
-        rotation = torch.tensor([p.rotation for p in poses], dtype=torch.float32)
-        return PoseTensors(translation, rotation, torch.from_numpy(average.scale.copy()))
-
     def together(self, points: np.ndarray, fields: Sequence[JointField]) -> list[np.ndarray]:
-        values = self.shape.part_distances(np.asarray(points, np.float32) / np.float32(self.unit))
+        inside = self.unit_frame.inverse()(np.asarray(points, np.float64)) / self.unit
+        values = self.shape.part_distances(inside.astype(np.float32))
         row = {name: i for i, name in enumerate(self.shape.names())}
         return [values[row[field.role]] * np.float32(self.unit) for field in fields]
 
     def __call__(self, points: Any) -> Any:
         if not is_tensor(points):
             return self.together(np.asarray(points), [self])[0]
-        shape = self.shape
-        each = shape.model.part_distances(shape.latents, shape.poses, points.float() / self.unit)
+        shape, frame = self.shape, self.unit_frame
+        turn = torch.tensor(rotation_matrix(frame.rotation), dtype=torch.float32, device=points.device)
+        inside = (points.float() - turn.new_tensor(frame.translation)) @ turn / self.unit
+        each = shape.model.part_distances(shape.latents, shape.poses, inside)
         return (self.unit * each[self.network.index(self.part)]).to(points.dtype)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -198,7 +205,7 @@ class NeuralField(JointField):
     @cached_property
     def _box(self) -> np.ndarray:
         """(2, 3) found by the cells that the surface can enter; a point where the part is nowhere."""
-        upper = _BOX_REACH * np.array(self.half_lengths)
+        upper = self.network.box(self.part) * np.array(self.half_lengths)
         box = np.array([-upper, upper])
         for _ in range(2):
             cell = (box[1] - box[0]) / _BOX_CELLS
@@ -233,17 +240,6 @@ class NeuralField(JointField):
 
     def to_dict(self) -> dict[str, Any]:
         return {name: value for name, value in super().to_dict().items() if name != "members"}
-
-
-def _seen_from(shape: NeuralShape, frame: Similarity, unit: float) -> NeuralShape:
-    """A shape whose poses, in lengths of `unit`, are seen from a frame in which the unit frame lies there."""
-    back = frame.inverse()
-    places = back(unit * shape.poses.translation.numpy()) / unit
-    turns = [(back @ Similarity(1.0, tuple(q))).rotation for q in shape.poses.rotation.tolist()]
-    poses = PoseTensors(
-        torch.tensor(places, dtype=torch.float32), torch.tensor(turns, dtype=torch.float32), shape.poses.scale
-    )
-    return dataclasses.replace(shape, poses=poses)
 
 
 def _alone(field: JointField) -> JointField:

@@ -6,7 +6,6 @@ import torch
 
 from partwright.partsdf.data import FamilySamples
 from partwright.partsdf.model import Model
-from partwright.partsdf.poses import local_points
 
 GRADIENT_QUANTILE = 0.999
 MARGIN = 1.05
@@ -24,8 +23,8 @@ def measured_lipschitz(model: Model, samples: FamilySamples) -> float:
         rows = torch.randint(samples.points.shape[1], (_POINTS_PER_SHAPE // 2,), generator=generator)
         spread = 2 * torch.rand(_POINTS_PER_SHAPE // 2, 3, generator=generator) - 1
         points = torch.cat([samples.points[i, rows], spread]).requires_grad_()
-        local = local_points(points, samples.poses.map(lambda t, i=i: t[i]))
-        distances = model.condition(model.latents[i][None])(local[None])[0][samples.present[i]]
+        each = model.part_distances(model.latents[i], samples.poses.map(lambda t, i=i: t[i]), points)
+        distances = each[samples.present[i]]
         for row in distances:
             (gradient,) = torch.autograd.grad(row.sum(), points, retain_graph=True)
             found.append(gradient.norm(dim=1))

@@ -36,7 +36,6 @@ MAX_RESOLUTION = 1024  # cells along the box
 _DEFAULT_RESOLUTION, _MAX_RESOLUTION_FOR_WALLS = 128, 256
 _BATCH = 1 << 14  # points between two reports of progress
 _LAST_EXCESS = 0.5  # of what the constant is above 1, at the last level
-_CUBOID_MARGIN = 1.25  # a part's surface may leave its cuboid by so much
 
 
 _LATTICE = np.stack(np.meshgrid(*[np.arange(FINEST + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -117,8 +116,8 @@ def labelled_surface(shape: NeuralShape, mesh: trimesh.Trimesh) -> LabelledSurfa
 
 def bounding_half_side(shape: NeuralShape) -> float:
     """Half the side of a cube around the origin that holds [-1, 1]^3 and every part's cuboid."""
-    turned = rotation_matrices(shape.poses.rotation).abs() @ shape.poses.scale[..., None]
-    reach = shape.poses.translation.abs() + _CUBOID_MARGIN * turned.squeeze(-1)
+    half = (shape.model.room * shape.poses.scale)[..., None]
+    reach = shape.poses.translation.abs() + (rotation_matrices(shape.poses.rotation).abs() @ half).squeeze(-1)
     return max(1.0, float(reach[shape.present].max()) if shape.model.config.poses else 1.0)
 
 
@@ -129,7 +128,7 @@ def _near_cuboids(shape: NeuralShape) -> Reach | None:
         return None
     poses = shape.poses.map(lambda t: t[shape.present])
     turn, place = rotation_matrices(poses.rotation).numpy(), poses.translation.numpy()
-    room = _CUBOID_MARGIN * poses.scale.numpy()
+    room = (shape.model.room[shape.present] * poses.scale).numpy()
 
     def reach(points: np.ndarray, distance: float) -> np.ndarray:
         near = np.zeros(len(points), dtype=bool)

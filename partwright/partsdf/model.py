@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -19,6 +20,7 @@ from partwright.errors import ModelError, NewerVersionError, SettingError, Unrea
 from partwright.input_files import check_file
 from partwright.partsdf.config import Config, DecoderSettings, config_from
 from partwright.partsdf.decoder import Conditioned, Decoder
+from partwright.partsdf.local import LocalDecoder
 from partwright.partsdf.losses import aggregate
 from partwright.partsdf.poses import PoseTensors, local_points
 from partwright.partsdf.transformer import TransformerDecoder
@@ -27,7 +29,12 @@ FORMAT, VERSION = "partwright-partsdf", 1
 SUFFIX = ".safetensors"
 SHIPPED = Path(__file__).parent / "models"
 FOLDERS = "PARTWRIGHT_MODELS"  # environment variable: folders, separated as PATH is
-_DECODERS: dict[str, type[nn.Module]] = {"mlp": Decoder, "transformer": TransformerDecoder}
+_BOX, _ROOM = 1.5, 1.25  # of decoders that hold nothing to its cuboid
+_DECODERS: dict[str, type[nn.Module]] = {
+    "mlp": Decoder,
+    "transformer": TransformerDecoder,
+    "local": LocalDecoder,
+}
 
 
 @dataclass(frozen=True)
@@ -56,6 +63,22 @@ class Model:
         return self.config.name
 
     @cached_property
+    def room(self) -> Tensor:
+        """(P, 3) how far the surface of each part may lie along its axes, in half-lengths of its cuboid."""
+        room = getattr(self.decoder, "room", None)
+        return torch.full((len(self.parts), 3), _ROOM) if room is None else room
+
+    def box(self, part: str) -> np.ndarray:
+        """(3,) half-lengths, in those of its cuboid, of a box that holds a part's surface."""
+        held = isinstance(self.decoder, LocalDecoder)
+        return np.asarray(self.room[self.index(part)]) if held else np.full(3, _BOX)
+
+    @property
+    def asked(self) -> int:
+        """About how many parts are decoded at a point."""
+        return 1 if self.config.decoder.architecture == "local" else len(self.parts)
+
+    @cached_property
     def mean_latent(self) -> Tensor:
         """(P, Z) over the training shapes that have the part."""
         weight = self.present.float()[..., None]
@@ -74,13 +97,14 @@ class Model:
             raise SettingError(f"{self.name} has no part {part!r}; its parts are {', '.join(self.parts)}")
         return self.parts.index(part)
 
-    def condition(self, latents: Tensor) -> Conditioned:
-        """The decoder with latents (B, P, Z) taken in."""
-        return self.decoder.condition(latents)  # type: ignore[operator]
+    def condition(self, latents: Tensor, poses: PoseTensors) -> Conditioned:
+        """The decoder with latents (B, P, Z) and poses (B, P, ...) taken in."""
+        return self.decoder.condition(latents, poses)  # type: ignore[operator]
 
     def part_distances(self, latents: Tensor, poses: PoseTensors, points: Tensor) -> Tensor:
         """(P, N) at points (N, 3) of one shape with latents (P, Z) and poses (P, ...), unit frame."""
-        return self.condition(latents[None])(local_points(points, poses)[None])[0]
+        alone = poses.map(lambda t: t[None])
+        return self.condition(latents[None], alone)(local_points(points, poses)[None])[0]
 
     def distances(self, latents: Tensor, poses: PoseTensors, points: Tensor) -> Tensor:
         """(N,) of the whole shape; arguments as in `part_distances`."""

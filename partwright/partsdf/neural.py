@@ -61,10 +61,10 @@ class NeuralShape:
 
     def part_distances(self, points: np.ndarray) -> np.ndarray:
         """(Q, N) float32 of the Q parts that are there, at points (N, 3) of the unit frame, in one pass."""
-        size = max(256, CHUNK // len(self.latents))
+        size = max(256, CHUNK // self.model.asked)
         chunks = torch.from_numpy(np.array(points, np.float32, order="C")).split(size)
         with torch.no_grad():
-            conditioned = self.model.condition(self.latents[None])
+            conditioned = self.model.condition(self.latents[None], self.poses.map(lambda t: t[None]))
 
         @torch.no_grad()
         def decode(chunk: Tensor) -> Tensor:

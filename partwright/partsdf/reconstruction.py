@@ -195,7 +195,7 @@ def _errors_of_trained(model: Model, target: Target, rows: Tensor, numbers: Tens
     errors = []
     for some in numbers.split(16):
         poses = PoseTensors(*(t[some] for t in model.poses))
-        each = model.condition(model.latents[some])(local_points(points, poses))
+        each = model.condition(model.latents[some], poses)(local_points(points, poses))
         whole = aggregate(each, model.config.decoder)
         errors.append(clamped_error(whole, sdf.expand_as(whole), model.config.losses).mean(dim=1))
     return torch.cat(errors)
@@ -262,7 +262,7 @@ def _loss(
     late: bool,
 ) -> Tensor:
     """Eq. 6 at some samples; with known parts the whole shape's loss waits for the second half."""
-    each = shape.model.condition(latents[None])(local_points(target.points[rows], poses)[None])
+    each = shape.model.part_distances(latents, poses, target.points[rows])[None]
     sdf = target.sdf[rows][None]
     known = target.part is not None
     part = target.part[rows][None] if target.part is not None else torch.zeros_like(sdf).long()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from partwright.assembly import Assembly, load_assembly
 from partwright.errors import SettingError
-from partwright.partsdf.assemblies import UNIT_FRAME, from_assembly, to_assembly
+from partwright.partsdf.assemblies import UNIT_FRAME, UPRIGHT, Quaternion, from_assembly, to_assembly
 from partwright.partsdf.model import load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.shapes import UnitFrame
@@ -15,17 +15,18 @@ from partwright.shapes import UnitFrame
 
 @dataclass(frozen=True)
 class Source:
-    """A neural shape and what its assembly says besides: frame, unit, up axis and name."""
+    """A neural shape and what its assembly says besides: frame, unit, up axis, name and turn."""
 
     shape: NeuralShape
     frame: UnitFrame = UNIT_FRAME
     unit: str | None = None
     up: str | None = None
     name: str = ""
+    turn: Quaternion = UPRIGHT
 
     def assembly(self, shape: NeuralShape) -> Assembly:
         """An edited shape as an assembly in the same units and place."""
-        return to_assembly(shape, self.frame, self.unit, self.up, self.name)
+        return to_assembly(shape, self.frame, self.unit, self.up, self.name, self.turn)
 
 
 def open_source(text: str, model: str | None = None) -> Source:
@@ -41,9 +42,9 @@ def open_source(text: str, model: str | None = None) -> Source:
         load_model(model)
     if Path(text).suffix == ".json":
         assembly = load_assembly(text)
-        shape, frame = from_assembly(assembly)
+        shape, frame, turn = from_assembly(assembly)
         name = str(assembly.metadata.get("source", Path(text).stem))
-        return Source(shape, frame, assembly.unit, assembly.up, name)
+        return Source(shape, frame, assembly.unit, assembly.up, name, turn)
     source, colon, shape_name = text.rpartition(":")
     if not colon:
         raise SettingError(

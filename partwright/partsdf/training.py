@@ -6,6 +6,7 @@ on from its last checkpoint ends with the same weights, to the bit on the same d
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 import time
@@ -24,9 +25,16 @@ from partwright.errors import MissingDependencyError, SettingError
 from partwright.partsdf.autodecoder import AutoDecoder
 from partwright.partsdf.checkpoints import TrainingState, load_checkpoint, save_checkpoint
 from partwright.partsdf.config import Config
-from partwright.partsdf.data import FamilySamples, check_training_shapes, load_samples, part_names
+from partwright.partsdf.data import (
+    FamilySamples,
+    check_training_shapes,
+    load_samples,
+    needed_room,
+    part_names,
+)
 from partwright.partsdf.gradient_accumulation import backward
 from partwright.partsdf.lipschitz import measured_lipschitz
+from partwright.partsdf.local import LocalDecoder
 from partwright.partsdf.logs import Log
 from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, identity
@@ -94,6 +102,8 @@ class Trainer:
         self.settings, self.parts = config.training, part_names(family, config)
         torch.manual_seed(self.settings.seed)
         self.plain = AutoDecoder(len(samples), len(self.parts), config.decoder)
+        if isinstance(self.plain.decoder, LocalDecoder):
+            self.plain.decoder.fit_room(needed_room(samples))
         optimiser = torch.optim.Adam(
             [
                 {"params": self.plain.decoder.parameters(), "lr": self.settings.rate},
@@ -140,7 +150,7 @@ class Trainer:
     def _step(self) -> None:
         batch = self._batch()
         self.generator.manual_seed((self.settings.seed << 32) + self.state.step)
-        drawn = self.samples.draw(batch, self.settings.points, self.generator)
+        drawn = self.samples.draw(batch, self.settings.points, self.generator, self.settings.balance)
         # Every process draws for the whole batch, so that their number changes nothing.
         mine = slice(self.fabric.global_rank, None, self.fabric.world_size)
         weight = len(batch[mine]) * self.fabric.world_size / len(batch)
@@ -165,7 +175,11 @@ class Trainer:
 
     def _set_rates(self) -> None:
         done = self.state.step / (self.settings.epochs * self.steps)
-        factor = self.settings.decay ** sum(done >= drop for drop in _RATE_DROPS)
+        if self.settings.anneal:
+            late = max(0.0, done - (1 - self.settings.anneal)) / self.settings.anneal
+            factor = 0.5 * (1 + math.cos(math.pi * late))
+        else:
+            factor = self.settings.decay ** sum(done >= drop for drop in _RATE_DROPS)
         rates = (self.settings.rate, self.settings.latent_rate)
         for group, rate in zip(self.optimiser.param_groups, rates, strict=True):
             group["lr"] = factor * rate

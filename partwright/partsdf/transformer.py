@@ -7,6 +7,7 @@ from torch import Tensor, nn
 
 from partwright.partsdf.config import DecoderSettings
 from partwright.partsdf.decoder import Conditioned
+from partwright.partsdf.poses import PoseTensors
 
 
 class TransformerDecoder(nn.Module):
@@ -31,8 +32,8 @@ class TransformerDecoder(nn.Module):
         self.blocks = nn.TransformerEncoder(block, count, norm, enable_nested_tensor=False)
         self.out = nn.Linear(width, 1)
 
-    def condition(self, latents: Tensor) -> Conditioned:
-        """Latents (B, P, Z) taken in, for any number of points."""
+    def condition(self, latents: Tensor, poses: PoseTensors | None = None) -> Conditioned:
+        """Latents (B, P, Z) taken in, for any number of points; poses are told by the points alone."""
         offset = self.latent(latents) + self.part
 
         def decode(local: Tensor) -> Tensor:
@@ -44,6 +45,6 @@ class TransformerDecoder(nn.Module):
 
         return decode
 
-    def forward(self, latents: Tensor, local: Tensor) -> Tensor:
+    def forward(self, latents: Tensor, local: Tensor, poses: PoseTensors | None = None) -> Tensor:
         """Distances (B, P, N) of latents (B, P, Z) at local points (B, P, N, 3)."""
         return self.condition(latents)(local)

@@ -175,11 +175,11 @@ def test_two_shapes_in_one_assembly_stay_apart(model: Model, assembly: pw.Assemb
 
 
 def test_there_and_back_again(lamp: NeuralShape, assembly: pw.Assembly) -> None:
-    again, frame = from_assembly(assembly)
+    again, frame, _ = from_assembly(assembly)
     np.testing.assert_allclose(frame.centre, FRAME.centre, atol=1e-9)
     assert frame.scale == pytest.approx(FRAME.scale)
     np.testing.assert_allclose(again.part_distances(POINTS), lamp.part_distances(POINTS), atol=1e-5)
-    dropped, frame = from_assembly(assembly.without("plate"))
+    dropped, frame, _ = from_assembly(assembly.without("plate"))
     assert dropped.names() == ["ball", "knob"]
     np.testing.assert_allclose(frame.centre, FRAME.centre, atol=1e-9)
 

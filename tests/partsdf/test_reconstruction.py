@@ -147,7 +147,7 @@ def test_the_start_that_a_few_iterations_bring_closest_goes_on(model: Model, lam
     target, few = held_out(lamps), replace(QUICK, iterations=8)
     good = nearest_trained(model, target)[0]
     generator = torch.Generator().manual_seed(0)
-    bad = replace(good, latents=torch.randn(good.latents.shape, generator=generator))
+    bad = replace(good, latents=3 * torch.randn(good.latents.shape, generator=generator))
     alone, together = (_scouted(starts, target, few) for starts in ([bad], [bad, good]))
     assert _error(together, target) < 0.7 * _error(alone, target)
     order = nearest_trained(model, target, 3)

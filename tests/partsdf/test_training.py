@@ -110,6 +110,7 @@ def test_draws_are_half_inside_and_labels_go_along(lamps: PreparedFamily) -> Non
         {"decoder": {"cross_part": False}},
         {"decoder": {"aggregation": "softmin"}},
         {"decoder": {"architecture": "transformer", "heads": 2}},
+        {"decoder": {"architecture": "local", "token": 16}},
         {"losses": {"inter": 0.0}},
         {"training": {"precision": "bf16-mixed"}},
     ],
