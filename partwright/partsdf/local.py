@@ -3,9 +3,9 @@
 The paper's network (`decoder`) evaluates every part at every point and mixes parts there. Here a token of
 each part, made of its latent and its pose, hears of the others by self-attention, once a shape. What comes
 out modulates a small network, which sees the local point with sines and cosines in octaves, and which is
-asked only where the part can matter: in its room, which is its cuboid, enlarged to what parts of training shapes
-need, and `REACH` around it. Farther away a part's distance is that from its room, which is never more than
-the true one, and more than what losses look at. No part leaves its room.
+asked only where the part can matter: in its room, which is its cuboid, enlarged to what parts of training
+shapes need, and `REACH` around it. Farther away a part's distance is that from its room, which is never
+more than the true one, and more than what losses look at. No part leaves its room.
 """
 
 from __future__ import annotations
