@@ -34,6 +34,8 @@ class LocalDecoder(nn.Module):
     out, `modulation` false lets tokens into the first layer only.
     """
 
+    room: Tensor
+
     def __init__(self, parts: int, settings: DecoderSettings) -> None:
         super().__init__()
         self.parts, self.settings = parts, settings
@@ -123,7 +125,8 @@ class _Local:
         modulations = iter(self.modulations)
         for weight in self.weights[:-1]:
             x = x @ weight
-            shift, scale = (next(modulations).index_select(0, owner) for _ in range(2))
+            shift, scale = next(modulations), next(modulations).tanh()  # bounded: it would run away
+            shift, scale = shift.index_select(0, owner), scale.index_select(0, owner)
             x = nn.functional.leaky_relu(torch.addcmul(x + shift, x, scale), LEAK)
         x = x @ self.weights[-1] + next(modulations).index_select(0, owner)
         return x.squeeze(1).to(points.dtype) * lengths.amin(dim=1)  # a small part's errors are small
