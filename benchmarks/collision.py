@@ -45,6 +45,13 @@ HERE = Path(__file__).parent
 TARGET = HERE / "results" / "collision.md"
 OWN_SHAPES = HERE.parent / "examples" / "shapes"
 COPIES, STEPS, POINTS = 5, 1000, 200_000
+PRIMITIVES, COLLIDE, AS_MANY, COACD, BOXES = KINDS = (
+    "primitives",
+    "collide",
+    "collide, as many as CoACD",
+    "CoACD hulls",
+    "a box per hull",
+)
 Inside = Callable[[np.ndarray], np.ndarray]  # points (N, 3), metres -> (N,) bool
 
 
@@ -96,13 +103,13 @@ def fitted(shape: Shape, method: str, options: dict[str, Any]) -> Body:
             body.add_geom(**own, meshname=geom.meshname)
 
     tests = [_in_part(g.part) for g in found if g.part] + [_in_hull(g.mesh) for g in found if g.mesh]
-    return Body("primitives", len(found), seconds, _any(tests), add)
+    return Body(PRIMITIVES, len(found), seconds, _any(tests), add)
 
 
-def covered(mesh: trimesh.Trimesh) -> Body:
-    """The shapes of `partwright collide`, by its defaults for a link."""
+def covered(mesh: trimesh.Trimesh, kind: str, options: CollideOptions) -> Body:
+    """The shapes of `partwright collide` for a link."""
     start = time.process_time()
-    options, use = CollideOptions(), MeshUse(Path("mesh"), np.eye(4), mesh)
+    use = MeshUse(Path("mesh"), np.eye(4), mesh)
     link = Link("mesh", np.eye(4), None, (use,))
     target = Solids().target(link, link.collisions)
     tolerance = options.length(target.size, target.size)
@@ -118,7 +125,7 @@ def covered(mesh: trimesh.Trimesh) -> Body:
                 add_solid(body, shape.part)
 
     tests = [_in_part(s.part) if s.part else _in_hull(s.mesh) for s in shapes]
-    return Body("collide", len(shapes), seconds, _any(tests), add)
+    return Body(kind, len(shapes), seconds, _any(tests), add)
 
 
 def add_hull(target: mujoco.MjSpec, body: mujoco.MjsBody, name: str, mesh: trimesh.Trimesh) -> None:
@@ -144,7 +151,7 @@ def hulls(mesh: trimesh.Trimesh) -> tuple[Body, list[trimesh.Trimesh]]:
         for i, part in enumerate(parts):
             add_hull(target, body, f"hull{i}", part)
 
-    body = Body("CoACD hulls", len(parts), seconds, _any([_in_hull(part) for part in parts]), add)
+    body = Body(COACD, len(parts), seconds, _any([_in_hull(part) for part in parts]), add)
     return body, parts
 
 
@@ -164,7 +171,7 @@ def boxes(parts: list[trimesh.Trimesh], seconds: float) -> Body:
             size = box.field.bounds()[1]
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=size, pos=box.translation, quat=box.rotation)
 
-    return Body("a box per hull", len(placed), seconds, _any([_in_part(box) for box in placed]), add)
+    return Body(BOXES, len(placed), seconds, _any([_in_part(box) for box in placed]), add)
 
 
 def _in_part(part: Part) -> Inside:
@@ -223,7 +230,11 @@ def simulate(body: Body, properties: MassProperties, height: float) -> tuple[flo
     return 1e6 * seconds / STEPS, contacts / STEPS
 
 
-def measure(path: Path, name: str, unit: str, method: str, options: dict[str, Any]) -> Iterator[Row]:
+def measure(
+    path: Path, name: str, unit: str, method: str, options: dict[str, Any], kept: list[Row]
+) -> Iterator[Row]:
+    """Rows of one shape; those that are kept are not measured again."""
+    known = {row.kind: row for row in kept}
     shape = pw.load_shape(path, unit=unit, up="z")
     frame = to_metres_z_up(Assembly((Part(Box((1, 1, 1))),), unit=unit, up="z"))
     mesh = trimesh.Trimesh(frame(shape.vertices), shape.faces, process=False)
@@ -231,9 +242,23 @@ def measure(path: Path, name: str, unit: str, method: str, options: dict[str, An
     def target(points: np.ndarray) -> np.ndarray:
         return shape.signed_distance(frame.inverse()(points)) < 0
 
-    ours, (decomposed, parts) = fitted(shape, method, options), hulls(mesh)
+    bodies: list[Body] = []
+    if PRIMITIVES not in known:
+        bodies.append(fitted(shape, method, options))
+    if not {COACD, BOXES} <= set(known):
+        decomposed, parts = hulls(mesh)
+        bodies += [decomposed, boxes(parts, decomposed.seconds)]
+        pieces = decomposed.pieces
+    else:
+        pieces = known[COACD].pieces
+    for kind, wanted in (
+        (COLLIDE, CollideOptions()),
+        (AS_MANY, CollideOptions(max_parts=pieces, extra=0.02)),
+    ):
+        if kind not in known:
+            bodies.append(covered(mesh, kind, wanted))
     height = float(np.linalg.norm(mesh.extents))
-    for body in (ours, covered(mesh), decomposed, boxes(parts, decomposed.seconds)):
+    for body in bodies:
         missing, extra = volume_errors(body, target, mesh.bounds)
         step, contacts = simulate(body, mass_properties(mesh), height)
         solidity = mesh.volume / mesh.convex_hull.volume
@@ -249,7 +274,8 @@ def document(rows: list[Row], command: str) -> str:
         "Missing and extra: volume that the body lacks or adds, in % of the shape's own. Step time and",
         f"contacts: means over {STEPS} steps of {COPIES} copies that fall onto a plane and one another.",
         "Seconds: CPU seconds to make the body from the mesh; for primitives that is a fit. collide: the",
-        "shapes of `partwright collide`. Solidity: the shape's volume over its hull's.",
+        "shapes of `partwright collide`; as many as CoACD: with `--extra 2% --max-parts` its count of hulls.",
+        "Solidity: the shape's volume over its hull's.",
         "",
         "| shape | solidity | body | pieces | missing % | extra % | step us | contacts | seconds |",
         "|---|---:|---|---:|---:|---:|---:|---:|---:|",
@@ -290,10 +316,10 @@ def main() -> int:
     kept = options.rows.read_text().splitlines() if options.rows.exists() else []
     rows = [Row(**json.loads(line)) for line in kept]
     for name in names:
-        if any(row.shape == name for row in rows):
-            continue
-        more = list(measure(paths[name], name, options.unit, options.method, about))
+        own = [row for row in rows if row.shape == name]
+        more = list(measure(paths[name], name, options.unit, options.method, about, own))
         rows += more
+        rows.sort(key=lambda row: (names.index(row.shape), KINDS.index(row.kind)))
         with options.rows.open("a") as file:
             file.writelines(json.dumps(dataclasses.asdict(row)) + "\n" for row in more)
         write_bytes(options.target, document(rows, command).encode())

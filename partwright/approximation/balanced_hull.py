@@ -6,47 +6,81 @@ such a face adds half as much and lacks about as much: the sum of both is what c
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.convex_cover import Piece, faces_of
+from partwright.approximation.convex_cover import faces_of
+from partwright.approximation.convex_piece import Piece
 from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-_FACES = 8  # of a hull, the largest that bridge something
-_STEPS = 6  # depths that are tried of each
+_FACES = 12  # of a hull, the largest, that are tried
+_SHALLOWEST = 2.0**-7  # of the deepest depth
+_REFINED = 4  # depths tried between the best of those that double and its neighbours
 _KEPT = 0.5  # of the piece's own volume, at least
-_WORTH = 0.002  # of the piece's volume: bridges that add less stay
+_WORTH = 5e-4  # of the piece's volume: what moves less stays
 
 
 def balanced_hull(piece: Piece, deepest: float) -> Manifold:
     """The hull of a piece with those faces moved inwards, by a length of `deepest` at most, where that adds
     less than it takes."""
     solid, hull = piece.solid, piece.hull
-    if piece.extra <= _WORTH * solid.volume():
+    own = solid.volume()
+    if piece.extra <= _WORTH * own:
         return hull
     extra = hull - solid
-    normals, offsets = _large_faces(hull)
-    for normal, offset in zip(normals, offsets, strict=True):
-        inward = tuple((-normal).tolist())
-        best, depth = _WORTH * solid.volume(), 0.0
-        for step in deepest * (np.arange(_STEPS) + 1) / _STEPS:
-            height = float(offset - step)
-            gone = extra.volume() - extra.trim_by_plane(inward, -height).volume()
-            lost = solid.volume() - solid.trim_by_plane(inward, -height).volume()
-            if solid.volume() - lost < _KEPT * piece.solid.volume():
-                break
-            if gone - lost > best:
-                best, depth = gone - lost, float(step)
-            elif depth:
-                break
-        if depth:
-            cut = -float(offset) + depth
-            hull, solid, extra = (one.trim_by_plane(inward, cut) for one in (hull, solid, extra))
+    for normal, offset in zip(*_large_faces(hull), strict=True):
+        if extra.volume() <= _WORTH * own:
+            break
+        face = _Face(tuple((-normal).tolist()), float(offset), solid, extra, _KEPT * own)
+        depth, gain = _deepest(face.gain, deepest)
+        if gain > _WORTH * own:
+            hull, solid, extra = (face.trimmed(one, depth) for one in (hull, solid, extra))
     return hull
+
+
+@dataclass(frozen=True)
+class _Face:
+    """One that may move inwards. extra: what the hull adds to the solid; kept: volume that has to stay."""
+
+    inward: tuple[float, ...]
+    offset: float
+    solid: Manifold
+    extra: Manifold
+    kept: float
+
+    def trimmed(self, solid: Manifold, depth: float) -> Manifold:
+        return solid.trim_by_plane(self.inward, depth - self.offset)
+
+    def gain(self, depth: float) -> float:
+        """Volume that is no longer added, less what is lost."""
+        left = self.trimmed(self.solid, depth).volume()
+        gone = self.extra.volume() - self.trimmed(self.extra, depth).volume()
+        return float(gone - (self.solid.volume() - left)) if left >= self.kept else -np.inf
+
+
+def _deepest(gain: Callable[[float], float], deepest: float) -> tuple[float, float]:
+    """The depth that gains most, and what it gains; gains rise up to it and fall beyond, but for steps."""
+    tried = {0.0: 0.0}
+    depth = deepest * _SHALLOWEST
+    while depth <= deepest:
+        tried[depth] = gain(depth)
+        if tried[depth] < min(max(tried.values()), 0.0) or np.isneginf(tried[depth]):
+            break
+        depth *= 2
+    for _ in range(_REFINED):
+        known = sorted(tried)
+        at = known.index(max(tried, key=lambda one: tried[one]))
+        sides = [(known[i], known[i + 1]) for i in (at - 1, at) if 0 <= i < len(known) - 1]
+        low, high = max(sides, key=lambda side: side[1] - side[0])
+        tried[(low + high) / 2] = gain((low + high) / 2)
+    chosen = max(tried, key=lambda one: tried[one])
+    return chosen, tried[chosen]
 
 
 def _large_faces(hull: Manifold) -> tuple[np.ndarray, np.ndarray]:

@@ -12,8 +12,9 @@ import numpy as np
 from partwright.approximation.balanced_hull import balanced_hull
 from partwright.approximation.change import Change
 from partwright.approximation.convex import segments, walls
-from partwright.approximation.convex_cover import Limits, convex_cover
+from partwright.approximation.convex_cover import convex_cover
 from partwright.approximation.convex_fit import CONVEX_KINDS, convex_fits
+from partwright.approximation.convex_piece import Limits
 from partwright.approximation.light_hull import light_hull
 from partwright.approximation.nearest import Approximation, nearest_solid
 from partwright.approximation.pieces import Piece, piece_mesh, pieces, require_some

@@ -2,21 +2,19 @@
 
 What is spent is volume: a piece is as bad as what its hull adds to it. Planes come from the solid itself:
 from the faces beside its concave edges, and across its principal axes. A cut through a ring gains nothing
-before
-the second one does, so where no cut gains anything the one whose halves can be cut best is taken. Other
-decompositions go by the depth of pockets (Wei et al., CoACD, 2022; Mamou, V-HACD, 2016); here depth is a
-limit, not the aim.
+before the second one does, so where no cut gains anything the one whose halves can be cut best is taken.
+Other decompositions go by the depth of pockets (Wei et al., CoACD, 2022; Mamou, V-HACD, 2016); here depth is
+a limit, not the aim.
 """
 
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.convex_piece import Limits, Piece
 from partwright.approximation.cutting_planes import (
     Corners,
     Plane,
@@ -24,62 +22,19 @@ from partwright.approximation.cutting_planes import (
     beside_concave_edges,
     candidates,
 )
+from partwright.approximation.piece_joining import exchanged, joined
 from partwright.meshing.manifolds import surface_of
 from partwright.shapes import MeshDistance
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-MOST = 64  # pieces at most, where nobody asked for fewer
 _EXACT = 5  # candidates whose pieces are really made
 _LOOKED_AT, _MADE = 6, 3  # planes of faces that are tried and really cut along, where one cut gains nothing
 _TRIES, _CHANGED = 4, 0.005  # of simplifying, and the share of the volume that it may change
 _GAIN = 0.03  # of what a hull adds: a cut that takes less off it looks one cut ahead
 _SLIVER = 1e-5  # of the whole volume: pieces below it are left out
-_SAMPLES = 0.5  # of the tolerance: spacing of points on a hull
-_FEWEST, _DENSEST = 12.0, 60.0  # points along the longest side of a hull, whatever the tolerance
 _COARSE = 0.05  # of the tolerance: how far the search's own copy of the solid may lie from it
-
-
-@dataclass(frozen=True)
-class Limits:
-    """deviation: how far a hull's surface may lie from the solid's, as a length. extra: volume that all hulls
-    may add, over the solid's. most: pieces at most; this one is kept where not all can be."""
-
-    deviation: float
-    extra: float = 0.03
-    most: int = MOST
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A part of the solid, and the least convex solid around it."""
-
-    solid: Manifold
-
-    @cached_property
-    def hull(self) -> Manifold:
-        return self.solid.hull()
-
-    @cached_property
-    def extra(self) -> float:
-        """Volume that the hull adds."""
-        return max(self.hull.volume() - self.solid.volume(), 0.0)
-
-    @cached_property
-    def corners(self) -> Corners:
-        return Corners.of(self.solid)
-
-    def deviation(self, limit: float) -> float:
-        """How far the hull's surface lies from the solid's at most, by points dense enough for the limit."""
-        vertices, faces = surface_of(self.solid)
-        side = float(np.ptp(vertices, axis=0).max())
-        spacing = float(np.clip(_SAMPLES * limit, side / _DENSEST, side / _FEWEST))
-        fine = self.hull.refine_to_length(spacing).to_mesh()
-        points = np.asarray(fine.vert_properties)[:, :3]
-        middle, scale = vertices.mean(axis=0), 1.0 / side
-        there = MeshDistance((vertices - middle) * scale, faces, faces, True)
-        return float(there.unsigned((points - middle) * scale).max(initial=0.0)) / scale
 
 
 def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
@@ -91,7 +46,9 @@ def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
     coarse = _simplified(solid, _COARSE * limits.deviation)
     pieces = _cut_up(coarse, limits)
     pieces += _far_off(solid, pieces, limits.deviation)
-    return _joined(pieces, coarse.volume(), limits)
+    pieces = joined(pieces, coarse.volume(), limits)
+    least = _SLIVER * coarse.volume()
+    return exchanged(pieces, limits, lambda piece: _best_cut(piece, least))
 
 
 def _far_off(solid: Manifold, pieces: list[Piece], deviation: float) -> list[Piece]:
@@ -275,50 +232,3 @@ def _few(corners: Corners) -> list[Plane]:
 def _cut(piece: Piece, normal: np.ndarray, offset: float, least: float) -> list[Piece]:
     sides = piece.solid.split_by_plane(tuple(normal.tolist()), float(offset))
     return [one for side in sides if not side.is_empty() for one in _components(side, least)]
-
-
-def _joined(pieces: list[Piece], volume: float, limits: Limits) -> list[Piece]:
-    """Pieces joined in pairs, the cheapest pair first, as long as the limits are kept or there are too
-    many."""
-    from manifold3d import Manifold, OpType
-
-    alive = dict(enumerate(pieces))
-    total = sum(piece.extra for piece in pieces)
-    heap: list[tuple[float, int, int]] = []
-
-    def price(i: int, j: int) -> None:
-        a, b = alive[i], alive[j]
-        if not _near(a.hull, b.hull):
-            return
-        hull = Manifold.batch_hull([a.hull, b.hull]).volume()
-        heapq.heappush(heap, (hull - a.hull.volume() - b.hull.volume(), i, j))
-
-    for i in alive:
-        for j in range(i):
-            price(i, j)
-    number = len(alive)
-    while heap and len(alive) > 1:
-        cost, i, j = heapq.heappop(heap)
-        if i not in alive or j not in alive:
-            continue
-        forced = len(alive) > limits.most
-        both = Piece(Manifold.batch_boolean([alive[i].solid, alive[j].solid], OpType.Add))
-        if not forced:
-            if total + cost > limits.extra * volume:
-                break
-            if both.deviation(limits.deviation) > limits.deviation:
-                continue
-        total += max(cost, 0.0)
-        del alive[i], alive[j]
-        alive[number] = both
-        for other in [key for key in alive if key != number]:
-            price(number, other)
-        number += 1
-    return list(alive.values())
-
-
-def _near(a: Manifold, b: Manifold) -> bool:
-    """Whether their boxes touch, with room to spare."""
-    first, second = (np.reshape(one.bounding_box(), (2, 3)) for one in (a, b))
-    room = 0.05 * float(np.ptp(np.concatenate([first, second]), axis=0).max())
-    return bool(((first[0] <= second[1] + room) & (second[0] <= first[1] + room)).all())

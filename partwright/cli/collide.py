@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from partwright.cli.lengths import length
+from partwright.cli.lengths import length, share
 from partwright.cli.outputs import add_output
 
 
@@ -43,6 +43,14 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option(
         "--max-parts", metavar="N", type=int, default=24, help="shapes a link at most (default: %(default)s)"
+    )
+    option(
+        "--extra",
+        metavar="SHARE",
+        type=share,
+        default=0.08,
+        help="volume that a link's shapes may add before it is cut further, as far as --max-parts allows "
+        "(default: 8%%)",
     )
     option(
         "--kinds",

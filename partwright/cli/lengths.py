@@ -1,4 +1,4 @@
-"""Lengths as they are typed: 0.5, 0.5mm, 1%."""
+"""Lengths and shares as they are typed: 0.5, 0.5mm, 1%."""
 
 from __future__ import annotations
 
@@ -16,6 +16,19 @@ def length(text: str) -> str:
     if found is None or not _is_suffix(found[3]):
         raise argparse.ArgumentTypeError(f"expected a length such as 0.5, 0.5mm or 1%, got {text!r}")
     return text
+
+
+def share(text: str) -> float:
+    """0.08 of "8%" or "0.08".
+
+    Raises:
+        argparse.ArgumentTypeError: it is no number.
+    """
+    number, percent, rest = text.strip().partition("%")
+    try:
+        return float("" if rest else number) / (100 if percent else 1)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a share such as 8% or 0.08, got {text!r}") from None
 
 
 def _is_suffix(text: str) -> bool:

@@ -9,8 +9,6 @@ import numpy as np
 
 from partwright.approximation.balanced_hull import balanced_hull
 from partwright.approximation.convex_cover import (
-    Limits,
-    Piece,
     convex_cover,
     covering,
     faces_of,
@@ -18,6 +16,7 @@ from partwright.approximation.convex_cover import (
     halved,
 )
 from partwright.approximation.convex_fit import ConvexFit, Mode, convex_fits
+from partwright.approximation.convex_piece import Limits, Piece
 from partwright.approximation.light_hull import light_hull
 from partwright.meshing.manifolds import as_mesh, surface_of
 from partwright.robots.growing import enclosed, shape_solid

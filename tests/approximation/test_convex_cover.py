@@ -9,7 +9,8 @@ import pytest
 from manifold3d import Manifold, OpType
 
 from partwright.approximation.balanced_hull import balanced_hull
-from partwright.approximation.convex_cover import Limits, Piece, convex_cover, covering, faces_of, grown
+from partwright.approximation.convex_cover import convex_cover, covering, faces_of, grown
+from partwright.approximation.convex_piece import Limits, Piece
 from partwright.approximation.light_hull import light_hull
 
 SEGMENTS = 96

@@ -16,6 +16,7 @@ def run(arguments: argparse.Namespace) -> int:
         inside=arguments.inside,
         tolerance=arguments.tolerance,
         max_parts=arguments.max_parts,
+        extra=arguments.extra,
         spheres=arguments.spheres,
         kinds=tuple(filter(None, arguments.kinds.split(","))),
     )

@@ -1,0 +1,61 @@
+"""A part of a solid that is to become its hull, and what hulls may do wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.approximation.cutting_planes import Corners
+from partwright.meshing.manifolds import surface_of
+from partwright.shapes import MeshDistance
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+MOST = 64  # pieces at most, where nobody asked for fewer
+_SAMPLES = 0.5  # of the tolerance: spacing of points on a hull
+_FEWEST, _DENSEST = 12.0, 60.0  # points along the longest side of a hull, whatever the tolerance
+
+
+@dataclass(frozen=True)
+class Limits:
+    """deviation: how far a hull's surface may lie from the solid's, as a length. extra: volume that all hulls
+    may add, over the solid's. most: pieces at most; this one is kept where not all can be."""
+
+    deviation: float
+    extra: float = 0.03
+    most: int = MOST
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A part of the solid, and the least convex solid around it."""
+
+    solid: Manifold
+
+    @cached_property
+    def hull(self) -> Manifold:
+        return self.solid.hull()
+
+    @cached_property
+    def extra(self) -> float:
+        """Volume that the hull adds."""
+        return max(self.hull.volume() - self.solid.volume(), 0.0)
+
+    @cached_property
+    def corners(self) -> Corners:
+        return Corners.of(self.solid)
+
+    def deviation(self, limit: float) -> float:
+        """How far the hull's surface lies from the solid's at most, by points dense enough for the limit."""
+        vertices, faces = surface_of(self.solid)
+        side = float(np.ptp(vertices, axis=0).max())
+        spacing = float(np.clip(_SAMPLES * limit, side / _DENSEST, side / _FEWEST))
+        fine = self.hull.refine_to_length(spacing).to_mesh()
+        points = np.asarray(fine.vert_properties)[:, :3]
+        middle, scale = vertices.mean(axis=0), 1.0 / side
+        there = MeshDistance((vertices - middle) * scale, faces, faces, True)
+        return float(there.unsigned((points - middle) * scale).max(initial=0.0)) / scale

@@ -1,0 +1,104 @@
+"""Pieces of a solid joined again where that costs little, and cut elsewhere instead where that saves more.
+
+What joining costs is the volume that the hull of both adds to their own hulls.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.approximation.convex_piece import Limits, Piece
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+_EXCHANGES = 24  # pieces that are tried to be cut once there are as many as may be
+
+
+def joined(pieces: Sequence[Piece], volume: float, limits: Limits) -> list[Piece]:
+    """Pieces joined in pairs, the cheapest pair first, as long as the limits are kept or there are too
+    many."""
+    alive = dict(enumerate(pieces))
+    total = sum(piece.extra for piece in pieces)
+    heap: list[tuple[float, int, int]] = []
+
+    def price(i: int, j: int) -> None:
+        cost = _cost(alive[i], alive[j])
+        if np.isfinite(cost):
+            heapq.heappush(heap, (cost, i, j))
+
+    for i in alive:
+        for j in range(i):
+            price(i, j)
+    number = len(alive)
+    while heap and len(alive) > 1:
+        cost, i, j = heapq.heappop(heap)
+        if i not in alive or j not in alive:
+            continue
+        forced = len(alive) > limits.most
+        both = _both(alive[i], alive[j])
+        if not forced:
+            if total + cost > limits.extra * volume:
+                break
+            if both.deviation(limits.deviation) > limits.deviation:
+                continue
+        total += max(cost, 0.0)
+        del alive[i], alive[j]
+        alive[number] = both
+        for other in [key for key in alive if key != number]:
+            price(number, other)
+        number += 1
+    return list(alive.values())
+
+
+def exchanged(pieces: Sequence[Piece], limits: Limits, cut: Callable[[Piece], list[Piece]]) -> list[Piece]:
+    """As many pieces, where there are as many as may be: the worst is cut in two, and two others are joined,
+    as long as that adds less."""
+    pieces = list(pieces)
+    if len(pieces) < limits.most:
+        return pieces
+    costs: dict[frozenset[Piece], float] = {}
+    kept: set[Piece] = set()
+    for _ in range(_EXCHANGES):
+        worst = max((piece for piece in pieces if piece not in kept), key=lambda one: one.extra, default=None)
+        if worst is None:
+            break
+        parts = cut(worst)
+        gain = worst.extra - sum(part.extra for part in parts)
+        left = [*(piece for piece in pieces if piece is not worst), *parts]
+        pairs = [pair for pair in combinations(left, 2) if not set(pair) <= set(parts)]
+        for pair in pairs:
+            costs.setdefault(frozenset(pair), _cost(*pair))
+        cheapest = min(pairs, key=lambda pair: costs[frozenset(pair)], default=None)
+        if len(parts) != 2 or cheapest is None or costs[frozenset(cheapest)] >= gain:
+            kept.add(worst)
+            continue
+        pieces = [*(piece for piece in left if piece not in cheapest), _both(*cheapest)]
+    return pieces
+
+
+def _both(a: Piece, b: Piece) -> Piece:
+    from manifold3d import Manifold, OpType
+
+    return Piece(Manifold.batch_boolean([a.solid, b.solid], OpType.Add))
+
+
+def _cost(a: Piece, b: Piece) -> float:
+    """Volume that the hull of both adds; infinite for those that lie apart."""
+    from manifold3d import Manifold
+
+    if not _near(a.hull, b.hull):
+        return np.inf
+    return float(Manifold.batch_hull([a.hull, b.hull]).volume() - a.hull.volume() - b.hull.volume())
+
+
+def _near(a: Manifold, b: Manifold) -> bool:
+    """Whether their boxes touch, with room to spare."""
+    first, second = (np.reshape(one.bounding_box(), (2, 3)) for one in (a, b))
+    room = 0.05 * float(np.ptp(np.concatenate([first, second]), axis=0).max())
+    return bool(((first[0] <= second[1] + room) & (second[0] <= first[1] + room)).all())
