@@ -19,6 +19,7 @@ negative weight); each is divided by what it is at the start. Given several time
   keep_out@x0,y0,z0,x1,y1,z1                              volume within boxes
   wall_thickness                                          of the thinnest twentieth of the surface
   distance@FILE                                           to the surface of a file
+  surrogate_drag@FILE                                     by a network (parts train-surrogate)
   newtonian_drag@AXIS                                     of flow along an axis: no CFD, see docs/optimise.md
   FILE.py:FUNCTION                                        your own
 
@@ -76,8 +77,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option(
         "--simulate",
-        metavar="AXIS",
-        help="at the end, the drag before and after by OpenFOAM, the air moving along x, -y ... (minutes)",
+        metavar="AIR",
+        help="at the end, the drag before and after by OpenFOAM (minutes), the air moving along x, -y ...: "
+        "AXIS[,ground][,cells=N][,iterations=N][,speed=V][,seconds=S]",
     )
     limits = command.add_argument_group("how far parts may go").add_argument
     limits(

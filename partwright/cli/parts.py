@@ -4,9 +4,25 @@ from __future__ import annotations
 
 import argparse
 
-from partwright.cli import parts_edit, parts_interpolate, parts_prepare, parts_reconstruct, parts_train
+from partwright.cli import (
+    parts_edit,
+    parts_interpolate,
+    parts_prepare,
+    parts_reconstruct,
+    parts_simulate,
+    parts_train,
+    parts_train_surrogate,
+)
 
-COMMANDS = (parts_prepare, parts_train, parts_reconstruct, parts_edit, parts_interpolate)
+COMMANDS = (
+    parts_prepare,
+    parts_train,
+    parts_reconstruct,
+    parts_edit,
+    parts_interpolate,
+    parts_simulate,
+    parts_train_surrogate,
+)
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -14,8 +14,7 @@ import trimesh
 from partwright.assembly import Assembly
 from partwright.atomic_io import replacing_files
 from partwright.goals.curves import curves
-from partwright.goals.objectives.axes import axis
-from partwright.goals.openfoam import Air, simulate
+from partwright.goals.flow import Air, Skin, simulate
 from partwright.goals.pictures import before_and_after, trajectory
 from partwright.goals.problem import Options, Point, Problem
 from partwright.goals.report import report
@@ -36,25 +35,35 @@ class Optimised:
     seconds: float
     simulated: dict[str, Any] = field(default_factory=dict)
     """What a flow simulation of the start and the result says, where one was asked for."""
+    skins: tuple[Skin, ...] = ()
+    """And the pressure on both."""
 
-    def with_simulation(self, axis_name: str, air: Air | None = None) -> Optimised:
-        """The same, with the drag of both ends by OpenFOAM, the air moving along an axis ("x", "-y" ...).
+    def with_simulation(self, air: str | Air) -> Optimised:
+        """The same, with the drag of both ends by OpenFOAM: "x", "-y,ground,cells=64", or an `Air`.
 
         Raises:
             MissingDependencyError: OpenFOAM is not installed.
             SimulationError: a simulation failed, diverged or took too long.
         """
-        flow, metres = axis(axis_name, "x", "simulate"), METRES.get(self.start.unit or "m", 1.0)
+        air = Air.of(air, self.start.up) if isinstance(air, str) else air
         ends = {"before": self.found.points[0], "after": self._best}
-        found: dict[str, Any] = {"program": "OpenFOAM, simpleFoam, k-omega SST", "flow": axis_name}
+        found: dict[str, Any] = {"program": "OpenFOAM, simpleFoam, Spalart-Allmaras", "air": air.to_dict()}
+        skins = []
         with tempfile.TemporaryDirectory(prefix="partwright-") as folder:
             for name, point in ends.items():
-                found[name] = simulate(point.surface, flow, Path(folder, name), air, metres).to_dict()
-        return replace(self, simulated=found)
+                one = simulate(point.surface, Path(folder, name), air, self.metres)
+                found[name] = one.to_dict()
+                skins.append(one.skin)
+        return replace(self, simulated=found, skins=tuple(skins))
 
     @property
     def start(self) -> Assembly:
         return self.problem.parameters.assembly
+
+    @property
+    def metres(self) -> float:
+        """Length of the assembly's unit; 1 where that is unknown."""
+        return METRES.get(self.start.unit or "m", 1.0)
 
     @property
     def assembly(self) -> Assembly:
@@ -99,7 +108,9 @@ class Optimised:
             self.assembly.save(staging / FILES[0])
             self.surface.export(staging / FILES[1])
             (staging / FILES[2]).write_text(json.dumps(self.to_dict(), indent=1) + "\n", encoding="utf-8")
-            before_and_after(self.found.points, self.problem.wanted[0].name, staging / FILES[3])
+            before_and_after(
+                self.found.points, self.problem.wanted[0].name, staging / FILES[3], self.skins, self.metres
+            )
             trajectory(self.found.points, staging / FILES[4])
             curves(self.problem, self.found.steps, staging / FILES[5])
 

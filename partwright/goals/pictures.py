@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from partwright.assembly.palette import palette
+from partwright.goals.flow.simulation import PRESSURE
+from partwright.goals.flow.skin import Skin
 from partwright.goals.objectives.axes import axis
 from partwright.goals.objectives.newtonian import pressure
 from partwright.goals.problem import Point
@@ -21,10 +23,16 @@ from partwright.render.shading import look
 _PANEL, _FRAME = (460, 400), (360, 320)
 _FRAMES = 16
 _CALM, _HIGH = np.array((66, 104, 180)), np.array((196, 52, 44))  # pressure coefficient 0 and 2
+_SUCTION, _NONE = np.array((66, 104, 180)), np.array((238, 238, 236))  # -1 and 0 of a simulation; 1 is high
 
 
-def before_and_after(points: Sequence[Point], objective: str, path: Path) -> None:
-    """PNG of the first and the last point, in a colour a part; for drag also the pressure on them."""
+def before_and_after(
+    points: Sequence[Point], objective: str, path: Path, skins: Sequence[Skin] = (), metres: float = 1.0
+) -> None:
+    """PNG of the first and the last point, in a colour a part; for drag also the pressure on them.
+
+    skins: what a simulation of both leaves on them, where there was one. metres: length of the points' unit.
+    """
     ends = [points[0], points[-1]]
     camera, view = _camera(ends, _PANEL)
     images = [_drawn(point, camera, view, _PANEL, _part_colours(point)) for point in ends]
@@ -33,6 +41,9 @@ def before_and_after(points: Sequence[Point], objective: str, path: Path) -> Non
     if name == "newtonian_drag":
         images += [_drawn(p, camera, view, _PANEL, _pressure_colours(p, axis(flow, "x", name))) for p in ends]
         captions += ["Newtonian pressure, before", "Newtonian pressure, after"]
+    for point, skin, caption in zip(ends, skins, captions, strict=False):
+        images.append(_drawn(point, camera, view, _PANEL, _skin_colours(point, skin, metres)))
+        captions = [*captions, f"simulated pressure, {caption}"]
     write_png(path, sheet(images, captions, columns=2))
 
 
@@ -79,3 +90,9 @@ def _pressure_colours(point: Point, flow: np.ndarray) -> np.ndarray:
     share = pressure(np.array(point.surface.vertices), np.array(point.surface.faces), flow) / 2
     share = np.round(16 * share)[:, None] / 16
     return np.round(_CALM + share * (_HIGH - _CALM)).astype(np.uint8)
+
+
+def _skin_colours(point: Point, skin: Skin, metres: float) -> np.ndarray:
+    share = np.clip(skin.at(PRESSURE, metres * point.surface.triangles_center), -1, 1)
+    share = np.round(12 * share)[:, None] / 12
+    return np.round(_NONE + np.abs(share) * (np.where(share > 0, _HIGH, _SUCTION) - _NONE)).astype(np.uint8)

@@ -18,6 +18,7 @@ OBJECTIVES: Registry[Objective] = Registry(
         "keep_out": "partwright.goals.objectives.keep_out:KEEP_OUT",
         "wall_thickness": "partwright.goals.objectives.wall_thickness:WALL_THICKNESS",
         "distance": "partwright.goals.objectives.target:DISTANCE",
+        "surrogate_drag": "partwright.goals.objectives.surrogate:SURROGATE_DRAG",
         "newtonian_drag": "partwright.goals.objectives.newtonian:NEWTONIAN_DRAG",
     },
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 
 from partwright.assembly import load_assembly
 from partwright.cli.interrupts import INTERRUPTED, stopping
@@ -10,8 +11,10 @@ from partwright.cli.progress import Count
 from partwright.cli.terminal import counted, note, say, warn
 from partwright.errors import ObjectiveError, SimulationError
 from partwright.goals import Optimised, Options, Step, optimise
-from partwright.goals.objectives.axes import axis
-from partwright.goals.openfoam import check_installed
+from partwright.goals.flow.air import Air
+from partwright.goals.flow.programs import check_installed
+from partwright.goals.flow.surrogate import Surrogate
+from partwright.goals.objectives.surrogate import outside
 from partwright.methods import Cancellation
 
 _ENDINGS = {
@@ -35,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
         contacts=not arguments.no_contacts,
     )
     if arguments.simulate is not None:
-        axis(arguments.simulate, "x", "simulate")
+        Air.of(arguments.simulate, assembly.up)
         check_installed()
     cancel = Cancellation()
     with Count("optimising") as count, stopping(cancel.request):
@@ -73,6 +76,7 @@ def _finish(result: Optimised, arguments: argparse.Namespace) -> int:
         )
     elif any(want.name.startswith("newtonian_drag") for want in result.problem.wanted):
         say("newtonian_drag is a pressure by angle, no flow simulation: compare with one before you build")
+    warn(_doubts(result))
     same = sum(a == b for a, b in zip(result.start.parts, result.assembly.parts, strict=True))
     accepted = len(result.found.points) - 1
     tried = counted(len(result.found.steps) - 1, "step")
@@ -90,6 +94,22 @@ def _finish(result: Optimised, arguments: argparse.Namespace) -> int:
         warn([f"interrupted: {arguments.output} holds the best assembly so far"])
         return INTERRUPTED
     return 0
+
+
+def _doubts(result: Optimised) -> Iterator[str]:
+    """Ends that a surrogate was not made for."""
+    ends = {"the start": result.found.points[0].surface, "the result": result.surface}
+    for name, _, file in (want.name.partition("@") for want in result.problem.wanted):
+        if name != "surrogate_drag":
+            continue
+        model = Surrogate.load(file)
+        for end, surface in ends.items():
+            far = outside(model, surface, result.metres)
+            if far > 1:
+                yield (
+                    f"{end} is unlike all that {file} has learned from ({far:.1f} times as far as any "
+                    "of them from its nearest): do not believe its drag, --simulate it"
+                )
 
 
 def _shown(step: Step) -> str:
