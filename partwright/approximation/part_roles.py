@@ -11,7 +11,7 @@ import numpy as np
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import rotation_matrix
-from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Frustum, Revolution, Sphere
+from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Frustum, Profile, Revolution, Sphere
 
 _FLAT = 0.3  # a plate's thickness over its next longer side, at most
 _LONG = 3.0  # a bar's length over its next shorter side, at least
@@ -65,7 +65,10 @@ def _bulk(node: Node) -> float:
     return float(np.prod(upper - lower)) if np.isfinite([lower, upper]).all() else 0.0
 
 
-_CUTS = ("hole", "blind_hole", "bore", "countersink", "dimple", "groove", "opening", "pocket", "island")
+_CUTS = (
+    "hole", "bolt_hole", "blind_hole", "counterbored_hole", "countersunk_hole", "bore", "countersink",
+    "dimple", "groove", "slot", "opening", "pocket", "island",
+)  # fmt: skip
 
 
 def _name(node: Node, cut_from: Node | None, roles: dict[str, str]) -> None:
@@ -118,7 +121,9 @@ def _cut(part: Part, cut_from: Node) -> str:
     if isinstance(field, Sphere):
         return "dimple"
     if isinstance(field, Revolution):
-        return "groove"
+        return _turned_cut(field.profile)
+    if isinstance(field, Extrusion) and _is_slot(field.profile):
+        return "slot"
     through = _goes_through(part, cut_from)
     if not isinstance(field, Cylinder):
         return "opening" if through and isinstance(field, Box | Extrusion) else "pocket"
@@ -126,7 +131,35 @@ def _cut(part: Part, cut_from: Node) -> str:
     sides = np.ptp(cut_from.bounds(), axis=0)[np.abs(axis) < math.sqrt(0.5)]
     if through and len(sides) and 2 * field.radius > _BORE * float(sides.min()):
         return "bore"
-    return "hole" if through else "blind_hole"
+    if through:
+        return "bolt_hole" if len(part.copies) > 1 else "hole"
+    return "blind_hole"
+
+
+def _turned_cut(profile: Profile) -> str:
+    """A stepped or tapering hole where it reaches the axis, else a groove."""
+    outline = [side for side in profile.sides[0] if side.centre is None]
+    if not any(side.start[0] == 0 == side.end[0] for side in outline):
+        return "groove"
+    size = _BEYOND * profile.size
+    sloped = [s for s in outline if min(abs(s.end[i] - s.start[i]) for i in (0, 1)) > size]
+    if any(min(side.start[0], side.end[0]) > 0 for side in sloped):
+        return "countersunk_hole"
+    walls = [s for s in outline if min(s.start[0], s.end[0]) > size and abs(s.end[0] - s.start[0]) <= size]
+    return "counterbored_hole" if len(walls) > 1 else "blind_hole" if walls else "dimple"
+
+
+def _is_slot(profile: Profile) -> bool:
+    """Two parallel lines, joined by half a circle at either end."""
+    sides = profile.sides[0]
+    arcs = [side for side in sides if side.centre is not None]
+    lines = [side for side in sides if side.centre is None]
+    if profile.holes or len(lines) != 2 or not arcs:
+        return False
+    turns = sorted(side.sweep for side in arcs)
+    one, two = (np.subtract(line.end, line.start) for line in lines)
+    parallel = abs(float(one[0] * two[1] - one[1] * two[0])) < _BEYOND * float(np.linalg.norm(one) ** 2)
+    return parallel and turns[0] > 0 and abs(sum(turns) - 2 * math.pi) < _BEYOND * 10
 
 
 def _goes_through(part: Part, cut_from: Node) -> bool:

@@ -30,13 +30,18 @@ _SIDE_PRICE = 1 / 25  # of a feature's
 _LEAST_PIECE = 2e-5  # of the volume
 _THIN = 2.5e-3  # unit lengths: twice the volume over the area of a skin between a wall and its chords
 _PIECES = 10  # of what is missed, and of what is too much, that are looked at in one step
-_BASES = 3
-_RIVAL = 0.8  # of the best base's objective, that another has to have
+_BASES = 4
+_RIVAL = 0.55  # of the best base's objective, that another has to have
 _BEHIND, _PATIENT = 0.03, 3  # of the objective, after so many steps
 _COMPLEX = 20_000  # triangles of a piece that is no feature
-_MOST = 30
+_MOST = 24
+_MOST_LOOKED = 150  # pieces whose candidates are made: a part of hundreds is no part that was drawn
+_PERFECT = 0.985  # R from which on no other base is tried
 _COPY = 0.4  # of what the first gains, that a copy has to
 _BATCH = 64
+_FAR = 0.04  # unit lengths: 2 % of the longest side, off by which nothing may be
+_AROUND = 5e-3
+_MENDS = 6
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
@@ -56,14 +61,14 @@ class Feature:
 class FeatureTree:
     """Features in order, and the samples (N,) within their fold.
 
-    inner, outer: the fold as a body, within its surface and around it: what of the shape lies outside of
-    the outer one is missed, what of the inner one lies outside of the shape is too much; skins are neither.
+    missed, excess: what of the shape the fold lacks, and what it has too much, as bodies without the skins
+    that chords leave. objectives: after each step.
     """
 
     features: list[Feature] = field(default_factory=list)
     covered: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
-    inner: Manifold = field(default_factory=Manifold)
-    outer: Manifold = field(default_factory=Manifold)
+    missed: Manifold = field(default_factory=Manifold)
+    excess: Manifold = field(default_factory=Manifold)
     score: float = 0.0
     price: float = 0.0
     objectives: tuple[float, ...] = ()
@@ -75,6 +80,14 @@ class FeatureTree:
             within = covers(feature.part, points)
             covered = covered | within if feature.added else covered & ~within
         return covered
+
+    def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(N,) of the fold at points (N, 3); beyond edges a bound."""
+        result = np.full(len(points), np.float32(10))
+        for feature in self.features:
+            own = feature.part.distance(points)
+            result = np.minimum(result, own) if feature.added else np.maximum(result, -own)
+        return result
 
     def first(self, count: int) -> FeatureTree:
         """The tree of the first features; its scores are not known."""
@@ -97,7 +110,8 @@ class FeatureSearch:
         most: int | None = None,
         told: Callable[[FeatureTree], None] | None = None,
     ) -> None:
-        self.alpha, self.checkpoint, self.told = alpha, checkpoint, told
+        self.samples, self.alpha, self.checkpoint, self.told = samples, alpha, checkpoint, told
+        self.distance = samples.distance[::_EVERY]
         self.most = min(most or _MOST, _MOST)
         vertices, faces = shape.unit_mesh
         self.body = Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
@@ -106,7 +120,7 @@ class FeatureSearch:
         self.points = samples.points[::_EVERY]
         self.weights = _weights(samples)[::_EVERY]
         self.inside = samples.inside[::_EVERY]
-        self._masks: dict[int, tuple[Candidate, NDArray[np.bool_]]] = {}
+        self._masks: dict[int, tuple[Candidate, NDArray[np.float32]]] = {}
         self._of_piece: dict[tuple[float, ...], list[Candidate]] = {}
 
     def run(self) -> FeatureTree | None:
@@ -116,17 +130,37 @@ class FeatureSearch:
         own = candidates(self.body, self.frames, holes=True)
         if not own:
             return None
-        empty = FeatureTree(covered=np.zeros(len(self.inside), bool))
+        empty = FeatureTree(covered=np.zeros(len(self.inside), bool), missed=self.body)
         gains = self._gains(empty, own, True)
         order = np.argsort(-gains)[:_BASES]
         best: FeatureTree | None = None
         for index in order:
-            if best is not None and gains[index] < _RIVAL * gains[order[0]]:
+            if best is not None and (gains[index] < _RIVAL * gains[order[0]] or best.score > _PERFECT):
                 break
             tree = self._grown(self._with(empty, own[index], True), own, best)
             if best is None or tree.objective > best.objective:
                 best = tree
-        return best
+        return self._mended(best, own) if best is not None else None
+
+    def _mended(self, tree: FeatureTree, own: Sequence[Candidate]) -> FeatureTree:
+        """With features that pay too little but whose lack leaves the surface far off."""
+        for _ in range(_MENDS):
+            far = self._far(tree)
+            if len(tree.features) >= self.most or not len(far):
+                break
+            step = self._step(tree, own, far)
+            if step is None:
+                break
+            tree = step
+        return tree
+
+    def _far(self, tree: FeatureTree) -> NDArray[np.float32]:
+        """(K, 3) points of the shape's surface far from the tree's, and samples within the tree far from the
+        shape."""
+        surface = self.samples.surface
+        missed = surface[np.abs(tree.distance(surface)) > _FAR]
+        stuck_out = self.points[tree.covered & (self.distance > _FAR)]
+        return np.concatenate([missed, stuck_out])
 
     def _grown(self, tree: FeatureTree, own: Sequence[Candidate], best: FeatureTree | None) -> FeatureTree:
         """Until nothing pays, or it is well behind where the best so far was after as many steps."""
@@ -149,10 +183,16 @@ class FeatureSearch:
         rival = best.objectives[min(count, len(best.objectives) - 1)]
         return count >= _PATIENT and tree.objective < rival - _BEHIND
 
-    def _step(self, tree: FeatureTree, own: Sequence[Candidate]) -> FeatureTree | None:
-        missed = self._pieces(self.body - tree.outer, self.inside & ~tree.covered)
-        excess = self._pieces(tree.inner - self.body, ~self.inside & tree.covered)
-        adding = [*own, *(c for piece in missed for c in self._candidates(piece))]
+    def _step(
+        self, tree: FeatureTree, own: Sequence[Candidate], far: NDArray[np.float32] | None = None
+    ) -> FeatureTree | None:
+        """The tree and what raises R most beyond its price.
+
+        far: (K, 3) points; what stands for pieces that hold any of them need only raise R.
+        """
+        missed = self._pieces(tree.missed, self.inside & ~tree.covered, far)
+        excess = self._pieces(tree.excess, ~self.inside & tree.covered, far)
+        adding = [*(own if far is None else ()), *(c for piece in missed for c in self._candidates(piece))]
         cutting = [c for piece in excess for c in self._candidates(piece)]
         best: tuple[float, Candidate, bool] | None = None
         for pool, added in ((adding, True), (cutting, False)):
@@ -162,7 +202,7 @@ class FeatureSearch:
             index = int(gains.argmax())
             if best is None or gains[index] > best[0]:
                 best = (float(gains[index]), pool[index], added)
-        if best is None or best[0] <= 0:
+        if best is None or best[0] <= (0.0 if far is None else -self._price(best[1].sides)):
             return None
         _, chosen, added = best
         return self._with(tree, chosen, added, missed if added else excess)
@@ -171,7 +211,7 @@ class FeatureSearch:
         self, tree: FeatureTree, chosen: Candidate, added: bool, pieces: Sequence[Manifold] = ()
     ) -> FeatureTree:
         """The tree and a candidate, with the copies that stand for other pieces."""
-        within = self._mask(chosen)
+        within = self._mask(chosen) > 0
         covered = tree.covered | within if added else tree.covered & ~within
         reached = self._score(covered)
         gain = reached - tree.score
@@ -193,21 +233,24 @@ class FeatureSearch:
         part = replace(chosen.part, instances=tuple(instances))
         feature = Feature(added, part, within, chosen.sides)
         if added:
-            inner, outer = tree.inner + inner, tree.outer + outer
+            missed, excess = tree.missed - outer, tree.excess + (inner - self.body)
         else:
-            inner, outer = tree.inner - outer, tree.outer - inner
-        for body in (inner, outer):
+            missed, excess = tree.missed + (inner ^ self.body), tree.excess - outer
+        for body in (missed, excess):
             body.num_tri()  # now, and not with every later step again
         features = [*tree.features, feature]
         price = tree.price + self._price(chosen.sides)
         steps = (*tree.objectives, reached - price)
-        return FeatureTree(features, covered, inner, outer, reached, price, steps)
+        return FeatureTree(features, covered, missed, excess, reached, price, steps)
 
     def _price(self, sides: int) -> float:
         return self.alpha * (1 + _SIDE_PRICE * max(0, sides - _FREE_SIDES))
 
-    def _pieces(self, residual: Manifold, wrong: NDArray[np.bool_]) -> list[Manifold]:
-        """Connected pieces of more than a skin, the largest first. wrong: the samples that they hold."""
+    def _pieces(
+        self, residual: Manifold, wrong: NDArray[np.bool_], far: NDArray[np.float32] | None = None
+    ) -> list[Manifold]:
+        """Connected pieces of more than a skin that may pay, the largest first, or that hold points `far`.
+        wrong: the samples that they hold."""
         points, weight = self.points[wrong], self.weights[wrong]
         total = self.weights[self.inside].sum(axis=0)
         pieces = []
@@ -215,6 +258,10 @@ class FeatureSearch:
             if piece.num_tri() > _COMPLEX:
                 continue
             low, high = np.reshape(piece.bounding_box(), (2, 3))
+            if far is not None:
+                if ((far > low - _AROUND) & (far < high + _AROUND)).all(axis=1).any():
+                    pieces.append((volume, piece))
+                continue
             within = ((points > low) & (points < high)).all(axis=1)
             if float((weight[within].sum(axis=0) / total).mean()) > _HOPELESS * self.alpha:
                 pieces.append((volume, piece if piece.num_tri() < _FINE else piece.simplify(_SKIN)))
@@ -224,13 +271,16 @@ class FeatureSearch:
         low, high = np.reshape(piece.bounding_box(), (2, 3))
         key = tuple(np.round([*low, *high, piece.volume()], 5).tolist())
         if key not in self._of_piece:
+            if len(self._of_piece) >= _MOST_LOOKED:
+                return []
             self._of_piece[key] = candidates(piece, self.frames, holes=True)
         return self._of_piece[key]
 
-    def _mask(self, candidate: Candidate) -> NDArray[np.bool_]:
+    def _mask(self, candidate: Candidate) -> NDArray[np.float32]:
+        """(N,) 1 at the samples within."""
         known = self._masks.get(id(candidate))
         if known is None:
-            known = candidate, covers(candidate.part, self.points)
+            known = candidate, covers(candidate.part, self.points).astype(np.float32)
             self._masks[id(candidate)] = known
         return known[1]
 
@@ -240,12 +290,12 @@ class FeatureSearch:
         both = (inside * tree.covered[:, None]).sum(axis=0)
         either = inside.sum(axis=0) + (outside * tree.covered[:, None]).sum(axis=0)
         changes = ~tree.covered if added else tree.covered
-        columns = np.hstack([inside, outside])[changes].astype(np.float32)
+        columns = (np.hstack([inside, outside]) * changes[:, None]).astype(np.float32)
         sign = 1.0 if added else -1.0
         scores = []
         for start in range(0, len(pool), _BATCH):
-            masks = np.stack([self._mask(c)[changes] for c in pool[start : start + _BATCH]])
-            change = sign * (masks.astype(np.float32) @ columns)
+            masks = np.stack([self._mask(c) for c in pool[start : start + _BATCH]])
+            change = sign * (masks @ columns)
             ratio = (both + change[:, :2]) / np.maximum(either + change[:, 2:], 1e-9)
             scores.append(ratio.mean(axis=1))
         price = np.array([self._price(c.sides) for c in pool])

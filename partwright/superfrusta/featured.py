@@ -8,9 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from partwright.approximation.part_roles import with_role_names
+from partwright.approximation.plain_numbers import with_plain_numbers
 from partwright.approximation.sketches.ends import with_open_ends
 from partwright.approximation.sketches.holes import holes_apart
-from partwright.assembly import Assembly
+from partwright.assembly import Assembly, Part
 from partwright.methods import Checkpoint, FitRequest, Progress
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_search import Feature, FeatureSearch, FeatureTree
@@ -18,6 +19,7 @@ from partwright.superfrusta.flat_tree import nested
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 
+_PLAIN = 1e-4  # unit lengths: how far numbers are moved to become plain
 SURE = 0.95
 """R from which on a tree of features is the result, and no other is looked for."""
 
@@ -65,7 +67,16 @@ def assembly(shape: Shape, tree: FeatureTree) -> Assembly:
     parts = [feature.part for feature in features]
     whole = nested(parts, [feature.added for feature in features], plain=True)
     whole = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
+    whole = _with_plain_numbers(whole, _PLAIN / shape.frame.scale)
     return with_role_names(dataclasses.replace(whole, unit=shape.unit))
+
+
+def _with_plain_numbers(node: Assembly, within: float) -> Assembly:
+    children = tuple(
+        with_plain_numbers(child, within) if isinstance(child, Part) else _with_plain_numbers(child, within)
+        for child in node.children
+    )
+    return dataclasses.replace(node, children=children)
 
 
 def _numbered(features: Sequence[Feature], shape: Shape) -> list[Feature]:

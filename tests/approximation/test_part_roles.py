@@ -6,7 +6,7 @@ import numpy as np
 
 from partwright.approximation.part_roles import with_role_names
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.fields import Box, Cone, Cylinder, Quadric, Sphere
+from partwright.fields import Box, Cone, Cylinder, Extrusion, Profile, Quadric, Revolution, Sphere
 
 
 def test_a_flanged_plate_reads_as_one() -> None:
@@ -27,7 +27,7 @@ def test_a_flanged_plate_reads_as_one() -> None:
     )
     before = Assembly((Part(Sphere(1), (0, 0, 20), name="convex_04"), boss, plate), unit="mm", name="part")
     after = with_role_names(before)
-    names = ["base_plate", "hole", "pocket", "boss", "bore", "countersink", "ball"]
+    names = ["base_plate", "bolt_hole", "pocket", "boss", "bore", "countersink", "ball"]
     assert [part.name for part in after.parts] == names
     assert [child.name for child in after.children] == ["base_plate_cut", "boss_cut", "ball"]
     assert (after.unit, after.name) == ("mm", "part")
@@ -50,3 +50,23 @@ def test_a_blind_hole_ends_within() -> None:
     cuts = (Part(Cylinder(2, 20), (0, 0, 10), name="y"), Part(Cylinder(12, 1), (0, 0, 0), name="z"))
     after = with_role_names(Assembly((body, *cuts), "difference"))
     assert [part.name for part in after.parts][:2] == ["base_cylinder", "blind_hole"]
+
+
+def test_holes_are_called_after_how_they_are_made() -> None:
+    through = Profile([(0, -5), (2, -5), (2, 3), (4, 3), (4, 8), (0, 8)])
+    sunk = Profile([(0, -5), (2, -5), (2, 1), (4, 3), (4, 8), (0, 8)])
+    drilled = Profile([(0, 0), (2, 1), (2, 8), (0, 8)])
+    slot = Profile([(-3, -1, 0), (3, -1, 1), (3, 1, 0), (-3, 1, 1)])
+    ring = Profile([(5, 2), (6, 2), (6, 8), (5, 8)])
+    moved = (Similarity(translation=(8, 0, 0)),)
+    cuts = (
+        Part(Revolution(through), name="a"),
+        Part(Revolution(sunk), (10, 0, 0), name="b"),
+        Part(Revolution(drilled), (0, 10, 0), name="c"),
+        Part(Extrusion(slot, 20), (10, 10, 0), name="d"),
+        Part(Revolution(ring), (-10, -10, 0), name="e"),
+        Part(Cylinder(1, 20), (-12, 10, 0), name="f", instances=moved),
+    )
+    after = with_role_names(Assembly((Part(Box((40, 40, 6)), name="x"), *cuts), "difference"))
+    names = ["counterbored_hole", "countersunk_hole", "blind_hole", "slot", "groove", "bolt_hole"]
+    assert [part.name for part in after.parts] == ["base_plate", *names]

@@ -132,6 +132,20 @@ def test_round_holes_come_apart_by_size() -> None:
     assert (inside == (plate.distance(points) < 0)).all()
 
 
+def test_holes_of_one_form_are_drawn_once() -> None:
+    slot = Profile([(-0.2, -0.05, 0), (0.2, -0.05, 1), (0.2, 0.05, 0), (-0.2, 0.05, 1)])
+    odd = Profile([(-0.1, 0.3), (0.1, 0.3), (0, 0.4)])
+    rolled = Profile((*slot.outline[2:], *slot.outline[:2])).moved((0, -0.2))
+    holes = (slot.outline, slot.moved((0.1, 0.15)).outline, rolled.outline, odd.outline)
+    plate = Part(Extrusion(Profile(Profile.rectangle(1.6, 1.0).outline, holes), 0.2), (0.1, 0, 0))
+    body, (cut,) = holes_apart(plate)
+    assert [len(loop) for loop in body.field.profile.loops] == [4, 3]
+    assert len(cut.copies) == 3
+    points = np.random.default_rng(0).uniform(-1, 1, (4000, 3)).astype(np.float32)
+    inside = (body.distance(points) < 0) & (cut.distance(points) > 0)
+    assert (inside == (plate.distance(points) < 0)).all()
+
+
 def test_a_plate_with_one_round_hole_is_a_box() -> None:
     body, (hole,) = holes_apart(
         Part(Extrusion(Profile(Profile.rectangle(1.0, 0.6).outline, (circle(0.1),)), 0.2))

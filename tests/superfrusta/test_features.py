@@ -52,7 +52,7 @@ def test_a_flange_is_turned_and_drilled_once() -> None:
     holes = [part for part in result.assembly.parts if len(part.copies) == 6]
     assert [type(part.field) for part in holes] == [Cylinder]
     assert holes[0].field.radius == pytest.approx(2.5, rel=2e-3)
-    assert holes[0].name == "hole"
+    assert holes[0].name == "bolt_hole"
     assert len(result.assembly) <= 3
     assert result.surface.volume == pytest.approx(result.shape.volume, rel=2e-3)
 

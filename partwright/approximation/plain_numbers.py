@@ -1,0 +1,76 @@
+"""Parts with the plainest numbers within a tolerance: 36.49998 read off a surface was typed as 36.5."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+from partwright.assembly import Part, Similarity
+from partwright.errors import ParameterError
+from partwright.fields import Field, Solid, Swept
+from partwright.fields.profile import Loop, Profile
+
+_ANGLES = ("taper", "angle")
+
+
+def plain(value: float, within: float) -> float:
+    """The number of the fewest digits at most `within` away: multiples of 0.5 before further digits."""
+    if value == 0 or within <= 0:
+        return value
+    digits = -math.floor(math.log10(max(abs(value), within)))
+    for decimals in range(digits, 13):
+        for halves in (1, 2):
+            unit = 10.0**-decimals / halves
+            nearest = round(value / unit) * unit
+            if abs(nearest - value) <= within:
+                return round(nearest, max(decimals + halves - 1, 0)) + 0.0
+    return value
+
+
+def with_plain_numbers(part: Part, within: float) -> Part:
+    """With lengths, corners and places made plain, each by at most `within` (own units); turns stay.
+
+    A field that does not allow its plain numbers stays as it is.
+    """
+    x, y, z = (plain(v, within) for v in part.translation)
+    try:
+        field = _plain_field(part.field, within)
+    except ParameterError:
+        field = part.field
+    moves = tuple(_plain_move(move, within) for move in part.instances)
+    return dataclasses.replace(part, field=field, translation=(x, y, z), instances=moves)
+
+
+def _plain_field(field: Field, within: float) -> Field:
+    if not isinstance(field, Solid | Swept):
+        return field
+    given: Any = field  # every kind of them is a dataclass
+    names = [own.name for own in dataclasses.fields(given)]
+    result: Field = dataclasses.replace(given, **{n: _number(n, getattr(given, n), within) for n in names})
+    return result
+
+
+def _number(name: str, value: Any, within: float) -> Any:
+    if isinstance(value, Profile):
+        return _plain_profile(value, within)
+    if isinstance(value, tuple):
+        return tuple(_number(name, v, within) for v in value)
+    if not isinstance(value, float | int) or name in _ANGLES:
+        return value
+    return plain(float(value), within)
+
+
+def _plain_profile(profile: Profile, within: float) -> Profile:
+    def loop(corners: Loop) -> Loop:
+        return tuple((plain(x, within), plain(y, within), b) for x, y, b in corners)
+
+    return Profile(loop(profile.outline), tuple(loop(hole) for hole in profile.holes))
+
+
+def _plain_move(move: Similarity, within: float) -> Similarity:
+    """A shift alone; the foot of a turn stays where the turn needs it."""
+    if move.rotation != (1.0, 0.0, 0.0, 0.0):
+        return move
+    x, y, z = (plain(v, within) for v in move.translation)
+    return dataclasses.replace(move, translation=(x, y, z))

@@ -1,0 +1,49 @@
+"""Numbers read off a surface become what a person typed."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from partwright.approximation.plain_numbers import plain, with_plain_numbers
+from partwright.assembly import Part, Similarity
+from partwright.fields import Box, Cylinder, Extrusion
+from partwright.fields.profile import Profile, circle
+
+
+@pytest.mark.parametrize(
+    ("value", "within", "expected"),
+    [
+        (36.49998, 1e-3, 36.5),
+        (-7.9996, 1e-3, -8.0),
+        (12.7003, 1e-3, 12.7),
+        (0.3333333, 1e-3, 0.333),
+        (1e-5, 1e-3, 0.0),
+        (0.0, 1e-3, 0.0),
+        (1234.567, 0.0, 1234.567),
+        (99.9, 0.2, 100.0),
+    ],
+)
+def test_the_fewest_digits_win(value: float, within: float, expected: float) -> None:
+    assert plain(value, within) == expected
+
+
+def test_lengths_corners_and_places_are_plain_and_turns_stay() -> None:
+    turn = (math.cos(0.2), 0.0, 0.0, math.sin(0.2))
+    outline = [(-10.0002, -5.0001, 0.0), (9.9999, -5, 0.4142), (10.0001, 5.0002, 0.0), (-10, 4.9998, 0.0)]
+    plate = Extrusion(Profile(outline, (circle(2.00004, (1.0001, 0)),)), 3.0003)
+    moves = (Similarity(translation=(20.0004, 0, 0)), Similarity(rotation=turn, translation=(0.123456, 0, 0)))
+    part = with_plain_numbers(Part(plate, (0.99995, 2.00002, 0), turn, instances=moves), 1e-3)
+    assert isinstance(part.field, Extrusion)
+    assert [corner[:2] for corner in part.field.profile.outline] == [(-10, -5), (10, -5), (10, 5), (-10, 5)]
+    assert part.field.profile.outline[1][2] == 0.4142
+    assert part.field.height == 3.0
+    assert (part.translation, part.rotation) == ((1.0, 2.0, 0.0), turn)
+    assert part.instances == (Similarity(translation=(20, 0, 0)), moves[1])
+    assert with_plain_numbers(Part(Box((1.0001, 2, 3))), 1e-3).field == Box((1, 2, 3))
+
+
+def test_what_would_vanish_stays() -> None:
+    thin = Part(Cylinder(1e-4, 5.0))
+    assert with_plain_numbers(thin, 1e-3) == thin
