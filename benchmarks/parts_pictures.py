@@ -22,7 +22,8 @@ from partwright.assembly.palette import palette
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.partsdf import Model, NeuralShape, ReconstructionSettings, editing, load_model
 from partwright.partsdf.meshing import mesh_shape
-from partwright.partsdf.reconstruction import Target, reconstruct_unknown
+from partwright.partsdf.reconstruction import reconstruct_unknown
+from partwright.partsdf.targets import Target
 from partwright.render import Camera, render_mesh, sheet, write_png
 
 TARGET = Path(__file__).parents[1] / "docs" / "images" / "parts"

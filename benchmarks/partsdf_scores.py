@@ -22,10 +22,10 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.reconstruction import (
     ReconstructionSettings,
-    Target,
     reconstruct,
     reconstruct_unknown,
 )
+from partwright.partsdf.targets import Target
 from partwright.partsdf.training import train
 
 RESULTS = Path(__file__).parent / "results"

@@ -216,6 +216,8 @@ class Fitted:
     """From many parts to few, where the settings asked for it."""
     details: dict[str, Any] = field(default_factory=dict)
     """For report.json: what only this method has to say, each entry under a name of its own."""
+    warnings: tuple[str, ...] = ()
+    """One line each, for people, of what may be wrong with it."""
     surface: trimesh.Trimesh | None = None
     """The assembly's surface in the shape's own units, where the method has made it anyway."""
 

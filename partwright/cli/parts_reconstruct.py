@@ -13,8 +13,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "reconstruct",
         help="find the parts of a shape with a trained model",
         description="Finds latents and poses of a model's parts that make up a plain shape, without labels. "
-        "Writes assembly.json, parts.glb, surface.ply, report.json and preview.png. The shape has to stand "
-        "as those that the model was trained on.",
+        "Writes assembly.json, parts.glb, surface.ply, report.json and preview.png. The shape may be turned "
+        "about its up axis, and lie on any side if that is unknown. A shape that is none of the model's "
+        "family is told so.",
     )
     command.add_argument("model", metavar="MODEL", help="a model that ships, or a file (.safetensors)")
     command.add_argument("shape", metavar="SHAPE", type=Path, help="mesh, points, grid or STEP file")
@@ -27,6 +28,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         choices=("nearest", "mean"),
         default="nearest",
         help="from which training shape: the one that fits best, or their mean (default: %(default)s)",
+    )
+    option(
+        "--as-it-stands",
+        action="store_true",
+        help="try no turns: the shape stands as those that the model was trained on",
     )
     option(
         "--resolution",

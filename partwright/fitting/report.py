@@ -58,6 +58,7 @@ def report(
             *warnings(shape, scores),
             *structure_warnings(shape, assembly, surface),
             *(bounds_warnings(enforced, shape) if enforced else []),
+            *dict.fromkeys(line for one in fitted for line in one.warnings),
         ],
     }
     for name in dict.fromkeys(name for one in fitted for name in one.details):

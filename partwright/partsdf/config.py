@@ -134,6 +134,8 @@ class TrainingSettings:
     """Adam's learning rate of the latents."""
     decay: float = 0.35
     """Factor on both rates at 80 % and at 90 % of the epochs."""
+    warmup: int = 0
+    """Steps over which both rates rise from nothing; the paper has none."""
     anneal: float = 0.0
     """Share of the epochs, the last ones, over which both rates fall to nothing along a cosine; 0 for the two
     drops of `decay` instead."""
@@ -157,7 +159,7 @@ class TrainingSettings:
     def __post_init__(self) -> None:
         for name in ("epochs", "batch", "points", "devices", "validate_shapes"):
             _at_least(f"training.{name}", getattr(self, name), 1)
-        for name in ("at_once", "samples", "shapes", "threads", "validate", "checkpoint", "seed"):
+        for name in ("at_once", "samples", "shapes", "threads", "validate", "checkpoint", "seed", "warmup"):
             _at_least(f"training.{name}", getattr(self, name), 0)
         for name in ("balance", "anneal"):
             if not 0 <= getattr(self, name) <= 1:

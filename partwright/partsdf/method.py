@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from partwright.assembly import Similarity
 from partwright.errors import SettingError
 from partwright.methods import Ability, Checkpoint, FitRequest, Fitted, Method, Progress, preset, timed
 from partwright.partsdf.assemblies import to_assembly
+from partwright.partsdf.familiarity import familiarity
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
-from partwright.partsdf.reconstruction import Step, Target, reconstruct_unknown
+from partwright.partsdf.reconstruction import Step, reconstruct_standing
 from partwright.partsdf.settings import Settings
+from partwright.partsdf.starts import UPRIGHT, ways_to_stand
+from partwright.partsdf.targets import Target
 
 _PRESETS: dict[str, dict[str, Any]] = {
     "draft": {"iterations": 100, "starts": 2},
@@ -37,8 +42,8 @@ class LearnedParts(Method[Settings]):
         return preset(presets, quality, changes)
 
     def fit(self, request: FitRequest[Settings]) -> Fitted:
-        """The parts of the model that a plain shape is made of. Its shape has to stand as those that the
-        model was trained on.
+        """The parts of the model that a plain shape is made of. It may stand otherwise than those
+        that the model was trained on: turned about its up axis, and with another where that is unknown.
 
         Raises:
             ModelError: there is no such model.
@@ -51,7 +56,9 @@ class LearnedParts(Method[Settings]):
         with timed(seconds, "prepare"):
             target = Target.of_shape(shape, seed=run.seed)
             rows = np.linspace(0, len(target.sdf) - 1, _PROBED).astype(int)
-            points, inside = target.points[rows].numpy(), target.sdf[rows].numpy() < 0
+            probe = replace(target, points=target.points[rows], sdf=target.sdf[rows])
+            inside = probe.sdf.numpy() < 0
+            turns = ways_to_stand(shape.up) if settings.turn else [UPRIGHT]
             checkpoint()
         history: list[dict[str, float | str]] = []
 
@@ -59,7 +66,7 @@ class LearnedParts(Method[Settings]):
             if step.number % _TOLD and step.number not in (1, step.of):
                 return
             neural = step.shape()
-            occupied = neural.distances(points) < 0
+            occupied = neural.distances(probe.turned(step.turn).points.numpy()) < 0
             iou = float((occupied & inside).sum() / max((occupied | inside).sum(), 1))
             parts = len(neural.names())
             history.append({"stage": "optimise", "round": step.number, "parts": parts, "loss": step.loss})
@@ -71,29 +78,34 @@ class LearnedParts(Method[Settings]):
                     parts,
                     iou,
                     step.number / step.of,
-                    lambda: to_assembly(neural, shape.frame, shape.unit, shape.up),
+                    lambda: to_assembly(neural, shape.frame, shape.unit, shape.up, turn=step.turn),
                 )
             )
 
         with timed(seconds, "optimise"):
-            found = reconstruct_unknown(model, target, settings, run.seed, told, checkpoint)
+            found, turn = reconstruct_standing(model, target, turns, settings, run.seed, told, checkpoint)
         with timed(seconds, "mesh"):
             meshed = mesh_shape(found, settings.resolution, parts=False)
         surface = meshed.whole
-        surface.vertices = shape.frame.from_unit(surface.vertices)
+        surface.vertices = shape.frame.from_unit(Similarity(1.0, turn)(surface.vertices))
+        known = familiarity(found, target.turned(turn))
         learned = {
             "model": {"name": model.name, "hash": model.hash},
             "absent": [name for name in model.parts if name not in found.names()],
+            "turn": list(turn),
+            "residual": known.residual,
+            "oddness": known.latents,
             "resolution": meshed.resolution,
             "evaluations": {"meshing": meshed.evaluations, "dense grid": meshed.dense},
         }
         return Fitted(
-            to_assembly(found, shape.frame, shape.unit, shape.up),
+            to_assembly(found, shape.frame, shape.unit, shape.up, turn=turn),
             "interrupted" if run.cancel.requested else "converged",
             seconds,
             history,
             details={"learned": learned},
             surface=surface,
+            warnings=tuple(known.warnings()),
         )
 
 

@@ -8,7 +8,7 @@ best as it is, and all of them move (section 3.4, without the encoder).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,11 +20,13 @@ from partwright.errors import CancelledError, ModelError
 from partwright.methods import Cancellation, Checkpoint
 from partwright.partsdf.config import LossSettings
 from partwright.partsdf.data import pose_tensors, present_parts
-from partwright.partsdf.losses import aggregate, clamped_error, latent_penalty, terms
+from partwright.partsdf.losses import clamped_error, latent_penalty, terms
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.poses import PoseTensors, local_points
+from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
+from partwright.partsdf.starts import UPRIGHT, Quaternion, Start, best_starts, exchanged_parts
+from partwright.partsdf.targets import Target
 from partwright.shapes import Shape
 
 
@@ -36,34 +38,15 @@ class Step(NamedTuple):
     loss: float
     shape: Callable[[], NeuralShape]
     """Makes the shape as it is now."""
+    turn: Quaternion = UPRIGHT
+    """From how the shape's family stands to how the target does."""
 
 
 Told = Callable[[Step], None]
 
 
-@dataclass(frozen=True)
-class Target:
-    """Samples of one shape, unit frame: points (N, 3), sdf (N,), and the nearest part (N,) where known."""
-
-    points: Tensor
-    sdf: Tensor
-    part: Tensor | None = None
-
-    @classmethod
-    def of_shape(cls, shape: Shape, count: int = 40_000, seed: int = 0) -> Target:
-        """Of any shape that comes in: near its surface with the paper's two variances, and around it."""
-        samples = shape.samples(round(0.95 * count), round(0.05 * count), seed, NEAR)
-        return cls(torch.tensor(samples.points), torch.tensor(samples.distance))
-
-    def halves(self) -> tuple[Tensor, Tensor]:
-        """Rows that lie inside and outside; each draw takes half of its points from either."""
-        inside = self.sdf < 0
-        return inside.nonzero().squeeze(1), (~inside).nonzero().squeeze(1)
-
-
 LEAST = 1e-3
 _SCOUTED = 8  # of the iterations, the part that each start is given
-NEAR = (0.005**0.5, 0.0005**0.5)  # section B.4 gives variances
 
 
 def reconstruct(
@@ -112,14 +95,27 @@ def reconstruct_unknown(
 
     Once the checkpoint's cancellation is requested, it ends with what was found.
     """
+    return reconstruct_standing(model, target, [UPRIGHT], settings, seed, told, checkpoint)[0]
+
+
+def reconstruct_standing(
+    model: Model,
+    target: Target,
+    turns: list[Quaternion],
+    settings: ReconstructionSettings | None = None,
+    seed: int = 0,
+    told: Told | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> tuple[NeuralShape, Quaternion]:
+    """The shape as its family stands, and that one of the `turns` which brings it to where the target is."""
     settings = settings or ReconstructionSettings()
     if settings.start == "nearest":
-        starts = nearest_trained(model, target, settings.starts)
+        starts = best_starts(model, target, settings.starts, turns)
     else:
-        starts = [NeuralShape.mean(model)]
-    starts = [replace(start, present=torch.ones_like(start.present)) for start in starts]
-    found = _scouted(starts, target, settings, seed, told, checkpoint)
-    return replace(found, present=_filling(found, target))
+        starts = [Start(NeuralShape.mean(model), turns[0], target.turned(turns[0]))]
+    starts = [replace(s, shape=replace(s.shape, present=torch.ones_like(s.shape.present))) for s in starts]
+    found = _scouted(starts, settings, seed, told, checkpoint)
+    return replace(found.shape, present=_filling(found.shape, found.target)), found.turn
 
 
 @torch.no_grad()
@@ -135,36 +131,41 @@ def _filling(shape: NeuralShape, target: Target) -> Tensor:
 
 
 def _scouted(
-    starts: list[NeuralShape],
-    target: Target,
+    starts: list[Start],
     settings: ReconstructionSettings,
     seed: int = 0,
     told: Told | None = None,
     checkpoint: Checkpoint | None = None,
-) -> NeuralShape:
+) -> Start:
     """From the start that a few iterations bring closest: one that is close as it is may be a dead end, as a
-    tube with flanges is for one without."""
+    tube with flanges is for one without. Then single parts are exchanged, and all are optimised."""
     few = replace(settings, iterations=max(1, settings.iterations // _SCOUTED), decay=1.0)
     scouts = starts if len(starts) > 1 else []
     steps = settings.iterations + len(scouts) * few.iterations
 
-    def after(done: int) -> Told | None:
-        return told and (lambda step: told(step._replace(number=done + step.number, of=steps)))
+    def after(done: int, start: Start) -> Told | None:
+        if told is None:
+            return None
+        return lambda step: told(step._replace(number=done + step.number, of=steps, turn=start.turn))
 
-    tried: list[NeuralShape] = []
+    tried: list[Start] = []
     for i, start in enumerate(scouts):
-        ahead = after(i * few.iterations)
-        shape, finished = _optimised(start, target, few, seed, ahead, checkpoint, start.model.config.poses)
-        tried.append(shape)
+        ahead = after(i * few.iterations, start)
+        poses = start.shape.model.config.poses
+        shape, finished = _optimised(start.shape, start.target, few, seed, ahead, checkpoint, poses)
+        tried.append(replace(start, shape=shape))
         if not finished:
-            return _closest(tried, target)
-    best = _closest(tried or starts, target)
-    ahead = after(len(scouts) * few.iterations)
-    return _optimised(best, target, settings, seed, ahead, checkpoint, best.model.config.poses)[0]
+            return _closest(tried)
+    best = _closest(tried or starts)
+    if settings.exchange:
+        best = replace(best, shape=exchanged_parts(best.shape, best.target, seed))
+    ahead, poses = after(len(scouts) * few.iterations, best), best.shape.model.config.poses
+    found = _optimised(best.shape, best.target, settings, seed, ahead, checkpoint, poses)[0]
+    return replace(best, shape=found)
 
 
-def _closest(shapes: list[NeuralShape], target: Target) -> NeuralShape:
-    return shapes[0] if len(shapes) == 1 else min(shapes, key=lambda one: _error(one, target))
+def _closest(starts: list[Start]) -> Start:
+    return starts[0] if len(starts) == 1 else min(starts, key=lambda one: _error(one.shape, one.target))
 
 
 @torch.no_grad()
@@ -173,32 +174,6 @@ def _error(shape: NeuralShape, target: Target, count: int = 8192) -> float:
     rows = torch.linspace(0, len(target.sdf) - 1, min(count, len(target.sdf))).long()
     whole = torch.from_numpy(shape.distances(target.points[rows].numpy()))
     return float(clamped_error(whole, target.sdf[rows], shape.model.config.losses).mean())
-
-
-@torch.no_grad()
-def nearest_trained(model: Model, target: Target, most: int = 1, count: int = 512) -> list[NeuralShape]:
-    """The `most` training shapes whose distances differ least from the target's, at `count` of its points.
-
-    A quarter of the points tells which of them come into question at all.
-    """
-    rows = torch.linspace(0, len(target.sdf) - 1, count).long()
-    everyone = torch.arange(len(model.latents))
-    likely = _errors_of_trained(model, target, rows[::4], everyone).argsort()
-    likely = likely[: max(4 * most, len(likely) // 8)]
-    order = likely[_errors_of_trained(model, target, rows, likely).argsort()]
-    return [NeuralShape.trained(model, str(int(i))) for i in order[:most]]
-
-
-def _errors_of_trained(model: Model, target: Target, rows: Tensor, numbers: Tensor) -> Tensor:
-    """Mean error (S,) of training shapes, by their numbers (S,), at the target's samples `rows`."""
-    points, sdf = target.points[rows], target.sdf[rows]
-    errors = []
-    for some in numbers.split(16):
-        poses = PoseTensors(*(t[some] for t in model.poses))
-        each = model.condition(model.latents[some], poses)(local_points(points, poses))
-        whole = aggregate(each, model.config.decoder)
-        errors.append(clamped_error(whole, sdf.expand_as(whole), model.config.losses).mean(dim=1))
-    return torch.cat(errors)
 
 
 def _optimised(

@@ -27,6 +27,9 @@ class ReconstructionSettings:
     """From the nearest training shapes, or from the mean of all; where poses are unknown only."""
     starts: int = 4
     """So many nearest shapes are tried for an eighth of the iterations each, and the best goes on."""
+    exchange: bool = True
+    """Single parts of the best start are exchanged for those of other training shapes where that comes
+    closer; where poses are unknown only."""
     pose_rate: float = 2e-3
     """Of Adam, for poses."""
     pose_delay: float = 0.1
@@ -52,3 +55,6 @@ class Settings(ReconstructionSettings):
     resolution: int | None = None
     """Cells along the unit frame of the surface's mesh, a multiple of 8 (None: 128, up to 256 where walls are
     thin)."""
+    turn: bool = True
+    """Whether the shape may stand otherwise than the family: turns about its up axis are tried, and all up
+    axes where that is unknown."""

@@ -180,6 +180,8 @@ class Trainer:
             factor = 0.5 * (1 + math.cos(math.pi * late))
         else:
             factor = self.settings.decay ** sum(done >= drop for drop in _RATE_DROPS)
+        if self.state.step < self.settings.warmup:
+            factor *= (self.state.step + 1) / self.settings.warmup
         rates = (self.settings.rate, self.settings.latent_rate)
         for group, rate in zip(self.optimiser.param_groups, rates, strict=True):
             group["lr"] = factor * rate

@@ -21,14 +21,14 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import rotation_matrices
 from partwright.partsdf.reconstruction import (
     Step,
-    Target,
     _error,
     _scouted,
-    nearest_trained,
     reconstruct,
     reconstruct_unknown,
 )
 from partwright.partsdf.settings import ReconstructionSettings
+from partwright.partsdf.starts import UPRIGHT, Start, nearest_trained
+from partwright.partsdf.targets import Target
 
 QUICK = ReconstructionSettings(iterations=150, points=512)
 
@@ -145,12 +145,16 @@ def held_out(lamps: PreparedFamily) -> Target:
 
 def test_the_start_that_a_few_iterations_bring_closest_goes_on(model: Model, lamps: PreparedFamily) -> None:
     target, few = held_out(lamps), replace(QUICK, iterations=8)
-    good = nearest_trained(model, target)[0]
+    good = nearest_trained(model, target)[0][1]
     generator = torch.Generator().manual_seed(0)
     bad = replace(good, latents=3 * torch.randn(good.latents.shape, generator=generator))
-    alone, together = (_scouted(starts, target, few) for starts in ([bad], [bad, good]))
+    few = replace(few, exchange=False)
+    alone, together = (
+        _scouted([Start(shape, UPRIGHT, target) for shape in starts], few).shape
+        for starts in ([bad], [bad, good])
+    )
     assert _error(together, target) < 0.7 * _error(alone, target)
-    order = nearest_trained(model, target, 3)
+    order = [shape for _, shape in nearest_trained(model, target, 3)]
     assert len(order) == 3
     assert not torch.equal(order[0].latents, order[1].latents)
     # Starts are ranked as they are used: with all parts, those that the training shape has not among them.

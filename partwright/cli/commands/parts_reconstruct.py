@@ -20,6 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
         iterations=arguments.iterations,
         points=arguments.points,
         start=arguments.start,
+        turn=not arguments.as_it_stands,
     )
     cancel = Cancellation()
     with Display() as display:

@@ -1,0 +1,67 @@
+"""Whether a shape is of the family that a model was trained on: what is left over, how odd its parts are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+
+from partwright.partsdf.losses import clamped_error
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.targets import Target
+
+POOR = 0.12  # of the distance at which losses clamp: a residual that no shape of the family leaves
+ODD = 1.5  # times the farthest training shape's distance from the mean latent
+_SAMPLES = 8192
+
+
+@dataclass(frozen=True)
+class Familiarity:
+    """How a reconstruction compares with what its model knows.
+
+    residual: mean error of the distance near the surface, as a share of what losses clamp at (0.1 of the unit
+    frame in the paper). latents: by part, how far its latent lies from the mean of the training shapes', each
+    number in its own spread, as a multiple of the farthest training shape's.
+    """
+
+    model: str
+    residual: float
+    latents: dict[str, float]
+
+    def warnings(self) -> list[str]:
+        """One line where the shape is none of the family, else nothing."""
+        part = max(self.latents, key=lambda name: self.latents[name], default="")
+        odd = bool(part) and self.latents[part] > ODD
+        if self.residual <= POOR and not odd:
+            return []
+        said = [f"its distances are off by {100 * self.residual:.0f} % of what counts as near"]
+        if odd:
+            said.append(f"{part} is {self.latents[part]:.1f} times as odd as any that was trained on")
+        return [
+            f"this may be no shape of the family that {self.model} knows: {', and '.join(said)}; look at "
+            "preview.png, or take another model or method"
+        ]
+
+
+@torch.no_grad()
+def familiarity(shape: NeuralShape, target: Target) -> Familiarity:
+    """Of a shape as it was found, and its target in the family's frame."""
+    losses = replace(shape.model.config.losses, hard=0.0)
+    rows = torch.linspace(0, len(target.sdf) - 1, min(_SAMPLES, len(target.sdf))).long()
+    whole = torch.from_numpy(shape.distances(target.points[rows].numpy()))
+    residual = float(clamped_error(whole, target.sdf[rows], losses).mean()) / losses.clamp
+    present = np.flatnonzero(shape.present.numpy()).tolist()
+    latents = {shape.model.parts[p]: oddness(shape.model, p, shape.latents[p]) for p in present}
+    return Familiarity(shape.model.name, residual, latents)
+
+
+def oddness(model: Model, part: int, latent: torch.Tensor) -> float:
+    """How far a latent (Z,) lies from the mean of the training shapes', as a multiple of their farthest."""
+    known = model.latents[model.present[:, part], part]
+    if len(known) < 2:
+        return 0.0
+    mean, spread = known.mean(dim=0), known.std(dim=0).clamp(min=1e-6)
+    farthest = ((known - mean) / spread).norm(dim=1).max()
+    return float(((latent - mean) / spread).norm() / farthest)

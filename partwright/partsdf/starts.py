@@ -1,0 +1,143 @@
+"""Where the search of an unknown shape begins: how it stands, near which training shapes, with which parts.
+
+Nobody's mesh stands as the family does, so the turns about the up axis are tried, and all up axes where it is
+unknown: each asks for no more than the distances of the training shapes at a few samples. And a shape of the
+family may be made of parts of several training shapes: each part of a start is exchanged for that of another
+one wherever this brings the whole closer.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from partwright.assembly.similarity import quaternion_product
+from partwright.partsdf.losses import aggregate, clamped_error
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.poses import PoseTensors, local_points
+from partwright.partsdf.targets import Target
+
+Quaternion = tuple[float, float, float, float]
+UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)
+FAMILY_UP = "z"  # of the made families, and of what `parts prepare` is given
+_HALF = math.sqrt(0.5)
+# From z up to another axis up.
+_FROM_Z: dict[str, Quaternion] = {
+    "z": UPRIGHT,
+    "-z": (0.0, 1.0, 0.0, 0.0),
+    "y": (_HALF, -_HALF, 0.0, 0.0),
+    "-y": (_HALF, _HALF, 0.0, 0.0),
+    "x": (_HALF, 0.0, _HALF, 0.0),
+    "-x": (_HALF, 0.0, -_HALF, 0.0),
+}
+_CLEARLY = 0.85  # of the error as the shape stands: less is worth a turn
+_JUDGES, _TURNS = 32, 2  # training shapes that turns are judged by, and how many of these go on
+_AT_ONCE = 16  # shapes that are decoded together
+_OTHERS, _SAMPLES = 48, 512  # training shapes that parts are taken from, and samples they are judged at
+
+
+@dataclass(frozen=True)
+class Start:
+    """A shape to begin from, the turn from the family's frame to the target's, and the target before it."""
+
+    shape: NeuralShape
+    turn: Quaternion
+    target: Target
+
+
+def ways_to_stand(up: str | None) -> list[Quaternion]:
+    """Turns from how the family stands to how a shape may: about the up axis, and to all up axes if unknown.
+
+    The first leaves it as it is where its up axis is the family's, or unknown.
+    """
+    half = math.pi / 4
+    about = [(math.cos(k * half), 0.0, 0.0, math.sin(k * half)) for k in range(4)]
+    axes = [up] if up else list(_FROM_Z)
+    return [quaternion_product(_FROM_Z[axis], turn) for axis in axes for turn in about]
+
+
+@torch.no_grad()
+def best_starts(model: Model, target: Target, most: int, turns: list[Quaternion]) -> list[Start]:
+    """The `most` ways to stand and training shapes that come closest together, the closest first.
+
+    Another way than the first has to be clearly better than that one.
+    """
+    turned = [target.turned(turn) for turn in turns]
+    few = torch.linspace(0, len(model.latents) - 1, min(_JUDGES, len(model.latents))).long()
+    rows, poses = _rows(target, _SAMPLES // 4), model.poses.map(lambda t: t[few])
+    least = [float(errors_of(model, model.latents[few], poses, seen, rows).min()) for seen in turned]
+    better = sorted(range(1, len(turns)), key=lambda k: least[k])[:_TURNS]
+    kept = [0, *(k for k in better if least[k] < _CLEARLY * least[0])]
+    found = [(error, k, shape) for k in kept for error, shape in nearest_trained(model, turned[k], most)]
+    as_it_stands = min(error for error, k, _ in found if k == 0)
+    good = [entry for entry in found if entry[1] == 0 or entry[0] < _CLEARLY * as_it_stands]
+    good.sort(key=lambda entry: entry[0])
+    return [Start(shape, turns[k], turned[k]) for _, k, shape in good[:most]]
+
+
+@torch.no_grad()
+def nearest_trained(
+    model: Model, target: Target, most: int = 1, count: int = _SAMPLES
+) -> list[tuple[float, NeuralShape]]:
+    """The `most` training shapes whose distances differ least from the target's, and by how much.
+
+    At `count` of its points; a quarter of these tells which shapes come into question at all.
+    """
+    rows = _rows(target, count)
+    everyone = torch.arange(len(model.latents))
+    likely = errors_of(model, model.latents, model.poses, target, rows[::4]).argsort()
+    likely = everyone[likely[: max(4 * most, len(likely) // 8)]]
+    poses = model.poses.map(lambda t: t[likely])
+    errors = errors_of(model, model.latents[likely], poses, target, rows)
+    order = errors.argsort()[:most].tolist()
+    return [(float(errors[i]), NeuralShape.trained(model, str(int(likely[i])))) for i in order]
+
+
+@torch.no_grad()
+def exchanged_parts(shape: NeuralShape, target: Target, seed: int = 0) -> NeuralShape:
+    """Each part by itself, the one that most samples are nearest to first, is exchanged for that of another
+    training shape, at that one's place, or at its own, where this brings the whole closer."""
+    model = shape.model
+    rows = _rows(target, _SAMPLES)
+    drawn = torch.randperm(len(model.latents), generator=torch.Generator().manual_seed(seed))[:_OTHERS]
+    best = float(errors_of(model, shape.latents[None], shape.poses.map(lambda t: t[None]), target, rows))
+    owner = shape.part_distances(target.points[rows].numpy()).argmin(axis=0)
+    numbers = np.flatnonzero(shape.present.numpy())
+    for part in numbers[np.argsort(-np.bincount(owner, minlength=len(numbers)), kind="stable")].tolist():
+        latents = shape.latents.repeat(2 * len(drawn), 1, 1)
+        latents[:, part] = model.latents[drawn, part].repeat(2, 1)
+        poses = shape.poses.map(lambda t: t.repeat(2 * len(drawn), *[1] * t.ndim))
+        for mine, theirs in zip(poses, model.poses, strict=True):
+            mine[: len(drawn), part] = theirs[drawn, part]
+        errors = errors_of(model, latents, poses, target, rows)
+        least = int(errors.argmin())
+        if errors[least] < best:
+            best = float(errors[least])
+            shape = replace(
+                shape, latents=latents[least].clone(), poses=poses.map(lambda t, i=least: t[i].clone())
+            )
+    return shape
+
+
+def _rows(target: Target, count: int) -> Tensor:
+    return torch.linspace(0, len(target.sdf) - 1, count).long()
+
+
+@torch.no_grad()
+def errors_of(model: Model, latents: Tensor, poses: PoseTensors, target: Target, rows: Tensor) -> Tensor:
+    """Mean error (S,) of the whole distance of shapes with latents (S, P, Z) and poses (S, P, ...), at the
+    target's samples `rows`."""
+    points, sdf = target.points[rows], target.sdf[rows]
+    errors = []
+    for first in range(0, len(latents), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        placed = poses.map(lambda t, some=some: t[some])
+        each = model.condition(latents[some], placed)(local_points(points, placed))
+        whole = aggregate(each, model.config.decoder)
+        errors.append(clamped_error(whole, sdf.expand_as(whole), model.config.losses).mean(dim=1))
+    return torch.cat(errors)

@@ -1,0 +1,118 @@
+"""Where a search begins: turned shapes, parts of several training shapes; and shapes of no such family."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+import partwright as pw
+from partwright.assembly import Similarity
+from partwright.partsdf.familiarity import ODD, POOR, Familiarity, familiarity, oddness
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.starts import UPRIGHT, best_starts, errors_of, exchanged_parts, ways_to_stand
+from partwright.partsdf.targets import Target
+
+
+def target_of(shape: NeuralShape, count: int = 4000) -> Target:
+    """A target that the model itself can reach exactly."""
+    points = np.random.default_rng(0).uniform(-0.9, 0.9, (count, 3)).astype(np.float32)
+    return Target(torch.from_numpy(points), torch.from_numpy(shape.distances(points)))
+
+
+def test_ways_to_stand_are_turns_about_the_up_axis_and_all_axes_where_it_is_unknown() -> None:
+    assert ways_to_stand("z")[0] == pytest.approx(UPRIGHT)
+    up = {
+        "x": (1, 0, 0),
+        "-x": (-1, 0, 0),
+        "y": (0, 1, 0),
+        "-y": (0, -1, 0),
+        "z": (0, 0, 1),
+        "-z": (0, 0, -1),
+    }
+    for axis, expected in up.items():
+        turned = [Similarity(1.0, turn)(np.eye(3)) for turn in ways_to_stand(axis)]
+        for rows in turned:
+            np.testing.assert_allclose(rows[2], expected, atol=1e-12)
+        assert len({tuple(np.round(rows[0], 6) + 0.0) for rows in turned}) == 4
+    every = {tuple(np.round(Similarity(1.0, t)(np.eye(3)), 6).flatten() + 0.0) for t in ways_to_stand(None)}
+    assert len(every) == 24
+
+
+@pytest.mark.parametrize("up", ["y", None])
+def test_a_turned_shape_is_found_as_it_stands(model: Model, up: str | None) -> None:
+    """A training shape lying on another axis and turned: the first start is that shape, in that turn."""
+    target = target_of(NeuralShape.trained(model, "lamp3"))
+    for turn in ways_to_stand("y")[1:3]:
+        matrix = torch.tensor(Similarity(1.0, turn)(np.eye(3)), dtype=torch.float32)
+        lying = replace(target, points=target.points @ matrix)
+        first = best_starts(model, lying, 3, ways_to_stand(up))[0]
+        np.testing.assert_allclose(np.abs(np.dot(first.turn, turn)), 1.0, atol=1e-9)
+        assert first.shape.latents.equal(NeuralShape.trained(model, "lamp3").latents)
+        torch.testing.assert_close(first.target.points, target.points, atol=1e-5, rtol=0)
+    assert all(s.turn == UPRIGHT for s in best_starts(model, target, 3, ways_to_stand("z")))
+
+
+def test_parts_are_exchanged_one_by_one(model: Model) -> None:
+    """A lamp with the plate of another: the start gets that plate, and what fits already stays."""
+    own, other = (NeuralShape.trained(model, name) for name in ("lamp0", "lamp4"))
+    latents, poses = own.latents.clone(), own.poses.map(torch.Tensor.clone)
+    latents[0] = other.latents[0]
+    for mine, theirs in zip(poses, other.poses, strict=True):
+        mine[0] = theirs[0]
+    target = target_of(replace(own, latents=latents, poses=poses))
+    found = exchanged_parts(own, target)
+    assert found.latents[0].equal(other.latents[0])
+    rows = torch.arange(1000)
+    before, after = (
+        float(errors_of(model, one.latents[None], one.poses.map(lambda t: t[None]), target, rows)[0])
+        for one in (own, found)
+    )
+    assert after < 0.5 * before
+    assert exchanged_parts(own, target_of(own)).latents.equal(own.latents)
+
+
+def test_a_fit_says_how_it_is_turned_and_what_is_no_such_shape(model: Model, tmp_path: Path) -> None:
+    """A ring among lamps: one line of warning, in the report as for every method; and a lamp that lies."""
+    file = tmp_path / "lamps.safetensors"
+    model.save(file)
+    settings = pw.LearnedParts(str(file), iterations=40, points=256, starts=2, resolution=48)
+    ring = trimesh.creation.torus(0.8, 0.15)
+    odd = pw.fit(pw.load_shape(ring), settings)
+    lines = [line for line in odd.warnings if "no shape of the family that lamps knows" in line]
+    assert len(lines) == 1
+    assert odd.report["learned"][0]["residual"] > POOR
+    half = math.sqrt(0.5)
+    ball = trimesh.creation.icosphere(3, 0.38).apply_translation((0.2, 0, 0.53))
+    lying = trimesh.util.concatenate([trimesh.creation.box((1.6, 1.2, 0.3)), ball])
+    lying.vertices = Similarity(1.0, (half, -half, 0.0, 0.0))(lying.vertices)  # y up
+    fitted = pw.fit(pw.load_shape(lying, up="y"), settings)
+    assert fitted.report["learned"][0]["residual"] < 0.7 * odd.report["learned"][0]["residual"]
+    assert fitted.scores.iou > 0.7
+    plate = fitted.assembly["plate"]
+    middle = np.mean(plate.bounds(), axis=0)
+    assert middle[1] == pytest.approx(0.0, abs=0.1)  # below the ball, along y
+    assert np.mean(fitted.assembly["ball"].bounds(), axis=0)[1] > 0.35
+
+
+def test_oddness_is_one_at_the_farthest_training_shape(model: Model) -> None:
+    worst = [
+        max(oddness(model, part, latent) for latent in model.latents[model.present[:, part], part])
+        for part in range(3)
+    ]
+    assert worst == pytest.approx([1.0, 1.0, 1.0])
+    shape = NeuralShape.trained(model, "lamp0")
+    known = familiarity(shape, target_of(shape))
+    assert known.residual < 1e-6
+    assert known.warnings() == []
+    far = replace(shape, latents=shape.latents + 5.0)
+    assert familiarity(far, target_of(far)).latents["plate"] > ODD
+    (line,) = Familiarity("lamps", 0.3, {"ball": 2.0}).warnings()
+    assert "30 %" in line
+    assert "ball is 2.0 times as odd" in line
