@@ -3,14 +3,16 @@
     python benchmarks/partsdf.py speed [--model MODEL]
     python benchmarks/partsdf.py reconstruct --family FOLDER --model MODEL [--config CONFIG] [--shapes N]
     python benchmarks/partsdf.py ablations --family FOLDER [--epochs N] [--width N] [--shapes N]
+    python benchmarks/partsdf.py decoders --family FOLDER [--seconds S]
     python benchmarks/partsdf.py training --models FOLDER
     python benchmarks/partsdf.py robots --parts FOLDER --held A,B [--epochs N]
 
 `reconstruct` with CONFIG also trains the same on all parts as one ("1P"), in --work, for a row of its own.
-`ablations` trains every variant in --work, one after another. `training` tables trainings in FOLDER/mixers,
-chairs and cars, and keeps their logs. Trainings go on where they were stopped, and every shape's scores are
-kept in benchmarks/results/partsdf-*.csv and not measured again, so that each command can be stopped and go
-on. Tables go to benchmarks/results/partsdf-*.md. One file a table: partsdf_*.py.
+`decoders` trains the paper's and the local one for the same seconds. `ablations` trains every variant in
+--work, one after another. `training` tables trainings in FOLDER/mixers, chairs and cars, and keeps their
+logs. Trainings go on where they were stopped, and every shape's scores are kept in
+benchmarks/results/partsdf-*.csv and not measured again, so that each command can be stopped and go on.
+Tables go to benchmarks/results/partsdf-*.md. One file a table: partsdf_*.py.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from pathlib import Path
 
 import torch
 from partsdf_ablations import ablations
+from partsdf_decoders import decoders
 from partsdf_reconstruct import reconstruction, robots
 from partsdf_speed import speed
 from partsdf_trainings import trainings
@@ -56,6 +59,9 @@ def main() -> None:
     one.add_argument("--family", required=True)
     one.add_argument("--model", required=True)
     one.add_argument("--config", help="of the model's training: also train and measure all parts as one")
+    one = measuring("decoders", decoders)
+    one.add_argument("--family", required=True)
+    one.add_argument("--seconds", type=float, default=180, help="of the processor, for each training")
     one = measuring("ablations", ablations)
     one.add_argument("--family", required=True)
     one.add_argument("--width", type=int, default=128, help="of the decoders")

@@ -56,5 +56,13 @@ class JointField(Field):
         """
 
     @abstractmethod
+    def whole(self, cell: float) -> trimesh.Trimesh | None:
+        """The union of all members as a closed mesh of this field's own frame, in cells of this length or
+        shorter where a wall is thin; None where it has no quicker way than any other field.
+
+        Raises NoSurfaceError where nothing is left of it.
+        """
+
+    @abstractmethod
     def together(self, points: np.ndarray, fields: Sequence[JointField]) -> list[np.ndarray]:
         """Distances (N,) of several members of the same shape at points (N, 3) of this field's own frame."""

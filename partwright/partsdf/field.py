@@ -114,6 +114,15 @@ class NeuralField(JointField):
     def preview(self) -> trimesh.Trimesh:
         return self._mesh("preview", lambda walls: min(resolution_for_wall(walls, _COARSE), _PREVIEWED))
 
+    def whole(self, cell: float) -> trimesh.Trimesh | None:
+        if self.network.config.decoder.aggregation != "min":  # a union is another shape than the model's
+            return None
+        shape = self.shape
+        cells = resolution_for_wall(float(shape.walls().min(initial=np.inf)), 2 * self.unit / cell)
+        mesh = mesh_shape(shape, cells, parts=False).whole
+        mesh.vertices = self.unit_frame(self.unit * mesh.vertices)
+        return mesh
+
     def _mesh(self, key: object, cells: Callable[[float], int]) -> trimesh.Trimesh:
         """cells: along the unit frame, by the thinnest wall of the shape in its lengths."""
         if key not in self._shared:

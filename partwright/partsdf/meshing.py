@@ -139,7 +139,7 @@ def _near_cuboids(shape: NeuralShape) -> Reach | None:
     return reach
 
 
-def resolution_for_wall(wall: float, resolution: int) -> int:
+def resolution_for_wall(wall: float, resolution: float) -> int:
     """Cells along [-1, 1] that put `ACROSS` of them across a wall: at least `resolution`, in eights, and no
     more than 256 for the wall's sake."""
     wanted = max(resolution, min(_MAX_RESOLUTION_FOR_WALLS, ACROSS * 2 / max(wall, 1e-9)))

@@ -254,3 +254,35 @@ def test_a_part_that_is_nowhere_has_no_wall_and_no_surface(
     assert np.isinf(lamp.walls()).all()
     with pytest.raises(NoSurfaceError, match=r"part plate of .* has no surface"):
         mesh_part(part)
+
+
+def test_the_whole_is_meshed_by_its_model_at_few_points(
+    lamp: NeuralShape, assembly: pw.Assembly, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same surface as of any assembly, turned and with a part dropped, too; blends go the usual way."""
+    from partwright.meshing import assemblies
+
+    turn = Similarity(2.0, (math.cos(0.4), 0.0, math.sin(0.4), 0.0), (1.0, -2.0, 5.0))
+    asked = []
+    decode = NeuralShape.part_distances
+
+    def counted(shape: NeuralShape, points: np.ndarray) -> np.ndarray:
+        asked.append(len(points))
+        return decode(shape, points)
+
+    monkeypatch.setattr(NeuralShape, "part_distances", counted)
+    for one in (assembly, assembly.without("knob").transformed(turn)):
+        one.bounds()
+        asked.clear()
+        own = mesh_assembly(one, 48)
+        quick = sum(asked)
+        asked.clear()
+        with monkeypatch.context() as usual:
+            usual.setattr(assemblies, "_learned", lambda *_: None)
+            marched = mesh_assembly(one, 48)
+        assert own.is_watertight
+        assert own.volume == pytest.approx(marched.volume, rel=0.04)
+        np.testing.assert_allclose(own.bounds, marched.bounds, atol=0.03 * np.ptp(marched.bounds))
+        assert quick < 0.6 * sum(asked)
+    ball = dataclasses.replace(assembly["ball"], blend=0.5)
+    assert mesh_assembly(assembly.replace_part("ball", ball), 48).volume > mesh_assembly(assembly, 48).volume
