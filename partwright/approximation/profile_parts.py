@@ -53,21 +53,21 @@ def _rectangle(loop: Loop) -> tuple[tuple[float, float], np.ndarray, tuple[float
     return (float(width / 2), float(depth / 2)), along, (x, y)
 
 
-def revolved_part(profile: Profile, frame: np.ndarray, foot: np.ndarray) -> Part:
+def revolved_part(profile: Profile, frame: np.ndarray, foot: np.ndarray, angle: float = 360.0) -> Part:
     """The profile turned about the frame's third column: a cylinder, cone, frustum or sphere where it is one.
-    foot: (3,) of the axis, in the frame."""
+    foot: (3,) of the axis, in the frame. angle: degrees, from the frame's x on."""
     size = profile.size
     loops = [tuple((0.0 if abs(x) < _SAME * size else x, y, b) for x, y, b in loop) for loop in profile.loops]
     heights = [y for _, y, _ in loops[0]]
     low, high = min(heights), max(heights)
-    named = _named(loops[0], low, high) if len(loops) == 1 else None
+    named = _named(loops[0], low, high) if len(loops) == 1 and angle >= 360 else None
     if named is not None:
         field, middle, over = named
         turned = frame @ np.diag([1.0, -1.0, -1.0]) if over else frame
         return _placed(field, turned, frame @ (foot[0], foot[1], middle))
     middle = (low + high) / 2
     moved = Profile(loops[0], tuple(loops[1:])).moved((0.0, -middle))
-    return _placed(Revolution(moved), frame, frame @ (foot[0], foot[1], middle))
+    return _placed(Revolution(moved, angle), frame, frame @ (foot[0], foot[1], middle))
 
 
 def _named(loop: Loop, low: float, high: float) -> tuple[Field, float, bool] | None:

@@ -16,13 +16,17 @@ from manifold3d import Manifold, Mesh
 from numpy.typing import NDArray
 
 from partwright.approximation.sketches.bodies import bodies
-from partwright.approximation.sketches.candidates import Candidate, candidates
+from partwright.approximation.sketches.candidate import Candidate
+from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames
+from partwright.approximation.sketches.open_sides import with_open_sides
 from partwright.approximation.sketches.repeats import moves_between
 from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
+from partwright.meshing.csg import solid_of
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
+from partwright.superfrusta.feature_mending import mended
 from partwright.superfrusta.samples import FitSamples
 
 _FREE_SIDES = 4
@@ -35,13 +39,12 @@ _RIVAL = 0.55  # of the best base's objective, that another has to have
 _BEHIND, _PATIENT = 0.03, 3  # of the objective, after so many steps
 _COMPLEX = 20_000  # triangles of a piece that is no feature
 _MOST = 24
+_FOR_MENDING = 10
 _MOST_LOOKED = 150  # pieces whose candidates are made: a part of hundreds is no part that was drawn
 _PERFECT = 0.985  # R from which on no other base is tried
 _COPY = 0.4  # of what the first gains, that a copy has to
 _BATCH = 64
-_FAR = 0.04  # unit lengths: 2 % of the longest side, off by which nothing may be
-_AROUND = 5e-3
-_MENDS = 6
+_CHORD = 1e-3  # unit lengths: how far chords of a cut with moved sides may be off
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
@@ -111,8 +114,8 @@ class FeatureSearch:
         told: Callable[[FeatureTree], None] | None = None,
     ) -> None:
         self.samples, self.alpha, self.checkpoint, self.told = samples, alpha, checkpoint, told
-        self.distance = samples.distance[::_EVERY]
         self.most = min(most or _MOST, _MOST)
+        self.limit = most or _MOST + _FOR_MENDING
         vertices, faces = shape.unit_mesh
         self.body = Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
         self.frames = frames(vertices, faces)
@@ -137,30 +140,10 @@ class FeatureSearch:
         for index in order:
             if best is not None and (gains[index] < _RIVAL * gains[order[0]] or best.score > _PERFECT):
                 break
-            tree = self._grown(self._with(empty, own[index], True), own, best)
+            tree = self._grown(self.extended(empty, own[index], True), own, best)
             if best is None or tree.objective > best.objective:
                 best = tree
-        return self._mended(best, own) if best is not None else None
-
-    def _mended(self, tree: FeatureTree, own: Sequence[Candidate]) -> FeatureTree:
-        """With features that pay too little but whose lack leaves the surface far off."""
-        for _ in range(_MENDS):
-            far = self._far(tree)
-            if len(tree.features) >= self.most or not len(far):
-                break
-            step = self._step(tree, own, far)
-            if step is None:
-                break
-            tree = step
-        return tree
-
-    def _far(self, tree: FeatureTree) -> NDArray[np.float32]:
-        """(K, 3) points of the shape's surface far from the tree's, and samples within the tree far from the
-        shape."""
-        surface = self.samples.surface
-        missed = surface[np.abs(tree.distance(surface)) > _FAR]
-        stuck_out = self.points[tree.covered & (self.distance > _FAR)]
-        return np.concatenate([missed, stuck_out])
+        return mended(self, best) if best is not None else None
 
     def _grown(self, tree: FeatureTree, own: Sequence[Candidate], best: FeatureTree | None) -> FeatureTree:
         """Until nothing pays, or it is well behind where the best so far was after as many steps."""
@@ -183,17 +166,12 @@ class FeatureSearch:
         rival = best.objectives[min(count, len(best.objectives) - 1)]
         return count >= _PATIENT and tree.objective < rival - _BEHIND
 
-    def _step(
-        self, tree: FeatureTree, own: Sequence[Candidate], far: NDArray[np.float32] | None = None
-    ) -> FeatureTree | None:
-        """The tree and what raises R most beyond its price.
-
-        far: (K, 3) points; what stands for pieces that hold any of them need only raise R.
-        """
-        missed = self._pieces(tree.missed, self.inside & ~tree.covered, far)
-        excess = self._pieces(tree.excess, ~self.inside & tree.covered, far)
-        adding = [*(own if far is None else ()), *(c for piece in missed for c in self._candidates(piece))]
-        cutting = [c for piece in excess for c in self._candidates(piece)]
+    def _step(self, tree: FeatureTree, own: Sequence[Candidate]) -> FeatureTree | None:
+        """The tree and what raises R most beyond its price."""
+        missed = self._pieces(tree.missed, self.inside & ~tree.covered)
+        excess = self._pieces(tree.excess, ~self.inside & tree.covered)
+        adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
+        cutting = [c for piece in excess for c in self.candidates_of(piece)]
         best: tuple[float, Candidate, bool] | None = None
         for pool, added in ((adding, True), (cutting, False)):
             if not pool:
@@ -202,12 +180,12 @@ class FeatureSearch:
             index = int(gains.argmax())
             if best is None or gains[index] > best[0]:
                 best = (float(gains[index]), pool[index], added)
-        if best is None or best[0] <= (0.0 if far is None else -self._price(best[1].sides)):
+        if best is None or best[0] <= 0:
             return None
         _, chosen, added = best
-        return self._with(tree, chosen, added, missed if added else excess)
+        return self.extended(tree, chosen, added, missed if added else excess)
 
-    def _with(
+    def extended(
         self, tree: FeatureTree, chosen: Candidate, added: bool, pieces: Sequence[Manifold] = ()
     ) -> FeatureTree:
         """The tree and a candidate, with the copies that stand for other pieces."""
@@ -231,6 +209,10 @@ class FeatureSearch:
                 for body, own in zip((inner, outer), chosen.bodies, strict=True)
             )
         part = replace(chosen.part, instances=tuple(instances))
+        opened = part if added else with_open_sides(part, self.samples.measure)
+        if opened is not part:
+            part, whole = opened, solid_of(opened, _CHORD)
+            inner, outer = inner + whole, outer + whole
         feature = Feature(added, part, within, chosen.sides)
         if added:
             missed, excess = tree.missed - outer, tree.excess + (inner - self.body)
@@ -246,11 +228,8 @@ class FeatureSearch:
     def _price(self, sides: int) -> float:
         return self.alpha * (1 + _SIDE_PRICE * max(0, sides - _FREE_SIDES))
 
-    def _pieces(
-        self, residual: Manifold, wrong: NDArray[np.bool_], far: NDArray[np.float32] | None = None
-    ) -> list[Manifold]:
-        """Connected pieces of more than a skin that may pay, the largest first, or that hold points `far`.
-        wrong: the samples that they hold."""
+    def _pieces(self, residual: Manifold, wrong: NDArray[np.bool_]) -> list[Manifold]:
+        """Connected pieces that may pay and are no skin, the largest first. wrong: the samples in them."""
         points, weight = self.points[wrong], self.weights[wrong]
         total = self.weights[self.inside].sum(axis=0)
         pieces = []
@@ -258,16 +237,12 @@ class FeatureSearch:
             if piece.num_tri() > _COMPLEX:
                 continue
             low, high = np.reshape(piece.bounding_box(), (2, 3))
-            if far is not None:
-                if ((far > low - _AROUND) & (far < high + _AROUND)).all(axis=1).any():
-                    pieces.append((volume, piece))
-                continue
             within = ((points > low) & (points < high)).all(axis=1)
             if float((weight[within].sum(axis=0) / total).mean()) > _HOPELESS * self.alpha:
                 pieces.append((volume, piece if piece.num_tri() < _FINE else piece.simplify(_SKIN)))
         return [piece for _, piece in sorted(pieces, key=lambda p: -p[0])[:_PIECES]]
 
-    def _candidates(self, piece: Manifold) -> list[Candidate]:
+    def candidates_of(self, piece: Manifold) -> list[Candidate]:
         low, high = np.reshape(piece.bounding_box(), (2, 3))
         key = tuple(np.round([*low, *high, piece.volume()], 5).tolist())
         if key not in self._of_piece:

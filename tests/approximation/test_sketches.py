@@ -12,6 +12,7 @@ from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames
 from partwright.approximation.sketches.ends import BEYOND, with_open_ends
 from partwright.approximation.sketches.holes import holes_apart
+from partwright.approximation.sketches.open_sides import with_open_sides
 from partwright.approximation.sketches.outlines import fitted_loop
 from partwright.assembly import Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Revolution
@@ -169,3 +170,31 @@ def test_ends_in_the_open_go_on() -> None:
 
 def test_nothing_has_no_candidates() -> None:
     assert candidates(Manifold(), [np.eye(3)], holes=True) == []
+
+
+def test_a_bend_is_turned_as_far_as_it_goes() -> None:
+    bend = Part(Revolution(Profile.circle(0.1, (0.6, 0.0)), 120.0), (0.1, 0.0, 0.0))
+    body = named_solid(bend.field, 1e-4).translate((0.1, 0.0, 0.0))
+    found = [c for c in candidates(body, [np.eye(3)], holes=True) if isinstance(c.part.field, Revolution)]
+    best = min(found, key=lambda c: abs(c.part.field.angle - 120))
+    assert best.part.field.angle == pytest.approx(120, abs=0.3)
+    points = np.random.default_rng(0).uniform(-0.8, 0.8, (4000, 3)).astype(np.float32)
+    assert ((best.part.distance(points) < 0) == (bend.distance(points) < 0)).mean() > 0.999
+    inner, outer = best.bodies
+    assert inner.volume() < body.volume() < outer.volume()
+
+
+def test_open_sides_of_a_cut_move_out() -> None:
+    plate = Part(Box((1.0, 1.0, 0.2)))
+    notch = Part(Box((0.2, 0.4, 0.2)), (0.4, 0.0, 0.0))
+    left = (plate - notch).distance
+    wider = with_open_sides(notch, left)
+    low, high = wider.bounds()
+    assert low == pytest.approx([0.3, -0.2, -0.1])
+    assert high == pytest.approx([0.5 + BEYOND, 0.2, 0.1])
+    outline = [(0.3, -0.2), (0.5, -0.2), (0.5, 0.2), (0.3, 0.2, 1.0)]
+    slot = Part(Extrusion(Profile(outline), 0.2))
+    longer = with_open_sides(slot, (plate - slot).distance)
+    assert isinstance(longer.field, Extrusion)
+    assert longer.field.profile.area == pytest.approx(slot.field.profile.area + 0.4 * BEYOND)
+    assert with_open_sides(Part(Box((0.2, 0.4, 0.2))), plate.distance) == Part(Box((0.2, 0.4, 0.2)))

@@ -92,3 +92,19 @@ def test_the_same_seed_gives_the_same_features() -> None:
     whole = Assembly((Part(Box((4.0, 3.0, 1.0))), Part(Cylinder(0.5, 3), (1, 0, 0))), operation="difference")
     first, second = (fitted(whole).assembly for _ in range(2))
     assert first == second
+
+
+def test_a_pin_that_hardly_pays_is_there_all_the_same() -> None:
+    whole = Assembly((Part(Box((100.0, 60.0, 20.0))), Part(Cylinder(0.5, 40), (20, 10, 10))))
+    result = fitted(whole)
+    assert result.report["scores"]["max_deviation_share"] < 0.01
+    assert sorted(type(part.field).__name__ for part in result.assembly.parts) == ["Box", "Cylinder"]
+
+
+def test_a_hook_is_turned_as_far_as_it_goes() -> None:
+    bend = Part(Revolution(Profile.circle(3, (20, 0)), 200))
+    result = fitted(Assembly((Part(Box((16.0, 16.0, 30.0)), (20, 0, 0)), bend)))
+    turned = [part.field for part in result.assembly.parts if isinstance(part.field, Revolution)]
+    assert len(turned) == 1
+    assert 199 < turned[0].angle < 224  # it goes on within the block
+    assert result.scores.iou > 0.99

@@ -13,7 +13,8 @@ from partwright.fields import Box, Cylinder, Extrusion, Field
 
 BEYOND = 0.03
 """Unit lengths: how far an open end goes on."""
-_STEPS = (0.004, 0.012, 0.02, BEYOND + 0.004)  # beyond an end, where it has to be open
+STEPS = (0.004, 0.012, 0.02, BEYOND + 0.004)
+"""Unit lengths beyond an end, where it has to be open."""
 _LATTICE = 24
 _EDGE = 0.004  # unit lengths: so near to its edge an end is not looked at
 
@@ -38,7 +39,7 @@ def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.
         end = high[2] if side > 0 else low[2]
         for copy in part.copies:
             frame = rotation_matrix(copy.rotation)
-            for step in _STEPS:
+            for step in STEPS:
                 points = np.column_stack([flat, np.full(len(flat), end + side * step)])
                 if (sign * distance(points @ frame.T + copy.translation) < 0).any():
                     return False

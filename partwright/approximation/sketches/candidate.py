@@ -1,0 +1,43 @@
+"""A part that a body may be made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from manifold3d import Manifold
+
+from partwright.assembly import Part
+
+_CHORDS = 4e-3  # unit lengths
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A part, and what makes the same body with the mesh's own walls, chords and all.
+
+    make: the body, further out by a length where its walls are not the mesh's own. sides: of its profile.
+    volume: tells candidates apart.
+    """
+
+    part: Part
+    make: Callable[[float], Manifold]
+    sides: int
+    volume: float
+
+    @cached_property
+    def bodies(self) -> tuple[Manifold, Manifold]:
+        """Within the part's surface and around it, by as little as chords are off it."""
+        return self.make(-_CHORDS), self.make(_CHORDS)
+
+    @cached_property
+    def key(self) -> tuple[float, ...]:
+        """The same for candidates that are the same."""
+        return tuple(np.round([*self.part.bounds().ravel(), self.volume], 3).tolist())
+
+
+def posed(body: Manifold, frame: np.ndarray) -> Manifold:
+    """A body of a view, where it belongs."""
+    return body.transform(np.column_stack([frame, np.zeros(3)]))

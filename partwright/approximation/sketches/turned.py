@@ -1,0 +1,176 @@
+"""Half sections of a body through an axis, turned about it: all around, or as far as they go on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from manifold3d import CrossSection, FillRule, JoinType, Manifold
+from scipy.spatial import cKDTree
+
+from partwright.approximation.profile_parts import revolved_part
+from partwright.approximation.sketches.candidate import Candidate, posed
+from partwright.approximation.sketches.sections import View, profile_of
+from partwright.errors import ParameterError
+from partwright.fields.profile import Profile
+
+_PLANES = 4  # through an axis, for what goes all around
+_HALVES = 32  # half-planes at which partial turns are looked for
+_FEWEST = 3  # of them, that a partial turn goes through
+_BISECTIONS = 7  # of the angle between two, for where it ends
+_ROUND = 0.4  # of what any half section has, that all have
+_SAME = 0.03  # of the area
+_LEAST = 4e-4  # unit areas
+_MOST_PARTIAL = 4
+_SNAP = 0.012
+_OFFSET = 0.0137  # radians: no plane along faces
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Of a view, through `centre` (2,) along its z."""
+
+    view: View
+    centre: np.ndarray
+
+    @cached_property
+    def body(self) -> Manifold:
+        return self.view.body.translate((-float(self.centre[0]), -float(self.centre[1]), 0.0))
+
+    @cached_property
+    def flat(self) -> np.ndarray:
+        """(V, 2) distance from the axis and height of the mesh's vertices."""
+        vertices = self.view.mesh[0] - (*self.centre, 0.0)
+        return np.column_stack([np.hypot(vertices[:, 0], vertices[:, 1]), vertices[:, 2]])
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        return cKDTree(self.flat)
+
+    @cached_property
+    def right(self) -> CrossSection:
+        reach = 2 * float(np.abs(self.flat).max())
+        corners = [(0.0, -reach), (reach, -reach), (reach, reach), (0.0, reach)]
+        return CrossSection([corners], FillRule.Positive)
+
+    def halves(self, turn: float) -> tuple[CrossSection, CrossSection]:
+        """Half sections at an angle and half a turn beyond: distance from the axis, and height."""
+        c, s = math.cos(turn), math.sin(turn)
+        # (x, y, z) to (distance along the plane, z, distance from it)
+        plane = np.array([[c, s, 0, 0], [0, 0, 1, 0], [s, -c, 0, 0]], dtype=float)
+        section = self.body.transform(plane).slice(0.0)
+        return section ^ self.right, section.mirror((1.0, 0.0)) ^ self.right
+
+
+def turned(view: View, centre: np.ndarray) -> Iterator[Candidate]:
+    """What may be turned about an axis at `centre` (2,) of the view."""
+    axis = Axis(view, centre)
+    turns = np.arange(_PLANES) * (math.pi / _PLANES) + _OFFSET
+    halves = [half for turn in turns for half in axis.halves(turn)]
+    whole, shared = CrossSection(), halves[0]
+    for half in halves:
+        whole, shared = whole + half, shared ^ half
+    if shared.area() <= _ROUND * whole.area():
+        yield from _partly(axis)
+        return
+    middle = sorted(halves, key=lambda half: half.area())[len(halves) // 2]
+    distinct: list[CrossSection] = []
+    for half in (middle, whole, shared):
+        alike = any((half - d).area() + (d - half).area() < _SAME * half.area() for d in distinct)
+        if half.area() > _LEAST and not alike:
+            distinct.append(half)
+    for half in distinct:
+        for region in half.decompose():
+            if region.area() > 0.05 * half.area():
+                yield from _revolved(axis, region, 0.0, 2 * math.pi)
+
+
+def _partly(axis: Axis) -> Iterator[Candidate]:
+    """Connected pieces of half sections, from the angle where they begin to that where they end."""
+    step = 2 * math.pi / _HALVES
+    both = [axis.halves(k * step + _OFFSET) for k in range(_HALVES // 2)]
+    halves = [one for one, _ in both] + [other for _, other in both]
+    found: list[tuple[CrossSection, int, int]] = []
+    for k, half in enumerate(halves):
+        for piece in half.decompose():
+            if piece.area() < _LEAST or len(found) >= _MOST_PARTIAL:
+                continue
+            if any((k - a) % _HALVES <= b - a and _within(piece, known) for known, a, b in found):
+                continue
+            first = last = k
+            while last - first < _HALVES and _within(piece, halves[(last + 1) % _HALVES]):
+                last += 1
+            while last - first < _HALVES and _within(piece, halves[(first - 1) % _HALVES]):
+                first -= 1
+            if last - first + 1 < _FEWEST:
+                continue
+            found.append((piece, first, last))
+            if last - first >= _HALVES - 1:
+                yield from _revolved(axis, piece, 0.0, 2 * math.pi)
+                continue
+            begin = _end(axis, piece, first * step + _OFFSET, -step)
+            end = _end(axis, piece, last * step + _OFFSET, step)
+            yield from _revolved(axis, piece, begin, end - begin)
+
+
+def _within(piece: CrossSection, half: CrossSection) -> bool:
+    return bool((piece - half).area() < 2 * _SAME * piece.area())
+
+
+def _end(axis: Axis, piece: CrossSection, turn: float, step: float) -> float:
+    """The angle between `turn`, where the piece is, and one step on, where it is not, at which it ends."""
+    near, far = 0.0, 1.0
+    for _ in range(_BISECTIONS):
+        middle = (near + far) / 2
+        if _within(piece, axis.halves(turn + middle * step)[0]):
+            near = middle
+        else:
+            far = middle
+    return turn + (near + far) / 2 * step
+
+
+def _revolved(axis: Axis, region: CrossSection, begin: float, angle: float) -> Iterator[Candidate]:
+    """A piece of a half section from an angle on, radians."""
+    half = _snapped(region, axis.flat, axis.tree)
+    profile = profile_of(half) if half is not None else None
+    if half is None or profile is None:
+        return
+    c, s = math.cos(begin), math.sin(begin)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    frame, degrees = axis.view.frame @ turn, min(math.degrees(angle), 360.0)
+    foot = turn.T @ (*axis.centre, 0.0)
+    try:
+        part = revolved_part(_off_axis(profile), frame, foot, degrees)
+    except ParameterError:
+        return
+
+    def make(further: float) -> Manifold:
+        grown = half.scale((1e3, 1e3)).offset(1e3 * further, JoinType.Miter, 2.0)
+        body = Manifold.revolve(grown, 128, degrees).scale((1e-3,) * 3)
+        return posed(body.translate((float(foot[0]), float(foot[1]), 0.0)), frame)
+
+    yield Candidate(part, make, len(profile.corners), half.area() * degrees)
+
+
+def _snapped(half: CrossSection, flat: np.ndarray, tree: cKDTree) -> CrossSection | None:
+    """With corners where the mesh's vertices are: a cut through chords lies within the surface."""
+    polygons = []
+    for polygon in half.to_polygons():
+        points = np.asarray(polygon, dtype=np.float64)
+        off, index = tree.query(points)
+        near = off < _SNAP * np.maximum(points[:, 0], 0.2)
+        points[near] = flat[index[near]]
+        points[np.abs(points[:, 0]) < 2e-3, 0] = 0.0
+        polygons.append(points)
+    snapped = CrossSection(polygons, FillRule.NonZero)
+    pieces = sorted(snapped.decompose(), key=lambda p: -p.area())
+    return pieces[0] if pieces else None
+
+
+def _off_axis(profile: Profile) -> Profile:
+    """Corners near the axis on it."""
+    loops = [tuple((0.0 if x < 2e-3 else x, y, b) for x, y, b in loop) for loop in profile.loops]
+    return Profile(loops[0], tuple(loops[1:]))

@@ -1,0 +1,74 @@
+"""Features that explain too little to pay, but without which the surface is far off: they join all the same.
+
+What a tree lacks and what it has too much are bodies, so how far each reaches from the other surface is known
+at its corners, slivers between the samples included.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from manifold3d import Manifold
+
+from partwright.approximation.sketches.bodies import bodies
+
+if TYPE_CHECKING:
+    from partwright.superfrusta.feature_search import FeatureSearch, FeatureTree
+
+FAR = 0.04
+"""Unit lengths: 2.2 % of the longest side, by which nothing may be off."""
+_MENDS = 10
+_LEAST = 1e-7  # of the volume
+_LOSS = 3e-4  # of R, that mending one place may cost
+
+
+def mended(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
+    """The tree with further features, the farthest place first, until nothing is far off or can be mended."""
+    given_up: set[tuple[float, ...]] = set()
+    for _ in range(_MENDS):
+        if len(tree.features) >= search.limit:
+            break
+        far = [one for one in far_pieces(search, tree) if _key(one[2]) not in given_up]
+        if not far:
+            break
+        _, added, piece = max(far, key=lambda one: one[0])
+        step = _with_best(search, tree, piece, added, [other for _, a, other in far if a is added])
+        if step is None:
+            given_up.add(_key(piece))
+        else:
+            tree = step
+    return tree
+
+
+def far_pieces(search: FeatureSearch, tree: FeatureTree) -> list[tuple[float, bool, Manifold]]:
+    """Pieces that reach further than `FAR`: how far, whether they are to be added, and the piece."""
+    found: list[tuple[float, bool, Manifold]] = []
+    for added, residual in ((True, tree.missed), (False, tree.excess)):
+        for _, piece in bodies(residual, _LEAST * search.volume, 0.0):
+            corners = np.asarray(piece.to_mesh().vert_properties)[:, :3].astype(np.float32)
+            off = tree.distance(corners) if added else search.samples.measure(corners)
+            reach = float(off.max())
+            if reach > FAR:
+                found.append((reach, added, piece))
+    return found
+
+
+def _with_best(
+    search: FeatureSearch, tree: FeatureTree, piece: Manifold, added: bool, alike: list[Manifold]
+) -> FeatureTree | None:
+    """The tree and the candidate that takes the most of a piece, of those that cost hardly anything."""
+    best: tuple[float, FeatureTree] | None = None
+    for candidate in search.candidates_of(piece):
+        _, outer = candidate.bodies
+        left = float((piece - outer).volume()) / float(piece.volume())
+        if left > 0.5 or (best is not None and left >= best[0]):
+            continue
+        step = search.extended(tree, candidate, added, alike)
+        if step.score >= tree.score - _LOSS:
+            best = left, step
+    return best[1] if best is not None else None
+
+
+def _key(piece: Manifold) -> tuple[float, ...]:
+    return tuple(np.round([*piece.bounding_box(), piece.volume()], 4).tolist())
