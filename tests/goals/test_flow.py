@@ -157,6 +157,8 @@ def test_a_queue_goes_on_where_it_stopped(stand_in: Path, tmp_path: Path) -> Non
     assert simulate_all(bodies[:1], tmp_path / "flows", Air("y"))[0].made  # other air, other file
     sample = read(first[0].path)
     assert (sample.name, sample.air, sample.skin.fields[PRESSURE].tolist()) == ("a", Air(), [1.0, -0.5])
+    assert sample.faces.tolist() == CUBE.faces.tolist()
+    np.testing.assert_allclose(sample.vertices, CUBE.vertices, atol=1e-6)
     with pytest.raises(UnreadableFileError, match="another air"):
         list(read_all(tmp_path / "flows"))
 

@@ -1,8 +1,8 @@
 """A data set of simulated bodies: one file each, made one after the other, and gone on with where it stopped.
 
-A file holds the body as the simulation meshed it, the pressure on it, and its drag area. Its name is made of
-the body's content, the air and this format's version: what was simulated before is not simulated again, and
-what was simulated otherwise is not mixed in.
+A file holds the body, also as the simulation meshed it, the pressure on that, and the drag area. Its name is
+made of the body's content, the air and this format's version: what was simulated before is not simulated again,
+and what was simulated otherwise is not mixed in.
 """
 
 from __future__ import annotations
@@ -24,19 +24,22 @@ from partwright.goals.flow.air import Air
 from partwright.goals.flow.simulation import PRESSURE, simulate
 from partwright.goals.flow.skin import Skin
 
-VERSION = 1
-_ARRAYS = ("vertices", "faces", "pressure")
+VERSION = 2
+_ARRAYS = ("vertices", "faces", "pressure", "body_vertices", "body_faces")
 
 
 @dataclass(frozen=True)
 class Sample:
-    """A simulated body. drag_area, swing: m2. skin: in metres, with the pressure coefficient of each face."""
+    """A simulated body, in metres. drag_area, swing: m2. skin: as the simulation meshed it, with the pressure
+    coefficient of each face. vertices (V, 3), faces (F, 3): as it was given."""
 
     name: str
     drag_area: float
     swing: float
     air: Air
     skin: Skin
+    vertices: np.ndarray
+    faces: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,8 @@ def _simulated(name: str, body: trimesh.Trimesh, path: Path, air: Air) -> float:
             vertices=found.skin.vertices.astype(np.float32),
             faces=found.skin.faces.astype(np.int32),
             pressure=found.skin.fields[PRESSURE].astype(np.float32),
+            body_vertices=np.asarray(body.vertices, np.float32),
+            body_faces=np.asarray(body.faces, np.int32),
         )
     return found.drag_area
 
@@ -130,18 +135,26 @@ def read(path: Path) -> Sample:
     try:
         with np.load(path, allow_pickle=False) as data:
             about = json.loads(data["about"].tobytes())
-            vertices, faces, pressure = (data[name] for name in _ARRAYS)
+            vertices, faces, pressure, body, body_faces = (data[name] for name in _ARRAYS)
         if about["version"] != VERSION:
             raise ValueError(f"its version is {about['version']}, expected {VERSION}")
-        if faces.ndim != 2 or len(faces) != len(pressure) or faces.max() >= len(vertices) or faces.min() < 0:
-            raise ValueError("its faces do not fit its vertices or pressures")
-        if not (np.isfinite(vertices).all() and np.isfinite(pressure).all()):
+        for points, triangles in ((vertices, faces), (body, body_faces)):
+            if triangles.ndim != 2 or triangles.max() >= len(points) or triangles.min() < 0:
+                raise ValueError("its faces do not fit its vertices")
+        if len(faces) != len(pressure):
+            raise ValueError("its pressures do not fit its faces")
+        if not all(np.isfinite(one).all() for one in (vertices, pressure, body)):
             raise ValueError("it holds numbers that are not finite")
-        skin = Skin(
-            vertices.astype(np.float64), faces.astype(np.int64), {PRESSURE: pressure.astype(np.float64)}
+        fields = {PRESSURE: pressure.astype(np.float64)}
+        return Sample(
+            str(about["name"]),
+            float(about["drag_area"]),
+            float(about["swing"]),
+            Air(**about["air"]),
+            Skin(vertices.astype(np.float64), faces.astype(np.int64), fields),
+            body.astype(np.float64),
+            body_faces.astype(np.int64),
         )
-        area, swing = float(about["drag_area"]), float(about["swing"])
-        return Sample(str(about["name"]), area, swing, Air(**about["air"]), skin)
     except (OSError, ValueError, KeyError, TypeError, IndexError, BadZipFile) as error:
         raise UnreadableFileError(f"{path}: expected a simulated body: {error}") from error
 

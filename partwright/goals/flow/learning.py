@@ -78,7 +78,7 @@ def train(
             f"{len(samples)} simulated bodies are too few to learn from; expected {_FEWEST} or more"
         )
     air, cancel = samples[0].air, cancel or Cancellation()
-    length = float(np.mean([np.ptp(one.skin.vertices, axis=0).max() for one in samples]))
+    length = float(np.mean([np.ptp(one.vertices, axis=0).max() for one in samples]))
     torch.manual_seed(seed)
     network = DragNetwork(width)
     views = _views(samples, range(_VIEWS), air, points)
@@ -136,19 +136,21 @@ def _finished(network: DragNetwork, samples: Sequence[Sample], air: Air, length:
 
 
 def _views(samples: Sequence[Sample], seeds: Sequence[int] | range, air: Air, count: int = POINTS) -> _Views:
-    """Draws of points of each body, all of a body together."""
+    """Draws of points of each body, all of a body together, with the pressure on the nearest of its skin.
+
+    Of the body as it was given, for so it will be asked for: a coarse simulation sees it blunted.
+    """
     rows = []
     for sample in samples:
-        vertices = torch.tensor(sample.skin.vertices, dtype=torch.float32)
-        faces = torch.tensor(sample.skin.faces)
-        pressure = torch.tensor(sample.skin.fields[PRESSURE], dtype=torch.float32)
-        corners = sample.skin.vertices[sample.skin.faces]
+        vertices = torch.tensor(sample.vertices, dtype=torch.float32)
+        faces = torch.tensor(sample.faces)
+        corners = sample.vertices[sample.faces]
         areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         drag = torch.tensor(sample.drag_area)
         for seed in seeds:
             spread = Spread.over(areas, seed, count)
             points, normals, area = spread.on(vertices, faces)
+            pressure = torch.tensor(sample.skin.at(PRESSURE, points.numpy()), dtype=torch.float32)
             points = placed(points, air, vertices)
-            near = neighbours(points[None])[0]
-            rows.append((points, normals, near, pressure[spread.face], area, drag))
+            rows.append((points, normals, neighbours(points[None])[0], pressure, area, drag))
     return _Views(*(torch.stack(column) for column in zip(*rows, strict=True)))
