@@ -46,7 +46,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path)
     parser.add_argument("--cars", type=int, default=3)
     parser.add_argument("--steps", type=int, default=8)
-    parser.add_argument("--rounds", type=int, default=250)
+    parser.add_argument("--rounds", type=int, default=120)
     parser.add_argument("--held-out", type=int, default=10)
     parser.add_argument("--convergence", action="store_true")
     parser.add_argument("--pictures", type=Path)

@@ -20,7 +20,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         command, "FILE", "the model (.safetensors)", reads=lambda a: [a.flows], writes=lambda a: [a.output]
     )
     option = command.add_argument
-    option("--rounds", metavar="N", type=int, default=300, help="over all bodies (default: %(default)s)")
+    option("--rounds", metavar="N", type=int, default=120, help="over all bodies (default: %(default)s)")
     option(
         "--held-out",
         metavar="N",

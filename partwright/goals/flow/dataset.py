@@ -1,8 +1,8 @@
 """A data set of simulated bodies: one file each, made one after the other, and gone on with where it stopped.
 
 A file holds the body, also as the simulation meshed it, the pressure on that, and the drag area. Its name is
-made of the body's content, the air and this format's version: what was simulated before is not simulated again,
-and what was simulated otherwise is not mixed in.
+made of the body's content, the air and this format's version: what was simulated before is not simulated
+again, and what was simulated otherwise is not mixed in.
 """
 
 from __future__ import annotations

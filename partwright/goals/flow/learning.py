@@ -57,9 +57,9 @@ class _Views:
 def train(
     samples: Sequence[Sample],
     *,
-    rounds: int = 300,
-    width: int = 64,
-    points: int = POINTS,
+    rounds: int = 120,
+    width: int = 32,
+    points: int = POINTS // 2,
     seed: int = 0,
     mirror: str = "",
     told: Callable[[Told], None] | None = None,
@@ -80,11 +80,11 @@ def train(
     air, cancel = samples[0].air, cancel or Cancellation()
     length = float(np.mean([np.ptp(one.vertices, axis=0).max() for one in samples]))
     torch.manual_seed(seed)
-    network = DragNetwork(width)
+    network = DragNetwork(width).train()
     views = _views(samples, range(_VIEWS), air, points)
     deviation = views.pressure.std()
     drag_deviation = views.drag.std().clamp_min(1e-3 * views.drag.mean().abs())
-    optimiser = torch.optim.AdamW(network.parameters(), lr=2e-3, weight_decay=1e-3)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=2e-3, weight_decay=0.1)
     steps = rounds * -(-len(samples) // _BATCH)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 4e-3, total_steps=steps, pct_start=0.1)
     draw = np.random.default_rng(seed)
@@ -98,7 +98,7 @@ def train(
                 flip["xyz".index(mirror)] = -1
                 places, normals = places * flip, normals * flip
             pressure, rest, _ = network(places / length, normals, views.near[rows])
-            drag = drag_area(pressure, rest, normals, views.area[rows], air, length)
+            drag = drag_area(pressure, rest, normals, views.area[rows], air)
             loss = ((pressure - views.pressure[rows]) / deviation).square().mean()
             loss = loss + _DRAG_WEIGHT * ((drag - views.drag[rows]) / drag_deviation).square().mean()
             optimiser.zero_grad()

@@ -12,15 +12,16 @@ import torch
 from torch import Tensor, nn
 
 POINTS = 1024
+_DROPPED = 0.2  # of the last features, while learning: bodies to learn from are few
 _NEIGHBOURS = 8
-_OCTAVES = 3
+_OCTAVES = 2
 INPUTS = 3 + 3 + 6 * _OCTAVES
 
 
 class DragNetwork(nn.Module):
     """From points (B, N, 3), in units of the training's mean length, and unit normals (B, N, 3)."""
 
-    def __init__(self, width: int = 64, layers: int = 3) -> None:
+    def __init__(self, width: int = 32, layers: int = 3) -> None:
         super().__init__()
         self.width, self.layers = width, layers
         self.first = nn.Sequential(nn.Linear(INPUTS, width), nn.SiLU())
@@ -28,13 +29,15 @@ class DragNetwork(nn.Module):
             nn.Sequential(nn.Linear(3 * width, width), nn.SiLU(), nn.Linear(width, width))
             for _ in range(layers)
         )
-        self.pressure = nn.Sequential(nn.Linear(2 * width, width), nn.SiLU(), nn.Linear(width, 1))
-        self.rest = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, 1))
+        self.pressure = nn.Sequential(
+            nn.Dropout(_DROPPED), nn.Linear(2 * width, width), nn.SiLU(), nn.Linear(width, 1)
+        )
+        self.rest = nn.Sequential(nn.Dropout(_DROPPED), nn.Linear(width, 1))
 
     def forward(
         self, points: Tensor, normals: Tensor, near: Tensor | None = None
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Pressure coefficients (B, N), what the drag has beside them (B,), embeddings (B, width).
+        """Pressure coefficients (B, N), what the drag coefficient has beside them (B,), embeddings (B, W).
 
         near: as of `neighbours`, where it is known.
         """

@@ -41,7 +41,7 @@ class Surrogate:
         (B, N, 3). area: (B,) of the surfaces, m2.
         """
         pressure, rest, whole = self.network(points / self.length, normals)
-        return drag_area(pressure, rest, normals, area, self.air, self.length), pressure, whole
+        return drag_area(pressure, rest, normals, area, self.air), pressure, whole
 
     def outside(self, embedding: Tensor) -> float:
         """How far a body is from the nearest of the training, over the largest such distance within that:
@@ -97,12 +97,11 @@ class Surrogate:
         return cls(network.eval(), air, length, embeddings, spread)
 
 
-def drag_area(
-    pressure: Tensor, rest: Tensor, normals: Tensor, area: Tensor, air: Air, length: float
-) -> Tensor:
-    """(B,) m2: of the pressures (B, N) against the flow, and the rest (B,), in squares of the length."""
+def drag_area(pressure: Tensor, rest: Tensor, normals: Tensor, area: Tensor, air: Air) -> Tensor:
+    """(B,) m2: of the pressures (B, N) against the flow, and a rest (B,) of the area that faces it."""
     against = -(normals @ torch.tensor(air.direction, dtype=normals.dtype))
-    return (pressure * against).mean(dim=1) * area + rest * length**2
+    front = against.clamp_min(0).mean(dim=1) * area
+    return (pressure * against).mean(dim=1) * area + rest * front
 
 
 @dataclass(frozen=True)
