@@ -311,6 +311,7 @@ def main() -> int:
     )
     command += f" --max-parts {options.max_parts}" if options.max_parts else ""
     command += f" --method {options.method}" if options.method != "superfrusta" else ""
+    command += f" --unit {options.unit}" if options.unit != "m" else ""
     command += " --clean" if options.clean else ""
     about = {"clean": options.clean} | ({"max_parts": options.max_parts} if options.max_parts else {})
     kept = options.rows.read_text().splitlines() if options.rows.exists() else []

@@ -64,6 +64,28 @@ TABLES = (
           "robots --parts {data}/parts/robot_arm --held ur5,ur10e --epochs 400 --iterations 200 "
           "--resolution 128 --threads 1", 120),
     Table("partsdf-speed.md", "partsdf.py", None, 0, "speed --model chairs", 60),
+    Table("named_convexes.md", "named_convexes.py", None, 0,
+          "--shapes {data}/cad --trees build/trees --quality draft", 60),
+    Table("cleaning.md", "cleaning.py", None, 0,
+          "--shapes {data} --fits build/fits/solids build/fits/superfrusta", 60, "build/fits, fitted before"),
+    Table("formats.md", "formats.py", None, 0,
+          "build/fits/solids build/fits/superfrusta --rows build/formats.jsonl", 60, "build/fits"),
+    Table("scenes.md", "formats.py", None, 0,
+          "build/fits/capri build/fits/solids build/fits/superfrusta --formats .glb,.usdc,.mjcf.xml,.urdf "
+          "--rows build/scenes.jsonl --target benchmarks/results/scenes.md", 20, "build/fits"),
+    Table("collision.md", "collision.py", "--names mug --rows collision.jsonl --target collision.md", 2,
+          "--shapes {data} --names parts/robot_arm/ur5e/forearm,cad/ttt_angle_bracket,toys/mug,toys/hammer,"
+          "cad/bd_rod_end,parts/robot_arm/ur3/forearm,parts/robot_arm/ur5e/upper_arm,"
+          "parts/robot_arm/ur3/upper_arm,parts/robot_arm/ur10/shoulder,parts/robot_arm/ur10/base,"
+          "toys/armchair,cad/f360_clamp_block --rows build/collision.jsonl", 30),
+    Table("collision-cad.md", "collision.py", None, 0,
+          "--shapes {data} --names cad/bdw_weld_neck_flange,cad/ttt_corner_tie,cad/prusa_y_rod_holder,"
+          "cad/f360_clamp_block --unit mm --method solids --clean --rows build/collision-cad.jsonl "
+          "--target benchmarks/results/collision-cad.md", 10),
+    Table("robots.md", "robots.py", "--rows robots.jsonl --ways nearest hinge=examples/shapes/hinge.urdf", 1,
+          None, 0, "robots of packages on PyPI, which the script names"),
+    Table("optimise.md", "optimise.py", None, 0,
+          "--shapes {data} --output benchmarks/results/optimise.md", 30),
     Table("anchors.md", "anchors.py", "--names bracket --peers coacd", 2, "", 20, "the peers"),
     Table("batch.md", "batch.py", "--shapes 8 --kills 4", 3,
           "--shapes 200 --kills 20 --output benchmarks/results/batch.md", 30),
@@ -108,9 +130,8 @@ def listing() -> str:
     for table in TABLES:
         quick = "-" if table.quick is None else f"`{table.quick}` {table.quick_minutes:g}"
         needs = f" (needs {table.needs})" if table.needs else ""
-        lines.append(
-            f"| {table.output} | {table.script} | {quick} | `{table.full}` {table.full_minutes:g}{needs} |"
-        )
+        full = "-" if table.full is None else f"`{table.full}` {table.full_minutes:g}"
+        lines.append(f"| {table.output} | {table.script} | {quick} | {full}{needs} |")
     return "\n".join(lines)
 
 
