@@ -39,13 +39,15 @@ def site(tmp_path: Path) -> Path:
 def test_search_finds_a_page_without_a_server(browser: Any, site: Path) -> None:
     context = browser.new_context(offline=True)
     page = context.new_page()
+    page.set_default_timeout(1000 * PATIENCE)
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
-    page.goto((site / "index.html").as_uri())
+    page.goto((site / "index.html").as_uri(), wait_until="load")
+    page.wait_for_function("document.documentElement.classList.contains('js')")  # its script has run
     page.click("input.md-search__input")
     page.fill("input.md-search__input", "wheelbarrow")
     found = page.locator(".md-search-result__link").first
-    found.wait_for(timeout=1000 * PATIENCE)
+    found.wait_for(state="attached", timeout=1000 * PATIENCE)
     assert found.get_attribute("href").split("?")[0].endswith("/other.html")
     assert all(url.startswith(("file:", "data:", "about:", "blob:")) for url in asked)
     context.close()
