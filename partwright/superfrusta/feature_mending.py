@@ -16,9 +16,9 @@ from partwright.approximation.sketches.bodies import bodies
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch, FeatureTree
 
-FAR = 0.04
-"""Unit lengths: 2.2 % of the longest side, by which nothing may be off."""
-_MENDS = 10
+FAR = 0.054
+"""Unit lengths: 3 % of the longest side, by which nothing may be off."""
+_MENDS = 8
 _LEAST = 1e-7  # of the volume
 _LOSS = 3e-4  # of R, that mending one place may cost
 

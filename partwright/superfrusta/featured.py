@@ -10,8 +10,9 @@ import numpy as np
 from partwright.approximation.part_roles import with_role_names
 from partwright.approximation.plain_numbers import with_plain_numbers
 from partwright.approximation.sketches.ends import with_open_ends
-from partwright.approximation.sketches.holes import holes_apart
+from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.assembly import Assembly, Part
+from partwright.fields import Cylinder
 from partwright.methods import Checkpoint, FitRequest, Progress
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_search import Feature, FeatureSearch, FeatureTree
@@ -82,16 +83,20 @@ def _with_plain_numbers(node: Assembly, within: float) -> Assembly:
 def _numbered(features: Sequence[Feature], shape: Shape) -> list[Feature]:
     """Round holes of profiles apart, each size once; ends that are open further out; names until they say
     more."""
+    distance = shape.unit_distance
     result: list[Feature] = []
-    for feature in features:
+    drilled: list[Part] = []
+    for i, feature in enumerate(features):
         part, holes = holes_apart(feature.part) if feature.added else (feature.part, ())
-        result.append(dataclasses.replace(feature, part=part))
-        none = np.zeros(0, bool)
-        result += [Feature(False, hole, none, 0) for hole in holes]
-    result = [
-        dataclasses.replace(f, part=with_open_ends(f.part, f.added, shape.unit_distance)) if i else f
-        for i, f in enumerate(result)
-    ]
+        parts = [(part, feature.added), *((hole, False) for hole in holes)]
+        for k, (one, added) in enumerate(parts):
+            longer = one if i == k == 0 else with_open_ends(one, added, distance)
+            if not added and isinstance(longer.field, Cylinder) and is_empty(longer, distance):
+                drilled.append(longer)
+            else:
+                result.append(dataclasses.replace(feature, part=longer, added=added))
+    none = np.zeros(0, bool)
+    result += [Feature(False, hole, none, 0) for hole in merged_holes(drilled, distance)]
     stems = {True: "part", False: "cut"}
     return [
         dataclasses.replace(f, part=dataclasses.replace(f.part, name=f"{stems[f.added]}_{i:02d}"))

@@ -11,10 +11,10 @@ from manifold3d import Manifold
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames
 from partwright.approximation.sketches.ends import BEYOND, with_open_ends
-from partwright.approximation.sketches.holes import holes_apart
+from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.approximation.sketches.open_sides import with_open_sides
 from partwright.approximation.sketches.outlines import fitted_loop
-from partwright.assembly import Part, Similarity
+from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Revolution
 from partwright.fields.profile import Profile, circle, circle_of
 from partwright.meshing.named_solids import named_solid
@@ -198,3 +198,20 @@ def test_open_sides_of_a_cut_move_out() -> None:
     assert isinstance(longer.field, Extrusion)
     assert longer.field.profile.area == pytest.approx(slot.field.profile.area + 0.4 * BEYOND)
     assert with_open_sides(Part(Box((0.2, 0.4, 0.2))), plate.distance) == Part(Box((0.2, 0.4, 0.2)))
+
+
+def test_a_bore_through_two_walls_is_one_and_bolt_holes_are_copies() -> None:
+    walls = Part(Box((0.1, 1.0, 1.0)), (-0.4, 0, 0), instances=(Similarity(translation=(0.8, 0, 0)),))
+    across = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+    bores = [Part(Cylinder(0.2, 0.1), (x, 0, 0), across) for x in (-0.4, 0.4)]
+    bolts = [Part(Cylinder(0.05, 0.1), (-0.4, y, 0.3), across) for y in (-0.3, 0.3)]
+    tree = Assembly((walls, *bores, *bolts), "difference")
+    assert all(is_empty(hole, tree.distance) for hole in (*bores, *bolts))
+    assert not is_empty(bores[0], walls.distance)
+    bore, bolt = merged_holes([*bores, *bolts], tree.distance)
+    assert bore.field.height == pytest.approx(0.9)
+    assert bore.translation == pytest.approx((0, 0, 0))
+    assert len(bolt.copies) == 2
+    assert bolt.field.height == pytest.approx(0.1)
+    blocked = (tree | Part(Box((0.1, 1.0, 1.0)))).distance
+    assert [len(hole.copies) for hole in merged_holes(bores, blocked)] == [2]

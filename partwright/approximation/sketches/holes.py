@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from partwright.approximation.profile_parts import extruded_part
 from partwright.assembly import Part, Similarity
+from partwright.assembly.checks import Quaternion
 from partwright.assembly.similarity import rotation_matrix
-from partwright.fields import Extrusion
+from partwright.fields import Cylinder, Extrusion
 from partwright.fields.profile import Loop, Profile, circle_of
 
 _SAME = 2e-3  # of its size, by which holes that are alike may differ
-_BEYOND = 0.03  # unit lengths: how far holes reach beyond what they go through
+_ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and heights of copies differ
+_BURR = 5e-3  # unit lengths: how deep within the shape a point of an empty hole may seem to lie
 
 
 def holes_apart(part: Part) -> tuple[Part, tuple[Part, ...]]:
@@ -38,16 +42,16 @@ def holes_apart(part: Part) -> tuple[Part, tuple[Part, ...]]:
     middle = frame.T @ np.array(part.translation)
     kept = tuple(loop for group in groups if group not in apart for loop in group)
 
-    def extruded(profile: Profile, more: float) -> Part:
-        low, high = middle[2] - height / 2 - more, middle[2] + height / 2 + more
+    def extruded(profile: Profile) -> Part:
+        low, high = middle[2] - height / 2, middle[2] + height / 2
         return extruded_part(profile.moved(middle[:2]), frame, low, high)
 
-    body = extruded(Profile(field.profile.outline, kept), 0.0)
+    body = extruded(Profile(field.profile.outline, kept))
     holes = []
     for first, *others in apart:
         own = [_shift(frame, _middle(other) - _middle(first)) for other in others]
         moves = [*own, *(move @ inner for move in part.instances for inner in (Similarity(), *own))]
-        holes.append(dataclasses.replace(extruded(Profile(first), _BEYOND), instances=tuple(moves)))
+        holes.append(dataclasses.replace(extruded(Profile(first)), instances=tuple(moves)))
     return dataclasses.replace(body, instances=part.instances, name=part.name), tuple(holes)
 
 
@@ -73,3 +77,93 @@ def _alike(one: Loop, other: Loop) -> bool:
 def _shift(frame: np.ndarray, offset: np.ndarray) -> Similarity:
     x, y, z = (frame[:, :2] @ offset).tolist()
     return Similarity(translation=(x, y, z))
+
+
+def is_empty(hole: Part, distance: Callable[[np.ndarray], np.ndarray]) -> bool:
+    """Whether a cylinder holds nothing of the shape, all copies; distance: as of `merged_holes`."""
+    return all(bool((distance(_Drilled.of(copy).points()) > -_BURR).all()) for copy in hole.copies)
+
+
+def merged_holes(holes: Sequence[Part], distance: Callable[[np.ndarray], np.ndarray]) -> list[Part]:
+    """Drilled holes: those on one axis of one radius as a single one, those of one size as copies of one.
+
+    distance: (N,) of the shape at points (N, 3), unit lengths like the holes. Where the shape is solid
+    between two holes they stay two.
+    """
+    drilled: list[_Drilled] = []
+    for hole in holes:
+        for copy in hole.copies:
+            one = _Drilled.of(copy)
+            for k, other in enumerate(drilled):
+                both = other.joined(one)
+                if both is not None and (distance(both.points()) > -_BURR).all():
+                    drilled[k] = both
+                    break
+            else:
+                drilled.append(one)
+    result: list[Part] = []
+    for one in drilled:
+        part = one.part()
+        same = next((k for k, other in enumerate(result) if _is_copy(other, part)), None)
+        if same is None:
+            result.append(part)
+        else:
+            x, y, z = np.subtract(part.translation, result[same].translation).tolist()
+            moves = (*result[same].instances, Similarity(translation=(x, y, z)))
+            result[same] = dataclasses.replace(result[same], instances=moves)
+    return result
+
+
+@dataclass(frozen=True)
+class _Drilled:
+    """A hole of a radius from one point of its axis to another; rotation: of the part that it was."""
+
+    radius: float
+    start: np.ndarray
+    end: np.ndarray
+    rotation: Quaternion
+
+    @classmethod
+    def of(cls, part: Part) -> _Drilled:
+        assert isinstance(part.field, Cylinder)
+        half = rotation_matrix(part.rotation)[:, 2] * part.field.height / 2
+        middle = np.array(part.translation)
+        return cls(part.field.radius, middle - half, middle + half, part.rotation)
+
+    def joined(self, other: _Drilled) -> _Drilled | None:
+        """Both as one; None where they differ in axis or radius."""
+        axis = (self.end - self.start) / np.linalg.norm(self.end - self.start)
+        ends = np.stack([self.start, self.end, other.start, other.end])
+        along = (ends - self.start) @ axis
+        aside = np.linalg.norm(ends - self.start - along[:, None] * axis, axis=1)
+        near = _SAME * max(self.radius, other.radius)
+        if abs(self.radius - other.radius) > near or aside.max() > max(near, _ASIDE):
+            return None
+        low, high = float(along.min()), float(along.max())
+        return dataclasses.replace(self, start=self.start + low * axis, end=self.start + high * axis)
+
+    def points(self) -> np.ndarray:
+        """(N, 3) within it."""
+        frame = rotation_matrix(self.rotation)
+        turns = np.arange(8) * (np.pi / 4)
+        ring = 0.9 * self.radius * (np.column_stack([np.cos(turns), np.sin(turns)]) @ frame[:, :2].T)
+        steps = np.linspace(0.02, 0.98, 25)[:, None, None]
+        return np.asarray(self.start + steps * (self.end - self.start) + [*ring, np.zeros(3)]).reshape(-1, 3)
+
+    def part(self) -> Part:
+        x, y, z = ((self.start + self.end) / 2).tolist()
+        height = float(np.linalg.norm(self.end - self.start))
+        return Part(Cylinder(self.radius, height), (x, y, z), self.rotation)
+
+
+def _is_copy(one: Part, other: Part) -> bool:
+    """Whether a shift takes one hole to the other."""
+    assert isinstance(one.field, Cylinder)
+    assert isinstance(other.field, Cylinder)
+    parallel = np.allclose(rotation_matrix(one.rotation), rotation_matrix(other.rotation), atol=1e-6)
+    near = _SAME * one.field.radius
+    return bool(
+        parallel
+        and abs(one.field.radius - other.field.radius) < near
+        and abs(one.field.height - other.field.height) < _ASIDE
+    )
