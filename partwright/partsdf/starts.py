@@ -51,14 +51,18 @@ class Start:
 
 
 def ways_to_stand(up: str | None) -> list[Quaternion]:
-    """Turns from how the family stands to how a shape may: about the up axis, and to all up axes if unknown.
+    """Turns from how the family stands to how a shape may, the first of which is none.
 
-    The first leaves it as it is where its up axis is the family's, or unknown.
+    All 24 where the up axis is unknown. Else those about it, for a family with the same one, and those that
+    bring `FAMILY_UP` to it.
     """
     half = math.pi / 4
     about = [(math.cos(k * half), 0.0, 0.0, math.sin(k * half)) for k in range(4)]
-    axes = [up] if up else list(_FROM_Z)
-    return [quaternion_product(_FROM_Z[axis], turn) for axis in axes for turn in about]
+    raised = [quaternion_product(_FROM_Z[axis], turn) for axis in ([up] if up else _FROM_Z) for turn in about]
+    if up in (None, FAMILY_UP):
+        return raised
+    w, x, y, z = _FROM_Z[up]
+    return [*(quaternion_product(turn, (w, -x, -y, -z)) for turn in raised), *raised]
 
 
 @torch.no_grad()
