@@ -140,13 +140,11 @@ def warnings(shape: Shape, scores: Scores) -> list[str]:
 
 def _about_openings(shape: Shape) -> str:
     """How much of the surface is made up, and where: scores are against the repaired shape, so hide it."""
-    from partwright.metrics.deviation import place_name
+    from partwright.metrics.deviation import place_in
 
     openings = shape.openings
     assert openings.largest is not None  # what has a share has a place
-    middle = shape.frame.to_unit(openings.largest)
-    size = shape.frame.length_to_unit(shape.vertices.max(axis=0) - shape.vertices.min(axis=0))
-    place = f"at the {place_name(middle, size, shape.up)}"
+    place = f"at the {place_in(shape, shape.frame.to_unit(openings.largest))}"
     if openings.count > 1:
         place = f"in {openings.count} places, the largest {place}"
     return (

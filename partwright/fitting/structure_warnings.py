@@ -100,7 +100,6 @@ def _opened(first: Node, cut: Node, rng: np.random.Generator) -> np.ndarray:
 
 
 def _place(shape: Shape, point: np.ndarray) -> str:
-    from partwright.metrics.deviation import place_name
+    from partwright.metrics.deviation import place_in
 
-    size = shape.frame.length_to_unit(shape.vertices.max(axis=0) - shape.vertices.min(axis=0))
-    return place_name(shape.frame.to_unit(point), size, shape.up)
+    return place_in(shape, shape.frame.to_unit(point))

@@ -137,6 +137,12 @@ def place_name(unit_point: np.ndarray, unit_size: np.ndarray, up: str | None = N
     return " ".join(word for word in reversed(named) if word) or "middle"
 
 
+def place_in(shape: Shape, unit_point: np.ndarray) -> str:
+    """Where a point (3,) of the unit frame is in a shape, in words."""
+    size = shape.frame.length_to_unit(np.ptp(shape.vertices, axis=0))
+    return place_name(unit_point, size, shape.up)
+
+
 def _in_input_units(pair: Comparison, length: float) -> float:
     return float(pair.shape.frame.length_from_unit(length))
 

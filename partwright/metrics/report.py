@@ -7,12 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from partwright.metrics.cad import CadScores, cad_scores
 from partwright.metrics.chamfer import chamfer_floor
 from partwright.metrics.comparison import Comparison
-from partwright.metrics.deviation import place_name
+from partwright.metrics.deviation import place_in
 from partwright.metrics.table import METRICS
 from partwright.shapes import LONGEST_SIDE
 
@@ -79,7 +77,6 @@ def evaluate(
 
     worst = pair.deviation.worst_point
     longest = float(shape.frame.length_from_unit(LONGEST_SIDE))
-    size = shape.frame.length_to_unit(np.ptp(shape.vertices, axis=0))
     largest, beyond, most = (of(name) for name in ("max_deviation", "max_protrusion", "deviation_95"))
     return Scores(
         iou=of("iou"),
@@ -95,7 +92,7 @@ def evaluate(
         max_deviation_share=largest / longest,
         max_protrusion_share=beyond / longest,
         deviation_95_share=most / longest,
-        worst_place=place_name(worst, size, shape.up),
+        worst_place=place_in(shape, worst),
         worst_point=tuple(shape.frame.from_unit(worst).tolist()),
         cad=cad_scores(assembly, shape, cad_points, seed, pair.surface) if cad_points else None,
         further={name: metric(pair) for name, metric in further.items()},

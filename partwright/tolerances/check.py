@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.meshing import mesh_assembly
-from partwright.metrics.deviation import COUNT, place_name, projected, surface_deviation
+from partwright.metrics.deviation import COUNT, projected, surface_deviation
 from partwright.shapes import Shape
 from partwright.shapes.sampling import sample_triangles
 from partwright.tolerances.distance_bounds import DistanceBounds
@@ -93,11 +93,6 @@ def check(assembly: Assembly, shape: Shape, bounds: DistanceBounds, seed: int = 
         )
         found["tolerance"] = Side(apart.maximum, apart.worst_point)
     return Checked(bounds, found)
-
-
-def place_of(point: Floats, shape: Shape) -> str:
-    """A unit-frame place in words."""
-    return place_name(point, shape.frame.length_to_unit(np.ptp(shape.vertices, axis=0)), shape.up)
 
 
 def shape_points(shape: Shape, count: int, seed: int) -> NDArray[np.float32]:

@@ -9,8 +9,8 @@ from typing import Any
 from partwright.assembly import Assembly
 from partwright.errors import BoundsError
 from partwright.methods import Cancellation
+from partwright.metrics.deviation import place_in
 from partwright.shapes import Shape
-from partwright.tolerances.check import place_of
 from partwright.tolerances.distance_bounds import DistanceBounds, Length, format_length
 from partwright.tolerances.minimising import minimise_parts
 from partwright.tolerances.satisfying import Bounded, measured, satisfy
@@ -93,7 +93,7 @@ def bounds_report(bounded: Bounded, shape: Shape, volume: float) -> dict[str, An
             "asked": float(shape.frame.length_from_unit(getattr(checked.bounds, name))),
             "reached": max(0.0, float(shape.frame.length_from_unit(side.worst))),
             "kept": name not in checked.excess,
-            "place": place_of(side.point, shape),
+            "place": place_in(shape, side.point),
         }
     return {**entries, "volume_ratio": volume / shape.volume}
 
@@ -113,7 +113,7 @@ def bounds_warnings(bounded: Bounded, shape: Shape) -> list[str]:
         side = checked.found[name]
         missed = _MISSED[name].format(reached=format_length(side.worst, shape))
         asked = format_length(getattr(checked.bounds, name), shape)
-        place = place_of(side.point, shape)
+        place = place_in(shape, side.point)
         parts = len(bounded.assembly)
         result.append(
             f"{name} {asked} is not kept: {missed}, at the {place}, with {parts} part{'s' * (parts > 1)}"
