@@ -73,6 +73,8 @@ TABLES = (
     Table("scenes.md", "formats.py", None, 0,
           "build/fits/capri build/fits/solids build/fits/superfrusta --formats .glb,.usdc,.mjcf.xml,.urdf "
           "--rows build/scenes.jsonl --target benchmarks/results/scenes.md", 20, "build/fits"),
+    Table("conformance.md", "conformance.py", None, 0, "build/fits/solids build/fits/superfrusta "
+          "--node build/node/node_modules", 10, "build/fits, npm's gltf-validator"),
     Table("collision.md", "collision.py", "--names mug --rows collision.jsonl --target collision.md", 2,
           "--shapes {data} --names parts/robot_arm/ur5e/forearm,cad/ttt_angle_bracket,toys/mug,toys/hammer,"
           "cad/bd_rod_end,parts/robot_arm/ur3/forearm,parts/robot_arm/ur5e/upper_arm,"
