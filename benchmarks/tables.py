@@ -88,6 +88,10 @@ TABLES = (
           None, 0, "robots of packages on PyPI, which the script names"),
     Table("optimise.md", "optimise.py", None, 0,
           "--shapes {data} --output benchmarks/results/optimise.md", 30),
+    Table("drag.md", "drag.py", None, 0,
+          "--flows flows --cars 3 --convergence --output benchmarks/results/drag.md", 20,
+          "OpenFOAM, and flows/ by partwright parts simulate cars -o flows --count 57 --seed 20 "
+          "--air y,ground,iterations=100"),
     Table("anchors.md", "anchors.py", "--names bracket --peers coacd", 2, "", 20, "the peers"),
     Table("batch.md", "batch.py", "--shapes 8 --kills 4", 3,
           "--shapes 200 --kills 20 --output benchmarks/results/batch.md", 30),
