@@ -1,0 +1,107 @@
+"""Fits as STEP: whether the solid is valid, what its faces are, and how much of the input's volume it has.
+
+    python benchmarks/solids.py --shapes FOLDER --sets cad --variants solids --fits FITS
+    python benchmarks/step.py --shapes FOLDER --sets cad --fits FITS/solids
+
+FITS/solids/NAME/assembly.json is exported, and the file is read again by the CAD kernel.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+from fit import find_shapes, machine
+
+import partwright as pw
+from partwright.atomic_io import write_bytes
+
+HERE = Path(__file__).parent
+WITHIN = 0.005  # of the volume
+NAMES = ("plane", "cylinder", "cone", "sphere", "torus", "revolution", "other")
+
+
+def faces_of(path: Path) -> tuple[bool, float, Counter[str]]:
+    """Whether the solid in a STEP file is valid, its volume, and its faces by kind."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+    from OCP.STEPControl import STEPControl_Reader
+    from OCP.TopAbs import TopAbs_FACE
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    reader = STEPControl_Reader()
+    reader.ReadFile(str(path))
+    reader.TransferRoots()
+    solid = reader.OneShape()
+    properties = GProp_GProps()
+    BRepGProp.VolumeProperties_s(solid, properties)
+    kinds: Counter[str] = Counter()
+    explorer = TopExp_Explorer(solid, TopAbs_FACE)
+    while explorer.More():
+        kind = BRepAdaptor_Surface(TopoDS.Face(explorer.Current())).GetType().name.lower()
+        kinds[next((name for name in NAMES if name in kind), "other")] += 1
+        explorer.Next()
+    return BRepCheck_Analyzer(solid).IsValid(), properties.Mass(), kinds
+
+
+def row(name: str, assembly: Path, shape: Path, folder: Path) -> tuple[str, bool]:
+    """A line of the table, and whether the file is as it should be."""
+    started, file = time.process_time(), folder / f"{name}.step"
+    whole = pw.load_assembly(assembly)
+    pw.export(whole, file)
+    valid, volume, kinds = faces_of(file)
+    share = volume / pw.load_shape(shape).volume
+    good = valid and abs(share - 1) <= WITHIN and not kinds["other"]
+    cells = [name, str(len(whole)), "yes" if valid else "no", f"{100 * (share - 1):+.2f}"]
+    cells += [str(kinds[kind] or "") for kind in NAMES]
+    return f"| {' | '.join(cells)} | {time.process_time() - started:.1f} |", good
+
+
+def main() -> int:
+    options = parser().parse_args()
+    lines, good, tried = [], 0, 0
+    with tempfile.TemporaryDirectory() as folder:
+        for entry in find_shapes(options.shapes, {*filter(None, options.sets.split(","))}, set()):
+            assembly = options.fits / entry.name / "assembly.json"
+            if assembly.exists():
+                line, fine = row(entry.name, assembly, entry.path, Path(folder))
+                lines.append(line)
+                good, tried = good + fine, tried + 1
+                print(line, flush=True)
+    head = [
+        "# Fits of solids as STEP",
+        "",
+        f"`python benchmarks/step.py --shapes {options.shapes.name} --sets {options.sets} --fits "
+        f"{options.fits.name}` on {machine()}.",
+        "",
+        f"{good} of {tried} are valid, analytic and within {100 * WITHIN:g} % of the input's volume. "
+        "Faces by what their surface is; CPU seconds of export and reading.",
+        "",
+        f"| shape | parts | valid | volume % | {' | '.join(NAMES)} | CPU s |",
+        "|---|---:|---|---:|" + "---:|" * (len(NAMES) + 1),
+    ]
+    write_bytes(options.output, ("\n".join([*head, *lines]) + "\n").encode())
+    return int(good < tried)
+
+
+def parser() -> argparse.ArgumentParser:
+    result = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    option = result.add_argument
+    option("--shapes", type=Path, required=True, metavar="FOLDER", help="an index.json, or meshes")
+    option("--sets", default="cad", metavar="A,B", help="only these sets (default: %(default)s)")
+    option("--fits", type=Path, required=True, metavar="FOLDER", help="fits, as FOLDER/NAME/assembly.json")
+    option("-o", "--output", type=Path, default=HERE / "results" / "step.md", metavar="FILE")
+    return result
+
+
+if __name__ == "__main__":
+    sys.exit(main())
