@@ -54,6 +54,11 @@ def far_pieces(search: FeatureSearch, tree: FeatureTree) -> list[tuple[float, bo
     return found
 
 
+def farthest(search: FeatureSearch, tree: FeatureTree) -> float:
+    """How far the farthest piece reaches, unit lengths; 0 where none is further than `FAR`."""
+    return max((reach for reach, _, _ in far_pieces(search, tree)), default=0.0)
+
+
 def _with_best(
     search: FeatureSearch, tree: FeatureTree, piece: Manifold, added: bool, alike: list[Manifold]
 ) -> FeatureTree | None:

@@ -26,7 +26,7 @@ from partwright.assembly.similarity import rotation_matrix
 from partwright.meshing.csg import solid_of
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
-from partwright.superfrusta.feature_mending import mended
+from partwright.superfrusta.feature_mending import farthest, mended
 from partwright.superfrusta.samples import FitSamples
 
 _FREE_SIDES = 4
@@ -65,7 +65,8 @@ class FeatureTree:
     """Features in order, and the samples (N,) within their fold.
 
     missed, excess: what of the shape the fold lacks, and what it has too much, as bodies without the skins
-    that chords leave. objectives: after each step.
+    that chords leave. objectives: after each step. off: how far a place is off that nothing mends, unit
+    lengths; 0 where none is.
     """
 
     features: list[Feature] = field(default_factory=list)
@@ -75,6 +76,7 @@ class FeatureTree:
     score: float = 0.0
     price: float = 0.0
     objectives: tuple[float, ...] = ()
+    off: float = 0.0
 
     def at(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
         """(N,) whether points (N, 3) lie within the fold."""
@@ -143,7 +145,7 @@ class FeatureSearch:
             tree = self._grown(self.extended(empty, own[index], True), own, best)
             if best is None or tree.objective > best.objective:
                 best = tree
-        return mended(self, best) if best is not None else None
+        return replace(whole := mended(self, best), off=farthest(self, whole)) if best is not None else None
 
     def _grown(self, tree: FeatureTree, own: Sequence[Candidate], best: FeatureTree | None) -> FeatureTree:
         """Until nothing pays, or it is well behind where the best so far was after as many steps."""

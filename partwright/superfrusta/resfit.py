@@ -83,7 +83,9 @@ def fit(request: FitRequest[Settings]) -> Fitted:
             "can see. Check its thickness, or use --quality high"
         )
     leaves = search.leaves or [RepeatedPart(row) for row in search.best]
-    if features is not None and features.objective >= search.objective(search.best, len(leaves)):
+    if features is not None and features.objective - features.off >= search.objective(
+        search.best, len(leaves)
+    ):
         return Fitted(assembly(shape, features), outcome, search.seconds, search.history)
     whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
     curve: list[CurvePoint] = []
