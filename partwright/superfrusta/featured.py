@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from partwright.approximation.plain_numbers import with_plain_numbers
 from partwright.approximation.sketches.ends import with_open_ends
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.assembly import Assembly, Part
+from partwright.errors import CancelledError
 from partwright.fields import Cylinder
 from partwright.methods import Checkpoint, FitRequest, Progress
 from partwright.shapes import Shape
@@ -20,6 +22,10 @@ from partwright.superfrusta.flat_tree import nested
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 
+_SHARE, _HALFWAY = (
+    0.3,
+    10,
+)  # of a fit's work that features are at most, and steps after which half of it is done
 _PLAIN = 1e-4  # unit lengths: how far numbers are moved to become plain
 SURE = 0.95
 """R from which on a tree of features is the result, and no other is looked for."""
@@ -34,25 +40,43 @@ def wants_features(request: FitRequest[Settings]) -> bool:
 
 def feature_tree(
     request: FitRequest[Settings], samples: FitSamples, checkpoint: Checkpoint
-) -> FeatureTree | None:
-    """The best tree of features within the part budget; none where the surface has no sections, or where it
-    misses the IoU that is asked for."""
+) -> tuple[FeatureTree | None, bool]:
+    """The best tree of features within the part budget, and whether it was interrupted; none where the
+    surface has no sections, or where it misses the IoU that is asked for.
+
+    Raises:
+        CancelledError: cancelled before there was a feature.
+    """
     settings = request.settings
+    seen: list[FeatureTree] = []
+
+    def report(tree: FeatureTree, share: float) -> None:
+        iou, count = volume_iou(tree, samples), len(tree.features)
+        made = partial(assembly, request.shape, tree)
+        request.run.told(Progress("features", count, count, count, iou, share, made))
 
     def told(tree: FeatureTree) -> None:
-        iou, count = volume_iou(tree, samples), len(tree.features)
-        run = request.run
-        run.told(Progress("features", count, count, count, iou, 0.3, lambda: assembly(request.shape, tree)))
+        seen.append(seen[-1] if seen and seen[-1].objective > tree.objective else tree)
+        report(seen[-1], _SHARE * len(seen) / (len(seen) + _HALFWAY))
 
     search = FeatureSearch(request.shape, samples, settings.alpha, checkpoint, settings.max_parts, told)
-    tree = search.run()
+    try:
+        tree = search.run()
+        if tree is not None:
+            seen.append(tree)
+            report(tree, _SHARE)
+        checkpoint()
+    except CancelledError:
+        if not seen:
+            raise
+        return seen[-1], True
     if tree is None or settings.min_iou is None:
-        return tree
+        return tree, False
     for count in range(1, len(tree.features) + 1):
         shorter = tree.first(count)
         if volume_iou(shorter, samples) >= settings.min_iou:
-            return search.scored(shorter)
-    return None
+            return search.scored(shorter), False
+    return None, False
 
 
 def volume_iou(tree: FeatureTree, samples: FitSamples) -> float:

@@ -62,9 +62,11 @@ def fit(request: FitRequest[Settings]) -> Fitted:
     features: FeatureTree | None = None
     if wants_features(request):
         with timed(seconds, "features"):
-            features = feature_tree(request, samples, checkpoint)
-        if features is not None and (features.score >= SURE or settings.min_iou is not None):
-            return Fitted(assembly(shape, features), "converged", seconds, [])
+            features, interrupted = feature_tree(request, samples, checkpoint)
+        if features is not None and (interrupted or features.score >= SURE or settings.min_iou is not None):
+            return Fitted(
+                assembly(shape, features), "interrupted" if interrupted else "converged", seconds, []
+            )
     assembled = partial(assembly_of, shape, settings=settings, fixed=fixed)
     search = ResidualFit(samples, settings, run.told, len(fixed), assembled, checkpoint, seconds=seconds)
     try:
@@ -88,12 +90,26 @@ def fit(request: FitRequest[Settings]) -> Fitted:
     ):
         return Fitted(assembly(shape, features), outcome, search.seconds, search.history)
     whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
+    whole = _with_locked(whole, request)
     curve: list[CurvePoint] = []
     for step in search.curve:
         smaller = curve[-1].assembly if curve else None
         one = assembled(step.rows, smaller=smaller)
         curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
     return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)))
+
+
+def _with_locked(whole: Assembly, request: FitRequest[Settings]) -> Assembly:
+    """With the locked parts' own numbers: the way to the unit frame and back rounds them."""
+    for name in request.locked:
+        given = request.start[name] if request.start is not None else None
+        if given is None or given.instances:
+            continue
+        found = replace(
+            whole[name], field=given.field, translation=given.translation, rotation=given.rotation
+        )
+        whole = whole.replace_part(name, found)
+    return whole
 
 
 @dataclass
