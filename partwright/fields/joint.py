@@ -55,13 +55,13 @@ class JointField(Field):
         Raises NoSurfaceError where it has none.
         """
 
-    @abstractmethod
     def whole(self, cell: float) -> trimesh.Trimesh | None:
         """The union of all members as a closed mesh of this field's own frame, in cells of this length or
         shorter where a wall is thin; None where it has no quicker way than any other field.
 
         Raises NoSurfaceError where nothing is left of it.
         """
+        return None
 
     @abstractmethod
     def together(self, points: np.ndarray, fields: Sequence[JointField]) -> list[np.ndarray]:
