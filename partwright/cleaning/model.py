@@ -61,7 +61,7 @@ class Model:
             if part.field.superfrustum() is None:
                 raise UncleanableError(
                     f"part {part.name!r} is a {part.field.kind}, whose numbers no relation can bind; only "
-                    "SuperFrusta and named solids can be cleaned"
+                    "SuperFrusta and named solids can be cleaned: fit --method solids --clean makes such"
                 )
             if size_of(part) == 0:
                 raise UncleanableError(f"part {part.name!r} has no size; take it out, or give it one")
