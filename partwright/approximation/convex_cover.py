@@ -72,41 +72,11 @@ def _far_off(solid: Manifold, pieces: list[Piece], deviation: float) -> list[Pie
     return [Piece(part) for part in left if reach(part) > deviation]
 
 
-def covering(pieces: list[Piece], solid: Manifold) -> list[Manifold]:
-    """The hulls, each moved out by as much as the solid sticks out of their union, found to rounding."""
-    from manifold3d import Manifold, OpType
-
-    hulls = [piece.hull for piece in pieces]
-    left = solid - Manifold.batch_boolean(hulls, OpType.Add)
-    if left.is_empty() or left.volume() <= 0:
-        return hulls
-    size = float(np.ptp(np.reshape(solid.bounding_box(), (2, 3)), axis=0).max())
-    out = []
-    for hull in hulls:
-        near = left ^ grown(hull, 0.02 * size)
-        points = surface_of(near)[0]
-        beyond = _beyond(hull, points).max(initial=0.0) if len(points) else 0.0
-        out.append(grown(hull, float(beyond) + 1e-7 * size) if beyond > 0 else hull)
-    return out
-
-
 def halved(piece: Piece) -> list[list[Piece]]:
     """What a piece is cut into across the middle of each of its principal axes."""
     least = _SLIVER * piece.solid.volume()
     cut = [_cut(piece, normal, offset, least) for normal, offset in across_axes(piece.corners)[:3]]
     return [parts for parts in cut if len(parts) > 1]
-
-
-def grown(hull: Manifold, by: float) -> Manifold:
-    """A convex solid with every face moved out by a length."""
-    from manifold3d import Manifold
-
-    normals, offsets = faces_of(hull)
-    lower, upper = np.reshape(hull.bounding_box(), (2, 3))
-    result = Manifold.cube(tuple((upper - lower + 2 * by).tolist())).translate(tuple((lower - by).tolist()))
-    for normal, offset in zip(normals, offsets, strict=True):
-        result = result.trim_by_plane(tuple((-normal).tolist()), -float(offset) - by)
-    return result
 
 
 def faces_of(hull: Manifold) -> tuple[np.ndarray, np.ndarray]:
@@ -123,12 +93,6 @@ def faces_of(hull: Manifold) -> tuple[np.ndarray, np.ndarray]:
     _, first = np.unique(np.round(normals, 9), axis=0, return_index=True)
     normals = normals[np.sort(first)]
     return normals, (corners @ normals.T).max(axis=0)
-
-
-def _beyond(hull: Manifold, points: np.ndarray) -> np.ndarray:
-    """(N,) how far points are outside of the nearest face's plane; negative inside."""
-    normals, offsets = faces_of(hull)
-    return np.asarray((points @ normals.T - offsets).max(axis=1))
 
 
 def _simplified(solid: Manifold, by: float) -> Manifold:

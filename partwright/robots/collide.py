@@ -15,7 +15,7 @@ import numpy as np
 from partwright.approximation.convex_fit import Mode
 from partwright.atomic_io import replacing_files
 from partwright.errors import RobotError, SettingError
-from partwright.robots.growing import shape_solid, sticking_out
+from partwright.robots.containment import shape_solid, sticking_out
 from partwright.robots.model import Link, RobotFile, Shape
 from partwright.robots.opening import open_robot
 from partwright.robots.overlaps import Pair, overlaps, too_near
@@ -167,6 +167,8 @@ def collide(
         near = too_near(pairs_before, pairs_after, volumes, _MORE_OVERLAP)
         neighbours = {frozenset((link.name, link.parent)) for link in links}
         todo = {name for pair in near if frozenset(pair) in neighbours for name in pair}
+        if options.enclose:  # nothing is left to be finer by
+            todo = {name for name in todo if len(shapes[name]) < options.max_parts}
         if not todo or turn == _FINER:
             break
         for name in todo:

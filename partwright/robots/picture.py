@@ -11,7 +11,7 @@ import numpy as np
 from partwright.assembly.palette import palette
 from partwright.meshing.manifolds import surface_of
 from partwright.render import Camera, render_mesh, sheet, write_png
-from partwright.robots.growing import shape_solid
+from partwright.robots.containment import shape_solid
 from partwright.robots.model import RobotFile, Shape
 from partwright.robots.solids import Solids
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,16 +11,15 @@ import numpy as np
 from partwright.approximation.balanced_hull import balanced_hull
 from partwright.approximation.convex_cover import (
     convex_cover,
-    covering,
     faces_of,
-    grown,
     halved,
 )
 from partwright.approximation.convex_fit import ConvexFit, Mode, convex_fits
 from partwright.approximation.convex_piece import Limits, Piece
 from partwright.approximation.light_hull import light_hull
 from partwright.meshing.manifolds import as_mesh, surface_of
-from partwright.robots.growing import enclosed, shape_solid
+from partwright.robots.containment import larger, shape_solid
+from partwright.robots.enclosing import containing, outer_hull
 from partwright.robots.model import Shape
 from partwright.robots.solids import Target
 from partwright.shapes import MeshDistance
@@ -27,10 +27,13 @@ from partwright.shapes import MeshDistance
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
+    from partwright.assembly import Part
     from partwright.fields import Field
 
 NATIVE_FOR = 0.03  # of its volume: by how much a native solid may be worse than the hull that it saves
-_LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners
+_LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners, or add for fewer faces
+_FACES = 64  # of an enclosing hull
+_ROOM = 1e-6  # of the size: by how much an enclosing shape is larger than it need be, for rounding
 _POINTS = 50_000  # of the triangles, for the hulls of wrapped pieces
 _LEAST = 1e-3  # of a wrapped piece's volume: a hull of points below it is a sheet
 _STEPS = 14  # of the bisection for shapes within
@@ -59,51 +62,68 @@ def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
     pieces = convex_cover(solid, Limits(wishes.tolerance, wishes.extra, wishes.most))
     if not wishes.hulls:
         pieces = _fit_for_natives(pieces, wishes)
-    if target.loose and wishes.mode == "around":
-        hulls = [_tight(piece, target) for piece in pieces]
-    elif wishes.mode == "around":
-        hulls = covering(pieces, target.solid)
+    if wishes.mode == "around":
+        hulls = _enclosing(pieces, target, wishes)
     elif wishes.mode == "nearest":
         hulls = [balanced_hull(piece, wishes.tolerance) for piece in pieces]
     else:
         hulls = [piece.hull for piece in pieces]
-    chosen = [_chosen(piece, hull, wishes) for piece, hull in zip(pieces, hulls, strict=True)]
+    chosen = [_chosen(piece, hull, target, wishes) for piece, hull in zip(pieces, hulls, strict=True)]
     if wishes.mode == "within":
         chosen = [one for shape in chosen if (one := _within(shape, target)) is not None]
     names = [name] if len(chosen) == 1 else [f"{name}_{i}" for i in range(1, len(chosen) + 1)]
-    shapes = [Shape(each, shape.part, shape.mesh) for each, shape in zip(names, chosen, strict=True)]
-    return enclosed(shapes, target) if wishes.mode == "around" else shapes
+    return [Shape(each, shape.part, shape.mesh) for each, shape in zip(names, chosen, strict=True)]
 
 
-def _chosen(piece: Piece, hull: Manifold, wishes: Wishes) -> Shape:
+def _enclosing(pieces: list[Piece], target: Target, wishes: Wishes) -> list[Manifold]:
+    """Hulls of the pieces, of few faces, and of all triangles that stick out of them: these contain every
+    triangle."""
+    fine, room = _LIGHT * wishes.tolerance, _ROOM * target.size
+    hulls = _tight(pieces, target) if target.loose else [piece.hull for piece in pieces]
+    hulls = [outer_hull(hull, fine, _FACES, room) for hull in hulls]
+    more = containing(hulls, target.vertices[target.faces], fine)
+    return [
+        new if new is old else outer_hull(new, fine, _FACES, room)
+        for old, new in zip(hulls, more, strict=True)
+    ]
+
+
+def _chosen(piece: Piece, hull: Manifold, target: Target, wishes: Wishes) -> Shape:
     """By volume: a native solid where it is near enough and hardly worse than the hull."""
     own = piece.solid.volume()
     added = max(hull.volume() - own, 0.0) / own
     fits = convex_fits(hull, wishes.kinds, wishes.mode) if wishes.kinds else []
     if not wishes.hulls:
-        return Shape("", min(fits, key=lambda fit: fit.volume_error_ratio).part)
+        return _native(fits[0].part, target, wishes)
     near = [fit for fit in fits if fit.deviation <= wishes.tolerance and fit.volume_error_ratio <= NATIVE_FOR]
     if near and near[0].volume_error_ratio + added <= added + NATIVE_FOR:
-        return Shape("", near[0].part)
-    return Shape("", mesh=_mesh(_light(hull, wishes)))
+        return _native(near[0].part, target, wishes)
+    if wishes.mode != "around":
+        hull = light_hull(hull, _LIGHT * wishes.tolerance)[0]
+    return Shape("", mesh=as_mesh(hull))
 
 
-def _tight(piece: Piece, target: Target) -> Manifold:
-    """The hull of the triangles' own points that lie in a piece of what wraps them."""
+def _native(part: Part, target: Target, wishes: Wishes) -> Shape:
+    if wishes.mode != "around":
+        return Shape("", part)
+    return Shape("", dataclasses.replace(part, field=larger(part.field, _ROOM * target.size)))
+
+
+def _tight(pieces: list[Piece], target: Target) -> list[Manifold]:
+    """The hulls of the triangles' own points that lie in each piece of what wraps them."""
     from manifold3d import Manifold
 
-    points = target.samples(_POINTS, seed=0)
-    lower, upper = np.reshape(piece.hull.bounding_box(), (2, 3))
-    points = points[((points >= lower) & (points <= upper)).all(axis=1)]
-    normals, offsets = faces_of(piece.hull)
-    within = points[(points @ normals.T <= offsets + 1e-9 * target.size).all(axis=1)]
-    hull = Manifold.hull_points(within) if len(within) > 3 else Manifold()
-    return piece.hull if hull.is_empty() or hull.volume() < _LEAST * piece.hull.volume() else hull
-
-
-def _light(hull: Manifold, wishes: Wishes) -> Manifold:
-    light, beyond = light_hull(hull, _LIGHT * wishes.tolerance)
-    return grown(light, beyond) if wishes.mode == "around" and beyond > 0 else light
+    points, room = target.samples(_POINTS, seed=0), 1e-9 * target.size
+    hulls = []
+    for piece in pieces:
+        lower, upper = np.reshape(piece.hull.bounding_box(), (2, 3))
+        within = points[((points >= lower) & (points <= upper)).all(axis=1)]
+        for normal, offset in zip(*faces_of(piece.hull), strict=True):
+            within = within[within @ normal <= offset + room]
+        hull = Manifold.hull_points(within) if len(within) > 3 else Manifold()
+        sheet = hull.is_empty() or hull.volume() < _LEAST * piece.hull.volume()
+        hulls.append(piece.hull if sheet else hull)
+    return hulls
 
 
 def _fit_for_natives(pieces: list[Piece], wishes: Wishes) -> list[Piece]:
@@ -174,8 +194,3 @@ def _scaled(shape: Shape, centre: np.ndarray, scale: float) -> Shape:
     mesh = shape.mesh.copy()
     mesh.vertices = (mesh.vertices - centre) * scale + centre
     return Shape(shape.name, mesh=mesh)
-
-
-def _mesh(hull: Manifold):  # type: ignore[no-untyped-def]  # trimesh
-
-    return as_mesh(hull)

@@ -9,7 +9,7 @@ import pytest
 from manifold3d import Manifold, OpType
 
 from partwright.approximation.balanced_hull import balanced_hull
-from partwright.approximation.convex_cover import convex_cover, covering, faces_of, grown
+from partwright.approximation.convex_cover import convex_cover, faces_of
 from partwright.approximation.convex_piece import Limits, Piece
 from partwright.approximation.light_hull import light_hull
 
@@ -69,8 +69,8 @@ def test_limits_are_kept_and_hulls_cover() -> None:
     assert len(loose) <= len(tight)
     for pieces, extra in ((loose, 0.2), (tight, 0.03)):
         assert sum(piece.extra for piece in pieces) <= extra * solid.volume() * (1 + 1e-6)
-        hulls = covering(pieces, solid)
-        assert (solid - union(hulls)).volume() < 1e-6 * solid.volume()
+        hulls = [piece.hull for piece in pieces]
+        assert (solid - union(hulls)).volume() < 3e-3 * solid.volume()
 
 
 def test_a_speck_far_from_all_else_is_covered_and_one_beside_it_is_not() -> None:
@@ -88,14 +88,6 @@ def test_no_more_pieces_than_asked_for() -> None:
     pieces = convex_cover(hollow_box(), Limits(0.05, most=2))
     assert len(pieces) == 2
     assert (hollow_box() - union([piece.hull for piece in pieces])).volume() < 1e-9
-
-
-def test_a_hull_grows_by_the_length_along_every_face() -> None:
-    cube = box(0, 0, 0, 1, 1, 1).rotate((10, 20, 30))
-    larger = grown(cube, 0.1)
-    round_ = Manifold.batch_hull([Manifold.sphere(0.1, 32).translate(tuple(c)) for c in corners_of(cube)])
-    assert (round_ - larger).volume() < 1e-12
-    assert round_.volume() < larger.volume() <= 1.2**3
 
 
 def test_a_light_hull_says_what_it_loses() -> None:

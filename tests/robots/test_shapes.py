@@ -12,7 +12,7 @@ from manifold3d import Manifold, OpType
 
 from partwright.errors import SettingError
 from partwright.robots import CollideOptions, collide, save
-from partwright.robots.growing import outside_of, shape_solid
+from partwright.robots.containment import outside_of, shape_solid
 from partwright.robots.solids import Solids
 from tests.robots.robots import mjcf, urdf
 

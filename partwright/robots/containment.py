@@ -1,4 +1,4 @@
-"""Shapes that contain what they stand for: grown by what sticks out of them, and tried on fresh points."""
+"""Whether shapes contain what they stand for: tried on fresh points, in double precision."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.convex_cover import faces_of, grown
+from partwright.approximation.convex_cover import faces_of
 from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
-from partwright.meshing.manifolds import as_mesh
 from partwright.robots.model import Shape
 
 if TYPE_CHECKING:
@@ -19,41 +18,14 @@ if TYPE_CHECKING:
 
     from partwright.robots.solids import Target
 
-_POINTS, _MANY = 20_000, 100_000  # of the triangles: to grow by, and to be sure by
-_ROUNDS, _CLEAN = 24, 5  # at most so many draws; it ends after so many in turn with nothing outside
-_MARGIN = 1e-6  # of the size: room for rounding, twice as much in each round
-_BEYOND = 0.2  # of what sticks out, more in each round: between two points that do, others may stick out more
+_POINTS = 100_000  # of the triangles, that are tried
 _SEGMENTS = 64
-
-
-def enclosed(shapes: Sequence[Shape], target: Target) -> list[Shape]:
-    """The shapes, those grown out of which some of the target's surface sticks: each by what is nearest to
-    it. Triangles run from one shape into another, so corners are not enough: it ends when
-    `_CLEAN` draws of `_MANY` points have none outside."""
-    shapes = list(shapes)
-    count, clean = _POINTS, 0
-    for turn in range(_ROUNDS):
-        room = 2 ** min(turn, 10) * _MARGIN * target.size
-        points = _left_out(shapes, target.samples(count, seed=turn))
-        if not len(points):
-            clean += count == _MANY
-            count = _MANY
-            if clean == _CLEAN:
-                break
-            continue
-        clean = 0
-        outside = np.stack([outside_of(shape, points) for shape in shapes])
-        more = 1 + _BEYOND * (1 + turn)
-        nearest, far = outside.argmin(axis=0), outside.min(axis=0)
-        for i in np.unique(nearest):
-            shapes[i] = _larger(shapes[i], more * float(far[nearest == i].max()) + room)
-    return shapes
 
 
 def sticking_out(shapes: Sequence[Shape], target: Target, seed: int = 1_000) -> float:
     """How far the target's surface sticks out of the shapes, by fresh points and all its corners; 0 for not
     at all."""
-    points = _left_out(shapes, target.samples(_MANY, seed))
+    points = _left_out(shapes, target.samples(_POINTS, seed))
     return float(np.min([outside_of(shape, points) for shape in shapes], axis=0).max(initial=0.0))
 
 
@@ -124,16 +96,8 @@ def _native(field: Field) -> Manifold:
     raise AssertionError(f"{field.kind} is no native solid")
 
 
-def _larger(shape: Shape, by: float) -> Shape:
+def larger(field: Field, by: float) -> Field:
     """Every point of its surface further out by at least a length."""
-    import dataclasses
-
-    if shape.part is None:
-        return Shape(shape.name, mesh=as_mesh(grown(shape_solid(shape), by)))
-    return Shape(shape.name, dataclasses.replace(shape.part, field=_larger_field(shape.part.field, by)))
-
-
-def _larger_field(field: Field, by: float) -> Field:
     match field:
         case Box(size=(x, y, z)):
             return Box((x + 2 * by, y + 2 * by, z + 2 * by))

@@ -1,0 +1,82 @@
+"""Convex solids that contain triangles exactly, without growing more than they must."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold, OpType
+
+from partwright.approximation.convex_cover import faces_of
+from partwright.robots import CollideOptions, collide
+from partwright.robots.enclosing import containing, outer_hull
+from tests.robots.robots import urdf
+
+
+def inside(hulls: list[Manifold], triangles: np.ndarray) -> bool:
+    """Whether every one of many points of the triangles is in one of the hulls."""
+    weights = np.random.default_rng(5).dirichlet((1, 1, 1), 4000)
+    points = np.einsum("nk,tkj->tnj", weights, triangles).reshape(-1, 3)
+    outside = [(points @ normals.T - offsets).max(axis=1) for normals, offsets in map(faces_of, hulls)]
+    return bool(np.min(outside, axis=0).max() <= 1e-12)
+
+
+def cube(*lower: float) -> Manifold:
+    return Manifold.cube((1, 1, 1)).translate(lower)
+
+
+def test_a_triangle_that_runs_from_one_cube_into_the_next_adds_next_to_nothing() -> None:
+    cubes = [cube(0, 0, 0), cube(1, 0, 0)]
+    across = np.array([[[0.1, 0.1, 0.5], [1.9, 0.1, 0.5], [1.0, 0.9, 0.5]]])
+    found = containing(cubes, across, 0.01)
+    assert inside(found, across)
+    assert sum(one.volume() for one in found) <= 2.02
+    assert Manifold.batch_boolean(found, OpType.Add).volume() == pytest.approx(2.0, abs=1e-9)
+
+
+def test_what_is_far_off_joins_the_nearest() -> None:
+    cubes = [cube(0, 0, 0), cube(5, 0, 0)]
+    apart = np.array(
+        [[[1.0, 0, 0], [1.0, 1, 0], [1.5, 0.5, 0.5]], [[0.2, 0.2, 0.2], [0.8, 0.2, 0.2], [0.2, 0.8, 0.2]]]
+    )
+    found = containing(cubes, apart, 0.05)
+    assert inside(found, apart)
+    assert found[1] is cubes[1]
+    assert found[0].volume() == pytest.approx(1 + 0.5 / 6 * 2, abs=0.08)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_triangles_at_random_are_contained(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    balls = [Manifold.sphere(0.6, 24).translate(tuple(random.uniform(-1, 1, 3))) for _ in range(4)]
+    triangles = random.uniform(-1.2, 1.2, (20, 3, 3))
+    assert inside(containing(balls, triangles, 0.05), triangles)
+
+
+def test_an_outer_hull_contains_with_few_faces() -> None:
+    ball = Manifold.sphere(1.0, 96).rotate((10, 20, 30))
+    outer = outer_hull(ball, 0.02, 64, 1e-6)
+    assert (ball - outer).volume() < 1e-12
+    assert outer.num_vert() <= 2 * 64 - 4 < ball.num_vert() / 10
+    assert outer.volume() < 1.1 * ball.volume()
+    turned = cube(0, 0, 0).rotate((10, 20, 30))
+    exact = outer_hull(turned, 0.1, 64, 1e-9)
+    assert exact.volume() == pytest.approx(1.0, rel=1e-6)
+    assert exact.num_vert() == 8
+
+
+def test_enclosing_adds_no_more_than_pieces_do(tmp_path: Path) -> None:
+    """A bowl with a rim: its hull adds half as much again; pieces of it less, and none is moved out."""
+    path = urdf(tmp_path)
+    ball = [trimesh.creation.icosphere(3, radius) for radius in (0.5, 0.42)]
+    half = trimesh.creation.box((2, 2, 2), transform=trimesh.transformations.translation_matrix((0, 0, 1)))
+    bowl = trimesh.boolean.difference([ball[0], ball[1], half])
+    bowl.apply_translation((0, 0, 5))  # clear of the base
+    bowl.export(tmp_path / "meshes" / "rod.stl")
+    options = CollideOptions(enclose=True, tolerance="20mm", max_parts=12, kinds=("hull",))
+    arm = next(link for link in collide(path, options).links if link.link == "arm")
+    assert arm.sticking_out == 0
+    assert arm.missing < 1e-3
+    assert arm.extra < 0.6 * (bowl.convex_hull.volume / bowl.volume - 1)
