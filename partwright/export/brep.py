@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ from partwright.assembly.rows import as_superfrustum
 from partwright.errors import NoSurfaceError
 from partwright.export.brep_bent import bent_solid
 from partwright.export.brep_errors import opencascade_errors
+from partwright.export.brep_mended_profile import mended
 from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
@@ -48,7 +50,7 @@ def built(part: Part) -> Approximation | None:
     if field.quadric() is not None:  # by `quadric_solid`, or not at all
         return Approximation(field, part, 0.0, 0.0)
     if isinstance(field, Swept):
-        return _built_swept(part)
+        return _built_swept(part, field)
     f = field.superfrustum()
     if f is None or f.thinnest < SAME * max(*f.size, f.dilation):
         return None
@@ -60,17 +62,17 @@ def built(part: Part) -> Approximation | None:
     return None
 
 
-def _built_swept(part: Part) -> Approximation | None:
-    """An extrusion or revolution, which is exact; None where OpenCASCADE fails at it."""
-    from OCP.BRepCheck import BRepCheck_Analyzer
-
-    try:
-        shape = solid_of(part.field)
-    except NoSurfaceError:
-        return None
-    volume = float(mesh_part(dataclasses.replace(part, instances=()), 128).volume)
-    same = abs(volume_and_area(shape)[0] / volume - 1) < _SAME_VOLUME
-    return Approximation(part.field, part, 0.0, 0.0) if same and BRepCheck_Analyzer(shape).IsValid() else None
+def _built_swept(part: Part, field: Swept) -> Approximation:
+    """Exact, or with the nearest profile that OpenCASCADE takes; where there is none it is left to facets."""
+    exact = Approximation(field, part, 0.0, 0.0)
+    with suppress(NoSurfaceError):
+        solid_of(field)
+        return exact
+    for near, off in mended(field):
+        with suppress(NoSurfaceError):
+            volume, area = volume_and_area(solid_of(near))
+            return Approximation(near, dataclasses.replace(part, field=near), area * off / volume, off)
+    return exact
 
 
 @lru_cache(maxsize=256)
@@ -81,7 +83,7 @@ def solid_of(field: Field) -> TopoDS_Shape:
         NoSurfaceError: OpenCASCADE cannot build it.
     """
     if isinstance(field, Swept):
-        return swept_profile(field)
+        return _swept(field)
     f = as_superfrustum(field)
     longest = max(*f.size, f.dilation)
     corner = f.roundness * min(f.size[:2]) / 2
@@ -101,6 +103,16 @@ def solid_of(field: Field) -> TopoDS_Shape:
     except failures as error:
         raise NoSurfaceError("a part is too thin for a B-rep") from error
     return result
+
+
+def _swept(field: Swept) -> TopoDS_Shape:
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
+    shape = swept_profile(field)
+    volume = float(mesh_part(Part(field), 128).volume)
+    if abs(volume_and_area(shape)[0] / volume - 1) > _SAME_VOLUME or not BRepCheck_Analyzer(shape).IsValid():
+        raise NoSurfaceError(f"OpenCASCADE fails at an {field.kind}; keep its outline from touching itself")
+    return shape
 
 
 def _not_tiny(half: float, longest: float) -> float:

@@ -13,13 +13,13 @@ from partwright.meshing.manifolds import surface_of
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-    from partwright.assembly import Assembly
+    from partwright.assembly import Node
 
 CHORD = 1 / 400  # of the longest side: how far facets may lie from the surface
 SHORTEST = 1e-4  # of the longest side: shorter edges are collapsed, which OpenCASCADE would stumble over
 
 
-def faceted(node: Assembly) -> TopoDS_Shape:
+def faceted(node: Node) -> TopoDS_Shape:
     """The exact mesh of a node of quadrics and named solids, its triangles sewn into a solid.
 
     Raises:
@@ -41,6 +41,8 @@ def faceted(node: Assembly) -> TopoDS_Shape:
     sewing = BRepBuilderAPI_Sewing(SHORTEST / 10 * longest)
     for triangle in triangles:
         outline = BRepBuilderAPI_MakePolygon(*(gp_Pnt(*places[i].tolist()) for i in triangle), True)
+        if not outline.IsDone():
+            raise NoSurfaceError("the facets of a node are too small for a B-rep")
         face = BRepBuilderAPI_MakeFace(outline.Wire(), True)
         if face.IsDone():  # a needle has no plane; sewing closes the slit that it leaves
             sewing.Add(face.Shape())

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Wire
 
 Place = tuple[float, float]
+_SPHERE = 1e-9  # of an arc's radius: its centre's distance from the axis, at which it turns into a sphere
 
 
 def swept_profile(field: Swept) -> TopoDS_Shape:
@@ -52,7 +53,7 @@ def _revolved(field: Revolution) -> TopoDS_Shape:
     def upright(x: float, y: float) -> gp_Pnt:
         return gp_Pnt(x, 0.0, y)
 
-    axis, face = gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), _face(field.profile, upright)
+    axis, face = gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), _face(field.profile, upright, turned=True)
     turned = (
         BRepPrimAPI_MakeRevol(face, axis)
         if field.full
@@ -79,12 +80,12 @@ def _level(z: float) -> Callable[[float, float], gp_Pnt]:
     return lambda x, y: gp_Pnt(x, y, z)
 
 
-def _face(profile: Profile, at: Callable[[float, float], gp_Pnt]) -> TopoDS_Face:
-    """The profile as a plane face; at: where a point of it lies."""
+def _face(profile: Profile, at: Callable[[float, float], gp_Pnt], turned: bool = False) -> TopoDS_Face:
+    """The profile as a plane face; at: where a point of it lies; turned: it is to be, about x = 0."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 
     outline, *holes = (
-        _wire(loop, sides, at) for loop, sides in zip(profile.loops, profile.sides, strict=True)
+        _wire(loop, sides, at, turned) for loop, sides in zip(profile.loops, profile.sides, strict=True)
     )
     face = BRepBuilderAPI_MakeFace(outline, True)
     for hole in holes:
@@ -92,7 +93,9 @@ def _face(profile: Profile, at: Callable[[float, float], gp_Pnt]) -> TopoDS_Face
     return face.Face()
 
 
-def _wire(loop: Loop, sides: tuple[Side, ...], at: Callable[[float, float], gp_Pnt]) -> TopoDS_Wire:
+def _wire(
+    loop: Loop, sides: tuple[Side, ...], at: Callable[[float, float], gp_Pnt], turned: bool
+) -> TopoDS_Wire:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeWire
 
     wire = BRepBuilderAPI_MakeWire()
@@ -101,7 +104,7 @@ def _wire(loop: Loop, sides: tuple[Side, ...], at: Callable[[float, float], gp_P
         wire.Add(_circle(*found, loop, at))
         return wire.Wire()
     for side in sides:
-        wire.Add(_edge(side, at))
+        wire.Add(_edge(side, at, turned and _crosses_itself(side)))
     return wire.Wire()
 
 
@@ -118,14 +121,24 @@ def _circle(radius: float, centre: Place, loop: Loop, at: Callable[[float, float
     return BRepBuilderAPI_MakeEdge(gp_Circ(axes, radius)).Edge()
 
 
-def _edge(side: Side, at: Callable[[float, float], gp_Pnt]) -> TopoDS_Edge:
+def _crosses_itself(side: Side) -> bool:
+    """Whether the whole circle of an arc does when it is turned about x = 0, as a spindle torus."""
+    return side.centre is not None and _SPHERE * side.radius < abs(side.centre[0]) < side.radius
+
+
+def _edge(side: Side, at: Callable[[float, float], gp_Pnt], of_its_own: bool = False) -> TopoDS_Edge:
+    """A line or an arc; of_its_own: the arc's curve ends where the arc does, rather than be a whole circle.
+
+    Readers of STEP take points on a surface that crosses itself for others."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
     from OCP.GC import GC_MakeArcOfCircle
+    from OCP.GeomConvert import GeomConvert
 
     start, end = at(*side.start), at(*side.end)
     if side.centre is None:
         return BRepBuilderAPI_MakeEdge(start, end).Edge()
-    return BRepBuilderAPI_MakeEdge(GC_MakeArcOfCircle(start, at(*side.middle), end).Value()).Edge()
+    arc = GC_MakeArcOfCircle(start, at(*side.middle), end).Value()
+    return BRepBuilderAPI_MakeEdge(GeomConvert.CurveToBSplineCurve_s(arc) if of_its_own else arc).Edge()
 
 
 def _tapered(field: Extrusion) -> TopoDS_Shape:

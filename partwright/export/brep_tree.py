@@ -1,8 +1,4 @@
-"""Trees of B-rep solids: the boolean operations of OpenCASCADE, each result checked.
-
-Where surfaces nearly touch, OpenCASCADE may lose a solid, or a cut, and say nothing. So volumes are compared:
-with what an operation can give at all, and with the exact mesh where a node has one.
-"""
+"""Trees of B-rep solids: each node's boolean operation, its volume compared with that of the exact mesh."""
 
 from __future__ import annotations
 
@@ -18,6 +14,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import NoSurfaceError
 from partwright.export.brep import solid_of, volume_and_area
+from partwright.export.brep_booleans import operated
 from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
@@ -26,11 +23,9 @@ from partwright.meshing import has_exact_mesh, mesh_csg
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-_LOST = 1e-4  # of the larger volume: what an operation may lose by rounding
-_FUZZY = (0.0, 1e-5, 1e-3)  # tolerances of operations, of the cube root of the volume
 _OVERLAP = 0.02  # of a union's volume: more of it twice, and facets stand for the union
-_SAME_MESH = 5e-3  # share of the volume by which an exact mesh may differ from what it stands for
-_ORDERS = 4  # of operands, beside the given one and its reverse
+_CHORD = 5e-5  # of the longest side: how far an exact mesh may lie from its surface
+_SAME_MESH = 5e-3  # share of the volume by which what stands for an exact mesh may have less
 
 
 @dataclass
@@ -56,7 +51,7 @@ def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
     try:
         solid = _combined(node, ball, within)
     except NoSurfaceError as error:
-        if isinstance(node, Part) or not has_exact_mesh(node):
+        if not has_exact_mesh(node) or not np.isfinite(node.bounds()).all():
             raise
         try:
             solid = faceted(node)
@@ -71,45 +66,36 @@ def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
 def _combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
     if isinstance(node, Part):
         return placed(node, ball)
-    if node.operation != "union":
-        return _ordered(node, [_combined(child, ball, made) for child in node.children])
-    result, left = combined(node.children[0], ball, made), []
-    for child in node.children[1:]:
-        solid = combined(child, ball, made)
+    united = node.operation == "union"
+    solids = [
+        combined(child, ball, made) if united or isinstance(child, Part) else _combined(child, ball, made)
+        for child in node.children
+    ]
+    right = _exact_volume(node)
+    try:
+        return _unified(node, operated(node.operation, solids, right, _label(node)))
+    except NoSurfaceError:
+        if not united:
+            raise
+    return _joined(node, solids, right, made)
+
+
+def _joined(
+    node: Assembly, solids: Sequence[TopoDS_Shape], right: float | None, made: Compromises
+) -> TopoDS_Shape:
+    """A union of all that can be united; the rest stays beside it, as long as that hardly overlaps."""
+    result, left = solids[0], []
+    for child, solid in zip(node.children[1:], solids[1:], strict=True):
         try:
-            result = _operated("union", result, solid, _label(child))
+            result = operated("union", (result, solid), None, _label(child))
         except NoSurfaceError:
             left.append(solid)
             made.apart.append(child.name or _label(child))
-    solids = [_unified(node, result), *left]
-    right = _exact_volume(node) if left else None
-    if right is not None and sum(volume_and_area(one)[0] for one in solids) > (1 + _OVERLAP) * right:
+    whole = [_unified(node, result), *left]
+    volume = sum(volume_and_area(one)[0] for one in whole)
+    if right is not None and not (1 - _SAME_MESH) * right < volume < (1 + _OVERLAP) * right:
         raise NoSurfaceError(f"OpenCASCADE fails at the union of {_label(node)}; move its parts a little")
-    return _side_by_side(solids)
-
-
-def _ordered(node: Assembly, solids: list[TopoDS_Shape]) -> TopoDS_Shape:
-    """The difference or intersection, its operands in one order after another until its volume is right.
-
-    Where quadrics touch at a slant, OpenCASCADE may leave one of them out, and say nothing.
-    """
-    right = _exact_volume(node)
-    count, first = len(solids), int(node.operation == "difference")
-    shuffled = [first + np.random.default_rng(seed).permutation(count - first) for seed in range(_ORDERS)]
-    error = f"OpenCASCADE gets the {node.operation} of {_label(node)} wrong; move it a little"
-    for order in (range(first, count), range(count - 1, first - 1, -1), *shuffled):
-        chain = [*range(first), *order]
-        result = solids[chain[0]]
-        try:
-            for i in chain[1:]:
-                result = _operated(node.operation, result, solids[i], _label(node.children[i]))
-            result = _unified(node, result)
-        except NoSurfaceError as failure:
-            error = str(failure)
-            continue
-        if right is None or abs(volume_and_area(result)[0] / right - 1) < _SAME_MESH:
-            return result
-    raise NoSurfaceError(error)
+    return _side_by_side(whole)
 
 
 def _exact_volume(node: Assembly) -> float | None:
@@ -117,7 +103,8 @@ def _exact_volume(node: Assembly) -> float | None:
     if not has_exact_mesh(node) or not np.isfinite(node.bounds()).all():
         return None
     try:
-        return float(mesh_csg(node).volume)
+        longest = float(np.ptp(np.array(node.bounds()), axis=0).max())
+        return float(mesh_csg(node, _CHORD * longest).volume)
     except NoSurfaceError as error:
         raise NoSurfaceError(f"nothing to export: the {node.operation} of {_label(node)} is empty") from error
 
@@ -153,37 +140,6 @@ def _side_by_side(solids: list[TopoDS_Shape]) -> TopoDS_Shape:
     for solid in solids:
         builder.Add(compound, solid)
     return compound
-
-
-def _operated(operation: str, first: TopoDS_Shape, second: TopoDS_Shape, label: str) -> TopoDS_Shape:
-    """The boolean operation, ever more tolerant until it is valid and its volume one that it can have.
-
-    Where surfaces nearly touch, OpenCASCADE may lose a whole solid and say nothing.
-    """
-    from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
-    from OCP.BRepCheck import BRepCheck_Analyzer
-    from OCP.collections import List_TopoDS_Shape as Shapes
-
-    a, b = volume_and_area(first)[0], volume_and_area(second)[0]
-    low, high = {"union": (max(a, b), a + b), "difference": (a - b, a), "intersection": (0.0, min(a, b))}[
-        operation
-    ]
-    slack = _LOST * max(a, b)
-    for tolerance in _FUZZY:
-        work = {"union": BRepAlgoAPI_Fuse, "difference": BRepAlgoAPI_Cut, "intersection": BRepAlgoAPI_Common}[
-            operation
-        ]()
-        arguments, tools = Shapes(), Shapes()
-        arguments.Append(first)
-        tools.Append(second)
-        work.SetArguments(arguments)
-        work.SetTools(tools)
-        work.SetFuzzyValue(tolerance * max(a, b) ** (1 / 3))
-        work.Build()
-        done = work.IsDone() and BRepCheck_Analyzer(work.Shape()).IsValid()
-        if done and low - slack <= volume_and_area(work.Shape())[0] <= high + slack:
-            return work.Shape()
-    raise NoSurfaceError(f"OpenCASCADE fails at the {operation} with {label}; move it a little")
 
 
 def placed(part: Part, ball: Ball) -> TopoDS_Shape:

@@ -8,6 +8,7 @@ exact mesh stand for its result. Blends become sharp edges. FILE.report.json lis
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -72,9 +73,31 @@ def _document(products: list[tuple[str, TopoDS_Shape]]) -> TDocStd_Document:
     XCAFDoc_DocumentTool.SetLengthUnit_s(document, _WORKING)
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     for name, shape in products:
-        label = shapes.AddShape(shape, False)
+        label = shapes.AddShape(_readable(shape), False)
         TDataStd_Name.Set_s(label, TCollection_ExtendedString(name, True))
     return document
+
+
+def _readable(shape: TopoDS_Shape) -> TopoDS_Shape:
+    """With faces of at most half a turn where some are arcs turned whose circle would cross the axis.
+
+    OpenCASCADE's own reader loses one that closes in itself and has a tip."""
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
+    from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideAngle
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    faces = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    while faces.More():
+        surface = BRepAdaptor_Surface(TopoDS.Face(faces.Current()))
+        turned = surface.GetType() == GeomAbs_SurfaceType.GeomAbs_SurfaceOfRevolution
+        if turned and surface.BasisCurve().GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
+            divided = ShapeUpgrade_ShapeDivideAngle(math.pi, shape)
+            return divided.Result() if divided.Perform() else shape
+        faces.Next()
+    return shape
 
 
 def _write(document: TDocStd_Document, path: Path, unit: str, wanted: Path) -> None:

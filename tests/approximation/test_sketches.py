@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from manifold3d import Manifold
+from manifold3d import CrossSection, Manifold
 
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames
@@ -14,6 +14,7 @@ from partwright.approximation.sketches.ends import BEYOND, with_open_ends
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.approximation.sketches.open_sides import with_open_sides
 from partwright.approximation.sketches.outlines import fitted_loop
+from partwright.approximation.sketches.sections import profile_of
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Revolution
 from partwright.fields.profile import Profile, circle, circle_of
@@ -74,6 +75,25 @@ def test_corners_within_a_wall_are_no_corners() -> None:
 
 def test_what_is_flat_is_no_outline() -> None:
     assert fitted_loop(np.array([(0, 0), (1e-6, 0), (0, 1e-6)]), TOLERANCE) is None
+
+
+def test_a_hole_that_touches_the_outline_is_a_hole() -> None:
+    ring = CrossSection([[(0, 0), (1, 0), (1, 1), (0.5, 1), (0.8, 0.5), (0.2, 0.5), (0.5, 1), (0, 1)]])
+    profile = profile_of(ring)
+    assert profile is not None
+    assert [len(loop) for loop in profile.loops] == [5, 3]
+    assert profile.area == pytest.approx(1 - 0.15, abs=2e-3)
+
+
+def test_an_arc_that_nearly_ends_a_sphere_on_the_axis_does() -> None:
+    quarter = math.tan(math.pi / 8)
+    dome = Profile([(0, -0.5), (0.5, -0.5), (0.5, 0, quarter + 1e-3), (0, 0.5)])
+    body = named_solid(Revolution(dome), 1e-5)
+    found = [c.part.field for c in candidates(body, [np.eye(3)], holes=True)]
+    bullet = next(field for field in found if isinstance(field, Revolution))
+    (arc,) = (side for side in bullet.profile.sides[0] if side.centre is not None)
+    assert arc.centre[0] == pytest.approx(0, abs=1e-9)
+    assert arc.radius == pytest.approx(0.5, abs=2e-3)
 
 
 def test_directions_of_a_turned_part_begin_with_its_axis() -> None:

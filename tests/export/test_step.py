@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections import Counter
 from pathlib import Path
@@ -21,7 +22,9 @@ from partwright.errors import (
     UnreadableFileError,
 )
 from partwright.export import export
-from partwright.fields import Box, Cylinder, Field, Sphere, SuperFrustum, Tube
+from partwright.fields import Box, Cylinder, Extrusion, Field, Revolution, Sphere, SuperFrustum, Tube
+from partwright.fields.profile import Profile
+from partwright.meshing import mesh_csg, mesh_part
 from partwright.shapes import load_shape
 from tests.export.trees import SOLIDS, TURNED, flange, lone
 
@@ -129,6 +132,71 @@ def test_a_bend_with_taper_is_a_surface_through_sections(tmp_path: Path) -> None
     assert change["to"] == "superfrustum"
     assert 0 < change["max_deviation"] < 1e-3
     assert 0 < change["volume_error_ratio"] < 1e-3
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [
+        (
+            (0.372, 0.0983, 0.63),
+            (0.0, 0.9),
+            (0.0, -0.5),
+            (0.372, -0.5),
+        ),  # an arc about a place beyond the axis
+        (
+            (1, 1),
+            (0, 1),
+            (0, 0.8, -0.9996),
+            (0, -0.3),
+            (0, -0.5),
+            (1, -0.5),
+        ),  # nearly half a circle, a cavity
+    ],
+)
+def test_arcs_whose_circles_cross_the_axis_are_read_as_they_were(tmp_path: Path, outline: Any) -> None:
+    field = Revolution(Profile(outline))
+    export(lone(field, unit="mm"), tmp_path / "solid.step")
+    volume, kinds = read_back(tmp_path / "solid.step")
+    assert volume == pytest.approx(mesh_part(Part(field), 256).volume, rel=1e-3)
+    assert set(kinds) <= ANALYTIC | {"SurfaceOfRevolution"}
+
+
+def test_faces_that_nearly_touch_are_united(tmp_path: Path) -> None:
+    """Two pieces as a fit has them, round alike but for the fourth digit: their exact union loses a third."""
+    rounds = ((0.3817, 0.11, 0.642910064975703), (0.065, 0.11), (-0.4007, 0.11))
+    left = (*rounds, (-0.4135, 0.1462, 1.1706161833162516), (-0.6018, 0.0441), (-0.4007, -0.2185))
+    waved = ((0.9, -0.1527, 0.4142141496294555), (0.8672, -0.1199), (0.7358, -0.1199, -0.41421363398847827))
+    rounds = (
+        (0.67, -0.0542),
+        (0.67, 0.11),
+        (0.1058, 0.11, 0.642910064975703),
+        (-0.211, 0.11),
+        (-0.6766, 0.11),
+    )
+    right = ((-0.6895, 0.1462, 1.1706271160175887), (-0.8777, 0.0441), (-0.6766, -0.2185), (0.9, -0.2185))
+    block = Extrusion(Profile((*left, (0.624, -0.2185), (0.624, 0.11))), 0.2628)
+    bar = Extrusion(Profile((*waved, *rounds, *right)), 0.1445)
+    turned = (0.5, 0.5, 0.5, 0.5)
+    tree = Assembly((Part(block, (0.2496, -0.276, 1e-5), turned), Part(bar, (0.3875, 0, 1e-5), turned)))
+    export(tree, tmp_path / "bars.step")
+    volume, kinds = read_back(tmp_path / "bars.step")
+    assert volume == pytest.approx(mesh_csg(tree).volume, rel=1e-3)
+    assert set(kinds) <= ANALYTIC
+    assert not (tmp_path / "bars.step.report.json").exists()
+
+
+def test_an_outline_that_touches_itself_is_moved_a_hair_apart(tmp_path: Path) -> None:
+    quarter = -math.tan(math.pi / 8) - 1e-7  # a touch beyond the edge, within rounding
+    hole = [(0.5, 1, quarter), (0.8, 0.7), (0.8, 0.5, -1), (0.2, 0.5), (0.2, 0.7, quarter), (0.5, 1)]
+    touching = Profile([(0, 0), (1, 0), (1, 1), *hole, (0, 1)])
+    tree = Assembly((Part(Extrusion(touching, 0.2), name="ring"), Part(Cylinder(0.1, 1), (0.12, 0.12, 0))))
+    export(tree, tmp_path / "ring.step")
+    volume, kinds = read_back(tmp_path / "ring.step")
+    assert volume == pytest.approx(mesh_csg(tree).volume, rel=1e-3)
+    assert kinds == {"Plane": 10, "Cylinder": 5}
+    (change,) = json.loads((tmp_path / "ring.step.report.json").read_text())["approximated"]
+    assert (change["parts"], change["to"]) == (["ring"], "extrusion")
+    assert 0 < change["max_deviation"] < 1e-3
 
 
 def test_a_tree_of_operations_with_hostile_names(tmp_path: Path) -> None:

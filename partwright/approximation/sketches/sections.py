@@ -11,6 +11,7 @@ import numpy as np
 from manifold3d import CrossSection, FillRule, Manifold
 
 from partwright.approximation.sketches.outlines import fitted_loop
+from partwright.approximation.sketches.pinches import unpinched
 from partwright.errors import ParameterError
 from partwright.fields.profile import Loop, Profile
 
@@ -123,7 +124,8 @@ def _profile(section: CrossSection, tolerance: float) -> Profile | None:
         for loop, p in zip(loops[1:], polygons[1:], strict=True)
         if loop is not None and abs(_loop_area(p)) > _SLIVER
     ]
-    return _valid(loops[0], holes)
+    outline, more = unpinched(loops[0], FINE)
+    return _valid(outline, holes + more)
 
 
 def _valid(outline: Loop, holes: Sequence[Loop]) -> Profile | None:

@@ -15,7 +15,7 @@ from partwright.approximation.profile_parts import revolved_part
 from partwright.approximation.sketches.candidate import Candidate, posed
 from partwright.approximation.sketches.sections import View, profile_of
 from partwright.errors import ParameterError
-from partwright.fields.profile import Profile
+from partwright.fields.profile import Corner, Profile
 
 _PLANES = 4  # through an axis, for what goes all around
 _HALVES = 32  # half-planes at which partial turns are looked for
@@ -26,6 +26,7 @@ _SAME = 0.03  # of the area
 _LEAST = 4e-4  # unit areas
 _MOST_PARTIAL = 4
 _SNAP = 0.012
+_DOMED = 3e-3  # unit lengths that an arc may move to become part of a sphere
 _OFFSET = 0.0137  # radians: no plane along faces
 
 
@@ -171,6 +172,24 @@ def _snapped(half: CrossSection, flat: np.ndarray, tree: cKDTree) -> CrossSectio
 
 
 def _off_axis(profile: Profile) -> Profile:
-    """Corners near the axis on it."""
+    """Corners near the axis on it, and arcs that nearly meet it squarely about a centre on it."""
     loops = [tuple((0.0 if x < 2e-3 else x, y, b) for x, y, b in loop) for loop in profile.loops]
+    loops = [
+        tuple(
+            (x, y, _domed((x, y), then, b)) for (x, y, b), then in zip(loop, loop[1:] + loop[:1], strict=True)
+        )
+        for loop in loops
+    ]
     return Profile(loops[0], tuple(loops[1:]))
+
+
+def _domed(start: tuple[float, float], then: Corner, bulge: float) -> float:
+    """The bulge of the arc that turns into part of a sphere, where it is the same within the tolerance."""
+    (x, y), (u, v, _) = start, then
+    if not bulge or min(x, u) > 0:
+        return bulge
+    # From a pole, a chord falls off the level by half of the angle that its arc spans.
+    dome = math.copysign(math.tan(math.atan2(abs(v - y), max(x, u)) / 2), bulge)
+    centre = (x + u) / 2 - (v - y) * (1 - dome * dome) / (4 * dome) if dome else math.inf
+    on_axis = abs(centre) < 1e-9 * math.hypot(x - u, y - v)
+    return dome if on_axis and abs(dome - bulge) * math.hypot(x - u, y - v) / 2 < _DOMED else bulge
