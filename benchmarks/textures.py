@@ -4,19 +4,22 @@
 
 Each shape is fitted, its colours are baked into maps of 128 texels a side, and both are seen without light,
 by the same rays. PSNR is of all pixels ("picture": outlines count) and of those where both are met
-("surface": colours alone). The second row of a shape is GLB as it is exported and read again. For comparison,
-the part's mean colour instead of its map.
+("surface": colours alone). Then GLB as it is exported and read again, part by part and as the one surface of
+all parts (--joined). For comparison, the part's mean colour instead of its map. Three shapes have textures of
+their own, three are painted here: bands and blots that are functions of the place.
 """
 
 from __future__ import annotations
 
 import argparse
 import tempfile
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
 import partwright as pw
 from partwright.assembly import Assembly, Similarity
@@ -26,7 +29,9 @@ from partwright.render.camera import Camera, View
 from partwright.render.raycast import Scene
 from partwright.textures import Colours, bake, load_colours, part_map
 
-NAMES = ("Duck.glb", "CesiumMilkTruck.glb", "fuze.obj")
+NAMES = ("dirty/Duck.glb", "dirty/CesiumMilkTruck.glb", "dirty/fuze.obj")
+PAINTED = ("toys/mug.ply", "toys/penguin.ply", "toys/ycb_mustard_bottle.ply")
+FINE = 1 / 150  # of the longest side: edges of painted shapes
 SIZE = 512
 VIEWS = 8
 
@@ -86,11 +91,28 @@ def psnr(a: np.ndarray, b: np.ndarray) -> float:
     return 10 * np.log10(255**2 / max(error, 1e-9))
 
 
-def fitted(path: Path, quality: str, size: int) -> tuple[Any, Colours, Any, Assembly]:
-    """The shape, its colours, the fit, and its assembly with maps."""
+def painted(path: Path, folder: Path) -> Path:
+    """A copy with colours at its vertices: soft ones, bands with sharp edges, and blots."""
+    mesh: Any = trimesh.load(path, process=False)
+    mesh = mesh.subdivide_to_size(FINE * float(mesh.extents.max()), max_iter=20)
+    x, y, z = (np.asarray(mesh.vertices) / float(mesh.extents.max())).T
+    soft = 127 + 100 * np.sin(6 * np.stack([x + y, y + 2 * z, z - x], axis=1))
+    soft[np.sin(25 * (y + 0.3 * x)) > 0.6] = (30, 60, 160)
+    soft[np.sin(17 * x) * np.sin(17 * y) * np.sin(17 * z) > 0.5] = (240, 230, 40)
+    mesh.visual.vertex_colors = np.column_stack([soft, np.full(len(soft), 255)]).round().astype(np.uint8)
+    target = folder / path.name
+    mesh.export(target)
+    return target
+
+
+def fitted(path: Path, quality: str, size: int) -> tuple[Any, Colours, Any, Assembly, tuple[float, float]]:
+    """The shape, its colours, the fit, its assembly with maps, and CPU seconds of the fit and of the maps."""
     shape, colours = pw.load_shape(path), load_colours(path)
+    start = time.process_time()
     result = pw.fit(shape, quality=quality, symmetry=False)
-    return shape, colours, result, bake(result.assembly, colours, size)
+    middle = time.process_time()
+    baked = bake(result.assembly, colours, size)
+    return shape, colours, result, baked, (middle - start, time.process_time() - middle)
 
 
 def picture_of(assembly: Assembly, view: View) -> np.ndarray:
@@ -104,8 +126,8 @@ def write_pictures(shapes: Path, quality: str, size: int, path: Path) -> None:
     from PIL import Image
 
     rows = []
-    for name, edit in (("Duck.glb", _bent), ("fuze.obj", _squared)):
-        shape, colours, _, baked = fitted(shapes / name, quality, size)
+    for name, edit in ((NAMES[0], _bent), (NAMES[2], _squared)):
+        shape, colours, _, baked, _ = fitted(shapes / name, quality, size)
         view = views(shape)[0]
         pixel, face, weights, _ = seen(Scene(colours.vertices, colours.faces), view)
         row = [picture(pixel, colours.on_faces(face, weights))]
@@ -137,40 +159,39 @@ def _squared(assembly: Assembly) -> Assembly:
     )
 
 
-def measured(path: Path, quality: str, size: int) -> list[str]:
-    shape, colours, result, baked = fitted(path, quality, size)
+def measured(path: Path, name: str, quality: str, size: int) -> list[str]:
+    shape, colours, result, baked, seconds = fitted(path, quality, size)
     truth = Scene(colours.vertices, colours.faces)
     mesh = mesh_assembly(baked)
     parts = Scene(mesh.vertices, mesh.faces)
-    with tempfile.TemporaryDirectory() as folder:
-        export(replace(baked, unit=None, up=None), Path(folder) / "a.glb")
-        glb = load_colours(Path(folder) / "a.glb")
-    exported = Scene(glb.vertices, glb.faces)
-    scores: dict[str, list[tuple[float, float]]] = {"maps": [], "GLB": [], "one colour a part": []}
+    exported, took = {}, {"maps": f"{seconds[0]:.0f} + {seconds[1]:.1f}"}
+    for kind, options in (("GLB", {}), ("GLB, joined", {"joined": True})):
+        with tempfile.TemporaryDirectory() as folder:
+            start = time.process_time()
+            export(replace(baked, unit=None, up=None), Path(folder) / "a.glb", **options)
+            took[kind] = f"{time.process_time() - start:.1f}"
+            glb = load_colours(Path(folder) / "a.glb")
+        exported[kind] = glb, Scene(glb.vertices, glb.faces)
+    scores: dict[str, list[tuple[float, float]]] = {}
     for view in views(shape):
         pixel, face, weights, _ = seen(truth, view)
         want = picture(pixel, colours.on_faces(face, weights))
         own, _, _, places = seen(parts, view)
-        found = {
-            "maps": (own, map_colours(baked, places)),
-            "one colour a part": (own, mean_colours(baked, places)),
-        }
-        at, face, weights, _ = seen(exported, view)
-        found["GLB"] = (at, glb.on_faces(face, weights))
+        found = {"maps": (own, map_colours(baked, places))}
+        for kind, (glb, scene) in exported.items():
+            at, face, weights, _ = seen(scene, view)
+            found[kind] = (at, glb.on_faces(face, weights))
+        found["one colour a part"] = (own, mean_colours(baked, places))
         for kind, (where, colour) in found.items():
             both = np.intersect1d(where, pixel)
             got = picture(where, colour)
-            scores[kind].append((psnr(got, want), psnr(got[both], want[both])))
+            scores.setdefault(kind, []).append((psnr(got, want), psnr(got[both], want[both])))
     kilobytes = sum(len(str(p.metadata.get("texture", ""))) for p in baked.parts) / 1000
     rows = []
     for kind, values in scores.items():
         whole, surface = np.mean(values, axis=0)
-        head = (
-            f"{path.name} | {len(baked)} | {result.scores.iou:.3f} | {kilobytes:.0f}"
-            if kind == "maps"
-            else " | | |"
-        )
-        rows.append(f"| {head} | {kind} | {whole:.1f} | {surface:.1f} |")
+        head = f"{name} | {len(baked)} | {result.scores.iou:.3f} | {kilobytes:.0f}" if not rows else " | | |"
+        rows.append(f"| {head} | {kind} | {whole:.1f} | {surface:.1f} | {took.get(kind, '')} |")
     return rows
 
 
@@ -180,7 +201,11 @@ def main() -> None:
     )
     parser.add_argument("--output", type=Path)
     parser.add_argument(
-        "--shapes", type=Path, required=True, metavar="FOLDER", help=f"that holds {', '.join(NAMES)}"
+        "--shapes",
+        type=Path,
+        required=True,
+        metavar="FOLDER",
+        help=f"that holds {', '.join((*NAMES, *PAINTED))}",
     )
     parser.add_argument("--quality", default="normal")
     parser.add_argument("--size", type=int, default=128)
@@ -194,15 +219,20 @@ def main() -> None:
         "# Colours in maps of parts",
         "",
         f"Made by `{command}`: {VIEWS} views of {SIZE} x {SIZE} pixels without light, maps of "
-        f"{arguments.size} texels a side, quality {arguments.quality}.",
+        f"{arguments.size} texels a side, quality {arguments.quality}. Painted: colours that are functions of the",
+        "place, made here. Seconds are CPU seconds: of the fit and the maps, and of the export.",
         "",
-        "| shape | parts | IoU | kB of maps | colours | PSNR of pictures | PSNR of the surface |",
-        "|---|---|---|---|---|---|---|",
+        "| shape | parts | IoU | kB of maps | colours | PSNR of pictures | PSNR of the surface | seconds |",
+        "|---|---|---|---|---|---|---|---|",
     ]
-    for name in NAMES:
-        rows = measured(arguments.shapes / name, arguments.quality, arguments.size)
-        print("\n".join(rows), flush=True)
-        lines += rows
+    with tempfile.TemporaryDirectory() as folder:
+        for name in (*NAMES, *PAINTED):
+            path, told = arguments.shapes / name, Path(name).name
+            if name in PAINTED:
+                path, told = painted(path, Path(folder)), f"{told}, painted"
+            rows = measured(path, told, arguments.quality, arguments.size)
+            print("\n".join(rows), flush=True)
+            lines += rows
     if arguments.output:
         arguments.output.write_text("\n".join(lines) + "\n", encoding="utf-8")
 

@@ -42,6 +42,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="what collides as something else is seen as it is (MJCF, URDF, SDFormat; default: on)",
     )
     option("--by-part", action="store_true", default=None, help="each part by itself (OBJ, PLY, STL, 3MF)")
+    option(
+        "--joined", action="store_true", default=None, help="the one surface of all parts, blends too (GLB)"
+    )
     option("--resolution", metavar="N", type=int, help="cells along the longest side of what is meshed")
     option("--facets", metavar="N", type=int, help="facets of a full circle (OpenSCAD; default: 96)")
     option("--separate", action="store_true", default=None, help="each part a product of its own (STEP)")

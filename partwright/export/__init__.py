@@ -17,8 +17,9 @@ def export(assembly: Assembly, path: str | Path, **options: Any) -> None:
 
     Options, where the format has them: `resolution` of what is meshed (cells along the longest side),
     `by_part` (each part closed by itself: OBJ, PLY, STL, 3MF), `density`, `tolerance` and `free_joint` (MJCF,
-    URDF), `physics` (colliders in GLB, OBJ and USD), `separate` (STEP: one product a part). Parts that the
-    format cannot hold become the nearest that it can, and FILE.report.json says which and how far off.
+    URDF), `physics` (colliders in GLB, OBJ and USD), `separate` (STEP: one product a part), `joined` (GLB:
+    the one surface of all parts, blends and all). Parts that the format cannot hold become the nearest that
+    it can, and FILE.report.json says which and how far off.
 
     Raises:
         UnsupportedFormatError: the suffix names no known format, or the format cannot hold a part at all.

@@ -6,7 +6,8 @@ its node, so that a far place costs no digits and a node turns about the part's 
 repeated part are nodes below the part's own, named leg/2, leg/3 ..., and share its mesh. An intersection of
 quadrics (a convex of CAPRI-Net's) is one node, since its leaves alone have no end; its `extras` list them.
 glTF knows no booleans: of a difference each part is shown as what is left of it, and what is subtracted is
-there without a mesh, for its parameters.
+there without a mesh, for its parameters. Nor does it know blends: `joined` writes the surface that parts make
+together, shared out among their nodes.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.file_text import instance_dict
 from partwright.assembly.palette import palette
 from partwright.atomic_io import write_bytes
-from partwright.errors import NoSurfaceError
+from partwright.errors import NoSurfaceError, SettingError
 from partwright.export.axes import to_gltf
 from partwright.export.formats import Format, Holds
 from partwright.export.glb_colliders import (
@@ -35,6 +36,7 @@ from partwright.export.glb_colliders import (
     check_physics,
     collider_body,
 )
+from partwright.export.glb_joined import add_patches
 from partwright.export.identifiers import free_name
 from partwright.meshing import mesh_part
 from partwright.textures import part_map
@@ -45,19 +47,24 @@ if TYPE_CHECKING:
     import trimesh
 
 _VERTICES, _INDICES = 34962, 34963  # glTF's targets of buffer views
+_PART, _WHOLE = 32, 128  # cells along a part, and along the whole
 _SUBTRACTED = {"role": "subtracted"}
 
 
 def write(
     assembly: Assembly,
     path: str | Path,
-    resolution: int = 32,
+    resolution: int | None = None,
     physics: str | None = None,
     density: float | None = None,
     tolerance: float | None = None,
     free_joint: bool = False,
+    joined: bool = False,
 ) -> None:
-    """Write the parts; `resolution` is the number of cells along each part.
+    """Write the parts.
+
+    resolution: the number of cells along each part, 32 if not given; joined: along the whole, 128.
+    joined: the one surface that the parts make, blends and all; a part's node has what of it is the part's.
 
     physics: colliders, too: "khr" as rigid bodies of KHR_physics_rigid_bodies, "unreal" or "godot" as meshes
     under the names that these engines know. density, free_joint: of "khr", which may then move. tolerance: as
@@ -66,12 +73,13 @@ def write(
     Raises:
         NothingToExportError: no part has a surface.
         NoSurfaceError: the assembly does not end.
-        SettingError: there is no such physics, or a density or joint without it.
+        SettingError: there is no such physics, a density or joint without it, or joined with it.
     """
     from trimesh.exchange.gltf import export_glb
 
     check_physics(physics, density, free_joint)
-
+    if joined and physics is not None:
+        raise SettingError("joined: parts of one surface have no colliders; leave out joined or physics")
     check_ends(assembly)
 
     def describe(tree: dict[str, Any]) -> None:
@@ -81,7 +89,7 @@ def write(
         if collide is not None:
             collide(tree)
 
-    made = _Scene(assembly, resolution, bodily=physics == KHR)
+    made = _Scene(assembly, resolution or (_WHOLE if joined else _PART), bodily=physics == KHR, joined=joined)
     scene, collide = made.scene, None
     require_some(assembly, list(scene.geometry))
     if physics is not None:
@@ -114,8 +122,10 @@ def _about(assembly: Assembly) -> dict[str, Any]:
 class _Scene:
     """Adds nodes to a scene."""
 
-    def __init__(self, assembly: Assembly, resolution: int, bodily: bool = False) -> None:
-        """bodily: all is below a node `body`, in metres."""
+    def __init__(
+        self, assembly: Assembly, resolution: int, bodily: bool = False, joined: bool = False
+    ) -> None:
+        """bodily: all is below a node `body`, in metres. joined: nodes have parts of the one surface."""
         import trimesh
 
         self.scene = trimesh.Scene(base_frame="world")
@@ -126,7 +136,11 @@ class _Scene:
         self.body = free_name("body", self.taken) if bodily else "world"
         if bodily:
             self.scene.graph.update(frame_to=self.body, frame_from="world")
-        self.add(assembly, self.body, to_gltf(assembly).matrix(), {})
+        pose = to_gltf(assembly).matrix()
+        if joined:
+            add_patches(self.scene, assembly, resolution, pose, self._patch, self._looking)
+        else:
+            self.add(assembly, self.body, pose, {})
 
     def add(self, node: Node, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> None:
         """A node below another. A difference holds what is left of it, and what it subtracts without mesh."""
@@ -214,6 +228,11 @@ class _Scene:
         if cut and first.name not in self.scene.graph.nodes:
             return first.name
         return free_name(node.name or ("convex" if is_atomic(node) else node.operation), self.taken)
+
+    def _patch(self, part: Part, copy: int) -> tuple[str, dict[str, Any]]:
+        if copy:
+            return free_name(f"{part.name}/{copy + 1}", self.taken), {"role": "copy"}
+        return part.name, _extras(part)
 
     def _add_bare(self, name: str, parent: str, pose: np.ndarray, about: dict[str, Any]) -> None:
         about = about | {"note": "no surface of its own at this resolution"}

@@ -138,6 +138,30 @@ def test_glb_has_the_maps_as_images(tmp_path: Path) -> None:
     assert np.quantile(off, 0.95) < 25
 
 
+def test_joined_glb_is_the_blended_surface_in_its_colours(tmp_path: Path) -> None:
+    """All triangles of the whole, each once, below the node of the part that it belongs to."""
+    arm = replace(ARM, blend=0.6, instances=(Similarity(translation=(-4.4, 0, 0)),))
+    blended = Assembly((BODY, arm), unit="m", up="y")
+    baked = bake(blended, load_colours(painted(blended, tmp_path / "a.ply")), 96)
+    whole = mesh_assembly(baked, 64)
+    for options in ({}, {"joined": True, "resolution": 64}):
+        export(baked, tmp_path / "b.glb", **options)
+        scene = trimesh.load_scene(tmp_path / "b.glb")
+        assert set(scene.graph.nodes_geometry) == {"body", "arm", "arm/2"}
+        mesh = trimesh.util.concatenate([one for one in scene.dump() if isinstance(one, trimesh.Trimesh)])
+        again = load_colours(tmp_path / "b.glb")
+        points = on_surface(whole)
+        off = np.abs(again.at(points) - look(points))
+        assert np.median(off) < 5
+        same = abs(mesh.area / whole.area - 1) < 1e-4 and abs(mesh.volume / whole.volume - 1) < 1e-4
+        assert same == bool(options)
+    about = next(e["metadata"] for (_, node), e in scene.graph.transforms.edge_data.items() if node == "body")
+    assert about["field"] == BODY.field.to_dict()
+    with pytest.raises(SettingError, match="leave out joined or physics"):
+        export(baked, tmp_path / "c.glb", joined=True, physics="khr")
+    assert not (tmp_path / "c.glb").exists()
+
+
 def test_cut_triangles_are_the_same_surface() -> None:
     part = Part(SuperFrustum((1, 2, 3), 0.5, 0.1, 0.7, 0.4, 0.5))
     mesh = mesh_part(part, 24)

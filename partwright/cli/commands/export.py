@@ -21,6 +21,7 @@ _OPTIONS = (
     "links",
     "visuals",
     "by_part",
+    "joined",
     "resolution",
     "facets",
     "separate",
