@@ -219,8 +219,8 @@ def main() -> None:
         "# Colours in maps of parts",
         "",
         f"Made by `{command}`: {VIEWS} views of {SIZE} x {SIZE} pixels without light, maps of "
-        f"{arguments.size} texels a side, quality {arguments.quality}. Painted: colours that are functions of the",
-        "place, made here. Seconds are CPU seconds: of the fit and the maps, and of the export.",
+        f"{arguments.size} texels a side, quality {arguments.quality}. Painted: colours that are functions",
+        "of the place, made here. Seconds are CPU seconds: of the fit and the maps, and of the export.",
         "",
         "| shape | parts | IoU | kB of maps | colours | PSNR of pictures | PSNR of the surface | seconds |",
         "|---|---|---|---|---|---|---|---|",
