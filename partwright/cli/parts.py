@@ -6,18 +6,24 @@ import argparse
 
 from partwright.cli import (
     parts_edit,
+    parts_generate,
     parts_interpolate,
     parts_prepare,
     parts_reconstruct,
     parts_simulate,
     parts_train,
+    parts_train_encoder,
+    parts_train_generator,
     parts_train_surrogate,
 )
 
 COMMANDS = (
     parts_prepare,
     parts_train,
+    parts_train_encoder,
+    parts_train_generator,
     parts_reconstruct,
+    parts_generate,
     parts_edit,
     parts_interpolate,
     parts_simulate,

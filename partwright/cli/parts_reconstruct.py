@@ -21,13 +21,20 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command.add_argument("shape", metavar="SHAPE", type=Path, help="mesh, points, grid or STEP file")
     option = command.add_argument
     add_output_folder(command)
-    option("--iterations", metavar="N", type=int, default=400, help="steps (default: %(default)s)")
+    option(
+        "--iterations",
+        metavar="N",
+        type=int,
+        default=400,
+        help="steps; 0: the start as it is (default: %(default)s)",
+    )
     option("--points", metavar="N", type=int, default=2048, help="samples a step (default: %(default)s)")
     option(
         "--start",
-        choices=("nearest", "mean"),
-        default="nearest",
-        help="from which training shape: the one that fits best, or their mean (default: %(default)s)",
+        choices=("auto", "encoder", "nearest", "mean"),
+        default="auto",
+        help="from what the model's encoder sees, from the training shape that fits best, or from the mean "
+        "of all; auto: the encoder's where the model has one and it is the better (default: %(default)s)",
     )
     option(
         "--as-it-stands",

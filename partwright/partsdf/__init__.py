@@ -12,6 +12,10 @@ except ImportError as error:
 from partwright.partsdf import editing
 from partwright.partsdf.assemblies import from_assembly, to_assembly
 from partwright.partsdf.config import Config, config_from, read_config
+from partwright.partsdf.encoder import Encoder, load_encoder
+from partwright.partsdf.encoder_training import train_encoder
+from partwright.partsdf.generator import Generator, load_generator
+from partwright.partsdf.generator_training import train_generator
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
@@ -21,6 +25,8 @@ from partwright.partsdf.training import train
 
 __all__ = [
     "Config",
+    "Encoder",
+    "Generator",
     "Model",
     "NeuralShape",
     "ReconstructionSettings",
@@ -28,10 +34,14 @@ __all__ = [
     "config_from",
     "editing",
     "from_assembly",
+    "load_encoder",
+    "load_generator",
     "load_model",
     "mesh_shape",
     "read_config",
     "reconstruct",
     "to_assembly",
     "train",
+    "train_encoder",
+    "train_generator",
 ]

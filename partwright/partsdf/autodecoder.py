@@ -11,12 +11,12 @@ from partwright.partsdf.poses import PoseTensors, local_points
 
 
 class AutoDecoder(nn.Module):
-    """latents: (S, P, Z), at first N(0, 1/Z), so that their expected squared norm is 1."""
+    """latents: (S, P, Z), at first N(0, s^2/Z), so that their expected squared norm is s^2, of `spread` s."""
 
-    def __init__(self, shapes: int, parts: int, settings: DecoderSettings) -> None:
+    def __init__(self, shapes: int, parts: int, settings: DecoderSettings, spread: float = 1.0) -> None:
         super().__init__()
         self.decoder = make_decoder(parts, settings)
-        start = torch.randn(shapes, parts, settings.latent) / settings.latent**0.5
+        start = spread * torch.randn(shapes, parts, settings.latent) / settings.latent**0.5
         self.latents = nn.Parameter(start)
 
     def forward(self, shapes: Tensor, points: Tensor, poses: PoseTensors) -> tuple[Tensor, Tensor]:

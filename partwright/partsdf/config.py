@@ -134,6 +134,9 @@ class TrainingSettings:
     """Adam's learning rate of the latents."""
     decay: float = 0.35
     """Factor on both rates at 80 % and at 90 % of the epochs."""
+    latent_spread: float = 1.0
+    """Expected norm of the latents that training begins with; the paper's 1. What is left of a random start
+    says nothing of the shape, so with less of it new shapes are found and predicted more easily."""
     warmup: int = 0
     """Steps over which both rates rise from nothing; the paper has none."""
     anneal: float = 0.0
@@ -161,6 +164,7 @@ class TrainingSettings:
             _at_least(f"training.{name}", getattr(self, name), 1)
         for name in ("at_once", "samples", "shapes", "threads", "validate", "checkpoint", "seed", "warmup"):
             _at_least(f"training.{name}", getattr(self, name), 0)
+        _positive("training.latent_spread", self.latent_spread)
         for name in ("balance", "anneal"):
             if not 0 <= getattr(self, name) <= 1:
                 raise SettingError(f"training.{name} is {getattr(self, name)}; expected 0 to 1")

@@ -14,9 +14,9 @@ from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.familiarity import familiarity
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
-from partwright.partsdf.reconstruction import Step, reconstruct_standing
+from partwright.partsdf.reconstruction import Step, mean_error, reconstruct_from
 from partwright.partsdf.settings import Settings
-from partwright.partsdf.starts import UPRIGHT, ways_to_stand
+from partwright.partsdf.starts import UPRIGHT, find_starts, ways_to_stand
 from partwright.partsdf.targets import Target
 
 _PRESETS: dict[str, dict[str, Any]] = {
@@ -63,7 +63,7 @@ class LearnedParts(Method[Settings]):
         history: list[dict[str, float | str]] = []
 
         def told(step: Step) -> None:
-            if step.number % _TOLD and step.number not in (1, step.of):
+            if step.number % _TOLD and step.number != step.of:
                 return
             neural = step.shape()
             occupied = neural.distances(probe.turned(step.turn).points.numpy()) < 0
@@ -82,8 +82,13 @@ class LearnedParts(Method[Settings]):
                 )
             )
 
+        with timed(seconds, "start"):
+            starts = find_starts(model, target, turns, settings)
+        first = starts[0]
+        loss = mean_error(first.shape, first.target)
+        told(Step(0, max(1, settings.iterations), loss, lambda: first.shape, first.turn))
         with timed(seconds, "optimise"):
-            found, turn = reconstruct_standing(model, target, turns, settings, run.seed, told, checkpoint)
+            found, turn = reconstruct_from(starts, settings, run.seed, told, checkpoint)
         with timed(seconds, "mesh"):
             meshed = mesh_shape(found, settings.resolution, parts=False)
         surface = meshed.whole
@@ -91,6 +96,7 @@ class LearnedParts(Method[Settings]):
         known = familiarity(found, target.turned(turn))
         learned = {
             "model": {"name": model.name, "hash": model.hash},
+            "start": "encoder" if starts[0].encoded else settings.start,
             "absent": [name for name in model.parts if name not in found.names()],
             "turn": list(turn),
             "residual": known.residual,

@@ -138,7 +138,8 @@ class Model:
         """
         data = self.to_bytes(half)
         write_bytes(path, data)
-        return _remembered(model_from_bytes(data, str(path)))
+        made = model_from_bytes(data, str(path))
+        return _remembered(made, _files.get(made.hash, Path(path)))
 
 
 def load_model(source: str | Path) -> Model:
@@ -157,7 +158,12 @@ def load_model(source: str | Path) -> Model:
         data = path.read_bytes()
     except OSError as error:
         raise UnreadableFileError(f"cannot read the model {path}: {error.strerror or error}") from error
-    return _remembered(model_from_bytes(data, str(path)))
+    return _remembered(model_from_bytes(data, str(path)), path)
+
+
+def file_of(model: Model) -> Path | None:
+    """The file that a model was last read from or written to; None if there was none."""
+    return _files.get(model.hash)
 
 
 def find_model(name: str, hash: str) -> Model:
@@ -201,9 +207,11 @@ def make_decoder(parts: int, settings: DecoderSettings) -> nn.Module:
 
 
 _loaded: dict[str, Model] = {}
+_files: dict[str, Path] = {}
 
 
-def _remembered(model: Model) -> Model:
+def _remembered(model: Model, path: Path) -> Model:
+    _files[model.hash] = path
     return _loaded.setdefault(model.hash, model)
 
 
@@ -269,4 +277,5 @@ def _candidates() -> Sequence[Path]:
     folders = [Path(f) for f in os.environ.get(FOLDERS, "").split(os.pathsep) if f]
     patterns = (f"*{SUFFIX}", f"*/model{SUFFIX}")
     own = [path for folder in folders for pattern in patterns for path in sorted(folder.glob(pattern))]
-    return [*sorted(SHIPPED.glob(f"*{SUFFIX}")), *own]
+    # MODEL.encoder.safetensors and the like belong to a model, and are none.
+    return [path for path in (*sorted(SHIPPED.glob(f"*{SUFFIX}")), *own) if "." not in path.stem]

@@ -2,7 +2,7 @@
 
 With known parts the poses are given and every sample knows its nearest part (section 4.1). Part-agnostic, a
 plain surface is all there is: latents and poses, rotations included, start from the training shape that fits
-best as it is, and all of them move (section 3.4, without the encoder).
+best as it is, and all of them move (section 3.4).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
-from partwright.partsdf.starts import UPRIGHT, Quaternion, Start, best_starts, exchanged_parts
+from partwright.partsdf.starts import UPRIGHT, Quaternion, Start, exchanged_parts, find_starts
 from partwright.partsdf.targets import Target
 from partwright.shapes import Shape
 
@@ -109,10 +109,18 @@ def reconstruct_standing(
 ) -> tuple[NeuralShape, Quaternion]:
     """The shape as its family stands, and that one of the `turns` which brings it to where the target is."""
     settings = settings or ReconstructionSettings()
-    if settings.start == "nearest":
-        starts = best_starts(model, target, settings.starts, turns)
-    else:
-        starts = [Start(NeuralShape.mean(model), turns[0], target.turned(turns[0]))]
+    starts = find_starts(model, target, turns, settings)
+    return reconstruct_from(starts, settings, seed, told, checkpoint)
+
+
+def reconstruct_from(
+    starts: list[Start],
+    settings: ReconstructionSettings,
+    seed: int = 0,
+    told: Told | None = None,
+    checkpoint: Checkpoint | None = None,
+) -> tuple[NeuralShape, Quaternion]:
+    """As `reconstruct_standing`, from given starts, one of which a few iterations choose."""
     starts = [replace(s, shape=replace(s.shape, present=torch.ones_like(s.shape.present))) for s in starts]
     found = _scouted(starts, settings, seed, told, checkpoint)
     return replace(found.shape, present=_filling(found.shape, found.target)), found.turn
@@ -140,7 +148,7 @@ def _scouted(
     """From the start that a few iterations bring closest: one that is close as it is may be a dead end, as a
     tube with flanges is for one without. Then single parts are exchanged, and all are optimised."""
     few = replace(settings, iterations=max(1, settings.iterations // _SCOUTED), decay=1.0)
-    scouts = starts if len(starts) > 1 else []
+    scouts = starts if len(starts) > 1 and settings.iterations else []
     steps = settings.iterations + len(scouts) * few.iterations
 
     def after(done: int, start: Start) -> Told | None:
@@ -157,7 +165,7 @@ def _scouted(
         if not finished:
             return _closest(tried)
     best = _closest(tried or starts)
-    if settings.exchange:
+    if settings.exchange and settings.iterations and not best.encoded:
         best = replace(best, shape=exchanged_parts(best.shape, best.target, seed))
     ahead, poses = after(len(scouts) * few.iterations, best), best.shape.model.config.poses
     found = _optimised(best.shape, best.target, settings, seed, ahead, checkpoint, poses)[0]
@@ -165,11 +173,11 @@ def _scouted(
 
 
 def _closest(starts: list[Start]) -> Start:
-    return starts[0] if len(starts) == 1 else min(starts, key=lambda one: _error(one.shape, one.target))
+    return starts[0] if len(starts) == 1 else min(starts, key=lambda one: mean_error(one.shape, one.target))
 
 
 @torch.no_grad()
-def _error(shape: NeuralShape, target: Target, count: int = 8192) -> float:
+def mean_error(shape: NeuralShape, target: Target, count: int = 8192) -> float:
     """Mean error of the whole shape's distance, at `count` of the target's samples."""
     rows = torch.linspace(0, len(target.sdf) - 1, min(count, len(target.sdf))).long()
     whole = torch.from_numpy(shape.distances(target.points[rows].numpy()))

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 from partwright.errors import SettingError
 from partwright.methods import check_count, check_number
 
-START_SHAPES = ("nearest", "mean")
+START_SHAPES = ("auto", "encoder", "nearest", "mean")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,27 +16,30 @@ class ReconstructionSettings:
     """How latents and poses are optimised until they decode to a shape (section 4.1)."""
 
     iterations: int = 400
-    """Steps (paper: 800)."""
+    """Steps (paper: 800); 0 leaves the start as it is."""
     points: int = 2048
     """Samples a step, half of them inside (paper: 8,000, all that it draws)."""
     rate: float = 5e-3
     """Of Adam, for latents."""
     decay: float = 0.1
     """What the rates fall by at half time, when the whole shape's loss joins in."""
-    start: Literal["nearest", "mean"] = "nearest"
-    """From the nearest training shapes, or from the mean of all; where poses are unknown only."""
+    start: Literal["auto", "encoder", "nearest", "mean"] = "auto"
+    """From what the model's encoder sees in points of the surface, from the nearest training shapes, or from
+    the mean of all; where poses are unknown only. "auto" takes the encoder where the model has one, and
+    compares it with the nearest training shape."""
     starts: int = 4
     """So many nearest shapes are tried for an eighth of the iterations each, and the best goes on."""
     exchange: bool = True
     """Single parts of the best start are exchanged for those of other training shapes where that comes
-    closer; where poses are unknown only."""
+    closer; where poses are unknown only, and not if the encoder's parts are the start."""
     pose_rate: float = 2e-3
     """Of Adam, for poses."""
     pose_delay: float = 0.1
     """Share of the iterations for which poses wait until latents have found the rough form."""
 
     def __post_init__(self) -> None:
-        for name in ("iterations", "points", "starts"):
+        check_count("iterations", self.iterations, low=0)
+        for name in ("points", "starts"):
             check_count(name, getattr(self, name), low=1)
         for name in ("rate", "decay", "pose_rate", "pose_delay"):
             check_number(name, getattr(self, name), low=0.0, high=1.0)

@@ -16,10 +16,13 @@ import torch
 from torch import Tensor
 
 from partwright.assembly.similarity import quaternion_product
+from partwright.errors import ModelError, SettingError
+from partwright.partsdf.encoder import Encoder, load_encoder
 from partwright.partsdf.losses import aggregate, clamped_error
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors, local_points
+from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.targets import Target
 
 Quaternion = tuple[float, float, float, float]
@@ -43,11 +46,36 @@ _OTHERS, _SAMPLES = 48, 512  # training shapes that parts are taken from, and sa
 
 @dataclass(frozen=True)
 class Start:
-    """A shape to begin from, the turn from the family's frame to the target's, and the target before it."""
+    """A shape to begin from, the turn from the family's frame to the target's, and the target before it.
+    encoded: whether an encoder saw it in the target, rather than a training shape being near."""
 
     shape: NeuralShape
     turn: Quaternion
     target: Target
+    encoded: bool = False
+
+
+def find_starts(
+    model: Model, target: Target, turns: list[Quaternion], settings: ReconstructionSettings
+) -> list[Start]:
+    """Shapes to begin from, as the settings ask for; one, or several to choose from.
+
+    Raises:
+        ModelError: an encoder is asked for, and the model has none; or its file is damaged.
+        EmptyShapeError, ParameterError, SettingError: as `encoded_start`.
+    """
+    encoder = load_encoder(model) if settings.start in ("auto", "encoder") else None
+    if encoder is None and settings.start == "encoder":
+        raise ModelError(
+            f"{model.name} has no encoder; make one with `parts train-encoder`, or start from the nearest"
+        )
+    if encoder is not None and (settings.start == "encoder" or target.surface is not None):
+        error, start = encoded_start(encoder, target, turns)
+        if settings.start == "encoder" or error <= nearest_trained(model, start.target)[0][0]:
+            return [start]
+    if settings.start == "mean":
+        return [Start(NeuralShape.mean(model), turns[0], target.turned(turns[0]))]
+    return best_starts(model, target, settings.starts, turns)
 
 
 def ways_to_stand(up: str | None) -> list[Quaternion]:
@@ -82,6 +110,32 @@ def best_starts(model: Model, target: Target, most: int, turns: list[Quaternion]
     good = [entry for entry in found if entry[1] == 0 or entry[0] < _CLEARLY * as_it_stands]
     good.sort(key=lambda entry: entry[0])
     return [Start(shape, turns[k], turned[k]) for _, k, shape in good[:most]]
+
+
+@torch.no_grad()
+def encoded_start(encoder: Encoder, target: Target, turns: list[Quaternion]) -> tuple[float, Start]:
+    """What the encoder sees in the target's surface, the way that it stands which is judged as in
+    `best_starts`, and how far its distances are off.
+
+    Raises:
+        SettingError: nothing is known of the surface.
+        EmptyShapeError, ParameterError: as `Encoder.encode`.
+    """
+    if target.surface is None:
+        raise SettingError("points on the surface are needed for an encoder; start from the nearest instead")
+    model = encoder.model
+    turned = [target.turned(turn) for turn in turns]
+    clouds = torch.stack([t.surface for t in turned if t.surface is not None])
+    seen = encoder.encode(clouds)
+    rows = _rows(target, _SAMPLES)
+    errors = [
+        float(errors_of(model, one.latents[None], one.poses.map(lambda t: t[None]), where, rows))
+        for one, where in zip(seen, turned, strict=True)
+    ]
+    best = min(range(len(turns)), key=lambda k: errors[k])
+    if errors[best] >= _CLEARLY * errors[0]:
+        best = 0
+    return errors[best], Start(seen[best], turns[best], turned[best], encoded=True)
 
 
 @torch.no_grad()

@@ -24,7 +24,7 @@ from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import MissingDependencyError, SettingError
 from partwright.partsdf.autodecoder import AutoDecoder
 from partwright.partsdf.checkpoints import TrainingState, load_checkpoint, save_checkpoint
-from partwright.partsdf.config import Config
+from partwright.partsdf.config import Config, TrainingSettings
 from partwright.partsdf.data import (
     FamilySamples,
     check_training_shapes,
@@ -101,14 +101,15 @@ class Trainer:
         self.config, self.family, self.folder, self.fabric = config, family, folder, fabric
         self.settings, self.parts = config.training, part_names(family, config)
         torch.manual_seed(self.settings.seed)
-        self.plain = AutoDecoder(len(samples), len(self.parts), config.decoder)
+        self.plain = AutoDecoder(len(samples), len(self.parts), config.decoder, self.settings.latent_spread)
         if isinstance(self.plain.decoder, LocalDecoder):
             self.plain.decoder.fit_room(needed_room(samples))
         optimiser = torch.optim.Adam(
             [
                 {"params": self.plain.decoder.parameters(), "lr": self.settings.rate},
                 {"params": [self.plain.latents], "lr": self.settings.latent_rate},
-            ]
+            ],
+            fused=True,
         )
         self.model, self.optimiser = fabric.setup(self.plain, optimiser)
         self.samples = samples.to(fabric.device)
@@ -246,14 +247,28 @@ def _fabric(config: Config) -> Any:
     if settings.threads:
         torch.set_num_threads(settings.threads)
     strategy = "ddp" if settings.devices > 1 else "auto"
+    mixed = settings.precision != "32-true"
     fabric = Fabric(
         accelerator=settings.accelerator,
         devices=settings.devices,
         strategy=strategy,
-        precision=settings.precision,  # type: ignore[arg-type]
+        plugins=[_mixed(settings)] if mixed else None,
     )
     fabric.launch()
     return fabric
+
+
+def _mixed(settings: TrainingSettings) -> Any:
+    """Mixed precision that leaves points and poses as they are: Fabric's own would round them to half, and
+    with them every place by up to 1/500 of the shape."""
+    from lightning_fabric.plugins.precision import MixedPrecision
+
+    class KeptInputs(MixedPrecision):
+        def convert_input(self, data: Any) -> Any:
+            return data
+
+    on_gpu = settings.accelerator == "cuda" or (settings.accelerator == "auto" and torch.cuda.is_available())
+    return KeptInputs(settings.precision, "cuda" if on_gpu else "cpu")  # type: ignore[arg-type]
 
 
 @contextmanager

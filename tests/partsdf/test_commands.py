@@ -52,6 +52,42 @@ def test_train(lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixt
     assert [(tmp_path / "out" / "model.safetensors").stat().st_size] == sizes[:1]
 
 
+def test_encoder_and_generator(
+    file: Path, lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both lie beside the model that they are for, and are used from there."""
+    assert main(["parts", "generate", "--model", str(file)]) == 2
+    assert "lamps has no generator; make one with `parts train-generator`" in capsys.readouterr().err
+    assert main(["parts", "train-encoder", str(file), str(lamps.folder), "--steps", "2"]) == 0
+    assert main(["parts", "train-generator", str(file), "--steps", "60"]) == 0
+    assert sorted(p.name for p in tmp_path.glob("*.safetensors")) == [
+        "lamps.encoder.safetensors",
+        "lamps.generator.safetensors",
+        "lamps.safetensors",
+    ]
+    make = ["parts", "generate", "--model", str(file), "-o", "made"]
+    assert main([*make, "-n", "2", "--seed", "3", "--keep", "plate", "--of", f"{file}:lamp0"]) == 0
+    assert "2 shapes of lamps's family: made; the least new differs by" in capsys.readouterr().out
+    about = json.loads(Path("made/samples.json").read_text())
+    assert [s["file"] for s in about["samples"]] == ["sample_00.json", "sample_01.json"]
+    assert all(0 <= s["difference"] <= 0.1 and s["nearest"].startswith("lamp") for s in about["samples"])
+    assert Image.open("made/samples.png").width == 480
+    first = pw.load_assembly("made/sample_00.json")
+    plate = NeuralShape.trained(pw.partsdf.load_model(file), "lamp0").poses.translation[0]
+    np.testing.assert_allclose(first["plate"].translation, plate, atol=1e-6)
+    Path("made/sample_00.json").rename("kept.json")
+    assert main([*make, "-n", "1", "--poses", "kept.json"]) == 0
+    assert not Path("made/sample_01.json").exists()
+    assert main([*make, "--keep", "plate"]) == 2
+    assert main([*make, "--poses", f"{file}:0", "--keep", "plate", "--of", f"{file}:0"]) == 2
+    assert main([*make, "-n", "0"]) == 2
+    said = capsys.readouterr().err
+    assert "--keep PARTS and --of SHAPE go together" in said
+    assert "give one of them" in said
+    assert "0 samples: expected 1 or more" in said
+    assert main(["parts", "train-encoder", str(file), str(lamps.folder), "-o", "encoder.bin"]) == 2
+
+
 def test_reconstruct(
     file: Path, lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -117,8 +153,8 @@ def test_interpolate(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["interpolate", "{}:1", "{}:2", "-o", "a.avi"], "written as .gif"),
         (["reconstruct", "{}", "none.ply"], "none.ply"),
         (
-            ["reconstruct", "{}", "none.ply", "--iterations", "0"],
-            "iterations: expected a whole number of at least 1",
+            ["reconstruct", "{}", "none.ply", "--iterations", "-1"],
+            "iterations: expected a whole number of at least 0",
         ),
         (["train", "none.toml", "-o", "out"], "none.toml: no such file"),
         (["train", "/dev/zero", "-o", "out"], "/dev/zero: is a pipe, socket or device"),

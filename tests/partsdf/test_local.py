@@ -23,6 +23,7 @@ from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors, local_points
 from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct
+from partwright.partsdf.segmented_linear import LEAK, segmented_linear
 from partwright.partsdf.training import MODEL, train
 from partwright.shapes import UnitFrame
 from tests.partsdf.lamps import small_config
@@ -74,6 +75,21 @@ def test_gradients_agree_with_finite_differences(changes: dict[str, object]) -> 
 
     inputs = [t[:1].detach().clone().requires_grad_() for t in (z, points, *poses)]
     assert torch.autograd.gradcheck(distances, inputs, eps=1e-7, atol=1e-4)
+
+
+def test_each_segment_has_its_own_weights() -> None:
+    generator = torch.Generator().manual_seed(0)
+    x = torch.randn(11, 5, generator=generator, dtype=torch.float64)
+    weight = torch.randn(4, 5, 3, generator=generator, dtype=torch.float64)
+    shift = torch.randn(4, 3, generator=generator, dtype=torch.float64)
+    ends = [4, 4, 9, 11]  # the second is empty
+    found = segmented_linear(x, weight, shift, ends, activated=True)
+    for first, last, g in ((0, 4, 0), (4, 9, 2), (9, 11, 3)):
+        expected = torch.nn.functional.leaky_relu(x[first:last] @ weight[g] + shift[g], LEAK)
+        torch.testing.assert_close(found[first:last], expected)
+    for activated in (True, False):
+        inputs = [t.clone().requires_grad_() for t in (x, weight, shift)]
+        assert torch.autograd.gradcheck(lambda *t, on=activated: segmented_linear(*t, ends, on), inputs)
 
 
 def test_parts_hear_of_one_another_once_a_shape() -> None:

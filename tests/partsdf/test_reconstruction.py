@@ -21,8 +21,8 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import rotation_matrices
 from partwright.partsdf.reconstruction import (
     Step,
-    _error,
     _scouted,
+    mean_error,
     reconstruct,
     reconstruct_unknown,
 )
@@ -115,8 +115,8 @@ def test_a_shape_of_another_family_is_refused(model: Model, lamps: PreparedFamil
     poses = Poses(*(a[:2] for a in (shape.translation, shape.rotation, shape.scale)))
     with pytest.raises(ModelError, match=r"lamp0 has 2 parts, but lamps knows 3: plate, ball, knob"):
         reconstruct(model, replace(shape, poses=poses, present=shape.present[:2]), QUICK)
-    with pytest.raises(SettingError, match="iterations: expected a whole number of at least 1, got 0"):
-        ReconstructionSettings(iterations=0)
+    with pytest.raises(SettingError, match="iterations: expected a whole number of at least 0, got -1"):
+        ReconstructionSettings(iterations=-1)
     with pytest.raises(SettingError, match="start is 'best'"):
         ReconstructionSettings(start="best")
 
@@ -153,12 +153,12 @@ def test_the_start_that_a_few_iterations_bring_closest_goes_on(model: Model, lam
         _scouted([Start(shape, UPRIGHT, target) for shape in starts], few).shape
         for starts in ([bad], [bad, good])
     )
-    assert _error(together, target) < 0.7 * _error(alone, target)
+    assert mean_error(together, target) < 0.7 * mean_error(alone, target)
     order = [shape for _, shape in nearest_trained(model, target, 3)]
     assert len(order) == 3
     assert not torch.equal(order[0].latents, order[1].latents)
     # Starts are ranked as they are used: with all parts, those that the training shape has not among them.
-    errors = [_error(replace(one, present=torch.ones_like(one.present)), target, 512) for one in order]
+    errors = [mean_error(replace(one, present=torch.ones_like(one.present)), target, 512) for one in order]
     assert errors == sorted(errors)
 
 

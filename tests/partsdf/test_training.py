@@ -14,12 +14,13 @@ import torch
 from partwright.datasets.prepared import PreparedFamily, write_family
 from partwright.errors import FamilyError, ModelError, SettingError
 from partwright.partsdf import model as models
+from partwright.partsdf.autodecoder import AutoDecoder
 from partwright.partsdf.config import config_from
 from partwright.partsdf.data import load_samples
 from partwright.partsdf.logs import read_log
 from partwright.partsdf.model import Model, find_model, load_model, model_from_bytes
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.training import CHECKPOINT, MODEL, EpochReport, train
+from partwright.partsdf.training import CHECKPOINT, MODEL, EpochReport, _fabric, train
 from tests.partsdf.lamps import PARTS, lamp, small_config
 
 
@@ -202,3 +203,15 @@ def test_models_are_found_by_name_and_hash(
     for broken in (b"", data[: len(data) // 2], b"\x08" + bytes(20)):
         with pytest.raises(ModelError, match=r"x: damaged, or no PartSDF model"):
             model_from_bytes(broken, "x")
+
+
+def test_half_precision_leaves_places_as_they_are(lamps: PreparedFamily) -> None:
+    """Points and poses enter the network to the bit; only its hidden products are in half precision."""
+    config = small_config(lamps, precision="bf16-mixed")
+    samples = load_samples(lamps, [0, 1], config)
+    seen: list[torch.Tensor] = []
+    fabric = _fabric(config)
+    plain = AutoDecoder(2, 3, config.decoder)
+    plain.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[1]))
+    fabric.setup(plain)(torch.tensor([0, 1]), samples.points[:, :9], samples.poses)
+    assert torch.equal(seen[0], samples.points[:, :9])

@@ -1,0 +1,161 @@
+"""Points to parts at once: latents, poses and presence of all parts of a cloud (section 3.4, appendix B.3).
+
+Learned queries, one a part and some more beside them, hear of the points by cross-attention and of one
+another by self-attention, twice over, as in 3DShape2VecSet; each part's own says what that part is like. The
+paper's has eight layers and no say about which parts there are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from partwright.errors import EmptyShapeError, ParameterError
+from partwright.partsdf.clouds import unit_cloud
+from partwright.partsdf.companions import beside, check_tensors, load_companion, save_companion
+from partwright.partsdf.decoder import positional_encoding
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.part_vectors import POSE, PartVectors
+from partwright.partsdf.poses import PoseTensors
+
+KIND = "encoder"
+FEWEST = 32  # points
+MOST = 2048  # points that are looked at
+_OCTAVES = 6
+
+
+@dataclass(frozen=True)
+class EncoderSettings:
+    """width: of tokens; heads; rounds: of cross-attention, each with `blocks` of self-attention; beside:
+    queries that are no part's."""
+
+    width: int = 128
+    heads: int = 4
+    rounds: int = 2
+    blocks: int = 2
+    beside: int = 24
+
+
+class EncoderNetwork(nn.Module):
+    """Clouds (B, N, 3) to vectors (B, P, K + 12 + 1): latents, poses, and the logit of presence."""
+
+    def __init__(self, parts: int, latent: int, settings: EncoderSettings) -> None:
+        super().__init__()
+        self.parts, width = parts, settings.width
+        self.point = nn.Sequential(
+            nn.Linear(3 + 6 * _OCTAVES, width), nn.GELU(), nn.Linear(width, width), nn.GELU()
+        )
+        self.query = nn.Parameter(0.1 * torch.randn(parts + settings.beside, width))
+        self.heard = nn.LayerNorm(width)
+        self.cross = nn.ModuleList(
+            nn.MultiheadAttention(width, settings.heads, batch_first=True) for _ in range(settings.rounds)
+        )
+        self.asking = nn.ModuleList(nn.LayerNorm(width) for _ in range(settings.rounds))
+        self.talk = nn.ModuleList(
+            nn.TransformerEncoder(
+                nn.TransformerEncoderLayer(
+                    width, settings.heads, 2 * width, dropout=0.0, batch_first=True, norm_first=True
+                ),
+                settings.blocks,
+                enable_nested_tensor=False,
+            )
+            for _ in range(settings.rounds)
+        )
+        self.out = nn.Sequential(nn.LayerNorm(width), nn.Linear(width, latent + POSE + 1))
+
+    def forward(self, points: Tensor) -> Tensor:
+        seen = self.heard(self.point(positional_encoding(points, _OCTAVES)))
+        tokens = self.query.expand(len(points), -1, -1)
+        for norm, cross, talk in zip(self.asking, self.cross, self.talk, strict=True):
+            tokens = tokens + cross(norm(tokens), seen, seen, need_weights=False)[0]
+            tokens = talk(tokens)
+        result: Tensor = self.out(tokens[:, : self.parts])
+        return result
+
+
+@dataclass(frozen=True)
+class Encoder:
+    """A trained network, with the model whose latents and poses it predicts."""
+
+    model: Model
+    settings: EncoderSettings
+    network: EncoderNetwork
+    vectors: PartVectors
+
+    @torch.no_grad()
+    def encode(self, points: Tensor) -> list[NeuralShape]:
+        """A shape for each of the clouds (B, N, 3), each in its own frame: where the cloud lies.
+
+        At most `MOST` of the points are looked at, spread evenly over their order.
+
+        Raises:
+            EmptyShapeError: there are fewer than `FEWEST` points, or they are all at one place.
+            ParameterError: a coordinate is not finite.
+        """
+        if points.shape[1] < FEWEST:
+            raise EmptyShapeError(
+                f"{points.shape[1]} points are too few to tell parts from; give {FEWEST} or more"
+            )
+        if not torch.isfinite(points).all():
+            raise ParameterError("a point has a NaN or infinite coordinate; all must be finite")
+        low, high = points.amin(dim=1), points.amax(dim=1)
+        size = (high - low).amax(dim=1)
+        if not (size > 0).all():
+            raise EmptyShapeError("all points are at one place; give points all over the surface")
+        rows = torch.linspace(0, points.shape[1] - 1, min(MOST, points.shape[1])).long()
+        framed = unit_cloud(points.float())
+        found = self.network(framed[:, rows])
+        latents, poses, logits = self.split(found)
+        # Back from the cloud's unit frame to the points'.
+        ratio = (size / (framed.amax(dim=1) - framed.amin(dim=1)).amax(dim=1)).float()[:, None, None]
+        centre = ((low + high) / 2).float()[:, None]
+        poses = PoseTensors(poses.translation * ratio + centre, poses.rotation, poses.scale * ratio)
+        present = logits > 0
+        present[torch.arange(len(present)), logits.argmax(dim=1)] = True  # one at least
+        latents = torch.where(present[..., None], latents, self.model.absent_latent)
+        placed = [
+            torch.where(present[..., None], mine, average)
+            for mine, average in zip(poses, self.model.average_pose, strict=True)
+        ]
+        poses = PoseTensors(*placed)
+        return [
+            NeuralShape(self.model, latents[i], poses.map(lambda t, i=i: t[i]), present[i])
+            for i in range(len(points))
+        ]
+
+    def split(self, found: Tensor) -> tuple[Tensor, PoseTensors, Tensor]:
+        """Latents (B, P, Z), poses (B, P, ...) and logits (B, P) of what the network gives."""
+        latents, poses, logits = found.split((self.vectors.width, POSE, 1), dim=-1)
+        return self.vectors.latents(latents), self.vectors.poses(poses), logits.squeeze(-1)
+
+    def save(self, path: str | Path) -> None:
+        """Write it; raises OutputError."""
+        save_companion(path, KIND, self.model, asdict(self.settings), self.network.state_dict())
+
+
+def load_encoder(model: Model, path: str | Path | None = None) -> Encoder | None:
+    """The encoder of a file, or of the one beside the model's; None where there is none.
+
+    Raises:
+        UnreadableFileError, ModelError, NewerVersionError: as `load_companion`.
+    """
+    source = Path(path) if path is not None else beside(model, KIND)
+    if source is None or (path is None and not source.exists()):
+        return None
+
+    def made(settings: dict[str, Any], tensors: dict[str, Tensor]) -> Encoder:
+        known = EncoderSettings(**settings)
+        vectors = PartVectors.of(model)
+        parts = len(model.parts)
+        with torch.device("meta"):  # shapes without memory
+            check_tensors(EncoderNetwork(parts, vectors.width, known).state_dict(), tensors)
+        network = EncoderNetwork(parts, vectors.width, known)
+        network.load_state_dict(tensors)
+        return Encoder(model, known, network.requires_grad_(False).eval(), vectors)
+
+    return load_companion(source, KIND, model, made)

@@ -1,0 +1,235 @@
+"""From noise to shapes: poses and presence of all parts first, then latents that suit them (section 4.2).
+
+SALAD's cascade of two diffusions (Koo et al. 2023), small. Latents are along their principal directions, each
+in its own spread, which the paper found crucial (appendix B.3), and every part's latent hears of all poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from partwright.errors import ModelError, SettingError
+from partwright.partsdf.companions import beside, check_tensors, load_companion, save_companion
+from partwright.partsdf.diffusion import denoised
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.part_vectors import POSE, PartVectors
+from partwright.partsdf.poses import PoseTensors
+
+KIND = "generator"
+_WAVES = 16  # by which a network sees the time
+
+
+@dataclass(frozen=True)
+class GeneratorSettings:
+    """width: of tokens; heads; blocks: of either network."""
+
+    width: int = 128
+    heads: int = 4
+    blocks: int = 4
+
+
+class Layouts(nn.Module):
+    """Noisy poses and presence (B, P, 13) at times (B,) to their velocities: self-attention among parts."""
+
+    def __init__(self, parts: int, settings: GeneratorSettings) -> None:
+        super().__init__()
+        width = settings.width
+        self.enter = nn.Linear(POSE + 1, width)
+        self.part = nn.Parameter(0.5 * torch.randn(parts, width))
+        self.time = _Time(width)
+        self.blocks = nn.TransformerEncoder(_block(nn.TransformerEncoderLayer, settings), settings.blocks,
+                                            enable_nested_tensor=False)  # fmt: skip
+        self.out = _last(width, POSE + 1)
+
+    def forward(self, layout: Tensor, time: Tensor) -> Tensor:
+        tokens = self.enter(layout) + self.part + self.time(time)[:, None]
+        result: Tensor = self.out(self.blocks(tokens))
+        return result
+
+
+class Forms(nn.Module):
+    """Noisy latents (B, P, K) at times (B,), with the poses and presence (B, P, 13) that they are for, to
+    their velocities: self-attention among latents, cross-attention to poses."""
+
+    def __init__(self, parts: int, latent: int, settings: GeneratorSettings) -> None:
+        super().__init__()
+        width = settings.width
+        self.enter = nn.Linear(latent, width)
+        self.placed = nn.Linear(POSE + 1, width)
+        self.part = nn.Parameter(0.5 * torch.randn(parts, width))
+        self.time = _Time(width)
+        self.blocks = nn.TransformerDecoder(_block(nn.TransformerDecoderLayer, settings), settings.blocks)
+        self.out = _last(width, latent)
+
+    def forward(self, latents: Tensor, time: Tensor, layout: Tensor) -> Tensor:
+        where = self.placed(layout) + self.part
+        tokens = self.enter(latents) + where + self.time(time)[:, None]
+        result: Tensor = self.out(self.blocks(tokens, where))
+        return result
+
+
+class _Time(nn.Module):
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.change = nn.Sequential(nn.Linear(2 * _WAVES, width), nn.SiLU(), nn.Linear(width, width))
+
+    def forward(self, time: Tensor) -> Tensor:
+        phase = time[:, None] * torch.pi * torch.arange(1, _WAVES + 1)
+        result: Tensor = self.change(torch.cat([phase.sin(), phase.cos()], dim=1))
+        return result
+
+
+def _block(kind: Any, settings: GeneratorSettings) -> Any:
+    return kind(
+        settings.width, settings.heads, 2 * settings.width, dropout=0.1, batch_first=True, norm_first=True
+    )
+
+
+def _last(width: int, outputs: int) -> nn.Module:
+    return nn.Sequential(nn.LayerNorm(width), nn.Linear(width, outputs))
+
+
+@dataclass(frozen=True)
+class Generator:
+    """Both networks, with the model whose parts they make."""
+
+    model: Model
+    settings: GeneratorSettings
+    layouts: Layouts
+    forms: Forms
+    vectors: PartVectors
+
+    def generate(
+        self,
+        count: int,
+        seed: int = 0,
+        source: NeuralShape | None = None,
+        keep: Sequence[str] = (),
+        keep_layout: bool = False,
+    ) -> list[NeuralShape]:
+        """Shapes, each by its own noise: the first n of more are those of n.
+
+        source: a shape whose parts `keep` stay as they are, or, with `keep_layout`, all of whose poses and no
+        latent.
+
+        Raises:
+            SettingError: none is asked for, nothing would be left to make, or the source is missing or of
+                another model.
+        """
+        if count < 1:
+            raise SettingError(f"{count} samples: expected 1 or more")
+        kept = torch.zeros(len(self.model.parts), dtype=torch.bool)
+        for name in keep:
+            kept[self.model.index(name)] = True
+        self._check(source, kept, keep_layout)
+        noise = _noise(count, seed, (len(kept), POSE + 1 + self.vectors.width))
+        layout, latents = noise[..., : POSE + 1], noise[..., POSE + 1 :]
+        if source is None:
+            layout = denoised(self.layouts, layout)
+            latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents)
+        else:
+            known = self.layout_of(source.poses, source.present).expand_as(layout)
+            fixed = torch.ones_like(kept) if keep_layout else kept
+            layout = denoised(self.layouts, layout, known, fixed[:, None].expand_as(layout))
+            form = self.vectors.of_latents(source.latents).expand_as(latents)
+            same = kept[:, None].expand_as(latents)
+            latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents, form, same)
+        return [self._shape(layout[i], latents[i], source, kept, keep_layout) for i in range(count)]
+
+    def layout_of(self, poses: PoseTensors, present: Tensor) -> Tensor:
+        """(..., P, 13) of poses (..., P, ...) and presence (..., P)."""
+        return tidy(torch.cat([self.vectors.of_poses(poses), 2.0 * present[..., None] - 1], dim=-1))
+
+    def _check(self, source: NeuralShape | None, kept: Tensor, keep_layout: bool) -> None:
+        name = self.model.name
+        if source is None:
+            if kept.any() or keep_layout:
+                raise SettingError("parts or poses are kept, but of which shape? Name it")
+            return
+        if source.model.hash != self.model.hash:
+            raise SettingError(f"{name} cannot keep parts of another model, {source.model.name}")
+        if keep_layout and kept.any():
+            raise SettingError("either all poses are kept, or some parts whole; choose one")
+        if not kept.any() and not keep_layout:
+            raise SettingError("a shape is named, but nothing of it is kept; name parts, or keep its poses")
+        if kept.all():
+            raise SettingError(f"all parts of {name} are kept; nothing is left to make")
+        for part in kept.nonzero().squeeze(1).tolist():
+            if not source.present[part]:
+                raise SettingError(f"{self.model.parts[part]} is to be kept, but the shape has none")
+
+    def _shape(
+        self, layout: Tensor, latents: Tensor, source: NeuralShape | None, kept: Tensor, keep_layout: bool
+    ) -> NeuralShape:
+        present = layout[:, -1] > 0
+        present[layout[:, -1].argmax()] = True  # one at least
+        there = present[:, None]
+        form = torch.where(there, self.vectors.latents(latents), self.model.absent_latent)
+        made = self.vectors.poses(layout[:, :POSE])
+        poses = [torch.where(there, a, b) for a, b in zip(made, self.model.average_pose, strict=True)]
+        if source is not None:  # to the bit, not through vectors
+            same = (kept | keep_layout)[:, None]
+            form = torch.where(kept[:, None], source.latents, form)
+            poses = [torch.where(same, a, b) for a, b in zip(source.poses, poses, strict=True)]
+            present = torch.where(same[:, 0], source.present, present)
+        return NeuralShape(self.model, form, PoseTensors(*poses), present)
+
+    def save(self, path: str | Path) -> None:
+        """Write it; raises OutputError."""
+        tensors = {
+            f"{n}.{k}": v for n in ("layouts", "forms") for k, v in getattr(self, n).state_dict().items()
+        }
+        save_companion(path, KIND, self.model, asdict(self.settings), tensors)
+
+
+def tidy(layout: Tensor) -> Tensor:
+    """Poses and presence (..., 13) where presence is 1 or -1, and the pose of what is absent the mean."""
+    there = layout[..., -1:] > 0
+    return torch.cat([torch.where(there, layout[..., :-1], 0.0), torch.where(there, 1.0, -1.0)], dim=-1)
+
+
+def load_generator(model: Model, path: str | Path | None = None) -> Generator:
+    """The generator of a file, or of the one beside the model's.
+
+    Raises:
+        ModelError: there is none; else as `load_companion`.
+    """
+    source = Path(path) if path is not None else beside(model, KIND)
+    if source is None or (path is None and not source.exists()):
+        raise ModelError(f"{model.name} has no generator; make one with `parts train-generator`")
+
+    def made(settings: dict[str, Any], tensors: dict[str, Tensor]) -> Generator:
+        known, vectors = GeneratorSettings(**settings), PartVectors.of(model)
+        with torch.device("meta"):  # shapes without memory
+            empty = networks(model, vectors, known)
+        expected = {f"{n}.{k}": v for n, one in empty.items() for k, v in one.state_dict().items()}
+        check_tensors(expected, tensors)
+        real = networks(model, vectors, known)
+        for name, one in real.items():
+            prefix = f"{name}."
+            one.load_state_dict({k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)})
+            one.requires_grad_(False).eval()
+        return Generator(model, known, **real, vectors=vectors)  # type: ignore[arg-type]
+
+    return load_companion(source, KIND, model, made)
+
+
+def networks(model: Model, vectors: PartVectors, settings: GeneratorSettings) -> dict[str, nn.Module]:
+    parts = len(model.parts)
+    return {"layouts": Layouts(parts, settings), "forms": Forms(parts, vectors.width, settings)}
+
+
+def _noise(count: int, seed: int, size: tuple[int, ...]) -> Tensor:
+    """(count, *size), of which each row depends on the seed and its own number alone."""
+    rows = []
+    for i in range(count):
+        generator = torch.Generator().manual_seed((seed << 20) + i)
+        rows.append(torch.randn(size, generator=generator))
+    return torch.stack(rows)

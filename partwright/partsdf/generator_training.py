@@ -1,0 +1,134 @@
+"""How a generator learns from the latents and poses of training shapes; and a Gaussian beside it."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from partwright.errors import SettingError
+from partwright.methods import Cancellation
+from partwright.partsdf.diffusion import noised
+from partwright.partsdf.generator import Generator, GeneratorSettings, networks, tidy
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.part_vectors import POSE, PartVectors
+from partwright.partsdf.poses import PoseTensors
+
+_BATCH, _RATE, _WARMUP = 64, 1e-3, 50
+_AVERAGE = 0.995  # of the weights that are kept, a step
+_TOLD = 50  # steps
+
+
+@dataclass(frozen=True)
+class GeneratorStep:
+    """layouts, forms: the mean squared errors of both velocities, 1 where nothing is known."""
+
+    number: int
+    of: int
+    layouts: float
+    forms: float
+
+
+def train_generator(
+    model: Model,
+    *,
+    steps: int = 3000,
+    seed: int = 0,
+    settings: GeneratorSettings | None = None,
+    told: Callable[[GeneratorStep], None] | None = None,
+    cancel: Cancellation | None = None,
+) -> Generator:
+    """A generator for a model, whose file holds all that is learned from; after a cancellation, as far as it
+    has come.
+
+    Raises:
+        SettingError: fewer than one step, fewer than two shapes, or a model without poses.
+    """
+    if steps < 1:
+        raise SettingError(f"steps is {steps}; expected 1 or more")
+    _check(model)
+    settings, cancel = settings or GeneratorSettings(), cancel or Cancellation()
+    torch.manual_seed(seed)
+    vectors = PartVectors.of(model)
+    made = networks(model, vectors, settings)
+    kept = {name: copy.deepcopy(one).requires_grad_(False) for name, one in made.items()}
+    optimiser = torch.optim.AdamW(
+        [p for one in made.values() for p in one.parameters()], lr=_RATE, fused=True
+    )
+    result = Generator(model, settings, **kept, vectors=vectors)  # type: ignore[arg-type]
+    layouts, forms = result.layout_of(model.poses, model.present), vectors.of_latents(model.latents)
+    generator = torch.Generator().manual_seed(seed)
+    sums, since = torch.zeros(2), 0
+    for step in range(steps):
+        if cancel.requested:
+            break
+        late = 0.5 * (1 + math.cos(math.pi * step / steps))
+        optimiser.param_groups[0]["lr"] = _RATE * late * min(1.0, (step + 1) / _WARMUP)
+        rows = torch.randint(len(layouts), (_BATCH,), generator=generator)
+        errors = _errors(made, layouts[rows], forms[rows], generator)
+        optimiser.zero_grad()
+        errors.sum().backward()
+        optimiser.step()
+        share = min(_AVERAGE, step / (step + 10))
+        for name, one in made.items():
+            for old, new in zip(kept[name].parameters(), one.parameters(), strict=True):
+                old.lerp_(new.detach(), 1 - share)
+        sums, since = sums + errors.detach(), since + 1
+        if told and (since == _TOLD or step + 1 == steps):
+            told(GeneratorStep(step + 1, steps, *(sums / since).tolist()))
+            sums, since = torch.zeros(2), 0
+    for one in kept.values():
+        one.eval()
+    return result
+
+
+def _errors(made: dict[str, nn.Module], layout: Tensor, form: Tensor, generator: torch.Generator) -> Tensor:
+    """(2,) of the velocities of layouts (B, P, 13) and forms (B, P, K); what is absent has no form."""
+    time = torch.rand(2, len(layout), generator=generator)
+    there = (layout[..., -1:] > 0).float()
+    found = []
+    for clean, when, weight in ((layout, time[0], torch.ones_like(there)), (form, time[1], there)):
+        noise = torch.randn(clean.shape, generator=generator)
+        noisy, wanted = noised(clean, noise, when)
+        name = "layouts" if clean is layout else "forms"
+        told = made[name](noisy, when) if name == "layouts" else made[name](noisy, when, layout)
+        error = (told - wanted).square().mean(dim=-1, keepdim=True)
+        found.append((weight * error).sum() / weight.sum().clamp(min=1))
+    return torch.stack(found)
+
+
+def gaussian_samples(model: Model, count: int, seed: int = 0) -> list[NeuralShape]:
+    """Shapes from the normal distribution of the training shapes' poses, presence and latents together: what
+    a generator has to be better than.
+
+    Raises:
+        SettingError: fewer than two shapes, or a model without poses.
+    """
+    _check(model)
+    vectors = PartVectors.of(model)
+    there = 2.0 * model.present[..., None] - 1
+    layout = tidy(torch.cat([vectors.of_poses(model.poses), there], dim=-1))
+    known = torch.cat([layout, vectors.of_latents(model.latents)], dim=-1)
+    mean = known.mean(dim=0)
+    weight = torch.randn(count, len(known), generator=torch.Generator().manual_seed(seed))
+    drawn = mean + torch.einsum("ns,spk->npk", weight, known - mean) / (len(known) - 1) ** 0.5
+    shapes = []
+    for one in drawn:
+        present = one[:, POSE] > 0
+        poses = vectors.poses(one[:, :POSE])
+        placed = [torch.where(present[:, None], a, b) for a, b in zip(poses, model.average_pose, strict=True)]
+        latents = torch.where(present[:, None], vectors.latents(one[:, POSE + 1 :]), model.absent_latent)
+        shapes.append(NeuralShape(model, latents, PoseTensors(*placed), present))
+    return shapes
+
+
+def _check(model: Model) -> None:
+    if model.config.one_part or not model.config.poses:
+        raise SettingError(f"{model.name} was trained without poses, which are generated first")
+    if len(model.shapes) < 2:
+        raise SettingError(f"{model.name} knows {len(model.shapes)} shape; two or more are needed")

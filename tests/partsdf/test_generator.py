@@ -1,0 +1,133 @@
+"""New shapes out of noise: by seed, with parts or poses kept, and apart from those that are known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+
+from partwright.errors import ModelError, SettingError
+from partwright.partsdf.companions import beside
+from partwright.partsdf.diffusion import denoised, levels, noised
+from partwright.partsdf.generator import KIND, Generator, GeneratorSettings, load_generator
+from partwright.partsdf.generator_training import gaussian_samples, train_generator
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.novelty import nearest_training_shape
+
+SMALL = GeneratorSettings(width=48, heads=2, blocks=2)
+
+
+@pytest.fixture(scope="module")
+def generator(model: Model, tmp_path_factory: pytest.TempPathFactory) -> Generator:
+    torch.set_num_threads(1)
+    saved = model.save(tmp_path_factory.mktemp("generated") / "lamps.safetensors")
+    made = train_generator(saved, steps=400, settings=SMALL)
+    made.save(beside(saved, KIND) or "")
+    return made
+
+
+def test_a_perfect_denoiser_finds_the_distribution() -> None:
+    """Of a normal distribution the best velocity is known: samples have its mean and spread."""
+    mean, spread = 1.5, 0.4
+
+    def best(at: torch.Tensor, time: torch.Tensor) -> torch.Tensor:
+        a, s = (one[:, None] for one in levels(time))
+        gain = a * spread**2 / (a**2 * spread**2 + s**2)
+        clean = mean + gain * (at - a * mean)
+        return (a * at - clean) / s
+
+    noise = torch.randn(4000, 1, generator=torch.Generator().manual_seed(0))
+    found = denoised(best, noise)
+    assert float(found.mean()) == pytest.approx(mean, abs=0.05)
+    assert float(found.std()) == pytest.approx(spread, rel=0.08)
+    known = torch.full_like(noise, 7.0)
+    some = torch.zeros_like(noise, dtype=torch.bool)
+    some[:2000] = True
+    kept = denoised(best, noise, known, some)
+    assert (kept[:2000] == 7).all()
+    torch.testing.assert_close(kept[2000:], found[2000:])
+    clean, time = torch.randn(50, 3), torch.rand(50)
+    noisy, velocity = noised(clean, torch.randn(50, 3), time)
+    a, s = (one[:, None] for one in levels(time))
+    torch.testing.assert_close(a * noisy - s * velocity, clean)
+    assert math.isclose(float(levels(torch.tensor(0.0))[0]), 1.0, abs_tol=1e-3)
+
+
+def test_samples_are_lamps_by_their_seed(generator: Generator) -> None:
+    """Balls stand on plates, as all do that were trained on; about a third has no knob."""
+    shapes = generator.generate(48, seed=3)
+    top = torch.stack([s.poses.translation[0, 2] + s.poses.scale[0, 2] for s in shapes])
+    bottom = torch.stack([s.poses.translation[1, 2] - s.poses.scale[1].mean() for s in shapes])
+    assert (top - bottom).abs().median() < 0.1
+    spread = torch.stack([s.poses.scale[1, 0] for s in shapes]).std()
+    assert float(spread / generator.model.poses.scale[:, 1, 0].std()) == pytest.approx(1.0, abs=0.6)
+    assert 24 <= sum("knob" in s.names() for s in shapes) <= 44
+    few = generator.generate(2, seed=3)
+    for one, same in zip(few, shapes, strict=False):
+        torch.testing.assert_close(one.latents, same.latents, atol=1e-4, rtol=0)
+    other = generator.generate(1, seed=4)[0]
+    assert (other.latents - few[0].latents).abs().max() > 0.01
+
+
+def test_parts_and_poses_may_be_kept(generator: Generator) -> None:
+    model = generator.model
+    source = NeuralShape.trained(model, "lamp0")
+    for one in generator.generate(3, 1, source, keep=["plate"]):
+        assert torch.equal(one.latents[0], source.latents[0])
+        for mine, theirs in zip(one.poses, source.poses, strict=True):
+            assert torch.equal(mine[0], theirs[0])
+        assert (one.latents[1] - source.latents[1]).abs().max() > 1e-3
+    first, second = generator.generate(2, 1, source, keep_layout=True)
+    for mine, theirs in zip(first.poses, source.poses, strict=True):
+        assert torch.equal(mine, theirs)
+    assert torch.equal(first.present, source.present)
+    assert (first.latents - second.latents).abs().max() > 1e-3
+
+
+def test_what_cannot_be_kept_is_told(generator: Generator) -> None:
+    source = NeuralShape.trained(generator.model, "lamp0")
+    bare = NeuralShape.trained(generator.model, "lamp2")  # without a knob
+    for changes, said in (
+        ({"count": 0}, "0 samples: expected 1 or more"),
+        ({"keep": ["plate"]}, "of which shape"),
+        ({"source": source}, "nothing of it is kept"),
+        ({"source": source, "keep": ["lid"]}, "no part 'lid'"),
+        ({"source": source, "keep": list(generator.model.parts)}, "nothing is left to make"),
+        ({"source": source, "keep": ["plate"], "keep_layout": True}, "choose one"),
+        ({"source": bare, "keep": ["knob"]}, "knob is to be kept, but the shape has none"),
+        (
+            {"source": replace(source, model=replace(source.model, hash="0" * 64)), "keep": ["plate"]},
+            "parts of another model",
+        ),
+    ):
+        with pytest.raises(SettingError, match=said):
+            generator.generate(**({"count": 1} | changes))  # type: ignore[arg-type]
+    with pytest.raises(SettingError, match="knows 1 shape"):
+        train_generator(replace(generator.model, shapes=("one",)))
+    with pytest.raises(SettingError, match="steps is 0"):
+        train_generator(generator.model, steps=0)
+
+
+def test_its_file(generator: Generator, tmp_path: Path) -> None:
+    again = load_generator(generator.model)
+    one, two = generator.generate(1, 5)[0], again.generate(1, 5)[0]
+    torch.testing.assert_close(one.latents, two.latents, atol=0.05, rtol=0)  # half precision
+    assert torch.equal(two.latents, load_generator(generator.model).generate(1, 5)[0].latents)
+    with pytest.raises(ModelError, match="lamps has no generator; make one with `parts train-generator`"):
+        load_generator(replace(generator.model, hash="3" * 64))
+
+
+def test_a_gaussian_to_compare_with_and_the_distance_to_what_is_known(generator: Generator) -> None:
+    model = generator.model
+    drawn = gaussian_samples(model, 200, seed=1)
+    latents = torch.stack([s.latents[0] for s in drawn])
+    spread = model.latents[:, 0].std(dim=0)
+    torch.testing.assert_close(latents.std(dim=0), spread, rtol=0.35, atol=0)
+    name, difference = nearest_training_shape(NeuralShape.trained(model, "lamp3"))
+    assert (name, difference) == ("lamp3", pytest.approx(0.0, abs=1e-6))
+    _, far = nearest_training_shape(drawn[0])
+    assert 1e-4 < far < 0.1
