@@ -58,13 +58,7 @@ class Model:
         """Raises UncleanableError where a leaf is no SuperFrustum or named solid or has no size, or there are
         too many."""
         for part in assembly.parts:
-            if part.field.superfrustum() is None:
-                raise UncleanableError(
-                    f"part {part.name!r} is a {part.field.kind}, whose numbers no relation can bind; only "
-                    "SuperFrusta and named solids can be cleaned: fit --method solids --clean makes such"
-                )
-            if size_of(part) == 0:
-                raise UncleanableError(f"part {part.name!r} has no size; take it out, or give it one")
+            check_cleanable(part)
         copies = [copy for part in assembly.parts for copy in part.copies]
         if len(copies) > MOST_COPIES:
             raise UncleanableError(
@@ -215,6 +209,17 @@ class Model:
         leaves = list(self.leaves)
         leaves[leaf] = joined(copies)
         return Model(with_leaves(self.assembly, leaves), rotations)
+
+
+def check_cleanable(part: Part) -> None:
+    """Raises UncleanableError where a leaf is no SuperFrustum or named solid, or has no size."""
+    if part.field.superfrustum() is None:
+        raise UncleanableError(
+            f"part {part.name!r} is a {part.field.kind}, whose numbers no relation can bind; SuperFrusta, "
+            "named solids, extrusions and revolutions can be cleaned: fit --method solids --clean makes such"
+        )
+    if size_of(part) == 0:
+        raise UncleanableError(f"part {part.name!r} has no size; take it out, or give it one")
 
 
 def joined(copies: Sequence[Part]) -> Part:

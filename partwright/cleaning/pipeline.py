@@ -13,26 +13,33 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
-from partwright.assembly import Assembly
+from partwright.assembly import Assembly, Similarity
+from partwright.assembly.distance import unit_similarity
 from partwright.cleaning.acceptance import AcceptanceTest
 from partwright.cleaning.deviation_samples import DeviationSamples, State
+from partwright.cleaning.feature_cleaning import cleaned_features, same_numbers
+from partwright.cleaning.feature_relations import FeatureNumber, feature_numbers, feature_relations
 from partwright.cleaning.grid import Grid
-from partwright.cleaning.model import Model
+from partwright.cleaning.model import Model, check_cleanable
 from partwright.cleaning.orientations import turned
 from partwright.cleaning.relations import Relation, relations
 from partwright.cleaning.repeated_parts import collapsed, tidy, unchanged
 from partwright.cleaning.snapping import snapped
 from partwright.cleaning.solid_kinds import plainer
 from partwright.errors import SettingError
-from partwright.meshing import occupancy_grid
+from partwright.fields import Swept
+from partwright.meshing import mesh_assembly, occupancy_grid
 from partwright.methods import Cancellation
 from partwright.metrics.iou import RESOLUTION, iou
 from partwright.shapes import Shape
 from partwright.tolerances.noise import roughness
 
 TOLERANCE = 5e-4  # of the longest side
+_POINTS = 8000
+_MESHED = 128  # cells along the longest side
 _COARSEST = 0.05  # of the longest side
 _FINEST = 1e-5
 
@@ -68,6 +75,8 @@ class Cleaned:
     """Of the cleaned one, at the very samples and cells of `before`."""
     changed: bool
     """Whether anything but rounding differs."""
+    numbers: tuple[FeatureNumber, ...] = ()
+    """Of extrusions, revolutions and what lies among them: nominal beside measured."""
 
     def to_dict(self) -> dict[str, Any]:
         """For report.json."""
@@ -77,6 +86,7 @@ class Cleaned:
             "before": self.before.to_dict(),
             "after": self.after.to_dict(),
             "relations": [relation.to_dict() for relation in self.relations],
+            "numbers": [number.to_dict() for number in self.numbers],
         }
 
 
@@ -105,6 +115,8 @@ def clean(
         NoSurfaceError: nothing is left of the assembly.
     """
     told = told or _nobody
+    if any(isinstance(part.field, Swept) for part in assembly.parts):
+        return _with_features(assembly, shape, tolerance, cancel or Cancellation(), told)
     told("sampling")
     model = Model.of(assembly)
     target = assembly if shape is None else shape
@@ -132,6 +144,48 @@ def clean(
     before = _agreement(assembly, samples, occupied)
     after = _agreement(result, samples, occupied) if changed else before
     return Cleaned(result, relations(result, frames, grid), tolerance, before, after, changed)
+
+
+def _with_features(
+    assembly: Assembly,
+    shape: Shape | None,
+    tolerance: float | None,
+    cancel: Cancellation,
+    told: Callable[[str], None],
+) -> Cleaned:
+    """`clean` where some parts are extrusions or revolutions; parts that are SuperFrusta stay."""
+    for part in assembly.parts:
+        if not isinstance(part.field, Swept):
+            check_cleanable(part)
+    target = assembly if shape is None else shape
+    tolerance = checked_tolerance(tolerance, target)
+    grid = Grid.of(_longest(target))
+    told("relating")
+    made = cleaned_features(assembly, tolerance, grid, cancel)
+    told("measuring")
+    if shape is None:
+        frame = unit_similarity(assembly)
+        surface = mesh_assembly(assembly, _MESHED)
+        points = np.asarray(trimesh.sample.sample_surface(surface, _POINTS, seed=0)[0])
+        occupied = occupancy_grid(assembly.transformed(frame).distance, RESOLUTION)
+    else:
+        x, y, z = (-shape.frame.scale * np.array(shape.frame.centre)).tolist()
+        frame = Similarity(shape.frame.scale, translation=(x, y, z))
+        points = shape.frame.from_unit(shape.unit_surface(_POINTS, 0).points)
+        occupied = shape.unit_occupancy(RESOLUTION)
+
+    def agreement(whole: Assembly) -> Agreement:
+        off = float(np.abs(whole.distance(points)).mean())
+        return Agreement(iou(whole.transformed(frame).distance, occupied), off, len(whole))
+
+    before, after = agreement(assembly), agreement(made)
+    changed = (
+        not same_numbers(assembly, made, grid) and after.mean_deviation <= before.mean_deviation + tolerance
+    )
+    if not changed:
+        made, after = assembly, before
+    numbers = feature_numbers(assembly, made, tolerance)
+    return Cleaned(made, feature_relations(made, grid), tolerance, before, after, changed, numbers)
 
 
 def _nobody(_: str) -> None:

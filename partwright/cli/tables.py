@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,11 +16,13 @@ from partwright.cli.terminal import counted, printable, say, warn
 
 if TYPE_CHECKING:
     from partwright.cleaning import Cleaned
+    from partwright.cleaning.feature_relations import FeatureNumber
     from partwright.fitting import Result
     from partwright.metrics import CadScores, Scores
 
 
 _RELATIONS = 40  # lines that are printed
+_NUMBERS = 12
 
 
 def finish_fit(result: Result, folder: Path) -> int:
@@ -60,6 +63,16 @@ def print_relations(cleaned: Cleaned) -> None:
         say(relation)
     if len(cleaned.relations) > _RELATIONS:
         say(f"and {len(cleaned.relations) - _RELATIONS} relations more, all of them in the report")
+    for number in _told(cleaned.numbers):
+        say(f"{number}{f' {cleaned.assembly.unit}' if cleaned.assembly.unit else ''}")
+    if len(cleaned.numbers) > _NUMBERS:
+        say(f"{len(cleaned.numbers)} numbers of features, nominal beside measured, are in the report")
+
+
+def _told(numbers: Sequence[FeatureNumber]) -> list[FeatureNumber]:
+    """Standard holes first, then those that moved most."""
+    ranked = sorted(numbers, key=lambda one: (not one.standard, -abs(one.deviation)))
+    return [one for one in ranked if one.standard or one.deviation][:_NUMBERS]
 
 
 def print_cleaned(cleaned: Cleaned, path: Path) -> None:

@@ -75,10 +75,15 @@ def test_an_angle_with_holes_has_exact_numbers() -> None:
     assert result.scores.iou > 0.997
 
 
-def test_bounds_and_cleaning_get_named_solids_alone() -> None:
+def test_cleaned_features_have_plain_numbers() -> None:
     profile = Profile([(0, 0), (4, 0), (4, 1), (1, 1), (1, 3), (0, 3)])
     result = fitted(Assembly((Part(Extrusion(profile, 2)),)), clean=True)
-    assert all(part.field.superfrustum() is not None for part in result.assembly.parts)
+    (part,) = result.assembly.parts
+    assert isinstance(part.field, Extrusion)
+    assert part.field.height == 2
+    assert part.field.profile.area == pytest.approx(profile.area, rel=1e-9)
+    assert result.clean is not None
+    assert [one.nominal for one in result.clean.numbers if one.name == "height"] == [2]
 
 
 def test_the_budget_and_the_target_are_kept() -> None:
