@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from partwright.assembly import Assembly
 from partwright.errors import CancelledError, ObjectiveError, SettingError
 from partwright.goals.problem import Point, Problem
 from partwright.goals.step import PENALTY, best_step
@@ -26,7 +27,8 @@ _NOTHING = 1e-6  # of the objective, along the whole longest side: rounding
 class Step:
     """One surface that was tried. numbers: what each objective and bound measures; empty where there is none.
 
-    broken: by how much the worst constraint is, as a share; 0 where all are kept.
+    broken: by how much the worst constraint is, as a share; 0 where all are kept. assembly: None where
+    nothing was left of it.
     """
 
     number: int
@@ -36,6 +38,7 @@ class Step:
     broken: float
     radius: float
     numbers: dict[str, float]
+    assembly: Assembly | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass
@@ -131,7 +134,16 @@ def _told(
 ) -> Step:
     value, broken = (point.value, float(point.broken.max(initial=0.0))) if point else (np.nan, np.nan)
     numbers = point.numbers if point else {}
-    step = Step(number, problem.options.steps, accepted, value, broken, radius, numbers)
+    step = Step(
+        number,
+        problem.options.steps,
+        accepted,
+        value,
+        broken,
+        radius,
+        numbers,
+        point.assembly if point else None,
+    )
     if told is not None:
         told(step)
     return step

@@ -33,7 +33,7 @@ class Task:
     """label: what the step of the history is called."""
 
     label: str
-    work: Callable[[Callable[[Progress], None], Cancellation], Done]
+    work: Callable[[Callable[[Progress | messages.Improving], None], Cancellation], Done]
 
 
 def fitting(shape: Shape, message: messages.Fit, present: Callable[[], Assembly]) -> Task:

@@ -38,6 +38,15 @@ class Size:
     text: str
 
 
+@dataclass(frozen=True)
+class Tried:
+    """A surface that was tried for a goal. value: the goal's number; kept: whether it was a step forward."""
+
+    number: int
+    value: float
+    kept: bool
+
+
 # From the page
 
 
@@ -103,6 +112,19 @@ class Learned:
 
 
 @dataclass(frozen=True)
+class Improve:
+    """Less of a goal, by changing all parts but the locked ones. walls, volume: what is kept of the thinnest
+    walls and of the volume, in %; 0 for whatever comes."""
+
+    goal: str
+    axis: Literal["x", "y", "z", "-x", "-y", "-z"]
+    locked: list[str]
+    steps: int
+    walls: float = 0.0
+    volume: float = 0.0
+
+
+@dataclass(frozen=True)
 class Stop:
     """End the fit with its best so far."""
 
@@ -140,6 +162,8 @@ class State:
     methods: list[str]
     donors: list[str]
     """Training shapes that learned parts of the assembly can be taken from."""
+    goals: list[str]
+    """Objectives for which parts can be changed."""
     formats: list[str]
     """Suffixes of what Download can write."""
     format_names: list[str]
@@ -192,6 +216,15 @@ class Curve:
 
 
 @dataclass(frozen=True)
+class Improving:
+    """How a goal goes: all that was tried so far, the start first, of so many."""
+
+    goal: str
+    of: int
+    tried: list[Tried]
+
+
+@dataclass(frozen=True)
 class Scored:
     """Of one revision against the shape; deviations in its unit."""
 
@@ -215,8 +248,10 @@ class Failed:
     message: str
 
 
-FROM_PAGE: tuple[type, ...] = (Commit, Undo, Redo, Fit, Reshape, Bake, Learned, Stop, Save)
-FROM_SERVER: tuple[type, ...] = (State, Accepted, Unkept, Fitting, Fitted, Curve, Scored, Saved, Failed)
+FROM_PAGE: tuple[type, ...] = (Commit, Undo, Redo, Fit, Reshape, Bake, Learned, Improve, Stop, Save)
+FROM_SERVER: tuple[type, ...] = (
+    State, Accepted, Unkept, Fitting, Fitted, Curve, Improving, Scored, Saved, Failed
+)  # fmt: skip
 
 
 def name_of(kind: type) -> str:
@@ -273,7 +308,7 @@ def _fits(value: Any, hint: Any) -> bool:
 def typescript() -> str:
     """The types of all messages, for studio/src/server/messages.ts."""
     lines = ["/** Made by `python -m partwright.studio.messages`: change them there. */", ""]
-    inner = (Step, Image, Size)
+    inner = (Step, Image, Size, Tried)
     for kind in (*inner, *FROM_PAGE, *FROM_SERVER):
         hints = get_type_hints(kind)
         own = [] if kind in inner else [f'  type: "{name_of(kind)}";']

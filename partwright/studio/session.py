@@ -20,7 +20,7 @@ from partwright.export.formats import FORMATS
 from partwright.methods import METHODS, Cancellation, Progress
 from partwright.metrics import evaluate
 from partwright.shapes import Shape
-from partwright.studio import fits, learned, messages
+from partwright.studio import fits, improving, learned, messages
 from partwright.studio.journal import Journal
 from partwright.textures import Colours
 
@@ -83,6 +83,7 @@ class Session:
             up=(shape.up if shape else None) or "",
             methods=[*(name for name in METHODS if name != "parts"), *learned.methods()],
             donors=self._donors(),
+            goals=improving.goals(),
             formats=list(FORMATS.own),
             format_names=[FORMATS[suffix].name for suffix in FORMATS.own],
             fitting=self._cancel is not None,
@@ -109,6 +110,8 @@ class Session:
             self._begin(self._task(message))
         elif isinstance(message, messages.Learned):
             self._begin(learned.reforming(self.assembly(), message))
+        elif isinstance(message, messages.Improve):
+            self._begin(improving.improving(self.assembly(), message))
         elif isinstance(message, messages.Stop):
             if self._cancel is not None:
                 self._cancel.request()
@@ -177,8 +180,11 @@ class Session:
     def _work_on(self, task: fits.Task, cancel: Cancellation) -> None:
         last = time.monotonic()
 
-        def progress(step: Progress) -> None:
+        def progress(step: Progress | messages.Improving) -> None:
             nonlocal last
+            if isinstance(step, messages.Improving):
+                self._on_loop(self.tell, step)
+                return
             text = ""
             if time.monotonic() - last > _SHOWN_EVERY:
                 best = step.assembly()

@@ -16,6 +16,12 @@ export interface Size {
   text: string;
 }
 
+export interface Tried {
+  number: number;
+  value: number;
+  kept: boolean;
+}
+
 export interface Commit {
   type: "commit";
   base: number;
@@ -65,6 +71,16 @@ export interface Learned {
   source?: string;
 }
 
+export interface Improve {
+  type: "improve";
+  goal: string;
+  axis: "x" | "y" | "z" | "-x" | "-y" | "-z";
+  locked: string[];
+  steps: number;
+  walls?: number;
+  volume?: number;
+}
+
 export interface Stop {
   type: "stop";
 }
@@ -89,6 +105,7 @@ export interface State {
   up: string;
   methods: string[];
   donors: string[];
+  goals: string[];
   formats: string[];
   format_names: string[];
   fitting: boolean;
@@ -127,6 +144,13 @@ export interface Curve {
   of: string;
 }
 
+export interface Improving {
+  type: "improving";
+  goal: string;
+  of: number;
+  tried: Tried[];
+}
+
 export interface Scored {
   type: "scored";
   revision: number;
@@ -147,5 +171,5 @@ export interface Failed {
   message: string;
 }
 
-export type FromPage = Commit | Undo | Redo | Fit | Reshape | Bake | Learned | Stop | Save;
-export type FromServer = State | Accepted | Unkept | Fitting | Fitted | Curve | Scored | Saved | Failed;
+export type FromPage = Commit | Undo | Redo | Fit | Reshape | Bake | Learned | Improve | Stop | Save;
+export type FromServer = State | Accepted | Unkept | Fitting | Fitted | Curve | Improving | Scored | Saved | Failed;

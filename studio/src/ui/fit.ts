@@ -18,6 +18,8 @@ const OUTCOMES: Record<string, string> = {
   budget_reached: "Done, all rounds used",
   target_reached: "Target reached",
   interrupted: "Stopped, the best is kept",
+  left_trained_region: "Stopped at the edge of what the model was trained on",
+  failed: "Stopped: the goal cannot be measured farther on",
 };
 
 export class FitPanel {

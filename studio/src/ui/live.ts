@@ -12,6 +12,7 @@ import type { App } from "./app";
 import { type Button, button, save, toast } from "./controls";
 import { h } from "./dom";
 import { FitPanel } from "./fit";
+import { ImprovePanel } from "./improve";
 
 const LOOKS: [Look["show"], string][] = [
   ["parts", "Parts"],
@@ -23,6 +24,7 @@ const UNSENT = "partwright-unsent";
 export class Live {
   readonly link: Link;
   readonly fit: FitPanel;
+  readonly improve: ImprovePanel;
   private input: Triangles | null = null;
   private inputName = "";
   private state: State | null = null;
@@ -37,6 +39,8 @@ export class Live {
     socket: string,
   ) {
     this.fit = new FitPanel(store);
+    this.improve = new ImprovePanel(store);
+    this.fit.element.append(this.improve.element);
     app.side.prepend(this.fit.element);
     app.addTab("fit", "Fit", this.fit.element);
     document.body.prepend(this.banner);
@@ -60,6 +64,7 @@ export class Live {
     this.link.onConnection = (there) => this.connection(there);
     this.link.onMessage = (message) => {
       this.fit.hear(message);
+      this.improve.hear(message);
       if (message.type === "accepted") this.decodeSoon();
       if (message.type === "accepted") this.banner.hidden = true;
       if (message.type === "unkept") {
@@ -76,6 +81,7 @@ export class Live {
     };
     this.fit.onFit = (fit) => this.link.send(fit) || toast("The server is gone, so nothing can be fitted now.", undefined, true);
     this.fit.onReshape = (reshape) => this.link.send(reshape) || toast("The server is gone, so nothing can be fitted now.", undefined, true);
+    this.improve.onImprove = (improve) => this.link.send(improve) || toast("The server is gone, so nothing can be improved now.", undefined, true);
     app.inspector.learnedActions = (part) => this.learnedActions(part);
     this.fit.onBake = () => this.link.send({ type: "bake", size: 128 });
     this.fit.onBox = () => this.drawBox();
@@ -191,6 +197,7 @@ export class Live {
     if (state.note) toast(state.note);
     if (own && own !== writeAssembly(store.root)) store.commit(readAssembly(own), "Edits of this page");
     this.fit.show(state);
+    this.improve.show(state);
     this.saveButton.title = `Save to ${state.file} (Ctrl S)`;
     if (state.input !== this.inputName) void this.showInput(state);
   }
