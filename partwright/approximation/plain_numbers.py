@@ -6,12 +6,16 @@ import dataclasses
 import math
 from typing import Any
 
+import numpy as np
+
 from partwright.assembly import Part, Similarity
+from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import ParameterError
 from partwright.fields import Field, Solid, Swept
 from partwright.fields.profile import Loop, Profile
 
 _ANGLES = ("taper", "angle")
+_ALONG = 1e-9  # of a cosine
 
 
 def plain(value: float, within: float) -> float:
@@ -39,7 +43,34 @@ def with_plain_numbers(part: Part, within: float) -> Part:
     except ParameterError:
         field = part.field
     moves = tuple(_plain_move(move, within) for move in part.instances)
-    return dataclasses.replace(part, field=field, translation=(x, y, z), instances=moves)
+    plain_part = dataclasses.replace(part, field=field, translation=(x, y, z), instances=moves)
+    return _between_plain_ends(part, plain_part, within)
+
+
+def _between_plain_ends(given: Part, part: Part, within: float) -> Part:
+    """Where its axis is one of the coordinates', between plain ends: parts that meet there go on meeting.
+
+    given: the part before its numbers were made plain.
+    """
+    if "height" not in _names(part.field) or "height" not in _names(given.field):
+        return part
+    axis = rotation_matrix(part.rotation)[:, 2]
+    k = int(np.abs(axis).argmax())
+    if abs(axis[k]) < 1 - _ALONG:
+        return part
+    height = float(given.field.height)  # type: ignore[attr-defined]
+    low, high = (plain(given.translation[k] + end * height / 2, within) for end in (-1, 1))
+    place = list(part.translation)
+    place[k] = round((low + high) / 2, 12) + 0.0
+    try:
+        field: Any = dataclasses.replace(part.field, height=round(high - low, 12))  # type: ignore[type-var]
+    except ParameterError:
+        return part
+    return dataclasses.replace(part, field=field, translation=(place[0], place[1], place[2]))
+
+
+def _names(field: Any) -> set[str]:
+    return {own.name for own in dataclasses.fields(field)} if dataclasses.is_dataclass(field) else set()
 
 
 def _plain_field(field: Field, within: float) -> Field:

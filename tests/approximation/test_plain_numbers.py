@@ -44,6 +44,17 @@ def test_lengths_corners_and_places_are_plain_and_turns_stay() -> None:
     assert with_plain_numbers(Part(Box((1.0001, 2, 3))), 1e-3).field == Box((1, 2, 3))
 
 
+def test_parts_that_meet_go_on_meeting() -> None:
+    """Places and heights that are plain each for themselves leave a slit of half a unit."""
+    lower = with_plain_numbers(Part(Cylinder(1.0, 1.00004), (0, 0, 0.50002)), 1e-4)
+    upper = with_plain_numbers(Part(Cylinder(1.0, 0.33333), (0, 0, 1.166705)), 1e-4)
+    assert isinstance(lower.field, Cylinder)
+    assert isinstance(upper.field, Cylinder)
+    assert (
+        upper.translation[2] - upper.field.height / 2 == lower.translation[2] + lower.field.height / 2 == 1.0
+    )
+
+
 def test_what_would_vanish_stays() -> None:
     thin = Part(Cylinder(1e-4, 5.0))
     assert with_plain_numbers(thin, 1e-3) == thin

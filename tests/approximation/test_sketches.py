@@ -16,7 +16,7 @@ from partwright.approximation.sketches.open_sides import with_open_sides
 from partwright.approximation.sketches.outlines import fitted_loop
 from partwright.approximation.sketches.sections import profile_of
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.fields import Box, Cylinder, Extrusion, Revolution
+from partwright.fields import Box, Cylinder, Extrusion, Revolution, Tube
 from partwright.fields.profile import Profile, circle, circle_of
 from partwright.meshing.named_solids import named_solid
 
@@ -94,6 +94,26 @@ def test_an_arc_that_nearly_ends_a_sphere_on_the_axis_does() -> None:
     (arc,) = (side for side in bullet.profile.sides[0] if side.centre is not None)
     assert arc.centre[0] == pytest.approx(0, abs=1e-9)
     assert arc.radius == pytest.approx(0.5, abs=2e-3)
+
+
+def pipe() -> Manifold:
+    """A thin pipe with a bend of a quarter turn between straight ends along y and z."""
+    bend = named_solid(Revolution(Profile(circle(0.2, (0.5, 0)), (circle(0.17, (0.5, 0)),)), 90.0), 1e-3)
+    straight = named_solid(Extrusion(Profile(circle(0.2), (circle(0.17),)), 0.8), 1e-3)
+    bend = bend.rotate((90, 0, 90))  # about x, from y = 0.5 to z = 0.5
+    return bend + straight.translate((0, 0.5, -0.4)) + straight.rotate((90, 0, 0)).translate((0, -0.4, 0.5))
+
+
+def test_a_bent_pipe_is_two_tubes_and_a_bend() -> None:
+    body = pipe()
+    assert len(body.decompose()) == 1
+    mesh = body.to_mesh64()
+    found = frames(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
+    parts = [one.part for one in candidates(body, found, holes=True)]
+    bends = [p.field for p in parts if isinstance(p.field, Revolution) and len(p.field.profile.holes) == 1]
+    assert any(bend.angle == pytest.approx(90, abs=15) for bend in bends)
+    tubes = [p.field for p in parts if isinstance(p.field, Tube)]
+    assert [tube.height for tube in tubes] == pytest.approx([0.8, 0.8], abs=0.01)
 
 
 def test_directions_of_a_turned_part_begin_with_its_axis() -> None:

@@ -10,6 +10,8 @@ _SAME = math.cos(math.radians(1.5))
 _LEAST = 0.01  # of the area, that faces across a direction, or round ones along it, have
 _MOST = 4
 _CELL = 0.02
+_SQUARE = 1e-3  # cosine of directions that are square
+_BESIDE, _SAME_AS = math.cos(math.radians(8)), math.cos(math.radians(0.1))
 _SMOOTH = (math.radians(1.0), math.radians(40))  # turns from face to face on a round wall
 
 
@@ -28,7 +30,7 @@ def frames(vertices: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
     votes = np.concatenate([normal[kept], around])
     weights = np.concatenate([area[kept], weight])
     found = _clusters(votes, weights, _LEAST * float(area.sum()))[:_MOST]
-    found = found or list(np.eye(3))
+    found = _with_square(found) or list(np.eye(3))
     return [_frame(direction, found) for direction in found]
 
 
@@ -72,6 +74,20 @@ def _clusters(votes: np.ndarray, weights: np.ndarray, least: float) -> list[np.n
         mean = (signed[heavy] * weights[near][heavy, None]).sum(axis=0)
         found.append((total, _snapped(mean / np.linalg.norm(mean))))
     return [direction for _, direction in sorted(found, key=lambda f: -f[0])]
+
+
+def _with_square(found: list[np.ndarray]) -> list[np.ndarray]:
+    """The direction across the first two, where they are square, in place of those that nearly are it: facets
+    of a round wall that the direction lies between."""
+    if len(found) < 3 or abs(float(found[0] @ found[1])) > _SQUARE:
+        return found
+    across = np.cross(found[0], found[1])
+    near = np.abs(np.array(found) @ across)
+    if near.max() < _BESIDE or near.max() > _SAME_AS:
+        return found
+    first = int(np.argmax(near >= _BESIDE))
+    others = [_snapped(across) if k == first else d for k, d in enumerate(found)]
+    return [d for k, d in enumerate(others) if k == first or near[k] < _BESIDE]
 
 
 def _snapped(direction: np.ndarray) -> np.ndarray:

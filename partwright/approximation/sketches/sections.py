@@ -19,6 +19,8 @@ FINE, COARSE = 4e-4, 4e-3  # unit lengths: how far outlines may lie from section
 _MANY = 24  # sides, from which on fewer are looked for at the coarse tolerance
 _FEWER = 0.5  # of the sides, that the coarse outline may have at most
 _FLAT = math.cos(math.radians(0.6))
+_UPRIGHT = math.sin(math.radians(0.6))
+_WALLS = 0.5  # of the width of upright walls, that begin or end at a level
 _LEAST_FLAT = 2e-4  # of the bounding rectangle: area of a level
 _SAME_LEVEL = 2e-3
 _MOST_LEVELS = 24
@@ -63,7 +65,8 @@ class View:
 
     @cached_property
     def levels(self) -> list[float]:
-        """Heights of flat faces, from the lowest point to the highest."""
+        """Heights of flat faces, from the lowest point to the highest; where there is none between these,
+        those at which upright walls begin and end."""
         vertices, faces = self.mesh
         corners = vertices[faces]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -72,18 +75,15 @@ class View:
         height, weight = corners[flat, :, 2].mean(axis=1), area[flat]
         low, high = float(vertices[:, 2].min()), float(vertices[:, 2].max())
         least = _LEAST_FLAT * float(np.prod(np.ptp(vertices[:, :2], axis=0)))
-        found: list[tuple[float, float]] = []
-        order = np.argsort(height)
-        start = 0
-        for i in range(1, len(order) + 1):
-            if i == len(order) or height[order[i]] - height[order[i - 1]] > _SAME_LEVEL:
-                group = order[start:i]
-                total = float(weight[group].sum())
-                if total > least:
-                    found.append((total, float(np.average(height[group], weights=weight[group]))))
-                start = i
-        found = sorted(found, reverse=True)[:_MOST_LEVELS]
+        found = sorted(_heights(height, weight, least), reverse=True)[:_MOST_LEVELS]
         inner = [z for _, z in found if low + _SAME_LEVEL < z < high - _SAME_LEVEL]
+        if not inner:
+            upright = (np.abs(normal[:, 2]) < 2 * area * _UPRIGHT) & (area > 0)
+            bottom, top = corners[upright, :, 2].min(axis=1), corners[upright, :, 2].max(axis=1)
+            width = 2 * area[upright] / np.maximum(top - bottom, _SAME_LEVEL)
+            most = _WALLS * float(width.sum())
+            ends = [*_heights(bottom, width, most), *_heights(top, width, most)]
+            inner = [z for _, z in ends if low + _SAME_LEVEL < z < high - _SAME_LEVEL]
         return [low, *sorted(inner), high]
 
     @property
@@ -98,6 +98,21 @@ class View:
             pieces = [p for p in pieces if p.area > _SLIVER]
             self._sections[height] = sorted(pieces, key=lambda p: -p.area)
         return self._sections[height]
+
+
+def _heights(height: np.ndarray, weight: np.ndarray, least: float) -> list[tuple[float, float]]:
+    """Weight and mean of the heights (K,) that lie together and have more than the least weight."""
+    found: list[tuple[float, float]] = []
+    order = np.argsort(height)
+    start = 0
+    for i in range(1, len(order) + 1):
+        if i == len(order) or height[order[i]] - height[order[i - 1]] > _SAME_LEVEL:
+            group = order[start:i]
+            total = float(weight[group].sum())
+            if total > least:
+                found.append((total, float(np.average(height[group], weights=weight[group]))))
+            start = i
+    return found
 
 
 def profile_of(section: CrossSection) -> Profile | None:

@@ -130,7 +130,9 @@ def _end(axis: Axis, piece: CrossSection, turn: float, step: float) -> float:
             near = middle
         else:
             far = middle
-    return turn + (near + far) / 2 * step
+    found = turn + (near + far) / 2 * step
+    whole = math.radians(round(math.degrees(found)))  # from the axis of the frame along which other parts lie
+    return whole if abs(whole - found) < abs(step) * 2.0**-_BISECTIONS else found
 
 
 def _revolved(axis: Axis, region: CrossSection, begin: float, angle: float) -> Iterator[Candidate]:
