@@ -25,6 +25,8 @@ from pathlib import Path
 import torch
 from partsdf_ablations import ablations
 from partsdf_decoders import decoders
+from partsdf_encoder import encoding
+from partsdf_generation import generation
 from partsdf_reconstruct import reconstruction, robots
 from partsdf_speed import speed
 from partsdf_trainings import trainings
@@ -66,6 +68,15 @@ def main() -> None:
     one.add_argument("--family", required=True)
     one.add_argument("--width", type=int, default=128, help="of the decoders")
     one.add_argument("--only", help="variants, separated by commas")
+    one = measuring("encode", encoding)
+    one.add_argument("--family", required=True)
+    one.add_argument("--model", required=True)
+    one = command("generate", generation)
+    one.add_argument("--family", required=True)
+    one.add_argument("--model", required=True)
+    one.add_argument("--samples", type=int, default=10_000, help="at most so many, and test shapes")
+    one.add_argument("--resolution", type=int, default=96, help="of the meshes")
+    one.add_argument("--seed", type=int, default=0)
     one = measuring("robots", robots)
     one.add_argument("--parts", required=True, help="folder of arms, a folder of link meshes each")
     one.add_argument("--held", required=True, help="arms that are held out in turn, separated by commas")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import re
 
 from partwright.atomic_io import replacing_files
@@ -13,6 +14,7 @@ from partwright.cli.terminal import counted, say
 from partwright.errors import SettingError
 from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.generator import load_generator
+from partwright.partsdf.meshing import resolution_for_wall
 from partwright.partsdf.model import load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
@@ -21,6 +23,7 @@ from partwright.partsdf.sources import open_source
 from partwright.render import Camera, sheet, write_png
 
 _PANEL, _COLUMNS = 240, 4  # pixels
+_COARSE, _FINEST = 64, 160  # cells
 _STALE = re.compile(r"sample_\d+\.json")
 
 
@@ -37,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
         work.stage("drawing")
         camera, pictures = Camera(up="z"), []
         for i, one in enumerate(samples):
-            pictures.append(picture(one, size=_PANEL, camera=camera))
+            pictures.append(picture(one, _resolution(one), _PANEL, camera))
             work.show((i + 1) / len(samples))
         captions = [f"{i}: {100 * far:.1f} from {name}" for i, (name, far) in enumerate(nearest)]
         about = {
@@ -67,6 +70,11 @@ def run(arguments: argparse.Namespace) -> int:
         f"differs by {100 * least:.2f} hundredths of a unit length from one that was trained on"
     )
     return 0
+
+
+def _resolution(shape: NeuralShape) -> int:
+    """Cells along the unit frame that show the thinnest wall, as far as the cost allows."""
+    return min(_FINEST, resolution_for_wall(float(shape.walls().min(initial=math.inf)), _COARSE))
 
 
 def _kept(arguments: argparse.Namespace) -> tuple[NeuralShape | None, list[str]]:
