@@ -48,8 +48,9 @@ def decoders(arguments: argparse.Namespace) -> None:
         "",
         *HEAD,
     ]
-    for label, name in (("the paper's", family.name), ("local", f"{family.name}-local")):
-        config = read_config(CONFIGS / f"{name}.toml")
+    for label, variant in (("the paper's", "paper"), ("local", "local")):
+        named = CONFIGS / f"{family.name}-{variant}.toml"  # the one that ships has the family's own name
+        config = read_config(named if named.exists() else CONFIGS / f"{family.name}.toml")
         training = replace(
             config.training, validate=0, batch=4, points=512, precision="32-true", warmup=0, threads=1
         )

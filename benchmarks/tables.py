@@ -55,8 +55,8 @@ TABLES = (
           "reconstruct --family families/chairs --model chairs --config configs/chairs.toml --shapes 3 "
           "--iterations 200 --resolution 128 --threads 1", 90, "families/"),
     Table("partsdf-reconstruct-mixers.md", "partsdf.py", None, 0,
-          "reconstruct --family families/mixers --model mixers --config configs/mixers.toml --shapes 3 "
-          "--iterations 200 --resolution 192 --threads 1", 120, "families/"),
+          "reconstruct --family families/mixers --model mixers --shapes 5 --iterations 200 "
+          "--resolution 192 --threads 1", 120, "families/"),
     Table("partsdf-ablations-cars.md", "partsdf.py", None, 0,
           "ablations --family families/cars-small --epochs 84 --width 96 --shapes 4 --iterations 150 "
           "--points 1024 --resolution 128 --threads 1", 900, "families/"),

@@ -26,6 +26,6 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         type=Path,
         help="where to write (default: MODEL.encoder.safetensors beside the model, where it is looked for)",
     )
-    option("--steps", metavar="N", type=int, default=1500, help="of 24 clouds each (default: %(default)s)")
+    option("--steps", metavar="N", type=int, default=5000, help="of 24 clouds each (default: %(default)s)")
     option("--seed", metavar="S", type=int, default=0, help="of all that is drawn (default: %(default)s)")
     command.set_defaults(run="parts_train_encoder")

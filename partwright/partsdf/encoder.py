@@ -1,7 +1,7 @@
 """Points to parts at once: latents, poses and presence of all parts of a cloud (section 3.4, appendix B.3).
 
 Learned queries, one a part and some more beside them, hear of the points by cross-attention and of one
-another by self-attention, twice over, as in 3DShape2VecSet; each part's own says what that part is like. The
+another by self-attention, as in 3DShape2VecSet; each part's own says what that part is like. The
 paper's has eight layers and no say about which parts there are.
 """
 
@@ -36,9 +36,9 @@ class EncoderSettings:
 
     width: int = 128
     heads: int = 4
-    rounds: int = 2
-    blocks: int = 2
-    beside: int = 24
+    rounds: int = 1
+    blocks: int = 3
+    beside: int = 12
 
 
 class EncoderNetwork(nn.Module):

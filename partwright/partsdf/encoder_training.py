@@ -18,7 +18,7 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.part_vectors import POSE, PartVectors
 
 _BATCH, _DECAY, _WARMUP = 24, 1e-2, 50
-_POINTS = (96, 192, 384, 768)  # of a step's clouds
+_POINTS = (64, 128, 256, 512)  # of a step's clouds
 _POSE, _PRESENCE = 1.0, 1.0  # weights beside the latents'
 _TOLD = 20  # steps
 
@@ -39,7 +39,7 @@ def train_encoder(
     model: Model,
     family: PreparedFamily,
     *,
-    steps: int = 1500,
+    steps: int = 5000,
     rate: float = 1e-3,
     seed: int = 0,
     settings: EncoderSettings | None = None,
