@@ -1,7 +1,7 @@
 """Whole robots with simple collision shapes: how many, how far off, whether they contain, and what a step
 costs.
 
-    python benchmarks/robots.py --rows rows.jsonl NAME=PATH ... [--ways nearest enclose CoACD]
+    python benchmarks/robots.py NAME=PATH ... --rows rows.jsonl [--ways nearest enclose CoACD]
 
 PATH is a robot's file (URDF or MJCF), as packages on PyPI ship them: airo-models, gym-ignition-models,
 gymnasium-robotics, robosuite, example-robot-data. Each is done three times: nearest; containing the visual
