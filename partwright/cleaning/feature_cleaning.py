@@ -40,6 +40,7 @@ Floats = NDArray[np.float64]
 T = TypeVar("T")
 
 _SMOOTH = np.radians(3.0)  # corners that turn by less were smooth
+_ROUNDED = 1 / 3  # tolerances that rounding may move a number: many are rounded at once
 _FURTHER = 2.0  # tolerances that a corner may go, which two sides move
 _DIGITS = 13
 
@@ -131,9 +132,9 @@ def groups(members: Sequence[T], value: Callable[[T], float], reach: float) -> l
 
 
 def _plain(given: Sequence[float], tolerance: float, grid: Grid) -> float:
-    """The plainest number at most the tolerance from all of them; where they are one and plain enough, it."""
+    """The plainest number near the middle of them; where they are one and plain enough, it."""
     low, high = min(given), max(given)
-    middle, limit = (low + high) / 2, tolerance - (high - low) / 2
+    middle, limit = (low + high) / 2, _ROUNDED * tolerance
     if high - low <= 10 * grid.same and _kept(middle, limit):
         return float(f"{middle:.12g}") + 0.0
     return next(grid.nearest(middle, limit), middle)

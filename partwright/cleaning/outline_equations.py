@@ -14,7 +14,11 @@ from partwright.fields.profile import Profile
 
 Floats = NDArray[np.float64]
 
-_STEPS = 15
+_STEPS = 10
+# Solutions that are looked for, fewer of long outlines, each of which takes longer; equations that are left
+# then are taken together or not at all.
+_SOLUTIONS, _FEWEST, _CORNERS = 40, 5, 1000
+_FAR = 3.0  # times as far as the outline may go: no later step leads back from there
 _NUDGE = 1e-7  # of the size, for difference quotients
 _MET = 1e-10  # of the size
 _RANK = 1e-6
@@ -94,6 +98,7 @@ class Solver:
     def __post_init__(self) -> None:
         self.given = self.profile.corners.copy()
         self.equations: list[Equation] = []
+        self.left = max(_FEWEST, min(_SOLUTIONS, _CORNERS // len(self.given)))
         following = np.concatenate(
             [
                 np.roll(np.arange(a, b), -1)
@@ -114,7 +119,7 @@ class Solver:
             self.profile = found
             self.equations += equations
             return list(equations)
-        if len(equations) == 1:
+        if len(equations) == 1 or self.left <= 0:
             return []
         half = len(equations) // 2
         return self.take(equations[:half]) + self.take(equations[half:])
@@ -141,12 +146,18 @@ class Solver:
 
     def _solved(self, equations: list[Equation]) -> Profile | None:
         corners, size = self.profile.corners.copy(), self.profile.size
+        self.left -= 1
+        worst = np.inf
         for _ in range(_STEPS):
             off = np.array([equation.residual(corners) for equation in equations])
-            if not np.isfinite(off).all():
+            before, worst = worst, float(np.abs(off).max())
+            moved = float(np.abs((corners - self.given) * self.weights).max())
+            if not np.isfinite(off).all() or moved > _FAR * self.within:
                 return None
-            if np.abs(off).max() <= _EXACT * size:
+            if worst <= _EXACT * size or (worst <= _MET * size and worst > before / 2):
                 break
+            if worst > before / 2:  # they contradict one another
+                return None
             step = np.linalg.lstsq(self._slopes(equations, corners, off), -off, rcond=1e-10)[0].reshape(-1, 3)
             step[corners[:, 2] == 0, 2] = 0.0  # lines stay lines
             corners = corners + step / self.weights
