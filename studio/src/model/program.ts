@@ -8,7 +8,7 @@
 import { programDistance } from "./distance";
 import { fieldBox, quadric, superfrustum } from "./fields";
 import { isLearned } from "./learned";
-import { type Swept, sideTexels, swept } from "./profiles";
+import { type Swept, swept } from "./profiles";
 import { type Group, type Node, type Part, isGroup, leaves, poses } from "./tree";
 import {
   type Box,
@@ -37,9 +37,6 @@ export const SUBTRACT = 2;
 export const LEAF = 0;
 export const PUSH = 1;
 export const POP = 2;
-
-/** Texels (of four floats) that an instruction has in the shader's table. */
-export const TEXELS = 8;
 
 export interface Instruction {
   action: number;
@@ -112,8 +109,7 @@ export function partBox(part: Part): Box {
     .reduce(joinBoxes, EMPTY);
 }
 
-/** A frame in which all that ends is centred, with a longest side of 1.8. */
-/** extra: what is to lie in the frame as well. */
+/** A frame in which all that ends is centred, with a longest side of 1.8; extra: what it holds instead. */
 export function unitFrame(root: Group, extra: Box | null = null): Frame {
   const boxes = [...leaves(root)].map(partBox).filter(isFinite3);
   let box = boxes.reduce(joinBoxes, EMPTY);
@@ -361,62 +357,5 @@ function boxOf(scope: Scope): Box {
   return [
     [-4, -4, -4],
     [4, 4, 4],
-  ];
-}
-
-/**
- * The table of the shader: TEXELS texels of four floats an instruction, and after those as many for each side of a
- * profile. layers: of the parts' images, or -1.
- */
-export function table(program: Program, layers: number[] = []): Float32Array {
-  const sides: number[] = [];
-  const begins = program.swept.map((profile) => {
-    const begin = program.count + sides.length / (TEXELS * 4);
-    if (profile) sides.push(...sideTexels(profile, program.frame.scale));
-    return begin;
-  });
-  const result = new Float32Array(program.count * TEXELS * 4 + sides.length);
-  result.set(sides, program.count * TEXELS * 4);
-  program.instructions.forEach((instruction, i) => {
-    const { action, operation, blend, part } = instruction;
-    const at = i * TEXELS * 4;
-    const isQuadric = program.quadrics[i];
-    // A push knows by what, and how softly, its group is folded in.
-    const third = action === PUSH ? program.roles[i] : part;
-    const layer = action === LEAF && !isQuadric ? (layers[part] ?? -1) + 1 : 0;
-    const profile = program.swept[i];
-    result.set([action * 16 + operation * 4 + isQuadric * 2 + (profile ? 1 : 0), blend, third, layer], at);
-    result.set(program.balls.subarray(i * 4, i * 4 + 4), at + 4);
-    result.set(program.poses.subarray(i * 12, i * 12 + 12), at + 8);
-    const row = program.rows.subarray(i * 12, i * 12 + 12);
-    if (profile) {
-      const whole = profile.turned && profile.angle > 6.2831 ? 1 : 0;
-      const turn = [profile.turned ? 1 : 0, whole, profile.angle, Math.sin(profile.angle), Math.cos(profile.angle)];
-      result.set([begins[i], profile.sides.length, profile.height * program.frame.scale, ...turn], at + 20);
-    } else if (action === LEAF && !isQuadric) result.set(derived(row), at + 20);
-    else result.set(row, at + 20);
-  });
-  return result;
-}
-
-/** What the shader needs of a SuperFrustum, with all that is the same at every point worked out. */
-function derived(row: Float64Array): number[] {
-  const [sx, sy, sz, roundness, dilation, taper, bulge, onion] = row;
-  const m = Math.min(sx, sy) / 2;
-  const theta = (bulge * Math.PI) / 2;
-  const closed = Math.max(taper, 1) * m * onion <= dilation ? 1 : 0;
-  return [
-    sx / 2,
-    sy / 2,
-    sz / 2 + 1e-12,
-    roundness * m,
-    dilation,
-    m * (taper - 1),
-    closed ? 1e9 : m * (onion - 1),
-    m * (taper * onion - 1),
-    theta,
-    Math.sin(theta),
-    Math.cos(theta),
-    0,
   ];
 }

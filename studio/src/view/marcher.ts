@@ -1,7 +1,8 @@
 /** Marches rays through a program of parts into targets: distance, normal, colour and part of what each ray meets. */
 
 import type { Maps } from "../model/maps";
-import { type Program, table, TEXELS } from "../model/program";
+import type { Program } from "../model/program";
+import { table, TEXELS } from "../model/table";
 import type { Vec3 } from "../model/vectors";
 import type { View } from "./camera";
 import type { Gpu, Shader, Target } from "./gpu";
