@@ -24,10 +24,15 @@ _FUZZY = (0.0, 1e-4, 1e-3, 3e-3)  # tolerances of operations, of the cube root o
 _RIGHT = 1e-3  # share of the volume: as close as meshes are that it is compared with
 _ACCEPTED = 5e-3  # the closest of all results may be this far off
 _ORDERS = 4  # of operands, beside the given one and its reverse
+_MOVES = (2e-4, 6e-4, 2e-3)  # of the cube root of the largest volume: what operands move by at last
+_DIRECTIONS = 3
 
 
-def operated(operation: str, solids: Sequence[TopoDS_Shape], right: float | None, label: str) -> TopoDS_Shape:
-    """The union, difference or intersection of the solids.
+def operated(
+    operation: str, solids: Sequence[TopoDS_Shape], right: float | None, label: str
+) -> tuple[TopoDS_Shape, float]:
+    """The union, difference or intersection of the solids, and how far some of them were moved for it: as a
+    length, 0 but where nothing else goes.
 
     right: its volume, where it is known.
 
@@ -35,9 +40,22 @@ def operated(operation: str, solids: Sequence[TopoDS_Shape], right: float | None
         NoSurfaceError: no way gives a valid solid of that volume.
     """
     if len(solids) == 1:
-        return solids[0]
+        return solids[0], 0.0
+    found = _closest(_results(operation, solids), right)
+    if found is not None:
+        return found, 0.0
+    scale = max(volume_and_area(solid)[0] for solid in solids) ** (1 / 3)
+    for distance in (share * scale for share in _MOVES) if right is not None else ():
+        found = _closest(_moved_results(operation, solids, distance), right)
+        if found is not None:
+            return found, distance
+    raise NoSurfaceError(f"OpenCASCADE gets the {operation} of {label} wrong; move it a little")
+
+
+def _closest(results: Iterator[TopoDS_Shape], right: float | None) -> TopoDS_Shape | None:
+    """The first of about the right volume, or the nearest to it of all that will do."""
     closest, error = None, _ACCEPTED
-    for result in _results(operation, solids):
+    for result in results:
         if right is None:
             return result
         off = abs(volume_and_area(result)[0] / right - 1)
@@ -45,9 +63,25 @@ def operated(operation: str, solids: Sequence[TopoDS_Shape], right: float | None
             closest, error = result, off
         if off < _RIGHT:
             break
-    if closest is None:
-        raise NoSurfaceError(f"OpenCASCADE gets the {operation} of {label} wrong; move it a little")
     return closest
+
+
+def _moved_results(operation: str, solids: Sequence[TopoDS_Shape], distance: float) -> Iterator[TopoDS_Shape]:
+    """With all but the first moved so far, each in another direction: faces that nearly touched do not."""
+    from OCP.gp import gp_Trsf, gp_Vec
+    from OCP.TopLoc import TopLoc_Location
+
+    for seed in range(_DIRECTIONS):
+        ways = np.random.default_rng(seed).normal(size=(len(solids), 3))
+        ways *= distance / np.linalg.norm(ways, axis=1)[:, None]
+        moved = [solids[0]]
+        for solid, way in zip(solids[1:], ways.tolist(), strict=False):
+            shift = gp_Trsf()
+            shift.SetTranslation(gp_Vec(*way))
+            moved.append(solid.Moved(TopLoc_Location(shift)))
+        for result in (_at_once(operation, moved, 0.0), _one_by_one(operation, moved, 0.0)):
+            if result is not None:
+                yield result
 
 
 def _results(operation: str, solids: Sequence[TopoDS_Shape]) -> Iterator[TopoDS_Shape]:

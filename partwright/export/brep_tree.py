@@ -30,10 +30,12 @@ _SAME_MESH = 5e-3  # share of the volume by which what stands for an exact mesh 
 
 @dataclass
 class Compromises:
-    """Names of what OpenCASCADE could not do: `apart`, united with the rest; `faceted`, built at all."""
+    """Names of what OpenCASCADE could not do: `apart`, united with the rest; `faceted`, built at all;
+    `moved`, joined where it was, and how far it moved."""
 
     apart: list[str] = field(default_factory=list)
     faceted: list[str] = field(default_factory=list)
+    moved: list[tuple[list[str], float]] = field(default_factory=list)
 
 
 def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
@@ -60,6 +62,7 @@ def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
         within = Compromises(faceted=[part.name for part in node.parts])
     made.apart += within.apart
     made.faceted += within.faceted
+    made.moved += within.moved
     return solid
 
 
@@ -73,7 +76,11 @@ def _combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
     ]
     right = _exact_volume(node)
     try:
-        return _unified(node, operated(node.operation, solids, right, _label(node)))
+        solid, distance = operated(node.operation, solids, right, _label(node))
+        result = _unified(node, solid)
+        if distance:
+            made.moved.append(([part.name for part in node.parts], distance))
+        return result
     except NoSurfaceError:
         if not united:
             raise
@@ -87,7 +94,7 @@ def _joined(
     result, left = solids[0], []
     for child, solid in zip(node.children[1:], solids[1:], strict=True):
         try:
-            result = operated("union", (result, solid), None, _label(child))
+            result, _ = operated("union", (result, solid), None, _label(child))
         except NoSurfaceError:
             left.append(solid)
             made.apart.append(child.name or _label(child))

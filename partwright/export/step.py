@@ -57,6 +57,9 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     if made.apart:
         overlap = "it overlaps the rest: the union failed"
         changes.append(Change(tuple(made.apart), "a solid of its own", note=overlap))
+    for moved, distance in made.moved:
+        note = "they nearly touch: some are moved by this much to be joined"
+        changes.append(Change(tuple(moved), "the same, moved", max_deviation=distance / scale, note=note))
     if made.faceted:
         wrong = "OpenCASCADE gets their boolean operations wrong"
         changes.append(Change(tuple(made.faceted), "flat facets", note=wrong))

@@ -21,7 +21,7 @@ from partwright.errors import (
     SettingError,
     UnreadableFileError,
 )
-from partwright.export import export
+from partwright.export import brep_booleans, export
 from partwright.fields import Box, Cylinder, Extrusion, Field, Revolution, Sphere, SuperFrustum, Tube
 from partwright.fields.profile import Profile
 from partwright.meshing import mesh_csg, mesh_part
@@ -183,6 +183,19 @@ def test_faces_that_nearly_touch_are_united(tmp_path: Path) -> None:
     assert volume == pytest.approx(mesh_csg(tree).volume, rel=1e-3)
     assert set(kinds) <= ANALYTIC
     assert not (tmp_path / "bars.step.report.json").exists()
+
+
+def test_what_cannot_be_joined_moves_a_hair(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where OpenCASCADE fails at all operands where they are."""
+    monkeypatch.setattr(brep_booleans, "_results", lambda *_: iter(()))
+    tree = Assembly((Part(Box((2, 2, 2)), name="box"), Part(Cylinder(0.5, 4), name="pin")), unit="cm")
+    export(tree, tmp_path / "a.step")
+    volume, kinds = read_back(tmp_path / "a.step")
+    assert volume / 1e3 == pytest.approx(8 + math.pi / 2, rel=1e-3)
+    assert set(kinds) == {"Plane", "Cylinder"}
+    (change,) = json.loads((tmp_path / "a.step.report.json").read_text())["approximated"]
+    assert change["parts"] == ["box", "pin"]
+    assert change["max_deviation"] == pytest.approx(2e-4 * 2, rel=1e-6)
 
 
 def test_an_outline_that_touches_itself_is_moved_a_hair_apart(tmp_path: Path) -> None:
