@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from partsdf_scores import RESULTS, command_line, scale_of, write
+from partsdf_scores import command_line, scale_of, write
 from scipy.spatial import cKDTree
 
 from partwright.datasets.prepared import PreparedFamily
@@ -20,8 +20,6 @@ from partwright.partsdf.meshing import labelled_surface, mesh_shape
 from partwright.partsdf.model import load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
-from partwright.partsdf.pictures import picture
-from partwright.render import Camera, sheet, write_png
 from partwright.shapes.sampling import sample_triangles
 
 POINTS, PART_POINTS = 2048, 1500
@@ -71,8 +69,6 @@ def generation(arguments: argparse.Namespace) -> None:
         there = [cloud for cloud in clouds if cloud]
         lines.append(row(label, there, real, usual, far, len(shapes) - len(there), seconds))
         print(lines[-1], flush=True)
-        panels = [picture(shape, 96, 240, Camera(up="z")) for shape in shapes[:8]]
-        write_png(RESULTS / f"partsdf-generation-{family.name}-{label.lower()}.png", sheet(panels, columns=4))
     write(f"generation-{family.name}", lines)
 
 
@@ -100,7 +96,7 @@ def cloud_of(shape: NeuralShape, resolution: int) -> Cloud | None:
         surface = labelled_surface(shape, mesh_shape(shape, resolution, parts=False).whole)
     except NoSurfaceError:
         return None
-    return _cloud(surface.vertices, surface.faces, surface.labels, len(shape.model.parts))
+    return _cloud(surface.vertices, surface.faces, surface.label, len(shape.model.parts))
 
 
 def _cloud(vertices: np.ndarray, faces: np.ndarray, label: np.ndarray, parts: int) -> Cloud:

@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 import partwright as pw
 from partwright.cli.main import main
 from partwright.datasets.families.recipes import FAMILIES, make_shape
+from partwright.partsdf.encoder import load_encoder
+from partwright.partsdf.generator import load_generator
 from partwright.partsdf.model import SHIPPED, Model, load_model
 from partwright.partsdf.neural import NeuralShape
 
@@ -26,6 +29,30 @@ def test_they_are_small_and_know_their_family(shipped: Model) -> None:
     assert (SHIPPED / f"{shipped.name}.safetensors").stat().st_size < 4e6
     assert shipped.parts == FAMILIES[shipped.name].parts
     assert len(shipped.shapes) >= 100
+
+
+def test_companions_are_small_and_belong_to_their_models() -> None:
+    files = [path for path in SHIPPED.glob("*.safetensors") if "." in path.stem]
+    assert files
+    for path in files:
+        assert path.stat().st_size < 5e6
+        name, kind = path.stem.split(".")
+        load = {"encoder": load_encoder, "generator": load_generator}[kind]
+        assert load(load_model(name)) is not None
+
+
+def test_new_mixers_hold_together() -> None:
+    """Both attach points stand on the tube, and the helix is in it."""
+    made = load_generator(load_model("mixers")).generate(12, 3)
+    for one in made:
+        assert one.names() == list(one.model.parts)
+        tube, helix, left, right = (one.poses.map(lambda t, p=p: t[p]) for p in range(4))
+        across, inner = (one.scale.sort().values[:2].max() for one in (helix, tube))
+        assert across < 1.1 * inner
+        for point in (left, right):
+            assert (point.translation - tube.translation).norm() < 1.0
+    sizes = torch.stack([one.poses.scale[0].amin() for one in made])
+    assert sizes.std() > 0.01  # not one mixer twelve times
 
 
 def test_training_shapes_are_those_that_were_made(shipped: Model) -> None:

@@ -23,7 +23,7 @@ from partwright.partsdf.sources import open_source
 from partwright.render import Camera, sheet, write_png
 
 _PANEL, _COLUMNS = 240, 4  # pixels
-_COARSE, _FINEST = 64, 160  # cells
+_COARSE, _FINEST = 64, 192  # cells
 _STALE = re.compile(r"sample_\d+\.json")
 
 
