@@ -34,7 +34,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         choices=("auto", "encoder", "nearest", "mean"),
         default="auto",
         help="from what the model's encoder sees, from the training shape that fits best, or from the mean "
-        "of all; auto: the encoder's where the model has one and it is the better (default: %(default)s)",
+        "of all; auto: the best of the encoder's, if there is one, and of training shapes' (default: auto)",
     )
     option(
         "--as-it-stands",

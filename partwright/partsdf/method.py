@@ -16,7 +16,7 @@ from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
 from partwright.partsdf.reconstruction import Step, mean_error, reconstruct_from
 from partwright.partsdf.settings import Settings
-from partwright.partsdf.starts import UPRIGHT, find_starts, ways_to_stand
+from partwright.partsdf.starts import UPRIGHT, Start, find_starts, ways_to_stand
 from partwright.partsdf.targets import Target
 
 _PRESETS: dict[str, dict[str, Any]] = {
@@ -96,7 +96,7 @@ class LearnedParts(Method[Settings]):
         known = familiarity(found, target.turned(turn))
         learned = {
             "model": {"name": model.name, "hash": model.hash},
-            "start": "encoder" if starts[0].encoded else settings.start,
+            "starts": [_origin(s, settings) for s in starts],
             "absent": [name for name in model.parts if name not in found.names()],
             "turn": list(turn),
             "residual": known.residual,
@@ -113,6 +113,10 @@ class LearnedParts(Method[Settings]):
             surface=surface,
             warnings=tuple(known.warnings()),
         )
+
+
+def _origin(start: Start, settings: Settings) -> str:
+    return "encoder" if start.encoded else "mean" if settings.start == "mean" else "training shape"
 
 
 METHOD = LearnedParts()

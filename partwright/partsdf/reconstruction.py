@@ -165,7 +165,7 @@ def _scouted(
         if not finished:
             return _closest(tried)
     best = _closest(tried or starts)
-    if settings.exchange and settings.iterations and not best.encoded:
+    if settings.exchange and settings.iterations and settings.start != "encoder":
         best = replace(best, shape=exchanged_parts(best.shape, best.target, seed))
     ahead, poses = after(len(scouts) * few.iterations, best), best.shape.model.config.poses
     found = _optimised(best.shape, best.target, settings, seed, ahead, checkpoint, poses)[0]

@@ -25,13 +25,13 @@ class ReconstructionSettings:
     """What the rates fall by at half time, when the whole shape's loss joins in."""
     start: Literal["auto", "encoder", "nearest", "mean"] = "auto"
     """From what the model's encoder sees in points of the surface, from the nearest training shapes, or from
-    the mean of all; where poses are unknown only. "auto" takes the encoder where the model has one, and
-    compares it with the nearest training shape."""
+    the mean of all; where poses are unknown only. "auto" tries what the encoder sees, where the model has
+    one, as one of the `starts`, beside the nearest training shapes."""
     starts: int = 4
     """So many nearest shapes are tried for an eighth of the iterations each, and the best goes on."""
     exchange: bool = True
     """Single parts of the best start are exchanged for those of other training shapes where that comes
-    closer; where poses are unknown only, and not if the encoder's parts are the start."""
+    closer; where poses are unknown only, and not with start "encoder", which is for speed."""
     pose_rate: float = 2e-3
     """Of Adam, for poses."""
     pose_delay: float = 0.1

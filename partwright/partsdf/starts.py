@@ -69,13 +69,13 @@ def find_starts(
         raise ModelError(
             f"{model.name} has no encoder; make one with `parts train-encoder`, or start from the nearest"
         )
-    if encoder is not None and (settings.start == "encoder" or target.surface is not None):
-        error, start = encoded_start(encoder, target, turns)
-        if settings.start == "encoder" or error <= nearest_trained(model, start.target)[0][0]:
-            return [start]
     if settings.start == "mean":
         return [Start(NeuralShape.mean(model), turns[0], target.turned(turns[0]))]
-    return best_starts(model, target, settings.starts, turns)
+    if encoder is None or (settings.start == "auto" and target.surface is None):
+        return best_starts(model, target, settings.starts, turns)
+    seen = encoded_start(encoder, target, turns)
+    others = settings.starts - 1 if settings.start == "auto" else 0
+    return [seen, *(best_starts(model, target, others, turns) if others else [])]
 
 
 def ways_to_stand(up: str | None) -> list[Quaternion]:
@@ -113,9 +113,9 @@ def best_starts(model: Model, target: Target, most: int, turns: list[Quaternion]
 
 
 @torch.no_grad()
-def encoded_start(encoder: Encoder, target: Target, turns: list[Quaternion]) -> tuple[float, Start]:
+def encoded_start(encoder: Encoder, target: Target, turns: list[Quaternion]) -> Start:
     """What the encoder sees in the target's surface, the way that it stands which is judged as in
-    `best_starts`, and how far its distances are off.
+    `best_starts`.
 
     Raises:
         SettingError: nothing is known of the surface.
@@ -135,7 +135,7 @@ def encoded_start(encoder: Encoder, target: Target, turns: list[Quaternion]) -> 
     best = min(range(len(turns)), key=lambda k: errors[k])
     if errors[best] >= _CLEARLY * errors[0]:
         best = 0
-    return errors[best], Start(seen[best], turns[best], turned[best], encoded=True)
+    return Start(seen[best], turns[best], turned[best], encoded=True)
 
 
 @torch.no_grad()

@@ -20,7 +20,7 @@ from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.part_vectors import PartVectors, quaternions
 from partwright.partsdf.poses import rotation_matrices
 from partwright.partsdf.reconstruction import ReconstructionSettings, mean_error, reconstruct_unknown
-from partwright.partsdf.starts import UPRIGHT, encoded_start, find_starts, nearest_trained
+from partwright.partsdf.starts import UPRIGHT, find_starts
 from partwright.partsdf.targets import Target
 from partwright.shapes.sampling import sample_triangles
 
@@ -118,10 +118,11 @@ def test_reconstruction_begins_with_what_it_sees(encoder: Encoder, lamps: Prepar
         model, target, ReconstructionSettings(start="encoder", iterations=60, points=512)
     )
     assert mean_error(refined, target) < 0.5 * mean_error(as_seen, target)
-    # By itself it is taken where it is nearer than the nearest training shape.
-    seen, nearest = encoded_start(encoder, target, [UPRIGHT])[0], nearest_trained(model, target)[0][0]
-    first = find_starts(model, target, [UPRIGHT], ReconstructionSettings())[0]
-    assert first.encoded == (seen <= nearest)
+    # By itself it is one of the starts, of which a few iterations choose.
+    starts = find_starts(model, target, [UPRIGHT], ReconstructionSettings(starts=3))
+    assert [one.encoded for one in starts] == [True, False, False]
+    quick = ReconstructionSettings(iterations=40, points=512, starts=3)
+    assert mean_error(reconstruct_unknown(model, target, quick), target) < mean_error(as_seen, target)
 
 
 def test_its_file_is_for_one_model(
