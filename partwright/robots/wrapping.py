@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _CELLS = 96  # along the longest side
 _THICK = 1.2  # cells on either side of the surface; a gap of twice that is bridged
+_FLAT = 0.1  # cells by which the wrap of fewer triangles may lie off: it has hundreds of thousands
 _MOST_SHEETS = 0.5  # of what wraps the triangles: with less inside they bound no solid
 
 
@@ -72,5 +73,8 @@ def _level(values: np.ndarray, counts: np.ndarray, cell: float, frame: UnitFrame
         mesh = mesh_field(level, -reach, reach, 2 * (counts - 1), lipschitz=3.0, sharp=False)
     except NoSurfaceError:
         return None
-    solid = closed(frame.from_unit(mesh.vertices), mesh.faces)
-    return None if solid.is_empty() or solid.volume() <= 0 else solid
+    vertices = frame.from_unit(mesh.vertices)
+    solid = closed(vertices, mesh.faces)
+    if solid.is_empty() or solid.volume() <= 0:
+        return None
+    return solid.simplify(_FLAT / _CELLS * float(np.ptp(vertices, axis=0).max()))
