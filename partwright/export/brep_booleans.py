@@ -24,8 +24,8 @@ _FUZZY = (0.0, 1e-4, 1e-3, 3e-3)  # tolerances of operations, of the cube root o
 _RIGHT = 1e-3  # share of the volume: as close as meshes are that it is compared with
 _ACCEPTED = 5e-3  # the closest of all results may be this far off
 _ORDERS = 4  # of operands, beside the given one and its reverse
-_MOVES = (2e-4, 6e-4, 2e-3)  # of the cube root of the largest volume: what operands move by at last
-_DIRECTIONS = 3
+_MOVES = (2e-4, 1e-3)  # of the cube root of the largest volume: what operands move by at last
+_DIRECTIONS = 2
 
 
 def operated(
@@ -79,9 +79,9 @@ def _moved_results(operation: str, solids: Sequence[TopoDS_Shape], distance: flo
             shift = gp_Trsf()
             shift.SetTranslation(gp_Vec(*way))
             moved.append(solid.Moved(TopLoc_Location(shift)))
-        for result in (_at_once(operation, moved, 0.0), _one_by_one(operation, moved, 0.0)):
-            if result is not None:
-                yield result
+        result = _one_by_one(operation, moved, 0.0)
+        if result is not None:
+            yield result
 
 
 def _results(operation: str, solids: Sequence[TopoDS_Shape]) -> Iterator[TopoDS_Shape]:

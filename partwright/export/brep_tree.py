@@ -91,13 +91,18 @@ def _joined(
     node: Assembly, solids: Sequence[TopoDS_Shape], right: float | None, made: Compromises
 ) -> TopoDS_Shape:
     """A union of all that can be united; the rest stays beside it, as long as that hardly overlaps."""
-    result, left = solids[0], []
+    result, left, joined = solids[0], [], [node.children[0]]
     for child, solid in zip(node.children[1:], solids[1:], strict=True):
+        so_far = _exact_volume(Assembly((*joined, child))) if right is not None else None
         try:
-            result, _ = operated("union", (result, solid), None, _label(child))
+            result, distance = operated("union", (result, solid), so_far, _label(child))
         except NoSurfaceError:
             left.append(solid)
             made.apart.append(child.name or _label(child))
+            continue
+        joined.append(child)
+        if distance:
+            made.moved.append(([part.name for part in child.parts], distance))
     whole = [_unified(node, result), *left]
     volume = sum(volume_and_area(one)[0] for one in whole)
     if right is not None and not (1 - _SAME_MESH) * right < volume < (1 + _OVERLAP) * right:
