@@ -52,14 +52,17 @@ def _between_plain_ends(given: Part, part: Part, within: float) -> Part:
 
     given: the part before its numbers were made plain.
     """
-    if "height" not in _names(part.field) or "height" not in _names(given.field):
+    if within <= 0 or "height" not in _names(part.field) or "height" not in _names(given.field):
         return part
     axis = rotation_matrix(part.rotation)[:, 2]
     k = int(np.abs(axis).argmax())
     if abs(axis[k]) < 1 - _ALONG:
         return part
     height = float(given.field.height)  # type: ignore[attr-defined]
-    low, high = (plain(given.translation[k] + end * height / 2, within) for end in (-1, 1))
+    digits = -math.floor(
+        math.log10(within) + 0.1
+    )  # one grid for all, so that what was at one level stays there
+    low, high = (round(given.translation[k] + end * height / 2, digits) for end in (-1, 1))
     place = list(part.translation)
     place[k] = round((low + high) / 2, 12) + 0.0
     try:
