@@ -2,12 +2,15 @@
 
     python benchmarks/partsdf.py speed [--model MODEL]
     python benchmarks/partsdf.py reconstruct --family FOLDER --model MODEL [--config CONFIG] [--shapes N]
+    python benchmarks/partsdf.py encode --family FOLDER --model MODEL [--shapes N]
+    python benchmarks/partsdf.py generate --family FOLDER --model MODEL [--samples N]
     python benchmarks/partsdf.py ablations --family FOLDER [--epochs N] [--width N] [--shapes N]
     python benchmarks/partsdf.py decoders --family FOLDER [--seconds S]
     python benchmarks/partsdf.py training --models FOLDER
     python benchmarks/partsdf.py robots --parts FOLDER --held A,B [--epochs N]
 
 `reconstruct` with CONFIG also trains the same on all parts as one ("1P"), in --work, for a row of its own.
+`encode` has held-out shapes from points by the model's encoder, `generate` new ones against held-out ones.
 `decoders` trains the paper's and the local one for the same seconds. `ablations` trains every variant in
 --work, one after another. `training` tables trainings in FOLDER/mixers, chairs and cars, and keeps their
 logs. Trainings go on where they were stopped, and every shape's scores are kept in

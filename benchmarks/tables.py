@@ -57,6 +57,12 @@ TABLES = (
     Table("partsdf-reconstruct-mixers.md", "partsdf.py", None, 0,
           "reconstruct --family families/mixers --model mixers --shapes 5 --iterations 200 "
           "--resolution 192 --threads 1", 120, "families/"),
+    Table("partsdf-encode-mixers.md", "partsdf.py", None, 0,
+          "encode --family families/mixers --model mixers --shapes 5 --iterations 200 --threads 1", 2,
+          "families/"),
+    Table("partsdf-generation-mixers.md", "partsdf.py", None, 0,
+          "generate --family families/mixers --model mixers --samples 32 --resolution 128 --threads 1", 4,
+          "families/"),
     Table("partsdf-ablations-cars.md", "partsdf.py", None, 0,
           "ablations --family families/cars-small --epochs 84 --width 96 --shapes 4 --iterations 150 "
           "--points 1024 --resolution 128 --threads 1", 900, "families/"),
