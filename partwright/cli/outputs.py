@@ -49,7 +49,7 @@ def check(arguments: argparse.Namespace) -> None:
         return
     if arguments.folder:
         arguments.output = arguments.folder(arguments)
-    elif not arguments.output.name:
+    elif arguments.output is not None and not arguments.output.name:
         raise OutputError(f"cannot write {arguments.output}: give the name of a file with -o")
     writes = list(arguments.writes(arguments))
     if not arguments.overwrite:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.outputs import add_output, given
+
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
@@ -19,12 +21,13 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "family", metavar="FAMILY", type=Path, help="the prepared family that it was trained on"
     )
     option = command.add_argument
-    option(
-        "-o",
-        "--output",
-        metavar="FILE",
-        type=Path,
-        help="where to write (default: MODEL.encoder.safetensors beside the model, where it is looked for)",
+    add_output(
+        command,
+        "FILE",
+        "where to write (default: MODEL.encoder.safetensors beside the model, where it is looked for)",
+        reads=lambda a: given(a.model),
+        writes=lambda a: given(a.output),
+        required=False,
     )
     option("--steps", metavar="N", type=int, default=5000, help="of 24 clouds each (default: %(default)s)")
     option("--seed", metavar="S", type=int, default=0, help="of all that is drawn (default: %(default)s)")

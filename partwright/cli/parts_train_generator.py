@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+
+from partwright.cli.outputs import add_output, given
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -16,12 +17,13 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     command.add_argument("model", metavar="MODEL", help="a model that ships, or a file (.safetensors)")
     option = command.add_argument
-    option(
-        "-o",
-        "--output",
-        metavar="FILE",
-        type=Path,
-        help="where to write (default: MODEL.generator.safetensors beside the model, where it is looked for)",
+    add_output(
+        command,
+        "FILE",
+        "where to write (default: MODEL.generator.safetensors beside the model, where it is looked for)",
+        reads=lambda a: given(a.model),
+        writes=lambda a: given(a.output),
+        required=False,
     )
     option("--steps", metavar="N", type=int, default=3000, help="of 64 shapes each (default: %(default)s)")
     option("--seed", metavar="S", type=int, default=0, help="of all that is drawn (default: %(default)s)")

@@ -52,6 +52,7 @@ def test_every_command_that_writes_says_what_it_reads() -> None:
         "parts reconstruct chairs {folder}/surface.ply -o {folder}",
         "segment {block} {assembly} --within {folder}/out.ply.labels.json -o {folder}/out.ply",
         "parts edit {assembly} -o {assembly}",
+        "parts train-generator {assembly} -o {assembly}",
         "parts interpolate mixers:0 {assembly} -o {assembly}",
     ],
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from partwright.atomic_io import check_files, check_unread
+from partwright.atomic_io import check_files
 from partwright.cli.interrupts import INTERRUPTED, stopping
 from partwright.cli.progress import Count
 from partwright.cli.terminal import say, warn
@@ -13,13 +13,12 @@ from partwright.methods import Cancellation
 from partwright.partsdf.companions import place_for
 from partwright.partsdf.encoder import KIND
 from partwright.partsdf.encoder_training import EncoderStep, train_encoder
-from partwright.partsdf.model import file_of, load_model
+from partwright.partsdf.model import load_model
 
 
 def run(arguments: argparse.Namespace) -> int:
     model = load_model(arguments.model)
     output = place_for(model, KIND, arguments.output)
-    check_unread([output], [path for path in [file_of(model)] if path])
     check_files([output])
     cancel = Cancellation()
     last: list[EncoderStep] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from partwright.atomic_io import check_files, check_unread
+from partwright.atomic_io import check_files
 from partwright.cli.interrupts import INTERRUPTED, stopping
 from partwright.cli.progress import Count
 from partwright.cli.terminal import counted, say, warn
@@ -12,13 +12,12 @@ from partwright.methods import Cancellation
 from partwright.partsdf.companions import place_for
 from partwright.partsdf.generator import KIND
 from partwright.partsdf.generator_training import GeneratorStep, train_generator
-from partwright.partsdf.model import file_of, load_model
+from partwright.partsdf.model import load_model
 
 
 def run(arguments: argparse.Namespace) -> int:
     model = load_model(arguments.model)
     output = place_for(model, KIND, arguments.output)
-    check_unread([output], [path for path in [file_of(model)] if path])
     check_files([output])
     cancel = Cancellation()
     with Count("training") as count, stopping(cancel.request):
