@@ -104,6 +104,14 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="weight of the squared distance from the start (default: %(default)s)",
     )
     limits(
+        "--still",
+        metavar="X",
+        type=float,
+        default=1e-3,
+        help="by the surface of learned parts that are frozen, which follows the others', as a share of the "
+        "longest side; 0 sets no limit (default: %(default)s)",
+    )
+    limits(
         "--neighbours",
         metavar="W",
         type=float,

@@ -33,7 +33,7 @@ def contacts(assembly: Assembly, pairs: list[tuple[int, int]] | None = None) -> 
     """Pairs of parts with how deep one reaches into the other; without `pairs` those that touch."""
     needed = set(range(len(assembly))) if pairs is None else {i for pair in pairs for i in pair}
     nothing = np.zeros((0, 3))
-    surfaces = [_surface(assembly, i) if i in needed else nothing for i in range(len(assembly))]
+    surfaces = [part_surface(assembly, i) if i in needed else nothing for i in range(len(assembly))]
     if not any(map(len, surfaces)):
         return []
     ends = np.cumsum([0, *map(len, surfaces)])
@@ -75,7 +75,8 @@ def contact_gradients(parameters: Parameters, found: list[Contact]) -> np.ndarra
     return np.array(rows)
 
 
-def _surface(assembly: Assembly, index: int) -> np.ndarray:
+def part_surface(assembly: Assembly, index: int) -> np.ndarray:
+    """(K, 3) points of a leaf's own surface, coarse; none where it has none."""
     try:
         part = assembly.parts[index]
         if isinstance(part.field, JointField):  # a coarse mesh that all parts of its shape share

@@ -19,6 +19,7 @@ from partwright.goals.pictures import before_and_after, trajectory
 from partwright.goals.problem import Options, Point, Problem
 from partwright.goals.report import report
 from partwright.goals.search import Ending, Found, Step, search
+from partwright.goals.steady import moved
 from partwright.goals.wanted import Bound, Wanted
 from partwright.methods import Cancellation, interruptible
 from partwright.shapes import METRES
@@ -87,6 +88,12 @@ class Optimised:
     def kept(self) -> bool:
         """Whether all bounds and contacts are."""
         return bool((self._best.broken <= KEPT_WITHIN).all())
+
+    @property
+    def held(self) -> dict[str, float]:
+        """How far the surface of each learned part that is frozen beside others that are not has moved at
+        most, as a share of the longest side."""
+        return moved(self.problem.held, self.assembly, self.problem.parameters.longest)
 
     @property
     def _best(self) -> Point:

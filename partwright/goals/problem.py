@@ -16,6 +16,7 @@ from partwright.goals.gradient import parameter_gradient
 from partwright.goals.objective import Measure, Measured, Start, measured
 from partwright.goals.parameters import Parameters
 from partwright.goals.regions import TrainedRegion
+from partwright.goals.steady import broken_by, gradients, held_parts
 from partwright.goals.surface import face_labels, pieces, surface_of, thin_parts
 from partwright.goals.wanted import Bound, Wanted, asks_for_labels, bounded, frozen_entries, measure_of
 from partwright.methods import check_count, check_number
@@ -33,6 +34,8 @@ class Options:
     may go from its place, as a share of the longest side (turns by as much at its far end). change: by which
     share of itself a size may change. anchor: weight of the squared distance from the start (L2). neighbours:
     weight of the distance of latents from those of the training (kNN). contacts: parts that touch go on to.
+    still: how far the surface of a learned part that is frozen may follow the others, as a share of the
+    longest side; 0 sets no limit.
     """
 
     steps: int = 60
@@ -42,6 +45,7 @@ class Options:
     anchor: float = 0.1
     neighbours: float = 0.1
     contacts: bool = True
+    still: float = 1e-3
 
     def __post_init__(self) -> None:
         check_count("steps", self.steps, low=1)
@@ -50,6 +54,7 @@ class Options:
         check_number("change", self.change, 0.0, 10.0)
         check_number("anchor", self.anchor, 0.0)
         check_number("neighbours", self.neighbours, 0.0)
+        check_number("still", self.still, 0.0)
 
 
 @dataclass
@@ -113,6 +118,7 @@ class Problem:
             self.terms[name] = (self._measured(name, assembly, surface), start.longest**power)
         touching = contacts(assembly) if options.contacts else []
         self.touching = [c for c in touching if self._moves(c.a) or self._moves(c.b)]
+        self.held = held_parts(assembly, [self._moves(i) for i in range(len(assembly))])
         self.depths = [allowed(contact, self.parameters.longest) for contact in self.touching]
 
     def _moves(self, part: int) -> bool:
@@ -185,6 +191,8 @@ class Problem:
             scale = (1.0 if bound.upper else -1.0) / (max(abs(begin.value), abs(limit)) or natural)
             broken.append(scale * (found[bound.name].value - limit))
             slopes.append(scale * found[bound.name].sensitivity)
+        if self.options.still:
+            broken += broken_by(self.held, assembly, self.options.still, p.longest)
         pairs = [(c.a, c.b) for c in self.touching]
         touching = contacts(assembly, pairs) if pairs else []
         broken += [(c.depth - d) / p.longest for c, d in zip(touching, self.depths, strict=True)]
@@ -202,7 +210,9 @@ class Problem:
         units = np.where(self.free, self.parameters.units, 0.0)
         stacked = np.stack([point.sensitivity, *point.bounds])
         rows = parameter_gradient(here, point.surface.vertices, point.surface.faces, stacked)
-        rows = np.concatenate([rows, contact_gradients(here, point.touching) / here.longest]) * units
+        still = gradients(self.held, here, self.parameters.longest) if self.options.still else rows[:0]
+        touching = contact_gradients(here, point.touching) / self.parameters.longest
+        rows = np.concatenate([rows, still, touching]) * units
         slope = rows[0] + 2 * self.options.anchor * np.where(self.free, point.change, 0.0)
         if self.region.parts:
             slope = slope + self.options.neighbours * self.region.measure(here.values)[1] * units

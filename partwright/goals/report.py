@@ -8,6 +8,7 @@ from typing import Any
 from partwright import __version__
 from partwright.goals.problem import Problem
 from partwright.goals.search import Found
+from partwright.goals.steady import moved
 
 
 def report(problem: Problem, found: Found, seconds: float, kept: bool) -> dict[str, Any]:
@@ -46,6 +47,7 @@ def report(problem: Problem, found: Found, seconds: float, kept: bool) -> dict[s
         "bounds_kept": kept,
         "contacts": len(problem.touching),
         "unchanged_parts": same,
+        "surfaces_held": moved(problem.held, best.assembly, problem.parameters.longest),
         "too_thin_to_change": [assembly.parts[i].name for i in problem.thin],
         "free_parameters": int(problem.free.sum()),
         "parameters": _changes(problem, found),

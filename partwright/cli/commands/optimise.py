@@ -36,6 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
         anchor=arguments.anchor,
         neighbours=arguments.neighbours,
         contacts=not arguments.no_contacts,
+        still=arguments.still,
     )
     if arguments.simulate is not None:
         Air.of(arguments.simulate, assembly.up)
@@ -83,6 +84,11 @@ def _finish(result: Optimised, arguments: argparse.Namespace) -> int:
     unchanged = f"{same} of {counted(len(result.assembly), 'part')} unchanged"
     say(f"{_ENDINGS[result.ending]}: {tried}, {accepted} accepted, {unchanged}")
     say(f"written to {arguments.output}")
+    if held := result.held:
+        name = max(held, key=lambda part: held[part])
+        say(f"the surface of frozen parts moved by {held[name]:.2%} of the longest side at most, {name}'s")
+        if 0 < arguments.still < held[name]:
+            warn([f"that is more than {arguments.still:.2%}: give more steps"])
     if result.problem.thin:
         names = ", ".join(result.start.parts[i].name for i in result.problem.thin)
         warn([f"thinner than a cell and left as they are: {names}; --resolution has smaller cells"])
