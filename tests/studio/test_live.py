@@ -78,6 +78,6 @@ def test_a_fit_from_nothing_shows_its_rounds_and_stops_with_its_best(
     page.page.get_by_role("button", name="Stop, keep the best").click()
     page.wait("() => partwright.store.undoLabel === 'Fit'")
     assert len(from_text(page.assembly())) > 0
-    assert page.page.locator(".fit-panel .hint").inner_text().startswith(("Stopped", "Done"))
+    assert page.page.locator(".fit-panel .hint").first.inner_text().startswith(("Stopped", "Done"))
     # The input was shown while there was nothing else; the parts took its place.
     assert page.ask("() => partwright.viewport.renderer.look.show") == "parts"
