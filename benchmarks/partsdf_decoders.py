@@ -21,7 +21,7 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct
 from partwright.partsdf.targets import Target
 from partwright.partsdf.training import train
-from partwright.partsdf.validation import _iou
+from partwright.partsdf.validation import occupancy_iou
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 PROBED, KEPT = 6, 5  # epochs of a probe; every fifth sample is measured at, not fitted to
@@ -112,5 +112,5 @@ def _against(found: NeuralShape, target: Target, part: np.ndarray) -> tuple[floa
     numbers = np.flatnonzero(found.present.numpy())
     owner = np.where(inside, numbers[each.argmin(axis=0)], -1)
     label = np.where(true, part, -1)
-    parts = [_iou(owner == p, label == p) for p in numbers]
-    return familiarity(found, target).residual, _iou(inside, true), float(np.mean(parts))
+    parts = [occupancy_iou(owner == p, label == p) for p in numbers]
+    return familiarity(found, target).residual, occupancy_iou(inside, true), float(np.mean(parts))

@@ -19,6 +19,7 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct_unknown
 from partwright.partsdf.starts import nearest_trained
 from partwright.partsdf.targets import Target
+from partwright.partsdf.validation import occupancy_iou
 from partwright.shapes.sampling import sample_triangles
 
 NEAR = 0.05  # unit lengths: occupancies are compared there
@@ -79,10 +80,5 @@ def near_surface(found: NeuralShape, shape: PreparedShape) -> tuple[float, float
     inside, true = found.whole(each) < 0, shape.sdf[rows] < 0
     owner = np.where(inside, np.flatnonzero(found.present.numpy())[each.argmin(axis=0)], -1)
     label = np.where(true, shape.part[rows], -1)
-    parts = [iou(owner == p, label == p) for p in np.flatnonzero(shape.present)]
-    return iou(inside, true), float(np.mean(parts))
-
-
-def iou(a: np.ndarray, b: np.ndarray) -> float:
-    union = np.count_nonzero(a | b)
-    return np.count_nonzero(a & b) / union if union else 1.0
+    parts = [occupancy_iou(owner == p, label == p) for p in np.flatnonzero(shape.present)]
+    return occupancy_iou(inside, true), float(np.mean(parts))

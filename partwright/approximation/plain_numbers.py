@@ -59,9 +59,8 @@ def _between_plain_ends(given: Part, part: Part, within: float) -> Part:
     if abs(axis[k]) < 1 - _ALONG:
         return part
     height = float(given.field.height)  # type: ignore[attr-defined]
-    digits = -math.floor(
-        math.log10(within) + 0.1
-    )  # one grid for all, so that what was at one level stays there
+    # One grid for all, so that what was at one level stays there.
+    digits = -math.floor(math.log10(within) + 0.1)
     low, high = (round(given.translation[k] + end * height / 2, digits) for end in (-1, 1))
     place = list(part.translation)
     place[k] = round((low + high) / 2, 12) + 0.0

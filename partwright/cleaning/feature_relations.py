@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from partwright.assembly import Assembly, Node, Part
+from partwright.approximation.separation import subtracted_names
+from partwright.assembly import Assembly, Part
 from partwright.cleaning.dimensions import dimensions, values
 from partwright.cleaning.feature_cleaning import groups
 from partwright.cleaning.feature_levels import Key, Lying, Size, levels, lying, sides_of, sizes
@@ -119,7 +120,7 @@ def _smooth(field: Swept) -> Iterator[int]:
 def feature_numbers(given: Assembly, made: Assembly, tolerance: float) -> tuple[FeatureNumber, ...]:
     """Numbers of the parts of `made` beside those of the same parts in `given`. tolerance: how far a hole may
     be off the size that it is made for."""
-    cuts = {part.name for part in _cut(made, False)}
+    cuts = subtracted_names(made)
     found: list[FeatureNumber] = []
     for before, after in zip(given.parts, made.parts, strict=True):
         cut = after.name in cuts
@@ -133,16 +134,6 @@ def feature_numbers(given: Assembly, made: Assembly, tolerance: float) -> tuple[
             if one not in found:
                 found.append(one)
     return tuple(found)
-
-
-def _cut(node: Node, taken: bool) -> Iterator[Part]:
-    """Parts that are taken off."""
-    if isinstance(node, Part):
-        if taken:
-            yield node
-        return
-    for k, child in enumerate(node.children):
-        yield from _cut(child, taken != (node.operation == "difference" and k > 0))
 
 
 def _numbers(part: Part, cut: bool, tolerance: float) -> dict[Key, tuple[str, float]]:

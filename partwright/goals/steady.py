@@ -13,7 +13,6 @@ import torch
 
 from partwright.assembly import Assembly
 from partwright.assembly.joint import is_joint
-from partwright.fields.joint import JointField
 from partwright.goals.composite import Composite
 from partwright.goals.contacts import part_surface
 from partwright.goals.parameters import Parameters
@@ -88,7 +87,7 @@ def _moved(held: Sequence[Held], assembly: Assembly, most: int | None) -> list[n
 
 def _shape_of(assembly: Assembly, index: int) -> object:
     part = assembly.parts[index]
-    return part.field.shape_key if is_joint(part) and isinstance(part.field, JointField) else None
+    return part.field.shape_key if is_joint(part) else None
 
 
 def _well_apart_first(points: np.ndarray) -> np.ndarray:

@@ -60,15 +60,16 @@ def _scores(found: NeuralShape, shape: PreparedShape) -> dict[str, float]:
     numbers = np.flatnonzero(found.present.numpy())
     owner = np.where(whole < 0, numbers[each.argmin(axis=0)], -1)
     target = np.where(inside, shape.part if len(found.present) > 1 else 0, -1)
-    parts = [_iou(owner == p, target == p) for p in numbers]
+    parts = [occupancy_iou(owner == p, target == p) for p in numbers]
     return {
         "val_error": float(error),
-        "val_iou": _iou(whole < 0, inside),
+        "val_iou": occupancy_iou(whole < 0, inside),
         "val_part_iou": float(np.mean(parts)),
     }
 
 
-def _iou(a: np.ndarray, b: np.ndarray) -> float:
+def occupancy_iou(a: np.ndarray, b: np.ndarray) -> float:
+    """Of two occupancies (N,) of the same samples; 1 where both are empty."""
     union = np.count_nonzero(a | b)
     return np.count_nonzero(a & b) / union if union else 1.0
 
