@@ -117,14 +117,8 @@ class Encoder:
         poses = PoseTensors(poses.translation * ratio + centre, poses.rotation, poses.scale * ratio)
         present = logits > 0
         present[torch.arange(len(present)), logits.argmax(dim=1)] = True  # one at least
-        latents = torch.where(present[..., None], latents, self.model.absent_latent)
-        placed = [
-            torch.where(present[..., None], mine, average)
-            for mine, average in zip(poses, self.model.average_pose, strict=True)
-        ]
-        poses = PoseTensors(*placed)
         return [
-            NeuralShape(self.model, latents[i], poses.map(lambda t, i=i: t[i]), present[i])
+            NeuralShape.of(self.model, latents[i], poses.map(lambda t, i=i: t[i]), present[i])
             for i in range(len(points))
         ]
 

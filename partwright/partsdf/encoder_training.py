@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -10,16 +9,16 @@ import torch
 from torch import Tensor
 
 from partwright.datasets.prepared import PreparedFamily
-from partwright.errors import SettingError
 from partwright.methods import Cancellation
 from partwright.partsdf.clouds import Drawn, PartClouds, draw
+from partwright.partsdf.companion_training import check_trainable, descend
 from partwright.partsdf.encoder import Encoder, EncoderNetwork, EncoderSettings
 from partwright.partsdf.model import Model
 from partwright.partsdf.part_vectors import POSE, PartVectors
 
-_BATCH, _DECAY, _WARMUP = 24, 1e-2, 50
+_BATCH = 24
 _POINTS = (64, 128, 256, 512)  # of a step's clouds
-_POSE, _PRESENCE = 1.0, 1.0  # weights beside the latents'
+_STEEPEST = 1.0  # norm of the gradients
 _TOLD = 20  # steps
 
 
@@ -53,35 +52,28 @@ def train_encoder(
         FamilyError: it is another family, or was prepared without surfaces.
         SettingError: fewer than one step, or a model of one part, which has no poses.
     """
-    if steps < 1:
-        raise SettingError(f"steps is {steps}; expected 1 or more")
-    if model.config.one_part or not model.config.poses:
-        raise SettingError(f"{model.name} was trained without poses, which an encoder predicts")
+    check_trainable(model, steps, "an encoder predicts")
     clouds = PartClouds.of(family, model)
-    settings, cancel = settings or EncoderSettings(), cancel or Cancellation()
+    settings = settings or EncoderSettings()
     torch.manual_seed(seed)
     vectors = PartVectors.of(model)
     network = EncoderNetwork(len(model.parts), vectors.width, settings)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=_DECAY, fused=True)
     generator = torch.Generator().manual_seed(seed)
-    sums, since = torch.zeros(3), 0
-    for step in range(steps):
-        if cancel.requested:
-            break
-        late = 0.5 * (1 + math.cos(math.pi * step / steps))
-        optimiser.param_groups[0]["lr"] = rate * late * min(1.0, (step + 1) / _WARMUP)
+
+    def terms() -> Tensor:
         shapes = torch.randint(len(model.shapes), (_BATCH,), generator=generator)
         count = _POINTS[int(torch.randint(len(_POINTS), (), generator=generator))]
         drawn = draw(clouds, model, shapes, count, generator)
-        terms = losses(network(drawn.points), drawn, vectors)
-        optimiser.zero_grad()
-        (terms[0] + _POSE * terms[1] + _PRESENCE * terms[2]).backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimiser.step()
-        sums, since = sums + terms.detach(), since + 1
-        if told and (since == _TOLD or step + 1 == steps):
-            told(EncoderStep(step + 1, steps, *(sums / since).tolist()))
-            sums, since = torch.zeros(3), 0
+        return losses(network(drawn.points), drawn, vectors)
+
+    def heard(number: int, means: list[float]) -> None:
+        if told is not None:
+            told(EncoderStep(number, steps, *means))
+
+    descend(
+        network.parameters(), terms, steps=steps, rate=rate, told=heard, every=_TOLD, cancel=cancel,
+        steepest=_STEEPEST,
+    )  # fmt: skip
     return Encoder(model, settings, network.requires_grad_(False).eval(), vectors)
 
 

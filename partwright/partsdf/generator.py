@@ -170,15 +170,15 @@ class Generator:
     ) -> NeuralShape:
         present = layout[:, -1] > 0
         present[layout[:, -1].argmax()] = True  # one at least
-        there = present[:, None]
-        form = torch.where(there, self.vectors.latents(latents), self.model.absent_latent)
-        made = self.vectors.poses(layout[:, :POSE])
-        poses = [torch.where(there, a, b) for a, b in zip(made, self.model.average_pose, strict=True)]
-        if source is not None:  # to the bit, not through vectors
-            same = (kept | keep_layout)[:, None]
-            form = torch.where(kept[:, None], source.latents, form)
-            poses = [torch.where(same, a, b) for a, b in zip(source.poses, poses, strict=True)]
-            present = torch.where(same[:, 0], source.present, present)
+        made = NeuralShape.of(
+            self.model, self.vectors.latents(latents), self.vectors.poses(layout[:, :POSE]), present
+        )
+        if source is None:
+            return made
+        same = (kept | keep_layout)[:, None]  # to the bit, not through vectors
+        form = torch.where(kept[:, None], source.latents, made.latents)
+        poses = [torch.where(same, a, b) for a, b in zip(source.poses, made.poses, strict=True)]
+        present = torch.where(same[:, 0], source.present, present)
         return NeuralShape(self.model, form, PoseTensors(*poses), present)
 
     def save(self, path: str | Path) -> None:

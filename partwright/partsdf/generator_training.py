@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -12,14 +11,15 @@ from torch import Tensor, nn
 
 from partwright.errors import SettingError
 from partwright.methods import Cancellation
+from partwright.partsdf.companion_training import check_posed, check_trainable, descend
 from partwright.partsdf.diffusion import noised
 from partwright.partsdf.generator import Generator, GeneratorSettings, networks, tidy
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import POSE, PartVectors
-from partwright.partsdf.poses import PoseTensors
 
-_BATCH, _RATE, _WARMUP = 64, 1e-3, 50
+_BATCH, _RATE = 64, 1e-3
+_FIRST = "are generated first"
 _AVERAGE = 0.995  # of the weights that are kept, a step
 _TOLD = 50  # steps
 
@@ -49,39 +49,35 @@ def train_generator(
     Raises:
         SettingError: fewer than one step, fewer than two shapes, or a model without poses.
     """
-    if steps < 1:
-        raise SettingError(f"steps is {steps}; expected 1 or more")
-    _check(model)
-    settings, cancel = settings or GeneratorSettings(), cancel or Cancellation()
+    check_trainable(model, steps, _FIRST)
+    _check_shapes(model)
+    settings = settings or GeneratorSettings()
     torch.manual_seed(seed)
     vectors = PartVectors.of(model)
     made = networks(model, vectors, settings)
     kept = {name: copy.deepcopy(one).requires_grad_(False) for name, one in made.items()}
-    optimiser = torch.optim.AdamW(
-        [p for one in made.values() for p in one.parameters()], lr=_RATE, fused=True
-    )
     result = Generator(model, settings, **kept, vectors=vectors)  # type: ignore[arg-type]
     layouts, forms = result.layout_of(model.poses, model.present), vectors.of_latents(model.latents)
     generator = torch.Generator().manual_seed(seed)
-    sums, since = torch.zeros(2), 0
-    for step in range(steps):
-        if cancel.requested:
-            break
-        late = 0.5 * (1 + math.cos(math.pi * step / steps))
-        optimiser.param_groups[0]["lr"] = _RATE * late * min(1.0, (step + 1) / _WARMUP)
+
+    def terms() -> Tensor:
         rows = torch.randint(len(layouts), (_BATCH,), generator=generator)
-        errors = _errors(made, layouts[rows], forms[rows], generator)
-        optimiser.zero_grad()
-        errors.sum().backward()
-        optimiser.step()
+        return _errors(made, layouts[rows], forms[rows], generator)
+
+    def averaged(step: int) -> None:
         share = min(_AVERAGE, step / (step + 10))
         for name, one in made.items():
             for old, new in zip(kept[name].parameters(), one.parameters(), strict=True):
                 old.lerp_(new.detach(), 1 - share)
-        sums, since = sums + errors.detach(), since + 1
-        if told and (since == _TOLD or step + 1 == steps):
-            told(GeneratorStep(step + 1, steps, *(sums / since).tolist()))
-            sums, since = torch.zeros(2), 0
+
+    def heard(number: int, means: list[float]) -> None:
+        if told is not None:
+            told(GeneratorStep(number, steps, *means))
+
+    descend(
+        [p for one in made.values() for p in one.parameters()], terms, steps=steps, rate=_RATE,
+        told=heard, every=_TOLD, cancel=cancel, after=averaged,
+    )  # fmt: skip
     for one in kept.values():
         one.eval()
     return result
@@ -109,7 +105,8 @@ def gaussian_samples(model: Model, count: int, seed: int = 0) -> list[NeuralShap
     Raises:
         SettingError: fewer than two shapes, or a model without poses.
     """
-    _check(model)
+    check_posed(model, _FIRST)
+    _check_shapes(model)
     vectors = PartVectors.of(model)
     there = 2.0 * model.present[..., None] - 1
     layout = tidy(torch.cat([vectors.of_poses(model.poses), there], dim=-1))
@@ -117,18 +114,17 @@ def gaussian_samples(model: Model, count: int, seed: int = 0) -> list[NeuralShap
     mean = known.mean(dim=0)
     weight = torch.randn(count, len(known), generator=torch.Generator().manual_seed(seed))
     drawn = mean + torch.einsum("ns,spk->npk", weight, known - mean) / (len(known) - 1) ** 0.5
-    shapes = []
-    for one in drawn:
-        present = one[:, POSE] > 0
-        poses = vectors.poses(one[:, :POSE])
-        placed = [torch.where(present[:, None], a, b) for a, b in zip(poses, model.average_pose, strict=True)]
-        latents = torch.where(present[:, None], vectors.latents(one[:, POSE + 1 :]), model.absent_latent)
-        shapes.append(NeuralShape(model, latents, PoseTensors(*placed), present))
-    return shapes
+    return [
+        NeuralShape.of(
+            model,
+            vectors.latents(one[:, POSE + 1 :]),
+            vectors.poses(one[:, :POSE]),
+            one[:, POSE] > 0,
+        )
+        for one in drawn
+    ]
 
 
-def _check(model: Model) -> None:
-    if model.config.one_part or not model.config.poses:
-        raise SettingError(f"{model.name} was trained without poses, which are generated first")
+def _check_shapes(model: Model) -> None:
     if len(model.shapes) < 2:
         raise SettingError(f"{model.name} knows {len(model.shapes)} shape; two or more are needed")

@@ -41,6 +41,13 @@ class NeuralShape:
         return cls(model, latents, model.average_pose, there)
 
     @classmethod
+    def of(cls, model: Model, latents: Tensor, poses: PoseTensors, present: Tensor) -> NeuralShape:
+        """Latents and poses of the parts that are present; absent ones as the model knows them."""
+        there = present[:, None]
+        placed = [torch.where(there, a, b) for a, b in zip(poses, model.average_pose, strict=True)]
+        return cls(model, torch.where(there, latents, model.absent_latent), PoseTensors(*placed), present)
+
+    @classmethod
     def trained(cls, model: Model, name: str) -> NeuralShape:
         """A shape that the model was trained on, by name or number; raises SettingError for another."""
         if name in model.shapes:

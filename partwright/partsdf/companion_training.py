@@ -1,0 +1,70 @@
+"""How what lies beside a model learns: AdamW, whose rate rises at first, then falls along half a cosine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+import torch
+from torch import Tensor, nn
+
+from partwright.errors import SettingError
+from partwright.methods import Cancellation
+from partwright.partsdf.model import Model
+
+_DECAY, _WARMUP = 1e-2, 50
+
+Told = Callable[[int, list[float]], None]
+"""The number of a step, from 1, and the means of the terms since it was last told."""
+
+
+def check_trainable(model: Model, steps: int, purpose: str) -> None:
+    """Raise SettingError for less than one step, or a model without poses, which `purpose` names."""
+    if steps < 1:
+        raise SettingError(f"steps is {steps}; expected 1 or more")
+    check_posed(model, purpose)
+
+
+def check_posed(model: Model, purpose: str) -> None:
+    """Raise SettingError for a model without poses. purpose: what needs them."""
+    if model.config.one_part or not model.config.poses:
+        raise SettingError(f"{model.name} was trained without poses, which {purpose}")
+
+
+def descend(
+    parameters: Iterable[nn.Parameter],
+    terms: Callable[[], Tensor],
+    *,
+    steps: int,
+    rate: float,
+    told: Told | None = None,
+    every: int = 50,
+    cancel: Cancellation | None = None,
+    steepest: float = math.inf,
+    after: Callable[[int], None] | None = None,
+) -> None:
+    """Lessen the sum of the terms (K,), until the steps are done or it is cancelled.
+
+    terms: of a batch that is drawn anew. every: steps after which `told` hears. steepest: norm that gradients
+    are cut to. after: called after each step, with its number from 0.
+    """
+    parameters = list(parameters)
+    optimiser = torch.optim.AdamW(parameters, lr=rate, weight_decay=_DECAY, fused=True)
+    cancel, sums, since = cancel or Cancellation(), torch.zeros(()), 0
+    for step in range(steps):
+        if cancel.requested:
+            return
+        late = 0.5 * (1 + math.cos(math.pi * step / steps))
+        optimiser.param_groups[0]["lr"] = rate * late * min(1.0, (step + 1) / _WARMUP)
+        found = terms()
+        optimiser.zero_grad()
+        found.sum().backward()
+        if steepest < math.inf:
+            torch.nn.utils.clip_grad_norm_(parameters, steepest)
+        optimiser.step()
+        if after is not None:
+            after(step)
+        sums, since = sums + found.detach(), since + 1
+        if told is not None and (since == every or step + 1 == steps):
+            told(step + 1, (sums / since).tolist())
+            sums, since = torch.zeros(()), 0
