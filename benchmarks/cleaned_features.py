@@ -9,22 +9,18 @@ of the longest side. Digits are those of every length of the parts: corners, rad
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
-from pathlib import Path
 from statistics import mean
 
 import numpy as np
-from fit import find_shapes, machine
+from fitted import command, fits, parser
 
 import partwright as pw
 from partwright.atomic_io import write_bytes
 from partwright.cleaning.dimensions import values
 from partwright.export.solid_source import number
 from partwright.fields import Solid, Swept
-
-HERE = Path(__file__).parent
 
 
 def digits(assembly: pw.Assembly) -> float:
@@ -41,12 +37,9 @@ def digits(assembly: pw.Assembly) -> float:
 
 
 def main() -> int:
-    options = parser().parse_args()
+    options = parser(__doc__, "cleaned_features.md").parse_args()
     lines, changes, drifts = [], [], []
-    for entry in find_shapes(options.shapes, {*filter(None, options.sets.split(","))}, set()):
-        path = options.fits / entry.name / "assembly.json"
-        if not path.exists():
-            continue
+    for entry, path in fits(options):
         fitted, shape = pw.load_assembly(path), pw.load_shape(entry.path)
         started = time.process_time()
         cleaned = pw.clean(fitted, shape)
@@ -70,8 +63,7 @@ def main() -> int:
     head = [
         "# Fits by features, cleaned",
         "",
-        f"`python benchmarks/cleaned_features.py --shapes {options.shapes.name} --sets {options.sets} --fits "
-        f"{options.fits.name}` on {machine()}.",
+        command("cleaned_features.py", options),
         "",
         f"Mean change of IoU {mean(changes):+.4f}, of the mean deviation {mean(drifts):+.4f} % of the "
         f"longest side, over {len(lines)} shapes. Digits: of all lengths, the mean; off: mean deviation in % "
@@ -82,18 +74,6 @@ def main() -> int:
     ]
     write_bytes(options.output, ("\n".join([*head, *lines]) + "\n").encode())
     return 0
-
-
-def parser() -> argparse.ArgumentParser:
-    result = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    option = result.add_argument
-    option("--shapes", type=Path, required=True, metavar="FOLDER", help="an index.json, or meshes")
-    option("--sets", default="cad", metavar="A,B", help="only these sets (default: %(default)s)")
-    option("--fits", type=Path, required=True, metavar="FOLDER", help="fits, as FOLDER/NAME/assembly.json")
-    option("-o", "--output", type=Path, default=HERE / "results" / "cleaned_features.md", metavar="FILE")
-    return result
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ FITS/solids/NAME/assembly.json is exported, and the file is read again by the CA
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 import tempfile
@@ -17,13 +16,12 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from fit import find_shapes, machine
+from fitted import command, fits, parser
 
 import partwright as pw
 from partwright.atomic_io import report_path, write_bytes
 from partwright.meshing import mesh_csg
 
-HERE = Path(__file__).parent
 WITHIN = 0.005  # of the volume
 CHORD = 2e-5  # of the longest side: how far the mesh of the assembly may lie from it
 NAMES = ("plane", "cylinder", "cone", "sphere", "torus", "revolution", "other")
@@ -76,21 +74,18 @@ def row(name: str, assembly: Path, shape: Path, folder: Path) -> tuple[str, bool
 
 
 def main() -> int:
-    options = parser().parse_args()
+    options = parser(__doc__, "step.md").parse_args()
     lines, good, tried = [], 0, 0
     with tempfile.TemporaryDirectory() as folder:
-        for entry in find_shapes(options.shapes, {*filter(None, options.sets.split(","))}, set()):
-            assembly = options.fits / entry.name / "assembly.json"
-            if assembly.exists():
-                line, fine = row(entry.name, assembly, entry.path, Path(folder))
-                lines.append(line)
-                good, tried = good + fine, tried + 1
-                print(line, flush=True)
+        for entry, assembly in fits(options):
+            line, fine = row(entry.name, assembly, entry.path, Path(folder))
+            lines.append(line)
+            good, tried = good + fine, tried + 1
+            print(line, flush=True)
     head = [
         "# Fits of solids as STEP",
         "",
-        f"`python benchmarks/step.py --shapes {options.shapes.name} --sets {options.sets} --fits "
-        f"{options.fits.name}` on {machine()}.",
+        command("step.py", options),
         "",
         f"{good} of {tried} are valid, without facets, analytic, and of the assembly's volume to "
         f"{100 * WITHIN:g} %. Volume against that of the assembly, which the export answers for, and of the "
@@ -102,18 +97,6 @@ def main() -> int:
     ]
     write_bytes(options.output, ("\n".join([*head, *lines]) + "\n").encode())
     return int(good < tried)
-
-
-def parser() -> argparse.ArgumentParser:
-    result = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    option = result.add_argument
-    option("--shapes", type=Path, required=True, metavar="FOLDER", help="an index.json, or meshes")
-    option("--sets", default="cad", metavar="A,B", help="only these sets (default: %(default)s)")
-    option("--fits", type=Path, required=True, metavar="FOLDER", help="fits, as FOLDER/NAME/assembly.json")
-    option("-o", "--output", type=Path, default=HERE / "results" / "step.md", metavar="FILE")
-    return result
 
 
 if __name__ == "__main__":

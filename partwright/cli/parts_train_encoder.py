@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from partwright.cli.outputs import add_output, given
+from partwright.cli.companions import add_training
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -16,19 +16,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "or many, blurred or with a side missing. `parts reconstruct` then begins with what it sees. Ctrl-C "
         "ends with what it has learned.",
     )
-    command.add_argument("model", metavar="MODEL", help="a model that ships, or a file (.safetensors)")
+    add_training(command, "encoder", 5000, "24 clouds")
     command.add_argument(
         "family", metavar="FAMILY", type=Path, help="the prepared family that it was trained on"
     )
-    option = command.add_argument
-    add_output(
-        command,
-        "FILE",
-        "where to write (default: MODEL.encoder.safetensors beside the model, where it is looked for)",
-        reads=lambda a: given(a.model),
-        writes=lambda a: given(a.output),
-        required=False,
-    )
-    option("--steps", metavar="N", type=int, default=5000, help="of 24 clouds each (default: %(default)s)")
-    option("--seed", metavar="S", type=int, default=0, help="of all that is drawn (default: %(default)s)")
     command.set_defaults(run="parts_train_encoder")

@@ -4,33 +4,20 @@ from __future__ import annotations
 
 import argparse
 
-from partwright.atomic_io import check_files
-from partwright.cli.interrupts import INTERRUPTED, stopping
+from partwright.cli.commands.companions import train_beside
 from partwright.cli.progress import Count
-from partwright.cli.terminal import counted, say, warn
+from partwright.cli.terminal import counted
 from partwright.methods import Cancellation
-from partwright.partsdf.companions import place_for
-from partwright.partsdf.generator import KIND
+from partwright.partsdf.generator import KIND, Generator
 from partwright.partsdf.generator_training import GeneratorStep, train_generator
-from partwright.partsdf.model import load_model
+from partwright.partsdf.model import Model
 
 
 def run(arguments: argparse.Namespace) -> int:
-    model = load_model(arguments.model)
-    output = place_for(model, KIND, arguments.output)
-    check_files([output])
-    cancel = Cancellation()
-    with Count("training") as count, stopping(cancel.request):
-
+    def train(model: Model, count: Count, cancel: Cancellation) -> Generator:
         def told(step: GeneratorStep) -> None:
             count.show(step.number, step.of, f"poses {step.layouts:.3f}  latents {step.forms:.3f}")
 
-        generator = train_generator(
-            model, steps=arguments.steps, seed=arguments.seed, told=told, cancel=cancel
-        )
-    generator.save(output)
-    say(f"{model.name}'s generator, of {counted(len(model.shapes), 'shape')}: written to {output}")
-    if cancel.requested:
-        warn([f"interrupted: {output} has learned as far as it had come"])
-        return INTERRUPTED
-    return 0
+        return train_generator(model, steps=arguments.steps, seed=arguments.seed, told=told, cancel=cancel)
+
+    return train_beside(arguments, KIND, train, lambda model: f", of {counted(len(model.shapes), 'shape')}:")
