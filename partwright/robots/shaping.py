@@ -79,7 +79,7 @@ def _enclosing(pieces: list[Piece], target: Target, wishes: Wishes) -> list[Mani
     """Hulls of the pieces, of few faces, and of all triangles that stick out of them: these contain every
     triangle."""
     fine, room = _LIGHT * wishes.tolerance, _ROOM * target.size
-    hulls = _tight(pieces, target) if target.loose else [piece.hull for piece in pieces]
+    hulls = _tight(pieces, target, fine) if target.loose else [piece.hull for piece in pieces]
     hulls = [outer_hull(hull, fine, _FACES, room) for hull in hulls]
     more = containing(hulls, target.vertices[target.faces], fine)
     return [
@@ -109,16 +109,17 @@ def _native(part: Part, target: Target, wishes: Wishes) -> Shape:
     return Shape("", dataclasses.replace(part, field=larger(part.field, _ROOM * target.size)))
 
 
-def _tight(pieces: list[Piece], target: Target) -> list[Manifold]:
+def _tight(pieces: list[Piece], target: Target, fine: float) -> list[Manifold]:
     """The hulls of the triangles' own points that lie in each piece of what wraps them."""
     from manifold3d import Manifold
 
     points, room = target.samples(_POINTS, seed=0), 1e-9 * target.size
     hulls = []
     for piece in pieces:
-        lower, upper = np.reshape(piece.hull.bounding_box(), (2, 3))
+        plain = outer_hull(piece.hull, fine, _FACES, 0.0)  # a wrap's own hull has thousands of faces
+        lower, upper = np.reshape(plain.bounding_box(), (2, 3))
         within = points[((points >= lower) & (points <= upper)).all(axis=1)]
-        for normal, offset in zip(*faces_of(piece.hull), strict=True):
+        for normal, offset in zip(*faces_of(plain), strict=True):
             within = within[within @ normal <= offset + room]
         hull = Manifold.hull_points(within) if len(within) > 3 else Manifold()
         sheet = hull.is_empty() or hull.volume() < _LEAST * piece.hull.volume()

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
     from partwright.shapes.source import Source
 
+_OPEN = "it does not close; what its surface goes around, or cannot be reached from outside, is its inside"
+
 
 @dataclass(frozen=True, eq=False)
 class Target:
@@ -70,14 +72,24 @@ class Target:
         return np.concatenate([points, self.vertices[np.unique(self.faces)]])
 
 
+@dataclass(frozen=True, eq=False)
+class _Mesh:
+    """A file's own triangles (V, 3), (F, 3), and the solid that they bound, if they do."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    solid: Manifold | None
+
+
 class Solids:
     """Reads each mesh file once."""
 
     def __init__(self) -> None:
-        self._read: dict[tuple[Path, bool], Target] = {}
+        self._meshes: dict[tuple[Path, bool], _Mesh] = {}
+        self._wraps: dict[tuple[tuple[Path, bytes], ...], tuple[Manifold, Manifold]] = {}
 
     def target(self, link: Link, uses: Sequence[MeshUse], sheets: bool = False) -> Target:
-        """All of these meshes as one.
+        """All of these meshes as one. Those that do not close are wrapped together: one may close another.
 
         sheets: those without thickness are wrapped, as what is seen often has them, for a label say.
 
@@ -87,50 +99,68 @@ class Solids:
         from manifold3d import Manifold, OpType
 
         read = [self._of(link, use, sheets) for use in uses]
-        solid, wrap = (
-            Manifold.batch_boolean(
-                [one.transform(use.matrix[:3]) for one, use in zip(kind, uses, strict=True)], OpType.Add
+        placed = [
+            (
+                one.vertices @ use.matrix[:3, :3].T + use.matrix[:3, 3],
+                one.faces[:, ::-1] if mirrored(use.matrix) else one.faces,
             )
-            for kind in ([one.solid for one in read], [one.wrap for one in read])
+            for one, use in zip(read, uses, strict=True)
+        ]
+        solids = [
+            one.solid.transform(use.matrix[:3])
+            for one, use in zip(read, uses, strict=True)
+            if one.solid is not None
+        ]
+        open_ = [i for i, one in enumerate(read) if one.solid is None]
+        if not open_:
+            solid = Manifold.batch_boolean(solids, OpType.Add)
+            return Target(solid, solid, *_together(placed), ())
+        key = tuple((uses[i].source, uses[i].matrix.tobytes()) for i in open_)
+        if key not in self._wraps:
+            try:
+                self._wraps[key] = wrapped(*_together([placed[i] for i in open_]))
+            except PartwrightError as error:
+                raise type(error)(f"link {link.name!r}: {uses[open_[0]].source.name}: {error}") from error
+        inner, whole = self._wraps[key]
+        return Target(
+            Manifold.batch_boolean([*solids, inner], OpType.Add),
+            Manifold.batch_boolean([*solids, whole], OpType.Add),
+            *_together(placed),
+            tuple(dict.fromkeys(f"{uses[i].source.name}: {_OPEN}" for i in open_)),
         )
-        vertices, faces, first = [], [], 0
-        for one, use in zip(read, uses, strict=True):
-            vertices.append(one.vertices @ use.matrix[:3, :3].T + use.matrix[:3, 3])
-            faces.append((one.faces[:, ::-1] if mirrored(use.matrix) else one.faces) + first)
-            first += len(one.vertices)
-        notes = dict.fromkeys(note for one in read for note in one.notes)
-        return Target(solid, wrap, np.concatenate(vertices), np.concatenate(faces), tuple(notes))
 
-    def _of(self, link: Link, use: MeshUse, sheets: bool) -> Target:
+    def _of(self, link: Link, use: MeshUse, sheets: bool) -> _Mesh:
         if not np.isfinite(use.matrix).all() or abs(np.linalg.det(use.matrix[:3, :3])) < 1e-30:
             raise RobotError(f"link {link.name!r}: the scale of {use.source.name} leaves nothing of it")
         key = use.source, sheets
-        if key not in self._read:
+        if key not in self._meshes:
             try:
-                self._read[key] = _read(use, sheets)
+                self._meshes[key] = _read(use, sheets)
             except PartwrightError as error:
                 raise type(error)(f"link {link.name!r}: {use.source.name}: {error}") from error
-        return self._read[key]
+        return self._meshes[key]
 
 
-def _read(use: MeshUse, sheets: bool) -> Target:
-    """The file's own triangles, and the solid that they bound: as they are, repaired, or wrapped.
+def _together(pieces: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of all pieces as one."""
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
+    faces = [faces + start for (_, faces), start in zip(pieces, starts, strict=False)]
+    return np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
+
+
+def _read(use: MeshUse, sheets: bool) -> _Mesh:
+    """A file's triangles, as they are or repaired to a solid.
 
     Raises:
-        FlatShapeError: they bound none, and are no `sheets` that are to be wrapped.
+        FlatShapeError: they bound none, and are no `sheets`.
     """
     source = source_of(use.inline) if use.inline is not None else _source(use.source)
-    vertices = np.concatenate([piece.vertices for piece in source.pieces])
-    starts = np.cumsum([0, *(len(piece.vertices) for piece in source.pieces)])
-    faces = np.concatenate([p.faces + start for p, start in zip(source.pieces, starts, strict=False)])
+    vertices, faces = _together([(piece.vertices, piece.faces) for piece in source.pieces])
+    solid = None
     with suppress(OpenShellError, *((FlatShapeError,) if sheets else ())):
         shape = InputShape(source)
         solid = _manifold(shape.vertices, shape.faces)
-        if solid is not None:
-            return Target(solid, solid, vertices, faces, ())
-    inner, whole = wrapped(vertices, faces)
-    told = f"{use.source.name}: it does not close; what cannot be reached from outside counts as its inside"
-    return Target(inner, whole, vertices, faces, (told,))
+    return _Mesh(vertices, faces, solid)
 
 
 def _source(path: Path) -> Source:

@@ -16,13 +16,16 @@ from partwright.errors import FlatShapeError, NoSurfaceError
 from partwright.meshing import mesh_field
 from partwright.meshing.manifolds import closed
 from partwright.shapes import MeshDistance, UnitFrame
+from partwright.shapes.repair import consistent
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
 _CELLS = 96  # along the longest side
 _THICK = 1.2  # cells on either side of the surface; a gap of twice that is bridged
-_FLAT = 0.1  # cells by which the wrap of fewer triangles may lie off: it has hundreds of thousands
+_FLAT = 0.2  # cells by which the wrap of fewer triangles may lie off: it has hundreds of thousands
+_STEEP = 8.0  # cells that a whole winding number counts as
+_NEAR = 2.0  # cells: distance from the triangles within which the winding number is not interpolated
 _MOST_SHEETS = 0.5  # of what wraps the triangles: with less inside they bound no solid
 
 
@@ -51,6 +54,10 @@ def wrapped(vertices: np.ndarray, faces: np.ndarray) -> tuple[Manifold, Manifold
     around = np.where(outside, distance - thick, -np.maximum(thick - distance, 0.5 * cell))
     beyond = outside | (cell * distance_transform_edt(~outside) < thick)
     bounded = np.where(beyond, distance, -distance)
+    wound = _wound(unit, faces, ticks, distance, beyond)
+    beside = np.minimum(np.abs(wound) * _STEEP * cell, distance)  # exact at triangles, smooth across openings
+    around = np.minimum(around, np.clip(-wound * _STEEP * cell, -0.5 * cell, np.inf))
+    bounded = np.minimum(bounded, np.where(wound > 0, -beside, beside))
     whole = _level(around, counts, cell, frame)
     if whole is None:
         raise FlatShapeError("it encloses nothing that could be wrapped")
@@ -58,6 +65,35 @@ def wrapped(vertices: np.ndarray, faces: np.ndarray) -> tuple[Manifold, Manifold
     if inner is None or inner.volume() < _MOST_SHEETS * whole.volume():
         return whole, whole
     return inner, whole
+
+
+def _wound(
+    vertices: np.ndarray, faces: np.ndarray, ticks: list[np.ndarray], distance: np.ndarray, asked: np.ndarray
+) -> np.ndarray:
+    """By how much the winding number exceeds one half where it is asked for, -1 elsewhere.
+
+    ticks: coordinates of the lattice (their number is odd); distance, asked: on it. Away from the triangles
+    the winding number is harmonic, so it is interpolated between every other point.
+    """
+    from scipy.interpolate import RegularGridInterpolator
+
+    wound = np.full(asked.shape, -1.0)
+    vertices, faces = consistent(vertices, faces)
+    if len(faces) == 0:
+        return wound
+    surface = MeshDistance(vertices, faces, faces, False)
+    cell = ticks[0][1] - ticks[0][0]
+    coarse = [axis[::2] for axis in ticks]
+    at = np.stack(np.meshgrid(*coarse, indexing="ij"), axis=-1)
+    known = surface.winding(at.reshape(-1, 3)).reshape(at.shape[:3])
+    near = asked & (distance <= _NEAR * cell)
+    far = np.argwhere(asked & ~near)
+    place = np.stack([axis[far[:, k]] for k, axis in enumerate(ticks)], axis=-1)
+    wound[tuple(far.T)] = RegularGridInterpolator(coarse, known)(place) - 0.5
+    close = np.argwhere(near)
+    place = np.stack([axis[close[:, k]] for k, axis in enumerate(ticks)], axis=-1)
+    wound[tuple(close.T)] = surface.winding(place) - 0.5
+    return wound
 
 
 def _level(values: np.ndarray, counts: np.ndarray, cell: float, frame: UnitFrame) -> Manifold | None:

@@ -81,6 +81,19 @@ def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Surface:
     return replace(surface, openings=openings)
 
 
+def consistent(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices (V, 3), in the unit frame, and triangles (F, 3): merged, welded and turned the same way."""
+    notes: list[str] = []
+    vertices, faces = merge_vertices(vertices, faces, notes)
+    faces = drop_doubles(faces, notes)
+    if len(faces) == 0:
+        return vertices, faces
+    vertices, edges = weld_boundary(vertices, EdgeTable(faces), notes)
+    return vertices, orient(vertices, edges, notes).faces
+
+
 def _refuse_plane(vertices: NDArray[np.float64]) -> None:
     """Raise FlatShapeError when all vertices lie in one plane, whichever way it is turned."""
     centred = vertices - vertices.mean(axis=0)

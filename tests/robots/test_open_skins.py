@@ -1,0 +1,63 @@
+"""Visual meshes that are skins without thickness, open where the next link begins: what they go around is
+theirs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from partwright.robots import CollideOptions, collide
+from partwright.robots.wrapping import wrapped
+from tests.robots.robots import urdf
+
+RADIUS, HEIGHT = 0.2, 1.0
+TUBE = np.pi * RADIUS**2 * HEIGHT
+
+
+def tube(open_ends: int) -> trimesh.Trimesh:
+    """The skin of a cylinder of 96 sides without its upper or both of its discs."""
+    rod = trimesh.creation.cylinder(RADIUS, HEIGHT, sections=96)
+    lids = rod.face_normals[:, 2] > 0.5
+    if open_ends == 2:
+        lids |= rod.face_normals[:, 2] < -0.5
+    rod.update_faces(~lids)
+    return rod
+
+
+@pytest.mark.parametrize(("open_ends", "turned"), [(1, False), (2, True)])
+def test_an_open_tube_bounds_what_it_goes_around(open_ends: int, turned: bool) -> None:
+    """Up to where its lids were: seen from there, the missing one fills half of all directions."""
+    skin = tube(open_ends)
+    if turned:
+        skin.invert()
+    inner, whole = wrapped(skin.vertices, skin.faces)
+    assert inner.volume() == pytest.approx(TUBE, rel=0.02)
+    thick = 1.2 / 96
+    assert inner.volume() < whole.volume() < np.pi * (RADIUS + 2 * thick) ** 2 * (HEIGHT + 4 * thick)
+
+
+def test_a_sheet_bounds_what_wraps_it() -> None:
+    sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    inner, whole = wrapped(sheet.vertices, sheet.faces)
+    assert inner is whole
+    assert whole.volume() == pytest.approx(2 * 1.2 / 96, rel=0.3)
+
+
+def test_an_open_skin_is_enclosed_by_one_shape_around_it(tmp_path: Path) -> None:
+    """Not by pieces that follow its wall, and two halves of it are wrapped as one."""
+    path = urdf(tmp_path, arm="meshes/ell.stl")
+    skin = tube(2)
+    left = skin.triangles_center[:, 0] < 0
+    for name, half in (("seen.stl", left), ("rod.stl", ~left)):
+        skin.submesh([half], append=True).export(tmp_path / "meshes" / name)
+    other = '</visual><visual><geometry><mesh filename="meshes/rod.stl"/></geometry></visual>'
+    path.write_text(path.read_text().replace("</visual>", other, 1))
+    base = next(one for one in collide(path, CollideOptions(enclose=True)).links if one.link == "base")
+    assert base.sticking_out == 0
+    assert base.count == 1
+    assert base.extra < 0.25
+    assert base.deviation < 0.05
+    assert len(base.notes) == 2
