@@ -6,6 +6,7 @@ import argparse
 
 from partwright.cli import (
     parts_edit,
+    parts_family,
     parts_generate,
     parts_interpolate,
     parts_prepare,
@@ -20,6 +21,7 @@ from partwright.cli import (
 COMMANDS = (
     parts_prepare,
     parts_train,
+    parts_family,
     parts_train_encoder,
     parts_train_generator,
     parts_reconstruct,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
@@ -155,13 +155,14 @@ def _with_parts(
     sources: Sequence[PartedSource], parts: tuple[str, ...], refused: list[Refused]
 ) -> tuple[list[PartedSource], tuple[str, ...]]:
     """The shapes whose parts can be named, and the family's parts: those given, or all in order of coming."""
-    kept, seen = [], dict[str, None]()
+    kept, told = [], dict[str, tuple[str, ...]]()
     for source in sources:
         try:
-            seen |= dict.fromkeys(source.part_names())
+            told[source.name] = source.part_names()
             kept.append(source)
         except PartwrightError as error:
             refused.append(Refused(source.name, str(error)))
+    seen = dict.fromkeys(name for names in told.values() for name in names)
     missing = [part for part in parts if part not in seen]
     if missing:
         raise FamilyError(
@@ -169,9 +170,32 @@ def _with_parts(
             "Name the parts as the shapes do"
         )
     names = parts or tuple(seen)
+    _check_names(told, names)
     if len(names) > MOST_PARTS:
         raise FamilyError(f"{len(names)} different part names; at most {MOST_PARTS} can be told apart")
     return kept, names
+
+
+def _check_names(told: Mapping[str, tuple[str, ...]], names: tuple[str, ...]) -> None:
+    """Raise FamilyError where part names tell nothing: spelled in two ways, or none in two shapes.
+
+    told: the names of each shape's parts.
+    """
+    holders = {name: [shape for shape, own in told.items() if name in own] for name in names}
+    plain: dict[str, str] = {}
+    for name in names:
+        other = plain.setdefault("".join(c for c in name.casefold() if c.isalnum()) or name, name)
+        if other != name and not set(holders[other]) & set(holders[name]):
+            raise FamilyError(
+                f"the part {other!r} (as in {holders[other][0]}) and the part {name!r} (as in "
+                f"{holders[name][0]}) differ in spelling alone; name them alike"
+            )
+    if len(told) > 1 and all(len(having) < 2 for having in holders.values()):
+        some = "; ".join(f"{shape} has {', '.join(told[shape])}" for shape in list(told)[:2])
+        raise FamilyError(
+            f"no part name is in two shapes: {some}. Name the nodes of each file after its parts, alike in "
+            "all, or put FILE.labels.json beside it"
+        )
 
 
 def _check_enough(name: str, sources: Sequence[PartedSource], refused: Sequence[Refused]) -> None:
@@ -211,8 +235,8 @@ def _prepare_shape(job: _Job) -> str:
         key = _key(job)
         if _is_done(job.path, key):
             return ""
-        shape, fits = _sampled(job)
-        write_shape(job.path, shape, {"key": key, "fits": fits})
+        shape, about = _sampled(job)
+        write_shape(job.path, shape, {"key": key, **about})
     except OutputError:
         raise
     except PartwrightError as error:
@@ -235,8 +259,9 @@ def _is_done(path: Path, key: str) -> bool:
         return False
 
 
-def _sampled(job: _Job) -> tuple[PreparedShape, dict[str, list[Any]]]:
-    """The shape with poses that are still to be agreed on, and all fits of each part."""
+def _sampled(job: _Job) -> tuple[PreparedShape, dict[str, Any]]:
+    """The shape with poses that are still to be agreed on, all `fits` of each part, and what the surface's
+    `repairs` were."""
     labelled = label_surface(job.source.read(), job.parts)
     points, sdf, part = sample(labelled, job.samples, _seed_of(job))
     fits = {number: fit_primitives(v, job.seed) for number, v in labelled.vertices.items()}
@@ -254,7 +279,8 @@ def _sampled(job: _Job) -> tuple[PreparedShape, dict[str, list[Any]]]:
         labelled.label,
         shape.frame,
     )
-    return prepared, {job.parts[number]: [fit.to_row() for fit in found] for number, found in fits.items()}
+    rows = {job.parts[number]: [fit.to_row() for fit in found] for number, found in fits.items()}
+    return prepared, {"fits": rows, "repairs": list(shape.repairs)}
 
 
 def _seed_of(job: _Job) -> int:
@@ -276,7 +302,7 @@ def _finish(output: Path, name: str, jobs: Sequence[_Job], split: dict[str, str]
     for job, has, own, said in zip(jobs, present, poses, about, strict=True):
         shape = read_shape(job.path, job.source.name)
         shape = replace(shape, poses=_filled(own, average, has))
-        extra = {key: said[key] for key in ("key", "fits")}
+        extra: dict[str, Any] = {key: said[key] for key in ("key", "fits", "repairs") if key in said}
         digest = write_shape(job.path, shape, extra)
         entries.append(Entry(shape.name, f"{SHAPES}/{job.path.name}", split[shape.name], digest))
     write_manifest(output, name, parts, entries, jobs[0].samples, average, jobs[0].seed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import tomllib
 from collections.abc import Mapping
@@ -9,6 +10,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
+from partwright.atomic_io import write_bytes
 from partwright.errors import SettingError, UnreadableFileError
 from partwright.input_files import check_file
 
@@ -224,6 +226,22 @@ def read_config(path: str | Path) -> Config:
         return config_from(data)
     except SettingError as error:
         raise SettingError(f"{path}: {error}") from error
+
+
+def write_config(path: str | Path, config: Config) -> None:
+    """Write what `read_config` reads, each value that is not the default's; raises OutputError."""
+    lines = [f"{name} = {json.dumps(getattr(config, name))}" for name in ("family", "name")]
+    lines += _changed(config, Config(config.family, config.name))
+    for table in ("decoder", "losses", "training"):
+        mine = getattr(config, table)
+        if changed := _changed(mine, type(mine)()):
+            lines += ["", f"[{table}]", *changed]
+    write_bytes(path, ("\n".join(lines) + "\n").encode())
+
+
+def _changed(mine: Any, plain: Any) -> list[str]:
+    pairs = {f.name: getattr(mine, f.name) for f in fields(mine) if not is_dataclass(getattr(mine, f.name))}
+    return [f"{k} = {json.dumps(v)}" for k, v in pairs.items() if v != getattr(plain, k)]
 
 
 def config_from(data: Mapping[str, Any]) -> Config:

@@ -143,7 +143,8 @@ class Model:
 
 
 def load_model(source: str | Path) -> Model:
-    """A model by its file, or by the name of one that ships or lies in a folder of $PARTWRIGHT_MODELS.
+    """A model by its file, the folder that it was trained into, or the name of one that ships or lies in a
+    folder of $PARTWRIGHT_MODELS.
 
     Raises:
         ModelError: no such model, or a file of another form.
@@ -152,7 +153,8 @@ def load_model(source: str | Path) -> Model:
     """
     path = Path(source)
     if path.suffix != SUFFIX:
-        path = _named(str(source))
+        trained = path / f"model{SUFFIX}"
+        path = trained if trained.is_file() else _named(str(source))
     check_file(path)
     try:
         data = path.read_bytes()

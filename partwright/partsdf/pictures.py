@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from partwright.assembly.palette import palette
+from partwright.datasets.prepared import PreparedShape
 from partwright.errors import NoSurfaceError, SettingError, UnsupportedFormatError
 from partwright.partsdf.editing import interpolated
 from partwright.partsdf.meshing import ShareDone, mesh_shape, resolution_for_wall
@@ -55,6 +56,17 @@ def picture(
     except NoSurfaceError:
         return blank(size)
     return render_mesh(mesh, camera, (size, size), colours)
+
+
+def target_picture(shape: PreparedShape, size: int, camera: Camera | None = None) -> np.ndarray:
+    """(size, size, 3) uint8 of a prepared shape, each part in its colour; blank where it was prepared without
+    its surface."""
+    import trimesh
+
+    if not len(shape.faces):
+        return blank(size)
+    mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
+    return render_mesh(mesh, camera, (size, size), palette(len(shape.present))[shape.label])
 
 
 def picture_resolution(*shapes: NeuralShape) -> int:

@@ -46,7 +46,8 @@ _RATE_DROPS = (0.8, 0.9)  # shares of the steps
 
 @dataclass(frozen=True)
 class EpochReport:
-    """What `progress` is told after each epoch: losses are means over it, unweighted."""
+    """What `progress` is told after each epoch: losses are means over it, unweighted; `model` makes the model
+    as it is now."""
 
     epoch: int
     epochs: int
@@ -54,6 +55,7 @@ class EpochReport:
     part: float
     inter: float
     seconds: float
+    model: Callable[[], Model]
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,11 @@ def train(
         ModelError, SettingError: `folder` holds a checkpoint of another family, or of other settings.
         MissingDependencyError: Lightning Fabric is not installed.
     """
+    return trainer(config, folder).run(progress)
+
+
+def trainer(config: Config, folder: str | Path) -> Trainer:
+    """What `train` runs, before its first step; raises as `train`."""
     check_folder(folder)
     fabric = _fabric(config)
     family = PreparedFamily(config.family)
@@ -89,7 +96,7 @@ def train(
         raise SettingError(f"{config.family}: no shape is in the split {' or '.join(splits)}")
     check_training_shapes(family, samples, config)
     Path(folder).mkdir(parents=True, exist_ok=True)
-    return Trainer(config, family, samples, Path(folder), fabric).run(progress)
+    return Trainer(config, family, samples, Path(folder), fabric)
 
 
 class Trainer:
@@ -128,7 +135,7 @@ class Trainer:
         with _stopping() as stop:
             while self.state.step < self.settings.epochs * self.steps and not stop():
                 self._set_rates()
-                self._step()
+                self.step()
                 self.state.seconds = time.monotonic() - started
                 if self.state.step % self.steps == 0:
                     self._end_epoch(log, validation, report)
@@ -148,7 +155,8 @@ class Trainer:
     def epoch(self) -> int:
         return self.state.step // self.steps
 
-    def _step(self) -> None:
+    def step(self) -> None:
+        """One step of the optimiser, the one that comes next."""
         batch = self._batch()
         self.generator.manual_seed((self.settings.seed << 32) + self.state.step)
         drawn = self.samples.draw(batch, self.settings.points, self.generator, self.settings.balance)
@@ -204,7 +212,8 @@ class Trainer:
             log.picture(self.epoch, picture)
         log.row(self.epoch, row)
         if report:
-            report(EpochReport(self.epoch, self.settings.epochs, whole, part, inter, self.state.seconds))
+            seconds, epochs = self.state.seconds, self.settings.epochs
+            report(EpochReport(self.epoch, epochs, whole, part, inter, seconds, self.trained))
 
     def _save(self) -> None:
         if self.fabric.is_global_zero:

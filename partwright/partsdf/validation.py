@@ -8,15 +8,14 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from partwright.assembly.palette import palette
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.partsdf.config import Config
 from partwright.partsdf.losses import clamped_error
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.pictures import blank, picture
+from partwright.partsdf.pictures import picture, target_picture
 from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct
-from partwright.render import render_mesh, sheet, write_png
+from partwright.render import sheet, write_png
 
 ITERATIONS, RESOLUTION, PANEL = 150, 64, 240
 HELD_OUT = 5  # every fifth sample is measured at, not fitted to
@@ -41,7 +40,7 @@ class Validation:
             held = np.arange(len(shape.sdf)) % HELD_OUT == 0
             found = reconstruct(model, _rows(shape, ~held), settings)
             scores.append(_scores(found, _rows(shape, held)))
-            panels += [_target_picture(shape), picture(found, RESOLUTION, PANEL)]
+            panels += [target_picture(shape, PANEL), picture(found, RESOLUTION, PANEL)]
         page = sheet(panels, columns=2)
         write_png(self._folder / f"validation_{epoch:05d}.png", page)
         return {name: float(np.mean([s[name] for s in scores])) for name in scores[0]}, page
@@ -72,13 +71,3 @@ def occupancy_iou(a: np.ndarray, b: np.ndarray) -> float:
     """Of two occupancies (N,) of the same samples; 1 where both are empty."""
     union = np.count_nonzero(a | b)
     return np.count_nonzero(a & b) / union if union else 1.0
-
-
-def _target_picture(shape: PreparedShape) -> np.ndarray:
-    """The shape itself, blank where the family was prepared without its surface."""
-    import trimesh
-
-    if not len(shape.faces):
-        return blank(PANEL)
-    mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
-    return render_mesh(mesh, size=(PANEL, PANEL), colours=palette(len(shape.present))[shape.label])

@@ -30,7 +30,7 @@ def commands(parent: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParse
 
 
 def test_every_command_that_writes_says_what_it_reads() -> None:
-    keeps_its_own = {"prepare", "train", "simulate", "run"}  # folders that are gone on with
+    keeps_its_own = {"prepare", "train", "family", "simulate", "run"}  # folders that are gone on with
     for command in commands(parser()):
         options = command._option_string_actions
         if "-o" in options and command.prog.split()[-1] not in keeps_its_own:

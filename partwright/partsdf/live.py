@@ -1,0 +1,54 @@
+"""A picture of a model as it learns: training shapes, and below them what it makes of them so far."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from partwright.datasets.prepared import PreparedFamily
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.pictures import picture, target_picture
+from partwright.partsdf.training import EpochReport
+from partwright.render import Camera, sheet, write_png
+
+_SHAPES, _PANEL, _CELLS = 4, 240, 64
+_LEAST, _SHARE = 20.0, 0.05  # seconds between pictures, and what they may take of all time
+
+
+class LivePicture:
+    """Drawn anew at the end of an epoch, whenever enough time has passed; and at the last."""
+
+    def __init__(self, path: Path, family: PreparedFamily, up: str = "z") -> None:
+        trained = family.split("train")
+        chosen = [trained[i * len(trained) // _SHAPES] for i in range(min(_SHAPES, len(trained)))]
+        self._shapes = [family.load(i) for i in chosen]
+        self._path, self._camera = path, Camera(up=up)
+        self._above = [target_picture(shape, _PANEL, self._camera) for shape in self._shapes]
+        self._due = 0.0
+
+    def show(self, report: EpochReport) -> None:
+        """Draw what has been learned, if it is time."""
+        start = time.monotonic()
+        if start < self._due and report.epoch < report.epochs:
+            return
+        model = report.model()
+        below = []
+        for shape in self._shapes:
+            made = NeuralShape.trained(model, shape.name)
+            below.append(picture(made, _CELLS, _PANEL, self._camera))
+        left = report.seconds / report.epoch * (report.epochs - report.epoch)
+        write_png(self._path, sheet([*self._above, *below], columns=len(below), title=_said(report, left)))
+        took = time.monotonic() - start
+        self._due = start + max(_LEAST, took / _SHARE)
+
+
+def _said(report: EpochReport, left: float) -> str:
+    rest = f"about {duration(left)} left" if report.epoch < report.epochs else "done"
+    return f"epoch {report.epoch} of {report.epochs}, error {report.part:.4f}, {rest}"
+
+
+def duration(seconds: float) -> str:
+    """`40 s`, `12 min`, `2.5 h`."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -1,0 +1,133 @@
+"""A folder of named parts becomes a model by one command; bad folders are told in a line."""
+
+from __future__ import annotations
+
+import json
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+import partwright as pw
+from partwright.cli.main import main
+from partwright.datasets.prepared import PreparedFamily
+from partwright.errors import FamilyError, SettingError
+from partwright.partsdf.config import read_config
+from partwright.partsdf.own_family import Plan, learn_family, settings_for
+from partwright.partsdf.training import EpochReport, Trained
+
+
+def scene(
+    path: Path, wide: float = 1.0, names: tuple[str, ...] = ("foot", "head"), hole: bool = False
+) -> None:
+    """A box with a ball above it; with `hole`, the ball lacks a triangle."""
+    foot = trimesh.creation.box((2 * wide, 1.2, 0.8))
+    head = trimesh.creation.icosphere(2, 0.5)
+    head.apply_translation((0, 0, 0.8))
+    if hole:
+        head.update_faces(np.arange(len(head.faces)) > 0)
+    made = trimesh.Scene()
+    for name, mesh in zip(names, (foot, head), strict=False):
+        made.add_geometry(mesh, node_name=name, geom_name=name)
+    made.export(path)
+
+
+def test_one_command_from_a_folder_to_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, output = tmp_path / "things", tmp_path / "things-model"
+    source.mkdir()
+    for i in range(4):
+        scene(source / f"thing_{i}.glb", 1 + 0.1 * i, hole=i == 2)
+    (source / "thing_4.glb").write_bytes(b"glTF")
+    command = ["parts", "family", str(source), "-o", str(output), "--steps", "3", "--samples", "1000"]
+    assert main([*command, "--threads", "1", "--workers", "1"]) == 0
+    said = capsys.readouterr()
+    assert "4 shapes of head, foot; 3 findings" in said.out
+    assert "3 steps will take about" in said.out
+    assert "thing_4, left out: " in said.err
+    table = (output / "check.md").read_text()
+    assert "| thing_2 | look at it | not watertight: filled 1 hole " in table
+    model = pw.partsdf.load_model(output)  # the folder is enough
+    assert (model.name, model.parts, len(model.shapes)) == ("things-model", ("head", "foot"), 3)
+    assert read_config(output / "training.toml").training.epochs == 3
+    assert Image.open(output / "live.png").width == 2 * 240  # two are in the split that trains
+
+
+def test_what_a_stopped_training_has_learned_is_kept_and_gone_on_from(tmp_path: Path) -> None:
+    source, output = tmp_path / "things", tmp_path / "out"
+    source.mkdir()
+    for i in range(3):
+        scene(source / f"thing_{i}.glb", 1 + 0.1 * i)
+    plans: list[Plan] = []
+    epochs: list[int] = []
+
+    def told(report: EpochReport) -> None:
+        epochs.append(report.epoch)
+        if len(epochs) == 2:
+            signal.raise_signal(signal.SIGINT)
+
+    def learn() -> Trained:
+        return learn_family(
+            source, output, steps=3, samples=1000, threads=1, workers=1, progress=told, planned=plans.append
+        )
+
+    assert learn().outcome == "interrupted"
+    assert (output / "live.png").exists()
+    first = pw.partsdf.load_model(output)
+    again = learn()
+    assert (again.outcome, epochs) == ("converged", [1, 2, 3])
+    assert again.model.hash != first.hash
+    assert plans[0].seconds > 0
+    assert [finding.shape for finding in plans[0].findings] == [""]  # three shapes are few
+
+
+def test_bad_folders_are_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def said(make: dict[str, tuple[str, ...]]) -> str:
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        folder.mkdir()
+        for name, parts in make.items():
+            scene(folder / f"{name}.glb", names=parts)
+        output = folder.parent / f"{folder.name}-model"
+        command = ["parts", "family", str(folder), "-o", str(output), "--samples", "1000", "--workers", "1"]
+        assert main(command) == 2
+        assert not (output / "model.safetensors").exists()
+        lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
+        assert len(lines) == 1
+        return lines[0]
+
+    pair = ("foot", "head")
+    assert "1 usable shapes; a family needs at least two" in said({"a": pair})
+    assert "no part name is in two shapes: a has a2, a1; b has b2, b1" in said(
+        {"a": ("a1", "a2"), "b": ("b1", "b2")}
+    )
+    assert "'Foot' (as in b) differ in spelling" in said({"a": pair, "b": ("Foot", "head")})
+    assert "every shape is one part, 'mesh'; name the nodes" in said({"a": ("mesh",), "b": ("mesh",)})
+    assert "holds no shapes" in said({})
+    with pytest.raises(FamilyError, match="no such folder"):
+        learn_family(tmp_path / "nowhere", tmp_path / "out")
+    with pytest.raises(SettingError, match="holds the shapes"):
+        learn_family(tmp_path, tmp_path / "." / "")
+    with pytest.raises(SettingError, match="steps is 0"):
+        learn_family(tmp_path, tmp_path / "out", steps=0)
+    assert not (tmp_path / "out").exists()
+
+
+def test_names_that_one_shape_tells_apart_do_not_conflict(tmp_path: Path) -> None:
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for i in range(2):
+        scene(folder / f"thing_{i}.glb", names=("leg_11", "leg_1_1"))
+    family = pw.datasets.prepare(folder, tmp_path / "out", samples=1000, workers=1).family
+    assert set(family.parts) == {"leg_11", "leg_1_1"}
+
+
+def test_settings_are_written_as_they_are_read(lamps: PreparedFamily, tmp_path: Path) -> None:
+    from partwright.partsdf.config import write_config
+
+    config = settings_for(lamps, "lamps", 1000, seed=3)
+    write_config(tmp_path / "c.toml", config)
+    assert read_config(tmp_path / "c.toml") == config
+    assert json.dumps(str(lamps.folder)) in (tmp_path / "c.toml").read_text()
+    assert config.training.epochs == round(1000 / 7)  # of 25 shapes, four a step
