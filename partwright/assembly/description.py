@@ -10,6 +10,7 @@ import numpy as np
 
 from partwright.assembly.placed import placed_quadric
 from partwright.fields import NormalForm, Profile, normal_form
+from partwright.fields.extrusion import RIMS
 
 if TYPE_CHECKING:
     from partwright.assembly.tree import Node, Part
@@ -42,8 +43,8 @@ def _leaf(part: Part, digits: int) -> str:
     if quadric is not None:
         own = _quadric(normal_form(quadric), digits)
     else:
-        shown = [f.name for f in dataclasses.fields(part.field) if f.repr]  # type: ignore[arg-type]
-        numbers = [f"{name} {_value(getattr(part.field, name), digits)}" for name in shown]
+        shown = {f.name: getattr(part.field, f.name) for f in dataclasses.fields(part.field) if f.repr}  # type: ignore[arg-type]
+        numbers = [f"{k} {_value(value, digits)}" for k, value in shown.items() if value or k not in RIMS]
         own = " ".join([part.field.kind, ", ".join(numbers), f"at {_numbers(part.translation, digits)}"])
     copies = f", {len(part.copies)} copies" if part.instances else ""
     blend = f", blend {_number(part.blend, digits)}" if part.blend else ""

@@ -33,6 +33,7 @@ from partwright.cleaning.outline_equations import (
 )
 from partwright.errors import CancelledError, ParameterError
 from partwright.fields import Extrusion, Field, Revolution, Swept
+from partwright.fields.extrusion import RIMS
 from partwright.fields.profile import Profile, circle, circle_of
 from partwright.methods import Cancellation
 
@@ -89,9 +90,13 @@ def same_numbers(a: Assembly, b: Assembly, grid: Grid) -> bool:
 def _same_field(one: Field, other: Field, near: float) -> bool:
     if not isinstance(one, Swept) or not isinstance(other, Swept):
         return one == other or bool(np.allclose(values(one), values(other), atol=near))
-    lengths = [(field.height if isinstance(field, Extrusion) else 0.0) for field in (one, other)]
+    lengths = [
+        np.array([getattr(field, name) for name in ("height", *RIMS)] if isinstance(field, Extrusion) else [])
+        for field in (one, other)
+    ]
     corners = np.abs(one.profile.corners - other.profile.corners)
-    return abs(lengths[0] - lengths[1]) <= near and bool((corners <= [near, near, 1e-5]).all())
+    same = np.allclose(lengths[0], lengths[1], rtol=0, atol=near)
+    return same and bool((corners <= [near, near, 1e-5]).all())
 
 
 def _targets(parts: Sequence[Lying], tolerance: float, grid: Grid, unit: str | None) -> _Targets:
@@ -270,10 +275,11 @@ def _swept(
     if isinstance(field, Revolution):
         return dataclasses.replace(field, profile=made)
     ends = [wanted.get((2, ("end", end))) for end in (0, 1)]
+    rims = {name: targets.sizes.get((index, ("rim", name)), getattr(field, name)) for name in RIMS}
     height = field.height
     if ends[0] is not None and ends[1] is not None and ends[0] != ends[1]:
         height = float(f"{abs(ends[1] - ends[0]):.{_DIGITS}g}")
-    return dataclasses.replace(field, profile=made, height=height)
+    return dataclasses.replace(field, profile=made, height=height, **rims)
 
 
 def _pairs(field: Swept, loop: int) -> list[tuple[tuple[int, int], tuple[int, int]]]:

@@ -15,6 +15,7 @@ from partwright.cleaning.dimensions import dimensions, flat, reaches, turned_fre
 from partwright.cleaning.orientations import CUBE, along
 from partwright.cleaning.outline_equations import arc
 from partwright.fields import Extrusion, Revolution, Swept
+from partwright.fields.extrusion import RIMS
 from partwright.fields.profile import circle_of
 
 Floats = NDArray[np.float64]
@@ -59,11 +60,11 @@ class Level:
 
 @dataclass(frozen=True)
 class Size:
-    """A radius of a part."""
+    """A radius of a part, or the length of a chamfer."""
 
     part: int
     key: Key
-    """("number", index), ("arc", corner, next), ("circle", loop) or ("turned", corner, next)."""
+    """("number", index), ("arc" or "turned", corner, next), ("circle", loop) or ("rim", name)."""
     value: float
     whole: bool
     """Whether it goes all around, so that a drawing gives the diameter."""
@@ -172,6 +173,11 @@ def sizes(index: int, one: Lying, tolerance: float) -> Iterator[Size]:
             if dimension.name in ROUND:
                 yield Size(index, ("number", k), float(values(field)[k]), True, dimension.name)
         return
+    if isinstance(field, Extrusion):
+        rims = ((name, getattr(field, name)) for name in RIMS)
+        yield from (
+            Size(index, ("rim", name), value, False, name.replace("_", " ")) for name, value in rims if value
+        )
     turned = isinstance(field, Revolution)
     corners = field.profile.corners
     for number, (loop, sides) in enumerate(zip(field.profile.loops, field.profile.sides, strict=True)):

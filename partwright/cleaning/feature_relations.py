@@ -158,4 +158,4 @@ def _named(name: str, value: float, along: str) -> tuple[str, float]:
 
 
 def _size(size: Size) -> tuple[str, float]:
-    return ("diameter", 2 * size.value) if size.whole else ("radius", size.value)
+    return ("diameter", 2 * size.value) if size.whole else (size.name, size.value)

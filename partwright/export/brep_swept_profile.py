@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
+from partwright.export.brep_rims import with_rims
 from partwright.export.brep_swept import sewn
 from partwright.fields import Extrusion, Profile, Revolution, Swept
 from partwright.fields.profile import Loop, Side, circle_of
@@ -43,7 +44,11 @@ def _extruded(field: Extrusion) -> TopoDS_Shape:
     from OCP.gp import gp_Vec
 
     base = _face(field.profile, _level(-field.height / 2))
-    return _oriented(BRepPrimAPI_MakePrism(base, gp_Vec(0, 0, field.height)).Shape())
+    prism = BRepPrimAPI_MakePrism(base, gp_Vec(0, 0, field.height))
+    solid = _oriented(prism.Shape())
+    return (
+        _oriented(with_rims(field, solid, prism.FirstShape(), prism.LastShape())) if field.has_rims else solid
+    )
 
 
 def _revolved(field: Revolution) -> TopoDS_Shape:

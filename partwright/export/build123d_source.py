@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import keyword
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -31,6 +32,7 @@ from partwright.export.solid_source import (
     superfrustum_source,
 )
 from partwright.fields import Extrusion, SuperFrustum, Swept
+from partwright.fields.extrusion import RIMS
 from partwright.shapes import canonical_unit
 
 _SOLIDS = {
@@ -51,6 +53,7 @@ _SOLIDS = {
 }
 _OPERATORS = {"union": "+", "difference": "-", "intersection": "&"}
 _RESERVED = (*keyword.kwlist, "bd", "math", "path", "assembly", "print", "superfrustum", "loop", "zip")
+_TIGHT = 0.99999  # of a rim's depth, where nothing else would be left between rims
 _NEARLY = 0.01  # of a frame's width
 
 
@@ -124,6 +127,8 @@ def _function(part: SourcePart) -> Iterator[str]:
     field = part.part.field
     solid = _swept(field, names) if isinstance(field, Swept) else _SOLIDS[field.kind].format(**names)
     yield f"    solid = {solid}"
+    if isinstance(field, Extrusion) and field.has_rims:
+        yield from _rims(field, names)
     yield f"    return {_placed(part, names)}"
     yield ""
     yield ""
@@ -138,10 +143,28 @@ def _swept(field: Swept, names: dict[str, str]) -> str:
     return f"bd.revolve(bd.Plane.XZ * ({flat}), bd.Axis.Z{angle})"
 
 
+def _rims(field: Extrusion, names: dict[str, str]) -> Iterator[str]:
+    """Statements that round or cut off the edges at the ends."""
+    share = f"{_TIGHT} * " if _is_tight(field) else ""
+    for name in RIMS:
+        if name in names:
+            end, operation = name.split("_")
+            edges = f"solid.edges().group_by(bd.Axis.Z)[{-1 if end == 'top' else 0}]"
+            yield f"    solid = bd.{operation}({edges}, {share}{names[name]})"
+
+
+def _is_tight(field: Extrusion) -> bool:
+    """Whether rims leave nothing of a wall or a side, which OpenCASCADE cannot do."""
+    left = field.height - sum(rim.depth for rim in field.rims)
+    sides = field.within(max(rim.depth for rim in field.rims))[0].sides
+    shortest = min(math.dist(side.start, side.end) for loop in sides for side in loop)
+    return min(left, shortest) < (1 - _TIGHT) * field.profile.size
+
+
 def _sharpened(parts: Sequence[Part]) -> list[Change]:
-    """Extrusions with taper whose inner corners are rounded on their way up, which build123d keeps sharp."""
-    tapered = [(p.name, p.field) for p in parts if isinstance(p.field, Extrusion)]
-    rounded = (name for name, f in tapered if any(wall.below is None for loop in f.walls for wall in loop))
+    """Extrusions with taper or rims that round inner corners on their way up, which build123d keeps sharp."""
+    extruded = ((p.name, p.field) for p in parts if isinstance(p.field, Extrusion))
+    rounded = (name for name, f in extruded if (f.taper or f.has_rims) and f.rounds_inner_corners)
     return [Change((name,), "extrusion", note="its inner corners stay sharp") for name in rounded]
 
 

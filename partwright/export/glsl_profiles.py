@@ -27,6 +27,10 @@ def swept_function(name: str, part: Part, numbers: Numbers) -> list[str]:
         angle = math.radians(field.taper)
         lean = f"vec2({numbers((math.sin(angle), math.cos(angle)))})"
         at = f"v.z + {numbers([field.height / 2])}"
+        if field.has_rims:
+            rims = f"vec4({numbers([number for rim in field.rims for number in rim])})"
+            call = f"extruded_with_rims({name}_profile(v.xy), {at}, {numbers([field.height])}, {rims})"
+            return [*_profile(f"{name}_profile", field, numbers, True), *head, f"    return {call};", "}", ""]
         result = f"    return extruded({name}_profile(v.xy), {at}, {numbers([field.height])}, {lean});"
         return [*_profile(f"{name}_profile", field, numbers, True), *head, result, "}", ""]
     assert isinstance(field, Revolution)

@@ -2,8 +2,9 @@
 the tree at the end.
 
 Named solids and SuperFrusta are exact, to the facets of `$fn`, and so are extrusions, revolutions, planes,
-cylinders, cones and spheres (of quadrics). Other quadrics, and extrusions with taper, are polyhedra; what
-`drawn` refuses becomes the nearest solid, and blends sharp edges: FILE.report.json lists them.
+cylinders, cones and spheres (of quadrics). Other quadrics, and extrusions with taper, are polyhedra, fillets
+and chamfers of extrusions slices; what `drawn` refuses becomes the nearest solid, and blends sharp edges:
+FILE.report.json lists them.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
 from partwright.export.instance_patterns import Poses, Ring, Row
-from partwright.export.profile_source import SCAD, SCAD_SOURCE, draws_loops, loops
+from partwright.export.profile_source import SCAD, SCAD_RIMS, SCAD_SOURCE, draws_loops, loops
 from partwright.export.solid_source import (
     SourcePart,
     drawn,
@@ -36,7 +37,8 @@ from partwright.export.solid_source import (
     source_parts,
     superfrustum_source,
 )
-from partwright.fields import Extrusion, Field, Quadric, Swept
+from partwright.fields import Extrusion, Field, Profile, Quadric, Swept
+from partwright.fields.profile_offset import turn_between
 from partwright.meshing.manifolds import surface_of
 from partwright.meshing.named_solids import named_solid
 from partwright.meshing.quadric_solids import quadric_solid
@@ -76,7 +78,8 @@ _RESERVED = (
     "module function if else for let assert echo each true false undef include use union difference "
     "intersection translate rotate scale mirror hull minkowski cube sphere cylinder polyhedron circle "
     "square polygon text color offset resize render children import projection surface linear_extrude "
-    "rotate_extrude multmatrix intersection_for group version end superfrustum loop side_points"
+    "rotate_extrude multmatrix intersection_for group version end superfrustum loop side_points "
+    "extrude_with_rims rim_slices rim_point"
 )
 
 
@@ -95,6 +98,8 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
     ball = Ball.around(tree)
     polyhedra = [part for part in tree.parts if part.field.quadric() is not None or _leans(part.field)]
     changes += [Change((part.name,), "mesh", note=f"{facets} facets to a full turn") for part in polyhedra]
+    sliced = [part for part in tree.parts if _has_rims(part.field)]
+    changes += [Change((part.name,), "slices", note="its fillets and chamfers are slices") for part in sliced]
     parts = source_parts(tree.parts, fixed_axes_angles, _RESERVED.split())
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     lines = [
@@ -108,6 +113,7 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
         "",
         *(line for part in parts for line in _module(part, ball, facets)),
         *superfrustum_source(parts, "superfrustum.scad"),
+        *(SCAD_RIMS.splitlines() if any(_has_rims(part.part.field) for part in parts) else []),
         *(SCAD_SOURCE.splitlines() if draws_loops(_drawn_swept(parts)) else []),
     ]
     write_bytes(path, ("\n".join(lines).rstrip() + "\n").encode())
@@ -183,10 +189,27 @@ def _swept(field: Swept, names: dict[str, str], facets: int) -> str:
     flat = outline
     if holes:
         flat = "difference() {\n" + "".join(f"            {one}\n" for one in (outline, *holes)) + "        }"
+    if isinstance(field, Extrusion) and field.has_rims:
+        bottom, top = (
+            f"[{names.get(f'{end}_fillet', 0)}, {names.get(f'{end}_chamfer', 0)}]"
+            for end in ("bottom", "top")
+        )
+        convex = "true" if _is_convex(field.profile) else "false"
+        return f"extrude_with_rims({names['height']}, {bottom}, {top}, convex = {convex}) {flat}"
     if isinstance(field, Extrusion):
         return f"linear_extrude(height = {names['height']}, center = true) {flat}"
     angle = f"angle = {names['angle']}" if "angle" in names else ""
     return f"rotate_extrude({angle}) {flat}"
+
+
+def _has_rims(field: Field) -> bool:
+    return isinstance(field, Extrusion) and field.has_rims
+
+
+def _is_convex(profile: Profile) -> bool:
+    (sides, *holes) = profile.sides
+    bends = (turn_between(before, after) for before, after in zip((sides[-1], *sides), sides, strict=False))
+    return not holes and all(side.sweep >= 0 for side in sides) and all(bend > -1e-6 for bend in bends)
 
 
 def _faces(solid: Manifold) -> str:

@@ -35,6 +35,26 @@ float extruded(float q, float z, float height, vec2 lean) {
     return wall;
 }
 
+// The corner between a wall and an end, u and v beyond them: rounded by rim.x, or else cut off at 45 degrees by rim.y.
+float rim_distance(float u, float v, vec2 rim) {
+    if (rim.x > 0.0) {
+        vec2 over = vec2(u, v) + rim.x;
+        return length(max(over, 0.0)) + min(max(over.x, over.y), 0.0) - rim.x;
+    }
+    float cut = (u + v + rim.y) * 0.70710678, inside = max(max(u, v), cut);
+    if (inside <= 0.0) return inside;
+    if (v <= -rim.y) return u;
+    if (u <= -rim.y) return v;
+    if (u - v > rim.y) return length(vec2(u, v + rim.y));
+    if (v - u > rim.y) return length(vec2(u + rim.y, v));
+    return cut;
+}
+
+// As `extruded`, with upright walls and rims: x and y of the bottom's, z and w of the top's.
+float extruded_with_rims(float q, float z, float height, vec4 rims) {
+    return max(rim_distance(q, -z, rims.xy), rim_distance(q, z - height, rims.zw));
+}
+
 // Turned through a part of a circle: distances to the side and to the profile at both flat ends, and off their planes.
 float turned_partly(float side, vec2 first, vec2 last, vec2 p, float angle) {
     float ends = min(length(vec2(max(first.x, 0.0), first.y)), length(vec2(max(last.x, 0.0), last.y)));

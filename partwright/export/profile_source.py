@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from partwright.fields import Extrusion, Profile, Swept
+from partwright.fields.extrusion import RIMS
 from partwright.fields.profile import Loop, circle_of
 
 _SAME = 1e-9  # of a rectangle's longer side
@@ -31,6 +32,38 @@ function side_points(a, b, bulge) = bulge == 0 ? [a] :
         centre + [d[0] * cos(t) - d[1] * sin(t), d[0] * sin(t) + d[1] * cos(t)]];
 """
 
+SCAD_RIMS = """\
+// The outline extruded, with the edges at its ends rounded or cut off: [fillet, chamfer] of the bottom and
+// of the top. In slices, of an outline that is convex within their hull.
+module extrude_with_rims(height, bottom, top, convex) {
+    if (convex) hull() rim_slices(height, bottom, top, true) children();
+    else {
+        rim_slices(height, bottom, top, false) children();
+        wall = height - max(bottom) - max(top);
+        if (wall > 0) translate([0, 0, max(bottom) - height / 2]) linear_extrude(wall) children();
+    }
+}
+module rim_slices(height, bottom, top, thin) {
+    count = ceil($fn / (thin ? 4 : 8));
+    for (end = [[-1, bottom], [1, top]])
+        let (rim = end[1], steps = max(rim) == 0 ? 0 : rim[0] > 0 ? count : thin ? 1 : count)
+        for (i = [0 : thin ? steps : steps - 1])
+            let (
+                from = rim_point(rim, i / max(steps, 1)),
+                to = rim_point(rim, (i + 1) / max(steps, 1)),
+                depth = thin ? from[0] : rim_point(rim, (i + 0.5) / steps)[0],
+                thick = thin ? min(height / 10000, height / 2 - from[1]) : from[1] - to[1],
+                low = end[0] < 0 ? (thin ? from[1] : to[1]) : height - from[1] - (thin ? thick : 0)
+            )
+            if (thick > 0)
+                translate([0, 0, low - height / 2]) linear_extrude(thick) offset(r = -depth) children();
+}
+// Along a rim, from the wall (0) to the end (1): how deep within the outline, and how far from the end.
+function rim_point(rim, t) = rim[0] > 0
+    ? [rim[0] * (1 - cos(90 * t)), rim[0] * (1 - sin(90 * t))]
+    : [rim[1] * t, rim[1] * (1 - t)];
+"""
+
 BUILD123D_SOURCE = '''\
 def loop(*corners):
     """The face within lines and arcs. Corners are (x, y) or (x, y, bulge); the bulge of the side to the next
@@ -50,7 +83,8 @@ def swept_parameters(field: Swept) -> dict[str, Any]:
     for name, loop in zip(_names(field.profile), field.profile.loops, strict=True):
         result |= {f"{name}_{what}" if what else name: value for what, value in _loop(loop).items()}
     if isinstance(field, Extrusion):
-        return result | {"height": field.height} | ({"taper": field.taper} if field.taper else {})
+        rest = {name: value for name in ("taper", *RIMS) if (value := getattr(field, name))}
+        return result | {"height": field.height} | rest
     return result | ({} if field.full else {"angle": field.angle})  # type: ignore[attr-defined]
 
 

@@ -19,6 +19,7 @@ from partwright.export.identifiers import comment, identifiers
 from partwright.export.instance_patterns import Poses, Ring, Row, pattern
 from partwright.export.profile_source import meaning, swept_parameters
 from partwright.fields import Field, HollowBox, HollowFrustum, SuperFrustum, Swept
+from partwright.fields.extrusion import RIMS
 
 MEANING = {
     "size": "full extents x, y, z",
@@ -39,12 +40,25 @@ MEANING = {
     "places": "where the origins of the copies lie",
     "poses": "where the origin of each copy lies, and its turn about x, y and z in degrees",
     "count": "copies, by equal turns",
+    "bottom_fillet": "radius of the fillet around the lower end",
+    "top_fillet": "radius of the fillet around the upper end",
+    "bottom_chamfer": "by which the edges of the lower end are cut off at 45 degrees",
+    "top_chamfer": "by which the edges of the upper end are cut off at 45 degrees",
     "angle": "through which the profile is turned",
     "centre": "through which the axis of these turns runs",
 }
 _LEAN = "by which the walls lean inwards on their way up"
 _NO_UNIT = ("roundness", "taper", "bulge", "onion", "count", "poses")
-_SHARED = ("radius", "height", "thickness", "bottom_radius", "top_radius", "major_radius", "minor_radius")
+_SHARED = (
+    "radius",
+    "height",
+    "thickness",
+    "bottom_radius",
+    "top_radius",
+    "major_radius",
+    "minor_radius",
+    *RIMS,
+)
 Value = float | tuple[Any, ...]
 
 

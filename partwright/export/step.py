@@ -23,6 +23,7 @@ from partwright.export.brep import built
 from partwright.export.brep_tree import Compromises, combined
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
+from partwright.fields import Extrusion, Field
 from partwright.shapes import METRES, canonical_unit
 
 if TYPE_CHECKING:
@@ -44,6 +45,10 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     scale = METRES[unit] / _WORKING if unit else 1.0
     scaled, changes = solid_tree(assembly.scaled(scale), built, 1 / scale)
+    mitred = [part.name for part in scaled.parts if _is_mitred(part.field)]
+    if mitred:
+        note = "about sharp inner corners its fillets and chamfers meet in a mitre"
+        changes.append(Change(tuple(mitred), "extrusion", note=note))
     children = scaled.children if separate and scaled.operation == "union" else (scaled,)
     names = [child.name or f"assembly_{i:02d}" for i, child in enumerate(children, 1)]
     if children == (scaled,):
@@ -64,6 +69,10 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
         wrong = "OpenCASCADE gets their boolean operations wrong"
         changes.append(Change(tuple(made.faceted), "flat facets", note=wrong))
     write_report(assembly, path, changes, notes)
+
+
+def _is_mitred(field: Field) -> bool:
+    return isinstance(field, Extrusion) and field.has_rims and field.rounds_inner_corners
 
 
 def _document(products: list[tuple[str, TopoDS_Shape]]) -> TDocStd_Document:

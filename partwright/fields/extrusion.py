@@ -1,4 +1,4 @@
-"""The extrusion: a profile moved along z, with straight or leaning walls."""
+"""The extrusion: a profile moved along z, with straight or leaning walls and sharp, rounded or cut rims."""
 
 from __future__ import annotations
 
@@ -9,15 +9,20 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from partwright.errors import ParameterError
 from partwright.fields.base import LARGEST, checked, normalise, number
 from partwright.fields.operations import library
 from partwright.fields.profile import Profile
 from partwright.fields.profile_distance import profile_distance, profile_gradients
 from partwright.fields.profile_offset import Wall, offset
+from partwright.fields.rims import Rim
 from partwright.fields.swept import Swept, SweptGradients
 
 _STEEPEST = 89.0
 _TINY = 1e-30
+_VANISHING = 1e-6  # of a rim's depth: what may be left of a side there, a corner as round as the rim
+RIMS = ("bottom_fillet", "top_fillet", "bottom_chamfer", "top_chamfer")
+"""The numbers of rims, in the order of `gradients`."""
 
 
 @dataclass(frozen=True)
@@ -28,25 +33,81 @@ class Extrusion(Swept):
     bottom lies what is at least h tan(taper) deep within the profile, so lines become planes, arcs cones, and
     corners that point inwards are rounded. Every side has to reach the top.
 
-    Without taper the distance is exact. With taper it is wherever the nearest point lies on a wall that the
-    nearest side of the profile makes, and beyond the edges between walls it never exceeds the true one.
+    bottom_fillet, top_fillet: radius by which the edges of that end are rounded, those of holes as well.
+    bottom_chamfer, top_chamfer: lengths by which they are cut off at 45 degrees instead. Rims need upright
+    walls, and sides that reach the end; a corner of the profile may be exactly as round as the fillet.
+
+    Without taper and rims the distance is exact. With them it is wherever the nearest point lies on a wall
+    that the nearest side of the profile makes, and beyond the edges between such walls, outside of corners
+    that are sharp, it never exceeds the true one.
 
     Raises:
         ParameterError: the height is not positive, the taper is not from 0 to 89 degrees, or too much for the
-            profile.
+            profile; rims are more than the height or than the profile has room for, an end has two, or a
+            leaning wall has one.
     """
 
     kind: ClassVar[str] = "extrusion"
     profile: Profile
     height: float
     taper: float = 0.0
+    bottom_fillet: float = 0.0
+    top_fillet: float = 0.0
+    bottom_chamfer: float = 0.0
+    top_chamfer: float = 0.0
 
     def __post_init__(self) -> None:
         self._check_profile()
         normalise(self, height=number(self, "height", 0.0, LARGEST, above=True))
         normalise(self, taper=number(self, "taper", 0.0, _STEEPEST))
+        for name in RIMS:
+            normalise(self, **{name: number(self, name, 0.0, LARGEST)})
         if self.taper:
             _ = self.top
+        self._check_rims()
+
+    def _check_rims(self) -> None:
+        if not self.has_rims:
+            return
+        if any(rim.fillet and rim.chamfer for rim in self.rims):
+            raise ParameterError(f"{self.kind}: an end has a fillet and a chamfer; expected one of them")
+        if self.taper:
+            raise ParameterError(
+                f"{self.kind}: a taper and rims; expected upright walls under a fillet or chamfer"
+            )
+        total = sum(rim.depth for rim in self.rims)
+        if total > self.height * (1 + 1e-9):
+            raise ParameterError(f"{self.kind}: rims take {total:.6g} of a height of {self.height:.6g}")
+        _ = self.within(max(rim.depth for rim in self.rims))
+
+    @property
+    def has_rims(self) -> bool:
+        """Whether any is not sharp."""
+        return any(getattr(self, name) for name in RIMS)
+
+    @property
+    def rims(self) -> tuple[Rim, Rim]:
+        """Of the bottom and of the top."""
+        return Rim(self.bottom_fillet, self.bottom_chamfer), Rim(self.top_fillet, self.top_chamfer)
+
+    @property
+    def rounds_inner_corners(self) -> bool:
+        """Whether the profile has corners that turn inwards: leaning walls and rims run in an arc about them.
+
+        CAD programs let them meet there in a mitre."""
+        depth = max(rim.depth for rim in self.rims)
+        walls = self.walls if self.taper else self.within(depth)[1]
+        return any(wall.below is None for loop in walls for wall in loop)
+
+    def within(self, depth: float) -> tuple[Profile, list[list[Wall]]]:
+        """The section that lies so deep, at most as deep as a rim goes, within the profile, and how its sides
+        grow out of the profile's."""
+        if depth <= 0:
+            return self.profile, []
+        known: dict[float, tuple[Profile, list[list[Wall]]]] = self.__dict__.setdefault("_sections", {})
+        if depth not in known:
+            known[depth] = offset(self.profile, depth * (1 - _VANISHING), curved=True)
+        return known[depth]
 
     @cached_property
     def top(self) -> Profile:
@@ -70,18 +131,34 @@ class Extrusion(Swept):
 
     def support(self, directions: np.ndarray, level: float = 0.0) -> np.ndarray:
         directions = np.asarray(directions, dtype=np.float64)
-        ends = [
-            profile.support(directions[:, :2]) + z * directions[:, 2]
-            for profile, z in ((self.profile, -self.height / 2), (self.top, self.height / 2))
-        ]
-        return np.asarray(np.maximum(*ends) + level)
+        half = self.height / 2
+        levels = [(self.profile, -half), (self.top, half)]
+        if self.has_rims:
+            corners = [
+                (depth, sign * (half - off))
+                for rim, sign in zip(self.rims, (-1, 1), strict=True)
+                for depth, off in rim.around()
+            ]
+            levels = [(self.within(depth)[0], z) for depth, z in corners]
+        reach = [profile.support(directions[:, :2]) + z * directions[:, 2] for profile, z in levels]
+        return np.asarray(np.maximum.reduce(reach) + level)
 
     def scaled(self, factor: float) -> Extrusion:
         factor = checked(f"{self.kind}: scale factor", factor, 0.0, LARGEST, above=True)
-        return Extrusion(self.profile.scaled(factor), factor * self.height, self.taper)
+        rims = {name: factor * getattr(self, name) for name in RIMS}
+        return Extrusion(self.profile.scaled(factor), factor * self.height, self.taper, **rims)
+
+    def to_dict(self) -> dict[str, Any]:
+        given = super().to_dict()
+        return {name: value for name, value in given.items() if name not in RIMS or value}
 
     def _distance(self, points: Any) -> Any:
-        return self._folded(profile_distance(self.profile, points[:, :2]), points[:, 2] + self.height / 2)
+        q, z = profile_distance(self.profile, points[:, :2]), points[:, 2]
+        if not self.has_rims:
+            return self._folded(q, z + self.height / 2)
+        bottom, top = self.rims
+        below, above = -z - self.height / 2, z - self.height / 2
+        return library(q).maximum(bottom.distance(q, below), top.distance(q, above))
 
     def _folded(self, q: Any, z: Any) -> Any:
         """From the distances to the profile and heights above the bottom, both (N,): to the quad between the
@@ -107,10 +184,28 @@ class Extrusion(Swept):
     def gradients(self, points: np.ndarray, upstream: np.ndarray) -> SweptGradients:
         points, upstream = np.asarray(points, np.float64), np.asarray(upstream, np.float64)
         q, z = profile_distance(self.profile, points[:, :2]), points[:, 2] + self.height / 2
-        by_q, by_height, by_angle = self._slopes(q, z)
+        if self.has_rims:
+            by_q, *by_numbers = self._rim_slopes(q, z)
+        else:
+            by_q, by_height, by_angle = self._slopes(q, z)
+            by_numbers = [by_height, by_angle * math.pi / 180, *np.zeros((4, len(q)))]
         corners, _ = profile_gradients(self.profile, points[:, :2], upstream * by_q)
-        numbers = [upstream @ by_height, upstream @ by_angle * math.pi / 180]
-        return SweptGradients(corners, np.array(numbers))
+        return SweptGradients(corners, np.array([upstream @ one for one in by_numbers]))
+
+    def _rim_slopes(self, q: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Of the distance by q, the height, the taper (none) and each of `RIMS`."""
+        ends = list(zip(self.rims, (-z, z - self.height), strict=True))
+        bottom, top = (rim.distance(q, v) for rim, v in ends)
+        nearest = (bottom >= top, bottom < top)
+        by_q, by_height, none = np.zeros((3, len(q)))
+        own = dict.fromkeys(RIMS, none)
+        for (rim, v), mine, end in zip(ends, nearest, ("bottom", "top"), strict=True):
+            by_u, by_v, by_own = rim.slopes(q, v)
+            by_q = np.where(mine, by_u, by_q)
+            by_height = np.where(mine, -by_v / 2, by_height)
+            if rim.depth:
+                own[f"{end}_{'fillet' if rim.fillet else 'chamfer'}"] = np.where(mine, by_own, 0.0)
+        return by_q, by_height, none, *own.values()
 
     def _slopes(self, q: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of the distance by q, by the height (which moves both ends apart), and by the taper's angle."""

@@ -2,58 +2,103 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
 import numpy as np
 from manifold3d import CrossSection, FillRule, Manifold, triangulate
 
 from partwright.fields import Extrusion, Revolution
 from partwright.fields.profile import Side, arc_chords
+from partwright.fields.profile_offset import Wall, turns_at_arcs
+from partwright.fields.rims import Rim
 from partwright.meshing.manifolds import closed
 from partwright.meshing.revolve import corners_of_circle
 
+_FLAT = 1e-9  # of half the height: between rims that meet there is no wall
+_CURVED = 12  # steps of a chamfer whose mitres are curves
 _SIDE = 1e3  # of a profile that is turned: manifold3d keeps eight digits behind the point
 
 
 def extruded(field: Extrusion, tolerance: float) -> Manifold:
     """The extrusion in its own frame."""
-    below, above, walls, count = [], [], [], 0
-    for low, high, index in _strips(field, tolerance):
-        below.append(low)
-        above.append(high)
-        walls.append((index, count))
-        count += len(low)
-    bottom, top = np.concatenate(below), np.concatenate(above)
-    half, total = field.height / 2, len(bottom)
-    vertices = np.concatenate(
-        [np.column_stack([bottom, np.full(total, -half)]), np.column_stack([top, np.full(len(top), half)])]
-    )
-    faces, at = [], total
-    for (index, start), high in zip(walls, above, strict=True):
-        i = index + start
-        j = np.arange(len(high)) + at
-        a, b, c, d = i, np.roll(i, -1), np.roll(j, -1), j
-        faces += [np.stack([a, b, c], 1), np.stack([a, c, d], 1)]
-        at += len(high)
-    lid, offset = np.asarray(triangulate(above)) + total, 0
-    base = np.asarray(triangulate(below))[:, ::-1]
-    faces += [base + offset, lid]
+    vertices: list[np.ndarray] = []
+    faces: list[np.ndarray] = []
+    ends: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
+    count = 0
+    for levels in _loops(field, tolerance):
+        rows = []
+        for points, height, index in levels:
+            vertices.append(np.column_stack([points, np.full(len(points), height)]))
+            rows.append(index + count)
+            count += len(points)
+        ends[0].append(levels[0][0])
+        ends[1].append(levels[-1][0])
+        for low, high in pairwise(rows):
+            after, above = np.roll(low, -1), np.roll(high, -1)
+            faces += [np.stack([low, after, above], 1), np.stack([low, above, high], 1)]
+    corners = np.concatenate(vertices)
+    for rings, height, turned in zip(ends, (-field.height / 2, field.height / 2), (True, False), strict=True):
+        own = np.flatnonzero(corners[:, 2] == height)
+        lid = own[np.asarray(triangulate(rings))]
+        faces.append(lid[:, ::-1] if turned else lid)
     mesh = np.concatenate(faces)
     distinct = (mesh != np.roll(mesh, 1, axis=1)).all(axis=1)
-    return closed(vertices, mesh[distinct])
+    return closed(corners, mesh[distinct])
 
 
-def _strips(field: Extrusion, tolerance: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Of each loop the points (K, 2) at the bottom, (L, 2) at the top, and (L,) which one each stands on."""
-    if not field.taper:
-        lines = field.profile.polylines(tolerance)
-        return [(line, line, np.arange(len(line))) for line in lines]
-    result = []
-    for loop in field.walls:
+Level = tuple[np.ndarray, float, np.ndarray]
+
+
+def _loops(field: Extrusion, tolerance: float) -> Iterator[list[Level]]:
+    """Of each loop its levels from the bottom to the top: points (K, 2), their height, and (L,) which of them
+    each of the L strips that go up begins at; the same strips at every level."""
+    half = field.height / 2
+    if field.taper:
+        for below, above, index in _strips(field.walls, _chords(field.walls, tolerance)):
+            yield [(below, -half, index), (above, half, np.arange(len(above)))]
+        return
+    if not field.has_rims:
+        for line in field.profile.polylines(tolerance):
+            yield [(line, -half, own := np.arange(len(line))), (line, half, own)]
+        return
+    straight = not turns_at_arcs(field.profile)
+    down, up = (_steps(rim, tolerance, straight) for rim in field.rims)
+    deepest = max(depth for depth, _ in (*down, *up))
+    chords = _chords(field.within(deepest)[1], tolerance)
+    inner = {depth: list(_strips(field.within(depth)[1], chords)) for depth, _ in (*down, *up) if depth > 0}
+    for k, (below, above, index) in enumerate(inner[deepest]):
+        own = np.arange(len(above))
+        levels: list[Level] = []
+        walls = [(-half + down[0][1], below), (half - up[0][1], below)]
+        for depth, off in reversed(down[1:]):
+            levels.append((inner[depth][k][1], -half + off, own))
+        levels += [
+            (points, height, index)
+            for height, points in walls[: 1 + (walls[1][0] - walls[0][0] > _FLAT * half)]
+        ]
+        for depth, off in up[1:]:
+            levels.append((inner[depth][k][1], half - off, own))
+        yield levels
+
+
+def _steps(rim: Rim, tolerance: float, straight: bool) -> list[tuple[float, float]]:
+    """straight: whether all edges across the rim are lines where the rim is a chamfer."""
+    chamfer = 1 if straight else _CURVED
+    return rim.steps(arc_chords(rim.fillet, math.pi / 2, tolerance) if rim.fillet else chamfer)
+
+
+def _strips(
+    walls: list[list[Wall]], chords: list[list[int]]
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Of each loop the points (K, 2) on the profile, (L, 2) deeper within, and (L,) what each grew out of.
+    chords: of each wall."""
+    for loop, counts in zip(walls, chords, strict=True):
         below: list[np.ndarray] = []
         above: list[np.ndarray] = []
         index: list[int] = []
-        for wall in loop:
-            radius = max(wall.above.radius, wall.below.radius if wall.below else 0.0)
-            count = arc_chords(radius, wall.above.sweep, tolerance) if wall.above.centre else 1
+        for wall, count in zip(loop, counts, strict=True):
             above.append(_cut(wall.above, count))
             here = sum(map(len, below))
             if wall.below is None:
@@ -62,8 +107,20 @@ def _strips(field: Extrusion, tolerance: float) -> list[tuple[np.ndarray, np.nda
                 below.append(_cut(wall.below, count))
                 index += range(here, here + count)
         low = np.concatenate(below)
-        result.append((low, np.concatenate(above), np.array(index) % len(low)))
-    return result
+        yield low, np.concatenate(above), np.array(index) % len(low)
+
+
+def _chords(walls: list[list[Wall]], tolerance: float) -> list[list[int]]:
+    """How many each wall is cut into."""
+    return [[_chords_of(wall, tolerance) for wall in loop] for loop in walls]
+
+
+def _chords_of(wall: Wall, tolerance: float) -> int:
+    if wall.above.centre is None:
+        return 1
+    radius = max(wall.above.radius, wall.below.radius if wall.below else 0.0)
+    sweep = wall.below.sweep if wall.below else wall.above.sweep
+    return arc_chords(radius, sweep, tolerance)
 
 
 def _cut(side: Side, count: int) -> np.ndarray:

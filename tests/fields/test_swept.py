@@ -17,6 +17,7 @@ from partwright import fields
 from partwright.assembly import Part
 from partwright.errors import ParameterError
 from partwright.fields import Cylinder, Extrusion, Frustum, Profile, Revolution, Swept, Torus
+from partwright.fields.extrusion import RIMS
 from partwright.fields.profile import circle
 from partwright.meshing import mesh_part
 from partwright.shapes import MeshDistance
@@ -31,8 +32,14 @@ SOLIDS: dict[str, Swept] = {
     "knob": Revolution(HALF),
     "wedge of a knob": Revolution(HALF, 100),
     "rounded block with taper": Extrusion(Profile.rectangle(2, 1.2, 0.3), 0.8, 10),
+    "block with rims": Extrusion(Profile.rectangle(2, 1.2, 0.3), 0.8, top_fillet=0.3, bottom_chamfer=0.2),
+    "dome": Extrusion(Profile.circle(0.5), 0.8, bottom_fillet=0.3, top_fillet=0.5),
 }
 LEANING = Extrusion(Profile.polygon([(-1, -1), (1, -1), (1, 0), (0, 0), (0, 1), (-1, 1)]), 0.8, 10)
+RIMMED = Extrusion(
+    Profile(PLATE.outline, [circle(0.15, (0.3, -0.1))]), 0.8, bottom_fillet=0.06, top_chamfer=0.05
+)
+CUT = replace(LEANING, taper=0.0, bottom_chamfer=0.2, top_fillet=0.25)
 
 
 def to_mesh(mesh: trimesh.Trimesh, points: np.ndarray) -> np.ndarray:
@@ -73,10 +80,10 @@ def rebuilt(field: Swept, corners: np.ndarray, numbers: list[float]) -> Swept:
 
 
 def names(field: Swept) -> tuple[str, ...]:
-    return ("height", "taper") if isinstance(field, Extrusion) else ("angle",)
+    return ("height", "taper", *RIMS) if isinstance(field, Extrusion) else ("angle",)
 
 
-@pytest.mark.parametrize("field", [*list(SOLIDS.values())[:5], LEANING], ids=[*list(SOLIDS)[:5], "leaning"])
+@pytest.mark.parametrize("field", [*list(SOLIDS.values())[:5], LEANING, RIMMED, CUT])
 def test_derivatives_by_every_corner_bulge_and_number(field: Swept) -> None:
     """Against central differences of the distance itself."""
     points, weights, step = around(field, 1500), RNG.normal(size=1500), 1e-6
@@ -97,14 +104,14 @@ def test_derivatives_by_every_corner_bulge_and_number(field: Swept) -> None:
         expected = slope(pair[0], numbers, pair[1], numbers)
         assert found.corners[i, k] == pytest.approx(expected, abs=1e-3)
     for k, value in enumerate(numbers):
-        if value in (0.0, 360.0):
+        if value in (0.0, 360.0):  # sharp, upright or whole
             continue
         more, less = list(numbers), list(numbers)
         more[k], less[k] = value + step, value - step
         assert found.numbers[k] == pytest.approx(slope(corners, more, corners, less), abs=1e-3)
 
 
-@pytest.mark.parametrize("field", [*SOLIDS.values(), LEANING])
+@pytest.mark.parametrize("field", [*SOLIDS.values(), LEANING, RIMMED, CUT])
 def test_tensors_files_and_sizes(field: Swept) -> None:
     points = around(field, 500)
     tensor = torch.tensor(points, requires_grad=True)
@@ -122,13 +129,30 @@ def test_tensors_files_and_sizes(field: Swept) -> None:
     assert (np.abs(field.support(directions) - reach) < 3e-3).all()
 
 
-def test_a_taper_never_says_too_much() -> None:
-    """Beyond the edges between leaning walls the distance is a lower bound."""
-    points = around(LEANING, 3000)
-    truth = to_mesh(mesh_part(Part(LEANING), 256), points)
-    found = LEANING(points)
+@pytest.mark.parametrize(
+    "field", [LEANING, RIMMED, CUT], ids=["taper", "rims at arcs", "rims at an inner corner"]
+)
+def test_beyond_mitres_the_distance_never_says_too_much(field: Extrusion) -> None:
+    """Outside of the edges between leaning walls, and between rims, it is a lower bound."""
+    points = around(field, 3000)
+    mesh = mesh_part(Part(field), 256)
+    assert mesh.is_watertight
+    assert np.abs(field(mesh.vertices)).max() < 1e-6
+    truth = to_mesh(mesh, points)
+    found = field(points)
     assert (np.abs(found) <= np.abs(truth) + 1e-3).all()
     assert ((found < 0) == (truth < 0))[np.abs(truth) > 1e-3].all()
+
+
+def test_rims_take_the_volume_that_they_should() -> None:
+    """A chamfer c around a box takes prisms along its edges, less where these meet; rims that meet leave half
+    a torus around a disc."""
+    c = 0.2
+    box = mesh_part(Part(Extrusion(Profile.rectangle(2, 1.2), 0.8, top_chamfer=c)), 64)
+    assert box.volume == pytest.approx(2 * 1.2 * 0.8 - (6.4 * c**2 / 2 - 4 * c**3 / 3), rel=1e-6)
+    disc = mesh_part(Part(Extrusion(Profile.circle(0.7), 0.6, bottom_fillet=0.3, top_fillet=0.3)), 512)
+    bulge = math.pi * 0.3**2 / 2 * 2 * math.pi * (0.4 + 4 * 0.3 / (3 * math.pi))
+    assert disc.volume == pytest.approx(math.pi * 0.4**2 * 0.6 + bulge, rel=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -138,6 +162,12 @@ def test_a_taper_never_says_too_much() -> None:
         (Extrusion, {"height": math.nan}, "height"),
         (Extrusion, {"taper": -1.0}, "taper"),
         (Extrusion, {"taper": 60.0}, "further inside"),
+        (Extrusion, {"taper": 0.0, "top_fillet": -0.1}, "top_fillet"),
+        (Extrusion, {"taper": 0.0, "top_fillet": math.nan}, "top_fillet"),
+        (Extrusion, {"top_fillet": 0.1}, "upright walls"),
+        (Extrusion, {"taper": 0.0, "top_fillet": 0.1, "top_chamfer": 0.1}, "one of them"),
+        (Extrusion, {"taper": 0.0, "top_fillet": 0.41, "bottom_chamfer": 0.4}, "rims take 0.81"),
+        (Extrusion, {"taper": 0.0, "height": 3, "top_fillet": 0.6}, "further inside"),
         (Extrusion, {"profile": "circle"}, "expected a Profile"),
         (Revolution, {"angle": 0.0}, "angle"),
         (Revolution, {"angle": 361.0}, "angle"),

@@ -44,6 +44,7 @@ SOLIDS = (
     HollowFrustum(12, 7, 2, 20),
     Extrusion(PLATE, 5),
     Extrusion(Profile.rectangle(20, 14, 4), 8, 12),
+    Extrusion(Profile.rectangle(20, 14, 4), 8, top_fillet=3, bottom_chamfer=2),
     Revolution(PLATE.moved((14, 0))),
     Revolution(Profile([(0, -8), (9, -8), (9, 0, 0.6), (0, 7)]), 230),
 )

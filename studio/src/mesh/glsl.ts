@@ -5,7 +5,7 @@ import profileFormula from "../../../partwright/export/profile.glsl?raw";
 import quadricFormula from "../../../partwright/export/quadric.glsl?raw";
 import superfrustumFormula from "../../../partwright/export/superfrustum.glsl?raw";
 import { quadric, superfrustum } from "../model/fields";
-import { isSwept, type Side, swept } from "../model/profiles";
+import { hasRims, isSwept, type Side, swept } from "../model/profiles";
 import { type Group, type Node, type Part, isGroup, leaves, poses } from "../model/tree";
 
 const literal = (value: number): string => {
@@ -31,7 +31,9 @@ export function toGlsl(root: Group): string {
       functions.push(planar(`${stem}_profile`, profile.sides, !profile.turned));
       if (!profile.turned) {
         const up = `v.z + ${literal(profile.height / 2)}`;
-        body.push(`    return extruded(${stem}_profile(v.xy), ${up}, ${literal(profile.height)}, vec2(${numbers(end)}));`);
+        const flat = `${stem}_profile(v.xy), ${up}, ${literal(profile.height)}`;
+        if (hasRims(profile)) body.push(`    return extruded_with_rims(${flat}, vec4(${numbers(profile.rims)}));`);
+        else body.push(`    return extruded(${flat}, vec2(${numbers(end)}));`);
       } else {
         const side = `${stem}_profile(vec2(length(v.xy), v.z))`;
         const [s, c] = end.map(literal);

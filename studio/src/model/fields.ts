@@ -1,6 +1,6 @@
 /** The kinds of field: their parameters, and the one formula that most of them are (SuperFrusta, section 3.2). */
 
-import { isSwept, loops, swept, sweptBox, withLoops } from "./profiles";
+import { RIMS, isSwept, loops, swept, sweptBox, withLoops } from "./profiles";
 import { type Box, type Vec3, dot } from "./vectors";
 
 export type Value = number | string | boolean | null | Value[] | { [name: string]: Value };
@@ -61,7 +61,7 @@ export const PARAMETERS: Record<string, Parameter[]> = {
   hollow_box: [extents("full extents"), WALL],
   neural: [{ name: "half_lengths", label: "half length", sort: "extents", low: 1e-6, help: "of the part's cuboid; the others adapt" }],
   hollow_frustum: [BOTTOM, TOP, WALL, HEIGHT],
-  extrusion: [HEIGHT],
+  extrusion: [HEIGHT, ...RIMS.map((name) => length(name, "by which the edges of that end are rounded or cut off", 0))],
   revolution: [fraction("angle", 360, "degrees through which the profile is turned")],
 };
 
@@ -129,6 +129,12 @@ export function complaint(field: FieldData): string | null {
     if (wrong) return `${parameter.label} has to be from ${parameter.low} to ${high}`;
   }
   if (isSwept(field) && !profileIsGood(field)) return "its profile is no outline of corners";
+  const [bottomFillet, bottomChamfer, topFillet, topChamfer] = RIMS.map(get);
+  if ((bottomFillet && bottomChamfer) || (topFillet && topChamfer)) return "an end has a fillet or a chamfer, not both";
+  if (bottomFillet + bottomChamfer + topFillet + topChamfer > 0 && get("taper"))
+    return "fillets and chamfers need upright walls: the taper has to be 0";
+  if (field.kind === "extrusion" && bottomFillet + bottomChamfer + topFillet + topChamfer > get("height"))
+    return "its fillets and chamfers are more than its height";
   if (/frustum$/.test(field.kind) && get("top_radius") > 2 * get("bottom_radius"))
     return "the top radius is at most twice the bottom radius: turn the part over instead";
   if (field.kind === "tube" && get("thickness") >= get("radius"))

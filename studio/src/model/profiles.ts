@@ -26,7 +26,14 @@ export interface Swept {
   height: number;
   /** Radians: of an extrusion its taper, of a revolution its angle. */
   angle: number;
+  /** Of an extrusion, in own lengths: fillet and chamfer at the bottom, fillet and chamfer at the top. */
+  rims: number[];
 }
+
+/** The names of the rims in a file, in that order. */
+export const RIMS = ["bottom_fillet", "bottom_chamfer", "top_fillet", "top_chamfer"];
+
+export const hasRims = (of: Swept): boolean => of.rims.some((v) => v > 0);
 
 type Corner = [number, number, number?];
 
@@ -53,7 +60,8 @@ export function swept(field: FieldData): Swept | null {
   const turned = field.kind === "revolution";
   const degrees = Number(turned ? (field.angle ?? 360) : (field.taper ?? 0));
   const sides = loops(field).flatMap((loop) => loop.map((corner, i) => side(corner, loop[(i + 1) % loop.length], turned)));
-  const made = { sides, turned, height: Number(field.height ?? 0), angle: (degrees * Math.PI) / 180 };
+  const rims = turned ? [0, 0, 0, 0] : RIMS.map((name) => Number(field[name] ?? 0));
+  const made = { sides, turned, height: Number(field.height ?? 0), angle: (degrees * Math.PI) / 180, rims };
   known.set(field, made);
   return made;
 }
@@ -120,12 +128,29 @@ function profileDistance(sides: Side[], x: number, y: number, axis: boolean): nu
   return inside ? -Math.sqrt(square) : Math.sqrt(square);
 }
 
+/** Of the corner between a wall and an end, u and v beyond them: rounded, or else cut off at 45 degrees. */
+function rimDistance(u: number, v: number, fillet: number, chamfer: number): number {
+  if (fillet > 0) {
+    const [a, b] = [u + fillet, v + fillet];
+    return Math.hypot(Math.max(a, 0), Math.max(b, 0)) + Math.min(Math.max(a, b), 0) - fillet;
+  }
+  const cut = (u + v + chamfer) * Math.SQRT1_2;
+  const inside = Math.max(u, v, cut);
+  if (inside <= 0) return inside;
+  if (v <= -chamfer) return u;
+  if (u <= -chamfer) return v;
+  if (u - v > chamfer) return Math.hypot(u, v + chamfer);
+  return v - u > chamfer ? Math.hypot(u + chamfer, v) : cut;
+}
+
 /** Signed distance in the field's own frame. */
 export function sweptDistance(of: Swept, x: number, y: number, z: number): number {
   if (!of.turned) {
     const [sine, cosine] = [Math.sin(of.angle), Math.cos(of.angle)];
     const q = profileDistance(of.sides, x, y, true);
     const up = z + of.height / 2;
+    if (hasRims(of))
+      return Math.max(rimDistance(q, -up, of.rims[0], of.rims[1]), rimDistance(q, up - of.height, of.rims[2], of.rims[3]));
     const lean = (of.height * sine) / cosine;
     const wall = q * cosine + up * sine;
     const along = up * cosine - q * sine;

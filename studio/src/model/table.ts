@@ -36,7 +36,8 @@ export function table(program: Program, layers: number[] = []): Float32Array {
     if (profile) {
       const whole = profile.turned && profile.angle > 6.2831 ? 1 : 0;
       const turn = [profile.turned ? 1 : 0, whole, profile.angle, Math.sin(profile.angle), Math.cos(profile.angle)];
-      result.set([begins[i], profile.sides.length, profile.height * program.frame.scale, ...turn], at + 20);
+      const rims = profile.rims.map((v) => v * program.frame.scale);
+      result.set([begins[i], profile.sides.length, profile.height * program.frame.scale, ...turn, ...rims], at + 20);
     } else if (action === LEAF && !isQuadric) result.set(derived(row), at + 20);
     else result.set(row, at + 20);
   });

@@ -50,6 +50,9 @@ float sides(vec2 p, int first, int count, bool axis) {
 float swept(vec3 v, int i) {
     vec4 a = row(i, 5), b = row(i, 6);
     int first = int(a.x), count = int(a.y);
+    vec4 rims = row(i, 7);
+    if (a.w == 0.0 && dot(rims, rims) > 0.0)
+        return extruded_with_rims(sides(v.xy, first, count, true), v.z + a.z / 2.0, a.z, rims);
     if (a.w == 0.0) return extruded(sides(v.xy, first, count, true), v.z + a.z / 2.0, a.z, b.zw);
     float side = sides(vec2(length(v.xy), v.z), first, count, false);
     if (b.x > 0.0) return side;

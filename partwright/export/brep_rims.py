@@ -1,0 +1,60 @@
+"""Fillets and chamfers at the ends of an extrusion, as the faces that a CAD program makes: cylinders, tori
+and spheres along a fillet, planes and cones along a chamfer.
+
+About a sharp corner that points inwards they meet in a mitre, where the field's run in an arc.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from partwright.errors import NoSurfaceError
+from partwright.export.brep_errors import opencascade_errors
+from partwright.fields import Extrusion
+from partwright.fields.rims import Rim
+
+if TYPE_CHECKING:
+    from OCP.TopoDS import TopoDS_Edge, TopoDS_Shape
+
+_SHARES = (1.0, 1 - 1e-5, 1 - 1e-3)
+"""Of a rim's depth: where two rims meet, or one takes all of a side, OpenCASCADE wants something left."""
+
+
+def with_rims(field: Extrusion, solid: TopoDS_Shape, bottom: TopoDS_Shape, top: TopoDS_Shape) -> TopoDS_Shape:
+    """The solid with its rims. bottom, top: its faces at the ends.
+
+    Raises:
+        NoSurfaceError: OpenCASCADE cannot build them.
+    """
+    ends = [(rim, face) for rim, face in zip(field.rims, (bottom, top), strict=True) if rim.depth]
+    for share in _SHARES:
+        try:
+            result = solid
+            for rim, face in ends:
+                result = _with_rim(result, face, rim, share)
+        except opencascade_errors():
+            continue
+        return result
+    raise NoSurfaceError(f"OpenCASCADE cannot build the rims of an {field.kind} {field.profile}")
+
+
+def _with_rim(solid: TopoDS_Shape, face: TopoDS_Shape, rim: Rim, share: float) -> TopoDS_Shape:
+    from OCP.BRepFilletAPI import BRepFilletAPI_MakeChamfer, BRepFilletAPI_MakeFillet
+
+    making = BRepFilletAPI_MakeFillet(solid) if rim.fillet else BRepFilletAPI_MakeChamfer(solid)
+    for edge in _edges(face):
+        making.Add(share * rim.depth, edge)
+    making.Build()
+    return making.Shape()
+
+
+def _edges(face: TopoDS_Shape) -> Iterator[TopoDS_Edge]:
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    found = TopExp_Explorer(face, TopAbs_ShapeEnum.TopAbs_EDGE)
+    while found.More():
+        yield TopoDS.Edge(found.Current())
+        found.Next()
