@@ -7,17 +7,30 @@ import numpy as np
 from partwright.assembly import Part, Similarity
 from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Frustum, Revolution, Sphere, Tube
 from partwright.fields.profile import Loop, Profile, circle_of
+from partwright.fields.rims import Rim
 
 _SAME = 1e-5  # of the size: lengths that differ by less are equal
 _SQUARE = 0.01
 
 
-def extruded_part(profile: Profile, frame: np.ndarray, low: float, high: float, taper: float = 0.0) -> Part:
+def extruded_part(
+    profile: Profile,
+    frame: np.ndarray,
+    low: float,
+    high: float,
+    taper: float = 0.0,
+    rims: tuple[Rim, Rim] | None = None,
+) -> Part:
     """The profile from one height to another along the frame's third column: a box, cylinder or tube where it
-    is one. frame: (3, 3) local to world."""
+    is one, and rims of the bottom and the top are sharp. frame: (3, 3) local to world.
+
+    Raises:
+        ParameterError: the profile has no room for the rims, or the taper.
+    """
     height, middle = high - low, (low + high) / 2
     round_ = circle_of(profile.outline)
-    if round_ is not None and not taper:
+    plain = not taper and rims is None
+    if round_ is not None and plain:
         radius, (x, y) = round_
         place = frame @ (x, y, middle)
         if not profile.holes:
@@ -26,13 +39,23 @@ def extruded_part(profile: Profile, frame: np.ndarray, low: float, high: float, 
         if bore is not None and np.hypot(bore[1][0] - x, bore[1][1] - y) < _SAME * radius:
             return _placed(Tube(radius, radius - bore[0], height), frame, place)
     box = _rectangle(profile.outline) if not profile.holes else None
-    if box is not None and not taper:
+    if box is not None and plain:
         (width, depth), along, (x, y) = box
         turned = frame @ np.array([[along[0], -along[1], 0], [along[1], along[0], 0], [0, 0, 1]])
         return _placed(Box((width, depth, height)), turned, frame @ (x, y, middle))
     lower, upper = profile.bounds()
     x, y = ((lower + upper) / 2).tolist()
-    return _placed(Extrusion(profile.moved((-x, -y)), height, taper), frame, frame @ (x, y, middle))
+    own = (
+        {}
+        if rims is None
+        else {
+            name: value
+            for rim, end in zip(rims, ("bottom", "top"), strict=True)
+            for name, value in ((f"{end}_fillet", rim.fillet), (f"{end}_chamfer", rim.chamfer))
+        }
+    )
+    field = Extrusion(profile.moved((-x, -y)), height, taper, **own)
+    return _placed(field, frame, frame @ (x, y, middle))
 
 
 def _rectangle(loop: Loop) -> tuple[tuple[float, float], np.ndarray, tuple[float, float]] | None:

@@ -139,10 +139,11 @@ class FeatureSearch:
         gains = self._gains(empty, own, True)
         order = np.argsort(-gains)[:_BASES]
         best: FeatureTree | None = None
+        others = [candidate for candidate in own if not candidate.cuts]
         for index in order:
             if best is not None and (gains[index] < _RIVAL * gains[order[0]] or best.score > _PERFECT):
                 break
-            tree = self._grown(self.extended(empty, own[index], True), own, best)
+            tree = self._grown(self.extended(empty, own[index], True), others, best)
             if best is None or tree.objective > best.objective:
                 best = tree
         return replace(whole := mended(self, best), off=farthest(self, whole)) if best is not None else None
@@ -197,7 +198,7 @@ class FeatureSearch:
         gain = reached - tree.score
         inner, outer = chosen.bodies
         instances = []
-        for move in moves_between(inner, pieces, self.frames, self.body):
+        for move in () if chosen.cuts else moves_between(inner, pieces, self.frames, self.body):
             copy = chosen.part.transformed(move)
             mask = covers(copy, self.points)
             more = covered | mask if added else covered & ~mask
@@ -222,7 +223,8 @@ class FeatureSearch:
             missed, excess = tree.missed + (inner ^ self.body), tree.excess - outer
         for body in (missed, excess):
             body.num_tri()  # now, and not with every later step again
-        features = [*tree.features, feature]
+        cuts = (Feature(False, cut, within, 0) for cut in chosen.cuts)
+        features = [*tree.features, feature, *cuts]
         price = tree.price + self._price(chosen.sides)
         steps = (*tree.objectives, reached - price)
         return FeatureTree(features, covered, missed, excess, reached, price, steps)
@@ -257,7 +259,10 @@ class FeatureSearch:
         """(N,) 1 at the samples within."""
         known = self._masks.get(id(candidate))
         if known is None:
-            known = candidate, covers(candidate.part, self.points).astype(np.float32)
+            within = covers(candidate.part, self.points)
+            for cut in candidate.cuts:
+                within &= ~covers(cut, self.points)
+            known = candidate, within.astype(np.float32)
             self._masks[id(candidate)] = known
         return known[1]
 

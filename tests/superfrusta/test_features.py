@@ -10,6 +10,7 @@ import pytest
 import partwright as pw
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution
+from partwright.fields.extrusion import RIMS
 from partwright.meshing import mesh_assembly
 from partwright.shapes import Shape, load_shape
 
@@ -43,6 +44,24 @@ def test_a_plate_with_octagonal_pockets_is_drawn_once() -> None:
     radii = [s.radius for s in plate.field.profile.sides[0] if s.centre is not None]
     assert radii == pytest.approx([6] * 4, rel=1e-3)
     assert result.scores.iou > 0.998
+
+
+def test_rounded_edges_are_numbers_of_the_body_that_has_them() -> None:
+    """A plate with a fillet and holes, and on it a boss with a chamfer: two parts and a hole, no further."""
+    plate = Part(Extrusion(Profile.rectangle(100, 60, corner=12), 12, top_fillet=3))
+    boss = Part(Extrusion(Profile.rectangle(30, 20, corner=6), 20, top_chamfer=1.5), (0, 0, 16))
+    hole = Part(Cylinder(5, 40), (30, 15, 0), instances=(Similarity(translation=(-60, 0, 0)),))
+    result = fitted(Assembly((Assembly((plate, boss)), hole), "difference"))
+    by_rim = {rim: part for part in result.assembly.parts for rim in RIMS if getattr(part.field, rim, 0.0)}
+    assert set(by_rim) == {"top_fillet", "top_chamfer"}
+    base, top = by_rim["top_fillet"].field, by_rim["top_chamfer"].field
+    assert isinstance(base, Extrusion)
+    assert isinstance(top, Extrusion)
+    assert base.top_fillet == pytest.approx(3, rel=0.01)
+    assert base.height == pytest.approx(12, rel=1e-3)
+    assert top.top_chamfer == pytest.approx(1.5, rel=0.01)
+    assert len(result.assembly) == 3
+    assert result.scores.max_deviation < 0.1
 
 
 def test_a_flange_is_turned_and_drilled_once() -> None:

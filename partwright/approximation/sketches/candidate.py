@@ -10,6 +10,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from partwright.assembly import Part
+from partwright.fields.rims import Rim
 
 _CHORDS = 4e-3  # unit lengths
 
@@ -19,13 +20,16 @@ class Candidate:
     """A part, and what makes the same body with the mesh's own walls, chords and all.
 
     make: the body, further out by a length where its walls are not the mesh's own. sides: of its profile.
-    volume: tells candidates apart.
+    volume, rims: tell candidates apart. cuts: parts that are cut from it and belong to it, holes with sharp
+    edges in a body with round ones; only a tree's first part may have such.
     """
 
     part: Part
     make: Callable[[float], Manifold]
     sides: int
     volume: float
+    rims: tuple[Rim, ...] = ()
+    cuts: tuple[Part, ...] = ()
 
     @cached_property
     def bodies(self) -> tuple[Manifold, Manifold]:
@@ -35,7 +39,10 @@ class Candidate:
     @cached_property
     def key(self) -> tuple[float, ...]:
         """The same for candidates that are the same."""
-        return tuple(np.round([*self.part.bounds().ravel(), self.volume], 3).tolist())
+        depths = [rim.depth for rim in self.rims]
+        return tuple(
+            np.round([*self.part.bounds().ravel(), self.volume, *depths, len(self.cuts)], 3).tolist()
+        )
 
 
 def posed(body: Manifold, frame: np.ndarray) -> Manifold:

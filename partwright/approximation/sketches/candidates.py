@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
 from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.candidate import Candidate, posed
+from partwright.approximation.sketches.holes import hole_parts
+from partwright.approximation.sketches.rims import SHARP, limited, measured_rims, rimmed_body
 from partwright.approximation.sketches.sections import Region, View, profile_of
 from partwright.approximation.sketches.turned import turned
+from partwright.errors import ParameterError
 from partwright.fields.profile import Profile
+from partwright.fields.rims import Rim
 
 _INSIDE = 0.02  # of a section: what of it may lie outside of the next slab's, and it still goes on
 _MOST_REGIONS = 4  # of a section
@@ -21,6 +27,7 @@ _AXES = 2
 _LEAST_AXIS = 0.2  # of the area of all walls, that those about an axis have
 _NEAR_AXIS = 4e-3
 _MOST_SLABS = 10
+_ALL_RIM = 0.95  # of a slab's height
 
 
 def candidates(body: Manifold, frames: Sequence[np.ndarray], holes: bool) -> list[Candidate]:
@@ -58,6 +65,7 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
                 if key not in done:
                     done.add(key)
                     yield from _extruded(view, region, slabs[a][0], slabs[b][1], holes)
+                    yield from _rounded(view, region, slabs, a, b, holes)
 
 
 def _goes_on(region: Region, others: Sequence[Region]) -> bool:
@@ -69,11 +77,15 @@ def _goes_on(region: Region, others: Sequence[Region]) -> bool:
     return bool(left.area() < _INSIDE * region.area)
 
 
+def _outlines(region: Region, holes: bool) -> Iterator[tuple[CrossSection, Profile | None]]:
+    """The region, and also with its holes closed."""
+    yield region.section, region.profile
+    if holes and region.section.num_contour() > 1:
+        yield region.filled, profile_of(region.filled)
+
+
 def _extruded(view: View, region: Region, low: float, high: float, holes: bool) -> Iterator[Candidate]:
-    for section in (
-        (region.section, region.filled) if holes and region.section.num_contour() > 1 else (region.section,)
-    ):
-        profile = region.profile if section is region.section else profile_of(section)
+    for section, profile in _outlines(region, holes):
         one = extrusion(section, profile, view.frame, low, high)
         if one is not None:
             yield one
@@ -91,6 +103,62 @@ def extrusion(
         return posed(Manifold.extrude(section, high - low).translate((0, 0, low)), frame)
 
     return Candidate(part, make, len(profile.corners), section.area() * (high - low))
+
+
+def _rounded(
+    view: View, region: Region, slabs: list[tuple[float, float]], first: int, last: int, holes: bool
+) -> Iterator[Candidate]:
+    """With the rims that the surface has there: at levels, or a slab further on, which then is all rim."""
+    lows = [slabs[i][0] for i in (first, first - 1) if i >= 0]
+    highs = [slabs[i][1] for i in (last, last + 1) if i < len(slabs)]
+    for section, profile in _outlines(region, holes):
+        for low, high in product(lows, highs) if profile is not None else ():
+            assert profile is not None
+            bottom, top = limited(measured_rims(view.leaning, profile, low, high), profile)
+            further = (lows[0] - low, high - highs[0])
+            if all(rim.depth >= _ALL_RIM * more for rim, more in zip((bottom, top), further, strict=True)):
+                rimmed = _with_rims(section, profile, view.frame, low, high, (bottom, top))
+                if rimmed is not None:
+                    yield rimmed
+                    if section is not region.section:
+                        yield from _drilled(rimmed, view, region, low, high)
+
+
+def _drilled(solid: Candidate, view: View, region: Region, low: float, high: float) -> Iterator[Candidate]:
+    """What stands on the region with its holes closed, with the holes cut from it."""
+    if region.profile is None:
+        return
+
+    def make(further: float) -> Manifold:
+        upright = Manifold.extrude(region.section, high - low).translate((0, 0, low))
+        return solid.make(further) ^ posed(upright, view.frame)
+
+    cuts = hole_parts(extruded_part(region.profile, view.frame, low, high, rims=(SHARP, SHARP)))
+    sides = len(region.profile.corners) + sum(rim != SHARP for rim in solid.rims)
+    yield replace(solid, make=make, sides=sides, volume=region.area * (high - low), cuts=cuts)
+
+
+def _with_rims(
+    section: CrossSection,
+    profile: Profile,
+    frame: np.ndarray,
+    low: float,
+    high: float,
+    rims: tuple[Rim, Rim],
+) -> Candidate | None:
+    """As `extrusion`, with rims; none where they are sharp, or the profile has no room for them."""
+    if rims == (SHARP, SHARP):
+        return None
+    try:
+        part = extruded_part(profile, frame, low, high, rims=rims)
+    except ParameterError:
+        return None
+
+    def make(further: float) -> Manifold:
+        return posed(rimmed_body(section, rims, high - low, further > 0).translate((0, 0, low)), frame)
+
+    sides = len(profile.corners) + sum(rim != SHARP for rim in rims)
+    return Candidate(part, make, sides, section.area() * (high - low), rims)
 
 
 def _revolutions(view: View) -> Iterator[Candidate]:

@@ -36,6 +36,8 @@ def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.
     sign = -1.0 if added else 1.0
 
     def is_open(side: float) -> bool:
+        if isinstance(field, Extrusion) and field.rims[side > 0].depth:
+            return False
         end = high[2] if side > 0 else low[2]
         for copy in part.copies:
             frame = rotation_matrix(copy.rotation)

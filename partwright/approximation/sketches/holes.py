@@ -23,10 +23,10 @@ _BURR = 5e-3  # unit lengths: how deep within the shape a point of an empty hole
 def holes_apart(part: Part) -> tuple[Part, tuple[Part, ...]]:
     """The part without holes that are round or come more than once, and what cuts these, each form once.
 
-    Lengths in the unit frame. A part that is no extrusion, or tapers, stays as it is.
+    Lengths in the unit frame. A part that is no extrusion, tapers or has rims stays as it is.
     """
     field = part.field
-    if not isinstance(field, Extrusion) or field.taper or not field.profile.holes:
+    if not isinstance(field, Extrusion) or field.taper or field.has_rims or not field.profile.holes:
         return part, ()
     groups: list[list[Loop]] = []
     for loop in field.profile.holes:
@@ -53,6 +53,17 @@ def holes_apart(part: Part) -> tuple[Part, tuple[Part, ...]]:
         moves = [*own, *(move @ inner for move in part.instances for inner in (Similarity(), *own))]
         holes.append(dataclasses.replace(extruded(Profile(first)), instances=tuple(moves)))
     return dataclasses.replace(body, instances=part.instances, name=part.name), tuple(holes)
+
+
+def hole_parts(part: Part) -> tuple[Part, ...]:
+    """What cuts all holes of an extrusion without taper and rims, those that are alike as copies of one."""
+    body, holes = holes_apart(part)
+    field = body.field
+    if not isinstance(field, Extrusion):
+        return holes
+    rest = (Extrusion(Profile(loop), field.height) for loop in field.profile.holes)
+    own = (Part(solid, body.translation, body.rotation) for solid in rest)
+    return (*holes, *own)
 
 
 def _middle(loop: Loop) -> np.ndarray:

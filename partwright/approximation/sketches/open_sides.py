@@ -50,7 +50,10 @@ def with_open_sides(part: Part, distance: Callable[[np.ndarray], np.ndarray]) ->
     if isinstance(field, Box):
         width, depth = (upper - lower).tolist()
         return dataclasses.replace(part, field=Box((width, depth, height)), translation=(x, y, z))
-    centred = Extrusion(moved.moved(-middle), height)
+    try:
+        centred = dataclasses.replace(field, profile=moved.moved(-middle))
+    except ParameterError:  # its rims have no room there
+        return part
     return dataclasses.replace(part, field=centred, translation=(x, y, z))
 
 

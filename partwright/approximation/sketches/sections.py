@@ -12,6 +12,7 @@ from manifold3d import CrossSection, FillRule, Manifold
 
 from partwright.approximation.sketches.outlines import fitted_loop
 from partwright.approximation.sketches.pinches import unpinched
+from partwright.approximation.sketches.rims import Leaning
 from partwright.errors import ParameterError
 from partwright.fields.profile import Loop, Profile
 
@@ -62,6 +63,10 @@ class View:
         """Vertices (V, 3) and faces (F, 3), in the view."""
         mesh = self.body.to_mesh64()
         return np.asarray(mesh.vert_properties, float)[:, :3], np.asarray(mesh.tri_verts, np.int64)
+
+    @cached_property
+    def leaning(self) -> Leaning:
+        return Leaning.of(*self.mesh)
 
     @cached_property
     def levels(self) -> list[float]:

@@ -1,0 +1,127 @@
+"""Fillets and chamfers around the ends of an extruded section, measured on the faces that lean there."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from manifold3d import CrossSection, JoinType, Manifold
+
+from partwright.fields.profile import Profile
+from partwright.fields.profile_distance import profile_distance
+from partwright.fields.rims import Rim
+
+SHARP = Rim(0.0, 0.0)
+_LEANS = (0.02, 0.9998)  # of a face's normal across the ends
+_LEAST = 6e-3  # unit lengths: smaller rims are sharp
+_MOST = 0.3
+_ALIKE = 0.02  # of its depth, by which vertices of one rim may differ
+_AT_45 = 0.025  # of the normal of a chamfer
+_CHAMFERED = 0.9  # of a rim's area, that is at 45 degrees
+_COVERED = 0.7  # of a rim's length, that has to be there
+_OFF = 2e-3  # unit lengths: how far a vertex may lie beyond a wall or an end
+_STEPS = 12
+
+
+class Leaning(NamedTuple):
+    """Faces of a body that are neither flat nor upright: corners (F, 3, 3), areas (F,), and of their normals
+    the part upwards (F,)."""
+
+    corners: np.ndarray
+    area: np.ndarray
+    upwards: np.ndarray
+
+    @classmethod
+    def of(cls, vertices: np.ndarray, faces: np.ndarray) -> Leaning:
+        corners = vertices[faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(normal, axis=1) / 2
+        upwards = normal[:, 2] / np.maximum(2 * area, 1e-300)
+        leans = (np.abs(upwards) > _LEANS[0]) & (np.abs(upwards) < _LEANS[1])
+        return cls(corners[leans], area[leans], upwards[leans])
+
+
+def measured_rims(faces: Leaning, profile: Profile, low: float, high: float) -> tuple[Rim, Rim]:
+    """Of the bottom and the top of a profile extruded from one height to another; unit lengths."""
+    heights = faces.corners[..., 2]
+    return _rim(faces, heights - low, -faces.upwards, profile), _rim(
+        faces, high - heights, faces.upwards, profile
+    )
+
+
+def _rim(faces: Leaning, off: np.ndarray, facing: np.ndarray, profile: Profile) -> Rim:
+    """off: (F, 3) how far below the end the corners are. facing: (F,) the normals' part beyond the end."""
+    own = (facing > 0) & (off.min(axis=1) > -_OFF) & (off.max(axis=1) < _MOST)
+    off, facing, area = np.maximum(off[own], 0), facing[own], faces.area[own]
+    lengths = np.array([_perimeter(Profile(loop)) for loop in profile.loops])
+    if area.sum() < _COVERED * _LEAST * lengths.sum():
+        return SHARP
+    flat = faces.corners[own][..., :2].reshape(-1, 2)
+    deep = -profile_distance(profile, flat).reshape(-1, 3)
+    # Of a circle that touches both, through a point; of a chamfer's end points it is the chamfer.
+    depth = np.maximum(deep, 0) + off + np.sqrt(2 * np.maximum(deep, 0) * off)
+    depth[(deep.min(axis=1) < -_OFF) | (deep.max(axis=1) > _MOST)] = np.inf
+    found = _most_common(depth.ravel(), np.repeat(area, 3))
+    alike = (np.abs(depth - found) < _ALIKE * found + _OFF / 4).all(axis=1) if np.isfinite(found) else own[:0]
+    if not _LEAST <= found < math.inf or not alike.any():
+        return SHARP
+    total = float(area[alike].sum())
+    tilted = np.abs(facing - math.sqrt(0.5)) < _AT_45
+    chamfer = float(area[alike & tilted].sum()) > _CHAMFERED * total
+    width = found * (math.sqrt(2) if chamfer else math.pi / 2)
+    apart = [
+        np.abs(profile_distance(Profile(loop), flat)).reshape(-1, 3).sum(axis=1) for loop in profile.loops
+    ]
+    along = np.argmin(apart, axis=0)
+    there = np.bincount(along[alike], area[alike], minlength=len(lengths))
+    if (there < _COVERED * lengths * width).any():
+        return SHARP
+    exact = float(np.average(depth[alike].ravel(), weights=np.repeat(area[alike], 3)))
+    return Rim(0.0, exact) if chamfer else Rim(exact, 0.0)
+
+
+def _most_common(values: np.ndarray, weights: np.ndarray) -> float:
+    """The middle of the narrow range that holds the most weight."""
+    known = np.isfinite(values)
+    if not known.any():
+        return math.inf
+    values, weights = values[known], weights[known]
+    order = np.argsort(values)
+    values, sums = values[order], np.concatenate([[0.0], np.cumsum(weights[order])])
+    ends = np.searchsorted(values, values * (1 + _ALIKE), side="right")
+    first = int((sums[ends] - sums[:-1]).argmax())
+    return float(np.median(values[first : ends[first]]))
+
+
+def _perimeter(profile: Profile) -> float:
+    sides = (side for loop in profile.sides for side in loop)
+    return sum(abs(s.sweep) * s.radius if s.centre else math.dist(s.start, s.end) for s in sides)
+
+
+def limited(rims: tuple[Rim, Rim], profile: Profile) -> tuple[Rim, Rim]:
+    """Fillets that are as wide as the narrowest corner where they are a little wider."""
+    arcs = [side.radius for loop in profile.sides for side in loop if side.sweep > 0]
+    least = min(arcs, default=math.inf)
+    bottom, top = (
+        Rim(*(least if least < value < (1 + _ALIKE) * least else value for value in rim)) for rim in rims
+    )
+    return bottom, top
+
+
+def rimmed_body(section: CrossSection, rims: tuple[Rim, Rim], height: float, outer: bool) -> Manifold:
+    """The section extruded from 0, its rims in steps outside or inside of them."""
+    bottom, top = rims
+    slabs = []
+    for rim, at_top in ((bottom, False), (top, True)):
+        points = rim.steps(_STEPS) if rim.depth else []
+        for (start, begin), (deep, end) in pairwise(points):
+            inner = section.offset(-(start if outer else deep), JoinType.Round, 2.0, 0)
+            if not inner.is_empty() and begin > end:
+                low = height - begin if at_top else end
+                slabs.append(Manifold.extrude(inner, begin - end).translate((0, 0, low)))
+    wall = height - bottom.depth - top.depth
+    if wall > 1e-6:
+        slabs.append(Manifold.extrude(section, wall).translate((0, 0, bottom.depth)))
+    return sum(slabs[1:], slabs[0])
