@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from partwright.assembly.files import load_assembly
+from partwright.assembly.repeated_groups import copies_of, line, ring
 from partwright.assembly.similarity import Similarity
 from partwright.assembly.tree import Assembly, Node, Part
 
-__all__ = ["Assembly", "Node", "Part", "Similarity", "load_assembly"]
+__all__ = ["Assembly", "Node", "Part", "Similarity", "copies_of", "line", "load_assembly", "ring"]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly.placed import placed_quadric
+from partwright.assembly.repeated_groups import repeats
 from partwright.fields import NormalForm, Profile, normal_form
 from partwright.fields.extrusion import RIMS
 
@@ -30,12 +31,19 @@ def _lines(node: Node, digits: int, first: str, rest: str) -> Iterator[str]:
         return
     blend = f", blend {_number(node.blend, digits)}" if node.blend else ""
     yield f"{first}{node.operation}{' ' + node.name if node.name else ''}{blend}"
-    for i, child in enumerate(node.children):
-        last = i == len(node.children) - 1
+    times = {repeat.first: len(repeat.copies) + 1 for repeat in repeats(node)}
+    copies = {i for repeat in repeats(node) for i in repeat.copies}
+    shown = [i for i in range(len(node.children)) if i not in copies]
+    for i in shown:
+        last = i == shown[-1]
         sign = "- " if node.operation == "difference" and i else ""
-        yield from _lines(
+        child = node.children[i]
+        said = _lines(
             child, digits, rest + ("└─ " if last else "├─ ") + sign, rest + ("   " if last else "│  ")
         )
+        if i in times:
+            yield f"{next(said)}, {times[i]} times"
+        yield from said
 
 
 def _leaf(part: Part, digits: int) -> str:

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.repeated_groups import alike_leaves
+from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.assembly.tree import Assembly, Node, Part
 from partwright.errors import ParameterError
 
@@ -46,11 +47,13 @@ def numbers_of(part: Part) -> dict[str, float]:
     return found | dict(zip("xyz", part.translation, strict=True))
 
 
-def with_numbers(assembly: Assembly, values: Mapping[str, float]) -> Edited:
+def with_numbers(assembly: Assembly, values: Mapping[str, float], alone: bool = False) -> Edited:
     """The assembly with these numbers.
 
     values: by "part.number", lengths in the assembly's unit and angles in degrees; the part's name may be a
     pattern ("hole*.diameter"). Copies of a part change with it.
+    alone: parts in the same place of groups that are copies of one another stay as they are; otherwise they
+    change alike, and move alike.
 
     Raises:
         ParameterError: no part or number has the name, or a field does not allow its number.
@@ -59,16 +62,41 @@ def with_numbers(assembly: Assembly, values: Mapping[str, float]) -> Edited:
     followed: list[str] = []
     for name, value in values.items():
         wanted, number = _split(assembly, name)
+        alike = {} if alone else alike_leaves(assembly)
+        done: set[str] = set()
         for part_name in wanted:
+            if part_name in done:
+                continue
             before = assembly[part_name]
             after = _with_number(before, number, value)
             old = numbers_of(before)[number]
             changed.append(f"{part_name}.{number}: {old:.6g} to {value:.6g}")
-            moves = list(_moves(before, after))
-            assembly = assembly.replace_part(part_name, after)
-            if number not in ("x", "y", "z"):
-                assembly = _follow(assembly, before, moves, followed)
+            copies = alike.get(part_name, ())
+            if copies:
+                followed.append(
+                    f"{_listed([copy for copy, _ in copies])}, copies of {part_name}, change with it"
+                )
+            for own_name, move in ((part_name, Similarity()), *copies):
+                done.add(own_name)
+                assembly = _changed(assembly, own_name, (before, after), move, number, followed)
     return Edited(assembly, tuple(changed), tuple(followed))
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+
+
+def _changed(
+    assembly: Assembly, name: str, change: tuple[Part, Part], move: Similarity, number: str, told: list[str]
+) -> Assembly:
+    """With a part changed as another one was, before and after, that a move takes to it."""
+    own, (before, after) = assembly[name], change
+    shift = rotation_matrix(move.rotation) @ np.subtract(after.translation, before.translation)
+    x, y, z = (np.array(own.translation) + shift).tolist() if shift.any() else own.translation
+    made = dataclasses.replace(own, field=after.field, translation=(x, y, z))
+    moves = list(_moves(own, made))
+    assembly = assembly.replace_part(name, made)
+    return assembly if number in ("x", "y", "z") else _follow(assembly, own, moves, told)
 
 
 def _split(assembly: Assembly, name: str) -> tuple[list[str], str]:

@@ -13,8 +13,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "edit",
         help="set numbers of an assembly's parts by name",
         description="Sets numbers of parts by name. What stood on a face that moves goes with it, cuts that "
-        "went through still do, cuts of one face keep their depth, and copies of a part change with it; each "
-        "such change is said. `partwright describe` shows names and numbers.",
+        "went through still do, cuts of one face keep their depth, and copies of a part, or of its group, "
+        "change with it; each such change is said. `partwright describe` shows names and numbers.",
     )
     option = command.add_argument
     option("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
@@ -26,6 +26,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         required=True,
         help="a number and its new value, say hole.diameter=6mm, base_plate.size.z=12 or 'hole*.x=0'; "
         "lengths without a unit are in the assembly's, angles in degrees; may be given several times",
+    )
+    option(
+        "--alone",
+        action="store_true",
+        help="only what is named changes, not its like in groups that are copies of one another",
     )
     add_output(command, "FILE", "where to write (.json)", reads=_reads, writes=_writes)
     command.set_defaults(run="edit")

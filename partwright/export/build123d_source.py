@@ -26,8 +26,10 @@ from partwright.export.instance_patterns import Poses, Row
 from partwright.export.profile_source import BUILD123D, BUILD123D_SOURCE, draws_loops, loops
 from partwright.export.solid_source import (
     SourcePart,
+    children_once,
     drawn,
     plain_unions,
+    said_once,
     source_parts,
     superfrustum_source,
 )
@@ -67,7 +69,8 @@ def write(assembly: Assembly, path: str | Path) -> None:
     """
     tree, changes = solid_tree(assembly, keep=_lofted, source=True)
     changes += _sharpened(tree.parts)
-    parts = source_parts(tree.parts, own_axes_angles, _RESERVED)
+    plain = plain_unions(tree)
+    parts = source_parts(said_once(plain), own_axes_angles, _RESERVED)
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     drawing = superfrustum_source(parts, "build123d_superfrustum.txt")
     swept = [field for part in parts if isinstance(field := part.part.field, Swept)]
@@ -85,7 +88,7 @@ def write(assembly: Assembly, path: str | Path) -> None:
         *([*drawing, "", ""] if drawing else []),
         *([*BUILD123D_SOURCE.splitlines(), "", ""] if draws_loops(swept) else []),
         *(line for part in parts for line in _function(part)),
-        f"assembly = {_tree(plain_unions(tree), {p.part.name: p.function for p in parts}, '')}",
+        f"assembly = {_tree(plain, {p.part.name: p.function for p in parts}, '')}",
         "",
         'if __name__ == "__main__":',
         f'    bd.export_step(assembly, Path(__file__).with_suffix(".step"){_unit_argument(assembly)})',
@@ -189,10 +192,17 @@ def _tree(node: Node, functions: dict[str, str], indent: str) -> str:
     if isinstance(node, Part):
         return f"{functions[node.name]}()"
     inner = indent + "    "
-    first, *others = (_tree(child, functions, inner) for child in node.children)
+    first, *others = (
+        _repeated(_tree(child, functions, inner), poses)
+        for child, poses in children_once(node, own_axes_angles, "()")
+    )
     operator = _OPERATORS[node.operation]
     rest = "".join(f"\n{inner}{operator} {other}" for other in others)
     return f"(\n{inner}{first}{rest}\n{indent})"
+
+
+def _repeated(solid: str, poses: str) -> str:
+    return f"(bd.Part() + [bd.Location(*pose) * {solid} for pose in {poses}])" if poses else solid
 
 
 FORMAT = Format(

@@ -31,9 +31,11 @@ from partwright.export.instance_patterns import Poses, Ring, Row
 from partwright.export.profile_source import SCAD, SCAD_RIMS, SCAD_SOURCE, draws_loops, loops
 from partwright.export.solid_source import (
     SourcePart,
+    children_once,
     drawn,
     number,
     plain_unions,
+    said_once,
     source_parts,
     superfrustum_source,
 )
@@ -100,7 +102,8 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
     changes += [Change((part.name,), "mesh", note=f"{facets} facets to a full turn") for part in polyhedra]
     sliced = [part for part in tree.parts if _has_rims(part.field)]
     changes += [Change((part.name,), "slices", note="its fillets and chamfers are slices") for part in sliced]
-    parts = source_parts(tree.parts, fixed_axes_angles, _RESERVED.split())
+    plain = plain_unions(tree)
+    parts = source_parts(said_once(plain), fixed_axes_angles, _RESERVED.split())
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     lines = [
         f"// {comment(assembly.name) or 'Assembly'}: {len(parts)} parts. "
@@ -109,7 +112,7 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
         f"$fn = {facets};  // facets of a full circle",
         "",
         *(line for part in parts for line in _table(part, unit)),
-        *_tree(plain_unions(tree), {p.part.name: p.function for p in parts}, ""),
+        *_tree(plain, {p.part.name: p.function for p in parts}, ""),
         "",
         *(line for part in parts for line in _module(part, ball, facets)),
         *superfrustum_source(parts, "superfrustum.scad"),
@@ -224,8 +227,12 @@ def _tree(node: Node, modules: dict[str, str], indent: str) -> Iterator[str]:
         yield f"{indent}{modules[node.name]}();"
         return
     yield f"{indent}{node.operation}() {{" + (f"  // {comment(node.name)}" if node.name else "")
-    for child in node.children:
-        yield from _tree(child, modules, indent + "    ")
+    for child, poses in children_once(node, fixed_axes_angles, "[]"):
+        inner = indent + "    "
+        if poses:
+            yield f"{inner}for (pose = {poses}) translate(pose[0]) rotate(pose[1])"
+            inner += "    "
+        yield from _tree(child, modules, inner)
     yield indent + "}"
 
 

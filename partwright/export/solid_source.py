@@ -14,7 +14,8 @@ import numpy as np
 from partwright.approximation.nearest import Approximation
 from partwright.approximation.recognise import SAME, exact_solid
 from partwright.assembly import Assembly, Node, Part
-from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.repeated_groups import repeats
+from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.export.identifiers import comment, identifiers
 from partwright.export.instance_patterns import Poses, Ring, Row, pattern
 from partwright.export.profile_source import meaning, swept_parameters
@@ -225,11 +226,37 @@ def number(value: float) -> str:
 
 
 def plain_unions(node: Node) -> Node:
-    """Nested unions flattened, and assemblies of one child replaced by it: the same, shorter to read."""
+    """Nested unions flattened, but for repeated ones, and assemblies of one child replaced by it."""
     if isinstance(node, Part):
         return node
     children: list[Node] = []
-    for child in map(plain_unions, node.children):
+    repeated = {i for repeat in repeats(node) for i in (repeat.first, *repeat.copies)}
+    for i, child in enumerate(map(plain_unions, node.children)):
         is_union = isinstance(child, Assembly) and child.operation == node.operation == "union"
-        children += child.children if is_union and isinstance(child, Assembly) else (child,)
+        inlined = is_union and i not in repeated
+        children += child.children if inlined and isinstance(child, Assembly) else (child,)
     return children[0] if len(children) == 1 else dataclasses.replace(node, children=tuple(children))
+
+
+def said_once(node: Node) -> tuple[Part, ...]:
+    """The leaves of a tree, without those of groups that are copies of others."""
+    if isinstance(node, Part):
+        return (node,)
+    copies = {i for repeat in repeats(node) for i in repeat.copies}
+    return tuple(p for i, child in enumerate(node.children) if i not in copies for p in said_once(child))
+
+
+def children_once(
+    node: Assembly, turn: Callable[[np.ndarray], tuple[float, ...]], brackets: str
+) -> list[tuple[Node, str]]:
+    """The children without those that are copies of others, and the places and turns of a group and its
+    copies as a list in such brackets, empty where it is not repeated."""
+    found = {repeat.first: repeat for repeat in repeats(node)}
+    copies = {i for repeat in found.values() for i in repeat.copies}
+    result: list[tuple[Node, str]] = []
+    for i, child in enumerate(node.children):
+        if i not in copies:
+            moves = (Similarity(), *found[i].moves) if i in found else ()
+            poses = tuple((_tidy(m.translation), turn(rotation_matrix(m.rotation))) for m in moves)
+            result.append((child, literal(poses, brackets) if poses else ""))
+    return result

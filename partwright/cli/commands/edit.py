@@ -19,7 +19,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UnsupportedFormatError(f"cannot write {name}: use a .json, then partwright export")
     assembly = load_assembly(arguments.assembly)
     values = dict(_value(text, assembly.unit) for text in arguments.values)
-    edited = with_numbers(assembly, values)
+    edited = with_numbers(assembly, values, arguments.alone)
     edited.assembly.save(arguments.output)
     for line in (*edited.changed, *(f"  {line}" for line in edited.followed)):
         print(line)

@@ -1,0 +1,165 @@
+"""Groups that are repeated: subtrees of which others are rigid copies, such as a foot and its hole.
+
+Copies are nodes like any other, so all that reads a tree reads them right; that they are copies is seen from
+their fields and places. Edits, descriptions and sources tell it by `repeats` and say each group once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.assembly.similarity import Similarity, rotation_matrix
+from partwright.errors import ParameterError
+
+if TYPE_CHECKING:
+    from partwright.assembly.tree import Assembly, Node, Part
+
+_SAME = 1e-9  # of the lengths that occur, and of entries of rotations
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """Children of a node: `first`, and those that are its copies, each by a rigid move."""
+
+    first: int
+    copies: tuple[int, ...]
+    moves: tuple[Similarity, ...]
+
+
+def line(count: int, step: Sequence[float]) -> tuple[Similarity, ...]:
+    """The moves of `count` in a line, (count - 1,), each a step (3,) further than the one before.
+
+    Raises:
+        ParameterError: the count is less than 2.
+    """
+    _check(count)
+    x, y, z = (float(v) for v in step)
+    return tuple(Similarity(translation=(i * x, i * y, i * z)) for i in range(1, count))
+
+
+def ring(count: int, axis: str = "z", centre: Sequence[float] = (0.0, 0.0, 0.0)) -> tuple[Similarity, ...]:
+    """The moves of `count` by equal turns about an axis "x", "y" or "z" through a centre (3,), (count - 1,).
+
+    Raises:
+        ParameterError: the count is less than 2, or there is no such axis.
+    """
+    _check(count)
+    if axis not in ("x", "y", "z"):
+        raise ParameterError(f"axis: expected x, y or z, got {axis!r}")
+    moves = []
+    for i in range(1, count):
+        half = math.pi * i / count
+        rotation = [math.cos(half), 0.0, 0.0, 0.0]
+        rotation[1 + "xyz".index(axis)] = math.sin(half)
+        turn = Similarity(rotation=(rotation[0], rotation[1], rotation[2], rotation[3]))
+        x, y, z = (np.asarray(centre, float) - turn(np.asarray(centre, float))).tolist()
+        moves.append(Similarity(1.0, turn.rotation, (x, y, z)))
+    return tuple(moves)
+
+
+def _check(count: int) -> None:
+    if count < 2:
+        raise ParameterError(f"count: expected at least 2, got {count}")
+
+
+def copies_of(group: Assembly, moves: Sequence[Similarity]) -> tuple[Assembly, ...]:
+    """The group moved by each of the moves; leaves of the first copy are called NAME_02, and so on."""
+    return tuple(_numbered(group.transformed(move), i) for i, move in enumerate(moves, start=2))
+
+
+def _numbered(node: Assembly, number: int) -> Assembly:
+    def renamed(child: Node) -> Node:
+        if child.is_part:
+            return dataclasses.replace(child, name=f"{child.name}_{number:02d}")
+        return _numbered(child, number)
+
+    return dataclasses.replace(node, children=tuple(map(renamed, node.children)))
+
+
+def repeats(node: Node) -> list[Repeat]:
+    """Groups among the children of a node that stand for one another; in a difference not its first child."""
+    if node.is_part:
+        return []
+    first = 1 if node.operation == "difference" else 0
+    left = [i for i, child in enumerate(node.children) if i >= first and not child.is_part]
+    found = []
+    while left:
+        own, *others = left
+        moves = {i: move_between(node.children[own], node.children[i]) for i in others}
+        copies = {i: move for i, move in moves.items() if move is not None}
+        if copies:
+            found.append(Repeat(own, tuple(copies), tuple(copies.values())))
+        left = [i for i in others if i not in copies]
+    return found
+
+
+def move_between(one: Node, other: Node) -> Similarity | None:
+    """The rigid move that takes a node to another of the same fields in the same tree; None where none."""
+    leaves: list[tuple[Part, Part]] = []
+    for pair in _pairs(one, other):
+        if pair is None:
+            return None
+        leaves.append(pair)
+    a, b = leaves[0]
+    move = _pose(b) @ _pose(a).inverse()
+    size = 1.0 + float(np.abs([part.translation for pair in leaves for part in pair]).max())
+    for a, b in leaves:
+        moved = a.transformed(move)
+        if not _same_place(_pose(moved), _pose(b), size) or not all(
+            _same_place(m, n, size) for m, n in zip(moved.instances, b.instances, strict=True)
+        ):
+            return None
+    return move
+
+
+def _pairs(one: Node, other: Node) -> Iterator[tuple[Part, Part] | None]:
+    """Leaves that stand for one another; None where the nodes differ."""
+    if one.is_part and other.is_part:
+        alike = one.field == other.field and one.blend == other.blend
+        yield (one, other) if alike and len(one.instances) == len(other.instances) else None
+    elif one.is_part or other.is_part or _form(one) != _form(other):
+        yield None
+    else:
+        for a, b in zip(one.children, other.children, strict=True):
+            yield from _pairs(a, b)
+
+
+def _form(node: Assembly) -> tuple[str, float, int]:
+    return node.operation, node.blend, len(node.children)
+
+
+def _pose(part: Part) -> Similarity:
+    return Similarity(1.0, part.rotation, part.translation)
+
+
+def _same_place(one: Similarity, other: Similarity, size: float) -> bool:
+    turned = np.abs(rotation_matrix(one.rotation) - rotation_matrix(other.rotation)).max()
+    moved = np.abs(np.subtract(one.translation, other.translation)).max()
+    return bool(turned < _SAME and moved < _SAME * size)
+
+
+def alike_leaves(node: Node) -> dict[str, tuple[tuple[str, Similarity], ...]]:
+    """By the name of a leaf: those in its place in groups that are copies of its own, and the moves there."""
+    found: dict[str, tuple[tuple[str, Similarity], ...]] = {}
+    if node.is_part:
+        return found
+    for child in node.children:
+        found |= alike_leaves(child)
+    within = dict(found)
+    for repeat in repeats(node):
+        groups = [node.children[i] for i in (repeat.first, *repeat.copies)]
+        moves = [Similarity(), *repeat.moves]
+        for leaves in zip(*(group.parts for group in groups), strict=True):
+            for k, leaf in enumerate(leaves):
+                back = moves[k].inverse()
+                others = [(o.name, moves[i] @ back) for i, o in enumerate(leaves) if i != k]
+                # What is alike within a copy is alike in all of them.
+                further = [(far, on @ move) for name, move in others for far, on in within.get(name, ())]
+                found[leaf.name] = (*within.get(leaf.name, ()), *others, *further)
+    return found
