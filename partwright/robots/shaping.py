@@ -17,12 +17,12 @@ from partwright.approximation.convex_cover import (
 from partwright.approximation.convex_fit import ConvexFit, Mode, convex_fits
 from partwright.approximation.convex_piece import Limits, Piece
 from partwright.approximation.light_hull import light_hull
-from partwright.meshing.manifolds import as_mesh, surface_of
+from partwright.meshing.manifolds import as_mesh
 from partwright.robots.containment import larger, shape_solid
 from partwright.robots.enclosing import containing, outer_hull
+from partwright.robots.inscribed import deepest, inscribed
 from partwright.robots.model import Shape
 from partwright.robots.solids import Target
-from partwright.shapes import MeshDistance
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -67,7 +67,7 @@ def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
     elif wishes.mode == "nearest":
         hulls = [balanced_hull(piece, wishes.tolerance) for piece in pieces]
     else:
-        hulls = [piece.hull for piece in pieces]
+        hulls = [inscribed(piece.hull, target.solid) for piece in pieces]
     chosen = [_chosen(piece, hull, target, wishes) for piece, hull in zip(pieces, hulls, strict=True)]
     if wishes.mode == "within":
         chosen = [one for shape in chosen if (one := _within(shape, target)) is not None]
@@ -159,7 +159,7 @@ def _within(shape: Shape, target: Target) -> Shape | None:
         return None
     if _outside(solid, target) <= 0:
         return shape
-    centre = _deepest(common)
+    centre = deepest(common)
     low, high = 0.0, 1.0
     for _ in range(_STEPS):
         middle = (low + high) / 2
@@ -174,17 +174,6 @@ def _outside(solid: Manifold, target: Target) -> float:
 
 def _about(solid: Manifold, centre: np.ndarray, scale: float) -> Manifold:
     return solid.translate(tuple(-centre)).scale((scale,) * 3).translate(tuple(centre))
-
-
-def _deepest(solid: Manifold) -> np.ndarray:
-    """The point of a lattice that lies deepest."""
-    vertices, faces = surface_of(solid)
-    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
-    ticks = (np.arange(12) + 0.5) / 12
-    points = lower + np.stack(np.meshgrid(ticks, ticks, ticks), axis=-1).reshape(-1, 3) * (upper - lower)
-    size = float((upper - lower).max())
-    distance = MeshDistance((vertices - lower) / size, faces, faces, True).signed((points - lower) / size)
-    return np.asarray(points[distance.argmin()])
 
 
 def _scaled(shape: Shape, centre: np.ndarray, scale: float) -> Shape:
