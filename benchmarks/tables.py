@@ -70,6 +70,8 @@ TABLES = (
           "robots --parts {data}/parts/robot_arm --held ur5,ur10e --epochs 400 --iterations 200 "
           "--resolution 128 --threads 1", 120),
     Table("partsdf-speed.md", "partsdf.py", None, 0, "speed --model chairs", 60),
+    Table("unlabelled.md", "unlabelled.py", "--made chairs:4", 1,
+          "--parts {data}/parts/robot_arm {data}/parts/truck", 5),
     Table("named_convexes.md", "named_convexes.py", None, 0,
           "--shapes {data}/cad --trees build/trees --quality draft", 60),
     Table("cleaning.md", "cleaning.py", None, 0,

@@ -9,6 +9,7 @@ from partwright.cli import (
     parts_family,
     parts_generate,
     parts_interpolate,
+    parts_match,
     parts_prepare,
     parts_reconstruct,
     parts_simulate,
@@ -19,6 +20,7 @@ from partwright.cli import (
 )
 
 COMMANDS = (
+    parts_match,
     parts_prepare,
     parts_train,
     parts_family,
