@@ -51,10 +51,10 @@ def main() -> None:
         f"`{' '.join(['python', 'benchmarks/unlabelled.py', *_plain(sys.argv[1:])])}`", "",
         "Fits of draft quality, one thread. Surface: the share that is rightly labelled, where each true "
         "part is one found part at most, in all shapes the same; pIoU: mean over shapes and their true "
-        "parts, by area. Pure: each found part stands for the true part that most of it is, so that a body in "
-        "ten pieces counts. Best: regions of the fits, each by itself by its true part, which no matching can "
-        "exceed. One part: all is the largest. To one template: one shape's regions are the parts, by the "
-        "same assignment; mean over all shapes as the template.", "",
+        "parts, by area. Pure: each found part stands for the true part that most of it is, so that a "
+        "body in ten pieces counts. Best: regions of the fits, each by itself by its true part, which no "
+        "matching can exceed. One part: all is the largest. To one template: one shape's regions are the "
+        "parts, by the same assignment; mean over all shapes as the template.", "",
         "| family | shapes | parts | found | surface % | pIoU % | pure % | best % | one part % | "
         "to one template: surface, pIoU % | s a fit | s matching |",
         "|---|---|---|---|---|---|---|---|---|---|---|---|",

@@ -33,6 +33,14 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option("--keep", metavar="PARTS", help="these parts of --of stay: names, separated by commas")
     option("--of", metavar="SHAPE", help="the shape whose parts are kept")
     option("--poses", metavar="SHAPE", help="a shape whose parts' poses are kept, but none of their forms")
+    option("--like", metavar="SHAPE", help="samples near a shape, or near what is found in a mesh or points")
+    option(
+        "--change",
+        metavar="X",
+        type=float,
+        default=0.4,
+        help="how far from --like: near 0 hardly, at 1 nothing of it is left (default: %(default)s)",
+    )
     command.set_defaults(run="parts_generate")
 
 
@@ -41,7 +49,7 @@ def _folder(arguments: argparse.Namespace) -> Path:
 
 
 def _reads(arguments: argparse.Namespace) -> list[Path]:
-    return given(arguments.model, arguments.of, arguments.poses)
+    return given(arguments.model, arguments.of, arguments.poses, arguments.like)
 
 
 def _writes(arguments: argparse.Namespace) -> list[Path]:

@@ -39,11 +39,14 @@ def denoised(
     known: Tensor | None = None,
     kept: Tensor | None = None,
     steps: int = STEPS,
+    like: Tensor | None = None,
+    since: float = 1.0,
 ) -> Tensor:
     """Clean vectors (B, ...) that begin as noise. Where `kept`, they are the `known` ones, noised as the rest
-    is on the way, so that the rest is made to suit them."""
-    at = noise
-    times = torch.linspace(1.0, 0.0, steps + 1)
+    is on the way, so that the rest is made to suit them. Given `like`, they begin at the time `since` as that
+    with its share of noise, and so come out near it (SDEdit, Meng et al. 2022)."""
+    at = noise if like is None else noised(like, noise, torch.full((len(noise),), since))[0]
+    times = torch.linspace(since, 0.0, max(1, round(steps * since)) + 1)
     for now, then in zip(times[:-1].tolist(), times[1:].tolist(), strict=True):
         time = torch.full((len(noise),), now)
         if known is not None and kept is not None:

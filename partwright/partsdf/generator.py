@@ -113,11 +113,12 @@ class Generator:
         source: NeuralShape | None = None,
         keep: Sequence[str] = (),
         keep_layout: bool = False,
+        change: float = 0.0,
     ) -> list[NeuralShape]:
         """Shapes, each by its own noise: the first n of more are those of n.
 
         source: a shape whose parts `keep` stay as they are, or, with `keep_layout`, all of whose poses and no
-        latent.
+        latent; or, with `change`, above 0 and at most 1, which the samples are like: 1 leaves nothing of it.
 
         Raises:
             SettingError: none is asked for, nothing would be left to make, or the source is missing or of
@@ -128,12 +129,18 @@ class Generator:
         kept = torch.zeros(len(self.model.parts), dtype=torch.bool)
         for name in keep:
             kept[self.model.index(name)] = True
-        self._check(source, kept, keep_layout)
+        self._check(source, kept, keep_layout, change)
         noise = _noise(count, seed, (len(kept), POSE + 1 + self.vectors.width))
         layout, latents = noise[..., : POSE + 1], noise[..., POSE + 1 :]
         if source is None:
             layout = denoised(self.layouts, layout)
             latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents)
+        elif change:
+            near = self.layout_of(source.poses, source.present).expand_as(layout)
+            layout = denoised(self.layouts, layout, like=near, since=change)
+            form = self.vectors.of_latents(source.latents).expand_as(latents)
+            latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents, like=form, since=change)
+            source = None
         else:
             known = self.layout_of(source.poses, source.present).expand_as(layout)
             fixed = torch.ones_like(kept) if keep_layout else kept
@@ -147,17 +154,21 @@ class Generator:
         """(..., P, 13) of poses (..., P, ...) and presence (..., P)."""
         return tidy(torch.cat([self.vectors.of_poses(poses), 2.0 * present[..., None] - 1], dim=-1))
 
-    def _check(self, source: NeuralShape | None, kept: Tensor, keep_layout: bool) -> None:
+    def _check(self, source: NeuralShape | None, kept: Tensor, keep_layout: bool, change: float) -> None:
         name = self.model.name
+        if not 0 <= change <= 1:
+            raise SettingError(f"change is {change}; expected above 0 and at most 1")
         if source is None:
-            if kept.any() or keep_layout:
-                raise SettingError("parts or poses are kept, but of which shape? Name it")
+            if kept.any() or keep_layout or change:
+                raise SettingError(
+                    "parts or poses are kept, or samples near a shape made, but of which shape? Name it"
+                )
             return
         if source.model.hash != self.model.hash:
             raise SettingError(f"{name} cannot keep parts of another model, {source.model.name}")
-        if keep_layout and kept.any():
-            raise SettingError("either all poses are kept, or some parts whole; choose one")
-        if not kept.any() and not keep_layout:
+        if keep_layout + bool(kept.any()) + bool(change) > 1:
+            raise SettingError("either all poses are kept, or some parts whole, or all is alike; choose one")
+        if not kept.any() and not keep_layout and not change:
             raise SettingError("a shape is named, but nothing of it is kept; name parts, or keep its poses")
         if kept.all():
             raise SettingError(f"all parts of {name} are kept; nothing is left to make")

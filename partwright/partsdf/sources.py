@@ -8,9 +8,14 @@ from pathlib import Path
 from partwright.assembly import Assembly, load_assembly
 from partwright.errors import SettingError
 from partwright.partsdf.assemblies import UNIT_FRAME, UPRIGHT, Quaternion, from_assembly, to_assembly
-from partwright.partsdf.model import load_model
+from partwright.partsdf.familiarity import familiarity
+from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
-from partwright.shapes import UnitFrame
+from partwright.partsdf.reconstruction import reconstruct_standing
+from partwright.partsdf.settings import ReconstructionSettings
+from partwright.partsdf.starts import ways_to_stand
+from partwright.partsdf.targets import Target
+from partwright.shapes import UnitFrame, load_shape
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,20 @@ class Source:
     def assembly(self, shape: NeuralShape) -> Assembly:
         """An edited shape as an assembly in the same units and place."""
         return to_assembly(shape, self.frame, self.unit, self.up, self.name, self.turn)
+
+
+def found_in(
+    model: Model, path: str | Path, settings: ReconstructionSettings | None = None, seed: int = 0
+) -> tuple[NeuralShape, tuple[str, ...]]:
+    """A mesh, points or grid as a shape of the model, however it stands, in the unit frame; and what is to be
+    said of that, where it is none of the family.
+
+    Raises what `load_shape` raises.
+    """
+    shape = load_shape(path)
+    target = Target.of_shape(shape, seed=seed)
+    found, turn = reconstruct_standing(model, target, ways_to_stand(shape.up), settings, seed)
+    return found, tuple(familiarity(found, target.turned(turn)).warnings())
 
 
 def open_source(text: str, model: str | None = None) -> Source:

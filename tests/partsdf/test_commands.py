@@ -78,12 +78,19 @@ def test_encoder_and_generator(
     Path("made/sample_00.json").rename("kept.json")
     assert main([*make, "-n", "1", "--poses", "kept.json"]) == 0
     assert not Path("made/sample_01.json").exists()
+    assert main([*make, "-n", "1", "--like", f"{file}:lamp0", "--change", "0.1"]) == 0
+    about = json.loads(Path("made/samples.json").read_text())
+    assert about["like"] == {"shape": f"{file}:lamp0", "change": 0.1}
+    assert about["samples"][0]["parts"] == ["plate", "ball", "knob"]
+    assert Image.open("made/samples.png").width == 480  # itself first
+    assert main([*make, "--like", f"{file}:lamp0", "--change", "0"]) == 2
     assert main([*make, "--keep", "plate"]) == 2
     assert main([*make, "--poses", f"{file}:0", "--keep", "plate", "--of", f"{file}:0"]) == 2
     assert main([*make, "-n", "0"]) == 2
     said = capsys.readouterr().err
     assert "--keep PARTS and --of SHAPE go together" in said
     assert "give one of them" in said
+    assert "--change is 0.0; expected above 0" in said
     assert "0 samples: expected 1 or more" in said
     assert main(["parts", "train-encoder", str(file), str(lamps.folder), "-o", "encoder.bin"]) == 2
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import torch
+import trimesh
 
 from partwright.errors import ModelError, SettingError
 from partwright.partsdf.companions import beside
@@ -17,6 +18,8 @@ from partwright.partsdf.generator_training import gaussian_samples, train_genera
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
+from partwright.partsdf.settings import ReconstructionSettings
+from partwright.partsdf.sources import found_in
 
 SMALL = GeneratorSettings(width=48, heads=2, blocks=2)
 
@@ -71,6 +74,50 @@ def test_samples_are_lamps_by_their_seed(generator: Generator) -> None:
         torch.testing.assert_close(one.latents, same.latents, atol=1e-4, rtol=0)
     other = generator.generate(1, seed=4)[0]
     assert (other.latents - few[0].latents).abs().max() > 0.01
+
+
+def test_samples_are_as_like_a_shape_as_is_asked_for(generator: Generator) -> None:
+    """A knob stays a knob where little is changed; where all is, the samples are those of noise alone."""
+    model = generator.model
+    source = NeuralShape.trained(model, "lamp0")
+
+    def apart(change: float) -> float:
+        made = generator.generate(8, 1, source, change=change)
+        return float(torch.stack([(s.poses.scale - source.poses.scale).abs().mean() for s in made]).mean())
+
+    little, some, all_of_it = apart(0.05), apart(0.5), apart(1.0)
+    assert little < 0.5 * some
+    assert some < all_of_it
+    near = generator.generate(8, 1, source, change=0.1)
+    assert all(torch.equal(one.present, source.present) for one in near)
+    assert len({float(one.poses.scale[0, 0]) for one in near}) == 8
+    new, free = generator.generate(8, 1, source, change=1.0), generator.generate(8, 1)
+    for one, other in zip(new, free, strict=True):  # the schedule leaves a thousandth of the signal
+        assert (one.poses.translation - other.poses.translation).abs().max() < 0.1
+    with pytest.raises(SettingError, match="expected above 0 and at most 1"):
+        generator.generate(1, 0, source, change=1.5)
+    with pytest.raises(SettingError, match="of which shape"):
+        generator.generate(1, 0, change=0.5)
+    with pytest.raises(SettingError, match="choose one"):
+        generator.generate(1, 0, source, keep=["plate"], change=0.5)
+
+
+def test_a_mesh_is_found_as_it_stands_in_the_family(generator: Generator, tmp_path: Path) -> None:
+    """Turned by a quarter and larger: the plate is found with its sides in the family's order."""
+    turned = trimesh.transformations.rotation_matrix(math.pi / 2, (0, 0, 1))
+    plate = trimesh.creation.box((1.6, 1.2, 0.3))
+    ball = trimesh.creation.icosphere(3, 0.38)
+    ball.apply_translation((0.2, 0, 0.15 + 0.38))
+    mesh = trimesh.util.concatenate([plate, ball])
+    mesh.apply_transform(trimesh.transformations.scale_matrix(30) @ turned)
+    mesh.export(tmp_path / "lamp.ply")
+    few = ReconstructionSettings(iterations=60, points=400, starts=2)
+    found, warnings = found_in(generator.model, tmp_path / "lamp.ply", few)
+    assert found.model is generator.model
+    assert "ball" in found.names()
+    size = found.poses.scale[0]
+    assert size[0] > size[1] > size[2]
+    assert isinstance(warnings, tuple)
 
 
 def test_parts_and_poses_may_be_kept(generator: Generator) -> None:

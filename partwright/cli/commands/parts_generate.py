@@ -6,21 +6,23 @@ import argparse
 import json
 import math
 import re
+from pathlib import Path
 
 from partwright.atomic_io import replacing_files
 from partwright.cli.parts_generate import sample_name
 from partwright.cli.progress import Work
-from partwright.cli.terminal import counted, say
+from partwright.cli.terminal import counted, say, warn
 from partwright.errors import SettingError
 from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.generator import load_generator
 from partwright.partsdf.meshing import resolution_for_wall
-from partwright.partsdf.model import load_model
+from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
 from partwright.partsdf.pictures import picture
-from partwright.partsdf.sources import open_source
+from partwright.partsdf.sources import found_in, open_source
 from partwright.render import Camera, sheet, write_png
+from partwright.shapes import SUFFIXES
 
 _PANEL, _COLUMNS = 240, 4  # pixels
 _COARSE, _FINEST = 64, 192  # cells
@@ -30,11 +32,14 @@ _STALE = re.compile(r"sample_\d+\.json")
 def run(arguments: argparse.Namespace) -> int:
     model = load_model(arguments.model)
     generator = load_generator(model)
-    source, keep = _kept(arguments)
-    with Work("making") as work:
+    _check(arguments)
+    with Work("reading") as work:
+        source, keep = _kept(arguments, model)
+        work.stage("making")
         samples = generator.generate(
-            arguments.count, arguments.seed, source, keep, keep_layout=arguments.poses is not None
-        )
+            arguments.count, arguments.seed, source, keep, keep_layout=arguments.poses is not None,
+            change=arguments.change if arguments.like else 0.0,
+        )  # fmt: skip
         work.stage("comparing")
         nearest = [nearest_training_shape(one) for one in samples]
         work.stage("drawing")
@@ -43,10 +48,14 @@ def run(arguments: argparse.Namespace) -> int:
             pictures.append(picture(one, _resolution(one), _PANEL, camera))
             work.show((i + 1) / len(samples))
         captions = [f"{i}: {100 * far:.1f} from {name}" for i, (name, far) in enumerate(nearest)]
+        if arguments.like and source is not None:
+            pictures.insert(0, picture(source, _resolution(source), _PANEL, camera))
+            captions.insert(0, "like this")
         about = {
             "model": {"name": model.name, "hash": model.hash},
             "seed": arguments.seed,
             "kept": list(keep) or ("poses" if arguments.poses else []),
+            "like": {"shape": arguments.like, "change": arguments.change} if arguments.like else None,
             "samples": [
                 {
                     "file": sample_name(i, len(samples)),
@@ -77,12 +86,25 @@ def _resolution(shape: NeuralShape) -> int:
     return min(_FINEST, resolution_for_wall(float(shape.walls().min(initial=math.inf)), _COARSE))
 
 
-def _kept(arguments: argparse.Namespace) -> tuple[NeuralShape | None, list[str]]:
-    """The shape of which something stays, and its parts that do."""
-    if arguments.poses is not None and (arguments.keep or arguments.of):
-        raise SettingError("--poses keeps the poses of all parts, --keep some parts whole; give one of them")
+def _check(arguments: argparse.Namespace) -> None:
+    given = [name for name in ("keep", "poses", "like") if getattr(arguments, name)]
+    if len(given) > 1:
+        raise SettingError(
+            "--poses keeps the poses of all parts, --keep some parts whole, --like nothing quite; "
+            "give one of them"
+        )
     if bool(arguments.keep) != bool(arguments.of):
         raise SettingError("--keep PARTS and --of SHAPE go together: which parts stay, and of which shape")
-    text = arguments.of or arguments.poses
+    if not 0 < arguments.change <= 1:
+        raise SettingError(f"--change is {arguments.change}; expected above 0 and at most 1")
+
+
+def _kept(arguments: argparse.Namespace, model: Model) -> tuple[NeuralShape | None, list[str]]:
+    """The shape of which something stays, and its parts that do."""
+    if arguments.like and Path(arguments.like).suffix.lower() in SUFFIXES:
+        found, warnings = found_in(model, arguments.like, seed=arguments.seed)
+        warn(warnings)
+        return found, []
+    text = arguments.of or arguments.poses or arguments.like
     keep = [name.strip() for name in arguments.keep.split(",")] if arguments.keep else []
     return (open_source(text, arguments.model).shape if text else None), keep
