@@ -11,6 +11,7 @@ from partwright.errors import ParameterError
 from partwright.fields.profile import Corner, Profile, Side
 
 _NEWTON, _CONVERGED = 50, 1e-11
+_ROUNDED = 1e-14  # of coordinates
 _SMOOTH = 1e-6  # radians: sides that turn by less run on smoothly
 
 
@@ -48,7 +49,7 @@ def offset(profile: Profile, depth: float, curved: bool = False) -> tuple[Profil
                 bend = turn_between(sides[i - 1], side)
                 corners.append((*arrive, math.tan(bend / 4)))
                 grown.append((side.start, None))
-            bulge = _kept(side, leave, begins[(i + 1) % count][0], depth, curved)
+            bulge = kept_bulge(side, leave, begins[(i + 1) % count][0], depth, curved)
             corners.append((*leave, bulge))
             grown.append((side.start, side))
         loops.append(tuple(corners))
@@ -102,7 +103,7 @@ def _begin(before: Side, after: Side, depth: float, curved: bool) -> tuple[Point
         (ax, ay), (bx, by) = (corner + depth * a).tolist(), (corner + depth * b).tolist()
         return (ax, ay), (bx, by)
     if curved and (before.centre is not None or after.centre is not None):
-        return (point := _crossing(before, after, depth)), point
+        return (point := parallels_cross(before, after, depth, depth)), point
     if before.centre is not None or after.centre is not None:
         raise ParameterError(
             f"profile: at ({after.start[0]:.6g}, {after.start[1]:.6g}) an arc meets a side at a corner, "
@@ -112,18 +113,24 @@ def _begin(before: Side, after: Side, depth: float, curved: bool) -> tuple[Point
     return (point := (x, y)), point
 
 
-def _crossing(before: Side, after: Side, depth: float) -> Point:
-    """Where the parallels of two sides meet that meet at a corner, one of them an arc: by Newton's method."""
+def parallels_cross(before: Side, after: Side, deep: float, deeper: float) -> Point:
+    """Where the parallels of two sides that meet at a corner meet, each so deep within: by Newton's method.
+
+    Raises:
+        ParameterError: they do not.
+    """
+    depth = max(abs(deep), abs(deeper))
     at = np.array(after.start)
+    near = _CONVERGED * depth + _ROUNDED * (float(np.abs(at).max()) + before.radius + after.radius)
     for _ in range(_NEWTON):
-        pairs = [_parallel(side, at, depth, end) for side, end in ((before, True), (after, False))]
+        pairs = [_parallel(before, at, deep, True), _parallel(after, at, deeper, False)]
         off = np.array([distance for distance, _ in pairs])
         slopes = np.array([direction for _, direction in pairs])
         if abs(np.linalg.det(slopes)) < _SMOOTH:
             raise _too_deep(depth)
         step = np.linalg.solve(slopes, off)
         at = at - step
-        if np.linalg.norm(step) <= _CONVERGED * depth:
+        if np.linalg.norm(step) <= near:
             break
     else:
         raise _too_deep(depth)
@@ -143,14 +150,15 @@ def _parallel(side: Side, at: np.ndarray, depth: float, at_end: bool) -> tuple[f
     return deep - depth, way / max(reach, 1e-300)
 
 
-def _kept(side: Side, start: Point, end: Point, depth: float, curved: bool) -> float:
+def kept_bulge(side: Side, start: Point, end: Point, depth: float, curved: bool) -> float:
     """The bulge of a side's parallel between two points. Raises ParameterError where nothing is left."""
     way = np.subtract(end, start)
     if side.centre is None:
-        if way @ side.direction() <= 1e-9 * depth:
+        if way @ side.direction() <= 1e-9 * abs(depth):
             raise _too_deep(depth)
         return 0.0
-    if side.sweep > 0 and side.radius - depth <= 1e-9 * depth:
+    shrinks = depth if side.sweep > 0 else -depth
+    if side.radius - shrinks <= 1e-9 * abs(depth):
         raise _too_deep(depth)
     first, last = (np.subtract(p, side.centre) for p in (start, end))
     sweep = math.atan2(first[0] * last[1] - first[1] * last[0], first @ last)

@@ -14,6 +14,7 @@ from partwright.fields.base import LARGEST, checked, normalise, number
 from partwright.fields.operations import library
 from partwright.fields.profile import Loop, Profile
 from partwright.fields.profile_distance import profile_distance, profile_gradients
+from partwright.fields.profile_growth import grown_profile
 from partwright.fields.swept import Swept, SweptGradients
 
 _TINY = 1e-30
@@ -52,6 +53,10 @@ class Revolution(Swept):
         """(V,) which sides bound the solid: all but those along the axis."""
         sides = [side for loop in self.profile.sides for side in loop]
         return np.array([s.centre is not None or s.start[0] != 0 or s.end[0] != 0 for s in sides])
+
+    def grown_profile(self, by: float) -> Profile:
+        """The profile with all sides but those on the axis further out; see `profile_growth`."""
+        return grown_profile(self.profile, by, still=np.flatnonzero(~self._off_axis).tolist())
 
     @property
     def full(self) -> bool:

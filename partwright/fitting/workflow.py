@@ -170,8 +170,6 @@ class _Task:
         }
         check_able(found, *(ability for ability, wanted in asked.items() if wanted))
         own = _settings(found, method, quality, suitable(found, settings))
-        if limits and getattr(own, "profiles", False):
-            own = replace(own, profiles=False)  # bounds move no profile
         target, curve = getattr(own, "min_iou", None), bool(getattr(own, "curve", False))
         if pieces is not None and curve:
             raise SettingError("a curve is of one assembly; fit the shape as a whole, or leave it out")

@@ -14,7 +14,9 @@ import numpy as np
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.rows import as_superfrustum
 from partwright.errors import ParameterError
-from partwright.fields import Field, SuperFrustum
+from partwright.fields import Extrusion, Field, Revolution, SuperFrustum, Swept
+from partwright.fields.extrusion import RIMS
+from partwright.fields.profile_growth import grown_profile
 from partwright.fields.solids import (
     Box,
     Capsule,
@@ -74,12 +76,17 @@ def _resized(assembly: Assembly, part: Part, by: float) -> Assembly:
         new = grown(part, by)
     except ParameterError:
         new = None
-    if new is not None and as_superfrustum(new.field).thinnest > _THINNEST:
+    if new is not None and _thinnest(new.field) > _THINNEST:
         return assembly.replace_part(part.name, new)
     try:
         return assembly.without(part.name)
     except ParameterError:  # it is all there is
         return assembly
+
+
+def _thinnest(field: Field) -> float:
+    """A profile that grows checks itself."""
+    return field.wall if isinstance(field, Swept) else as_superfrustum(field).thinnest
 
 
 def grown(part: Part, by: float) -> Part:
@@ -104,6 +111,18 @@ def _dilated(field: SuperFrustum, by: float) -> SuperFrustum:
     onion = hole / max(min(x, y) / 2, 1e-12) if hole else 0.0
     bulge = min(field.bulge, tightest_bulge(x, z))
     return replace(field, dilation=0.0, size=(x, y, z), bulge=bulge, onion=onion)
+
+
+def _grown_extrusion(field: Extrusion, by: float) -> Extrusion:
+    """Walls that lean stay as steep, rims as they are in a parallel surface."""
+    lean = math.radians(field.taper)
+    out = by * (1 / math.cos(lean) + math.tan(lean))  # at the lower end, which is further down
+    rims = {name: value for name in RIMS if (value := getattr(field, name))}
+    rims = {
+        name: max(0.0, value + by * (1.0 if "fillet" in name else 2 - math.sqrt(2)))
+        for name, value in rims.items()
+    }
+    return replace(field, profile=grown_profile(field.profile, out), height=field.height + 2 * by, **rims)
 
 
 def _grown(field: Field, by: float) -> tuple[Field, float]:
@@ -141,4 +160,8 @@ def _grown(field: Field, by: float) -> tuple[Field, float]:
             # the hole narrows where its wall is thinnest in proportion, and a little more elsewhere
             wall = field.thickness + 2 * out + 2 * abs(along)
             return HollowFrustum(bottom, top, wall, field.height + 2 * by), 0.0
+        case Extrusion():
+            return _grown_extrusion(field, by), 0.0
+        case Revolution():  # whose flat ends, where it is no whole turn, stay
+            return replace(field, profile=field.grown_profile(by)), 0.0
     raise ParameterError(f"a field of kind {field.kind!r} has no offset of its own kind")

@@ -2,13 +2,14 @@
 
 The chain rule in two halves: how the tree's fold weighs each copy of each leaf at a point, in closed form,
 and how a copy's own distance moves with its leaf's numbers, by central differences in the kernel. So any tree
-of SuperFrusta and named solids will do: blends, differences, and repeats whose copies move as one.
+of SuperFrusta, named solids, extrusions and revolutions will do: blends, differences, and repeats whose
+copies move as one.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -19,9 +20,10 @@ from partwright.assembly.rows import rows
 from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Node
 from partwright.errors import ParameterError
-from partwright.fields import Field, SuperFrustum, kernel
+from partwright.fields import Extrusion, Field, Revolution, SuperFrustum, Swept, kernel
 from partwright.fields.columns import ROTATION_STEP, TRANSLATION_STEP, Tangent
 from partwright.fields.operations import SHARP
+from partwright.fields.profile_growth import grown_profile
 from partwright.fields.superfrustum import tightest_bulge
 
 _POSE = Tangent.SX  # numbers of the pose come first, as in the kernel's steps; a SuperFrustum's are those
@@ -46,6 +48,21 @@ class Slope:
     """(N, P) its derivatives by the free numbers of all leaves, leaf by leaf."""
 
 
+def copies_at(parts: Sequence[Part], points: NDArray[np.float32]) -> Floats:
+    """(C, N) distances of the copies of all parts at points (N, 3), part by part."""
+    rest = [part for part in parts if not isinstance(part.field, Swept)]
+    found = iter(kernel.evaluate_parts(rows(rest), points).astype(np.float64) if rest else ())
+    values = []
+    for part in parts:
+        for copy in part.copies:
+            if isinstance(part.field, Swept):
+                local = (points - np.array(copy.translation)) @ rotation_matrix(copy.rotation)
+                values.append(np.asarray(part.field(local), np.float64))
+            else:
+                values.append(next(found))
+    return np.stack(values)
+
+
 def free_numbers(part: Part) -> NDArray[np.bool_]:
     """Which of a leaf's numbers may move: its place, its turn unless it stands along the axes, its lengths,
     of a SuperFrustum's other numbers those that are not plain, and last its blend unless that is 0."""
@@ -60,7 +77,12 @@ def free_numbers(part: Part) -> NDArray[np.bool_]:
 
 
 def numbers(field: Field) -> Floats:
-    """The field's numbers in the order of its declaration, triples flattened."""
+    """The field's numbers in the order of its declaration, triples flattened.
+
+    Of a profile that is moved or turned, how much further out it lies than it does, which is 0, and the
+    height: its corners keep what they are to one another."""
+    if isinstance(field, Swept):
+        return np.array([0.0, field.height] if isinstance(field, Extrusion) else [0.0])
     return np.concatenate([np.atleast_1d(getattr(field, f.name)) for f in fields(field)])  # type: ignore[arg-type]
 
 
@@ -70,6 +92,11 @@ def with_numbers(field: Field, values: Floats) -> Field:
     Raises:
         ParameterError: they are out of its range.
     """
+    if isinstance(field, Extrusion):
+        profile = grown_profile(field.profile, float(values[0])) if values[0] else field.profile
+        return replace(field, profile=profile, height=float(values[1]))
+    if isinstance(field, Revolution):
+        return replace(field, profile=field.grown_profile(float(values[0]))) if values[0] else field
     new, at = {}, 0
     for entry in fields(field):  # type: ignore[arg-type]
         old = getattr(field, entry.name)
@@ -158,7 +185,7 @@ def _smooth_minimum(a: Floats, b: Floats, k: float) -> tuple[Floats, Floats, Flo
 
 def weigh(assembly: Assembly, points: NDArray[np.float32]) -> tuple[Floats, Floats]:
     """F (N,) at points (N, 3), and its derivative (L, N) by each leaf's distance, all copies added."""
-    copies = kernel.evaluate_parts(rows(assembly.parts), points).astype(np.float64)
+    copies = copies_at(assembly.parts, points)
     value, shares = fold(assembly, iter(copies))
     firsts = np.cumsum([0, *(len(part.copies) for part in assembly.parts[:-1])])
     return value, np.add.reduceat(np.stack([share.by_value for share in shares]), firsts, axis=0)
@@ -166,7 +193,7 @@ def weigh(assembly: Assembly, points: NDArray[np.float32]) -> tuple[Floats, Floa
 
 def slope(assembly: Assembly, points: NDArray[np.float32], free: list[NDArray[np.bool_]]) -> Slope:
     """F and its derivatives at points (N, 3); `free` marks each leaf's numbers that may move."""
-    copies = kernel.evaluate_parts(rows(assembly.parts), points).astype(np.float64)
+    copies = copies_at(assembly.parts, points)
     value, shares = fold(assembly, iter(copies))
     columns, at = [np.empty((len(points), 0))], 0
     for part, may in zip(assembly.parts, free, strict=True):
@@ -190,8 +217,11 @@ def _leaf_slope(part: Part, points: NDArray[np.float32], may: NDArray[np.bool_],
         step[number] = _STEP
         pair = [_moved_or_same(part, step), _moved_or_same(part, -step)]
         ends += pair
-        width.append(2 * _STEP if number < _POSE else _apart(pair[0], pair[1], int(number) - _POSE))
-    values = kernel.evaluate_parts(rows(ends), points).astype(np.float64)
+        if number < _POSE or (isinstance(part.field, Swept) and number == _POSE):
+            width.append(_STEP * sum(end is not part for end in pair))
+        else:
+            width.append(_apart(pair[0], pair[1], int(number) - _POSE))
+    values = copies_at(ends, points)
     high, low = np.moveaxis(values.reshape(len(width), 2, count, -1), 1, 0)
     return np.asarray((high - low) / np.maximum(width, _STEP / 10)[:, None, None])
 

@@ -16,17 +16,22 @@ from partwright.fields import (
     Capsule,
     Cone,
     Cylinder,
+    Extrusion,
     Frustum,
     HollowBox,
+    Profile,
+    Revolution,
     Sphere,
     SuperFrustum,
     Torus,
     Tube,
 )
+from partwright.fields.profile import circle
 from partwright.tolerances.feasible_offset import grown
 from partwright.tolerances.leaves import free_numbers, moved, numbers, slope, weigh, with_numbers
 from tests.tolerances.shapes import ALL
 
+PLATE = Profile([(-0.5, -0.4), (0.5, -0.4, 0.5), (0.5, 0.3), (0, 0.3), (-0.5, 0.1)], [circle(0.15)])
 SOLIDS = (
     Box((0.8, 0.5, 0.3)),
     Cylinder(0.4, 0.7),
@@ -40,6 +45,10 @@ SOLIDS = (
     Frustum(0.3, 0.5, 0.6),
     SuperFrustum((0.6, 0.4, 0.5), 0.5, 0.05, 0.8),
     SuperFrustum((0.6, 0.6, 0.5), 1.0, 0.0, 1.0, 0.0, 0.6),
+    Extrusion(PLATE, 0.4),
+    Extrusion(Profile.rectangle(0.8, 0.6, 0.2), 0.5, top_fillet=0.15, bottom_chamfer=0.1),
+    Extrusion(Profile.rectangle(0.9, 0.8, 0.3), 0.3, 10),
+    Revolution(Profile([(0, -0.3), (0.5, -0.3), (0.5, 0.1), (0.3, 0.3, 0.3), (0, 0.35)])),
 )
 POINTS = np.random.default_rng(0).uniform(-1, 1, (4000, 3)).astype(np.float32)
 
@@ -51,9 +60,20 @@ def test_the_fold_is_the_assemblys_own_distance(name: str) -> None:
     np.testing.assert_allclose(value, assembly.distance(POINTS), atol=2e-5)
 
 
-@pytest.mark.parametrize("name", ALL)
+def profiles() -> pw.Assembly:
+    """Two copies of a plate with a rim, a hole in it, and a turned knob."""
+    plate = pw.Part(
+        Extrusion(PLATE, 0.4, top_fillet=0.05),
+        (0, 0, -0.3),
+        instances=(pw.assembly.Similarity(translation=(0.2, 0, 0.5)),),
+    )
+    knob = pw.Part(SOLIDS[-1], (0.3, 0.2, 0.2), (0.9, 0.2, 0.3, 0.1))
+    return (plate | knob) - pw.Part(Extrusion(Profile.regular(6, 0.2), 1.0))
+
+
+@pytest.mark.parametrize("name", [*ALL, "profiles"])
 def test_slopes_are_finite_differences_of_the_whole(name: str) -> None:
-    assembly = ALL[name]()[1]
+    assembly = profiles() if name == "profiles" else ALL[name]()[1]
     free = [free_numbers(part) for part in assembly.parts]
     by_number, column, step = slope(assembly, POINTS, free).by_number, 0, 4e-3
     for part, may in zip(assembly.parts, free, strict=True):

@@ -1,0 +1,70 @@
+"""A profile with all of its sides further out: corners stay corners, arcs stay about their centres."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+import numpy as np
+
+from partwright.errors import ParameterError
+from partwright.fields.profile import Corner, Loop, Profile, Side
+from partwright.fields.profile_offset import Point, kept_bulge, parallels_cross, turn_between
+
+_NEARLY_SMOOTH = 0.02  # radians: where sides run into one another, their corner moves along their normal
+
+
+def grown_profile(profile: Profile, by: float, still: Collection[int] = ()) -> Profile:
+    """The profile with its sides moved outwards by a length, or inwards where it is negative; holes narrow.
+
+    still: sides, counted over all loops, that stay where they are. Unlike the points within a distance, it
+    has as many corners as before, and a sharp one goes further.
+
+    Raises:
+        ParameterError: a side vanishes, or sides cross.
+    """
+    loops, at = [], 0
+    for sides in profile.sides:
+        depths = [0.0 if at + i in still else -by for i in range(len(sides))]
+        loops.append(_grown_loop(sides, depths))
+        at += len(sides)
+    result = Profile(loops[0], tuple(loops[1:]))
+    if any(_area(a) * _area(b) <= 0 for a, b in zip(loops, profile.loops, strict=True)):
+        raise ParameterError(f"profile: nothing is left of a loop {-by:.6g} further inside")
+    return result
+
+
+def _grown_loop(sides: tuple[Side, ...], depths: list[float]) -> Loop:
+    count = len(sides)
+    starts = [
+        _corner(sides[i - 1], sides[i], depths[i - 1], depths[i])
+        if depths[i - 1] or depths[i]
+        else sides[i].start
+        for i in range(count)
+    ]
+    corners: list[Corner] = []
+    for i, side in enumerate(sides):
+        bulge = kept_bulge(side, starts[i], starts[(i + 1) % count], depths[i], curved=True)
+        corners.append((*starts[i], bulge))
+    return tuple(corners)
+
+
+def _corner(before: Side, after: Side, deep: float, deeper: float) -> Point:
+    if abs(turn_between(before, after)) > _NEARLY_SMOOTH:
+        return parallels_cross(before, after, deep, deeper)
+    x, y = before.direction(at_end=True) + after.direction()
+    inwards = np.array([-y, x]) / math.hypot(x, y)
+    px, py = (np.array(after.start) + (deep + deeper) / 2 * inwards).tolist()
+    return px, py
+
+
+def _area(loop: Loop) -> float:
+    """Signed, of its chords with what is between these and the arcs."""
+    chords = sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(loop, (*loop[1:], loop[0]), strict=True)) / 2
+    arcs = 0.0
+    for a, b in zip(loop, (*loop[1:], loop[0]), strict=True):
+        if a[2]:
+            sweep, half = 4 * math.atan(a[2]), math.dist(a[:2], b[:2]) / 2
+            radius = half * (1 + a[2] ** 2) / (2 * abs(a[2]))
+            arcs += radius**2 / 2 * (sweep - math.sin(sweep))
+    return chords + arcs
