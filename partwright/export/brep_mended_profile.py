@@ -7,13 +7,18 @@ import math
 from collections.abc import Iterator
 from contextlib import suppress
 
+import numpy as np
+from manifold3d import CrossSection, FillRule
+
 from partwright.approximation.sketches.pinches import unpinched
+from partwright.approximation.sketches.slits import section_of, touches_itself, without_slits
 from partwright.errors import ParameterError
 from partwright.fields import Extrusion, Revolution, Swept
 from partwright.fields.profile import Loop, Profile
 
 _APART = 2e-4  # of the profile's size: how far corners that are one are moved apart
 _CHORD = 5e-4  # of the profile's size: how far the chords of an arc lie from it
+_SAME_AREA = 5e-3  # by which closed slits may change the area
 _MOST_ARCS = 24  # that are tried one by one
 
 
@@ -24,11 +29,21 @@ def mended(field: Swept) -> Iterator[tuple[Swept, float]]:
     outline, holes = unpinched(profile.outline, distance / 2)
     if holes:
         yield from _with_profile(field, (outline, *profile.holes, *holes), distance)
-    arcs = [(i, k) for i, sides in enumerate(profile.sides) for k, side in enumerate(sides) if side.sweep]
     chord = _CHORD * profile.size
+    if touches_itself(profile.loops, distance / 10):
+        for apart in without_slits(section_of(profile, chord), distance):
+            if abs(apart.area() / profile.area - 1) < _SAME_AREA:
+                yield from _with_profile(field, _loops_of(apart), chord + distance)
+    arcs = [(i, k) for i, sides in enumerate(profile.sides) for k, side in enumerate(sides) if side.sweep]
     for arc in arcs[:_MOST_ARCS]:
         yield from _with_profile(field, _in_chords(profile, {arc}, chord), chord)
     yield from _with_profile(field, _in_chords(profile, set(arcs), chord), chord)
+
+
+def _loops_of(section: CrossSection) -> tuple[Loop, ...]:
+    lines = [np.asarray(line) for line in section.to_polygons()]
+    lines.sort(key=lambda line: -CrossSection([line], FillRule.EvenOdd).area())
+    return tuple(tuple((x, y, 0.0) for x, y in line.tolist()) for line in lines)
 
 
 def _with_profile(field: Swept, loops: tuple[Loop, ...], off: float) -> Iterator[tuple[Swept, float]]:

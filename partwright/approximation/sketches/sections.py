@@ -13,6 +13,7 @@ from manifold3d import CrossSection, FillRule, Manifold
 from partwright.approximation.sketches.outlines import fitted_loop
 from partwright.approximation.sketches.pinches import unpinched
 from partwright.approximation.sketches.rims import Leaning
+from partwright.approximation.sketches.slits import TOUCHING, touches_itself, without_slits
 from partwright.errors import ParameterError
 from partwright.fields.profile import Loop, Profile
 
@@ -26,6 +27,7 @@ _LEAST_FLAT = 2e-4  # of the bounding rectangle: area of a level
 _SAME_LEVEL = 2e-3
 _MOST_LEVELS = 24
 _ROUNDING = 2e-5  # unit lengths
+_SLIT = 1.5  # tolerances: half the width of what is closed or cut where an outline touches itself
 _SLIVER = 3e-5  # unit areas
 
 
@@ -131,7 +133,8 @@ def profile_of(section: CrossSection) -> Profile | None:
     return fine
 
 
-def _profile(section: CrossSection, tolerance: float) -> Profile | None:
+def _profile(section: CrossSection, tolerance: float, mended: bool = False) -> Profile | None:
+    """mended: whether slits and necks that the tolerance would close or cut are no more."""
     polygons = [np.asarray(p) for p in section.to_polygons()]
     if not polygons:
         return None
@@ -145,7 +148,12 @@ def _profile(section: CrossSection, tolerance: float) -> Profile | None:
         if loop is not None and abs(_loop_area(p)) > _SLIVER
     ]
     outline, more = unpinched(loops[0], FINE)
-    return _valid(outline, holes + more)
+    profile = _valid(outline, holes + more)
+    if profile is None or not touches_itself(profile.loops, TOUCHING):
+        return profile
+    tried = () if mended else without_slits(section, _SLIT * tolerance)
+    simple = (_profile(one, tolerance, True) for one in tried)
+    return next((one for one in simple if one is not None), None)
 
 
 def _valid(outline: Loop, holes: Sequence[Loop]) -> Profile | None:
