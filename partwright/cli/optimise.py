@@ -79,7 +79,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--simulate",
         metavar="AIR",
         help="at the end, the drag before and after by OpenFOAM (minutes), the air moving along x, -y ...: "
-        "AXIS[,ground][,cells=N][,iterations=N][,speed=V][,seconds=S]",
+        "AXIS[,ground][,cells=N][,iterations=N][,speed=V][,seconds=S][,turning=PARTS]; PARTS is a pattern of "
+        "wheels that roll on the ground",
     )
     limits = command.add_argument_group("how far parts may go").add_argument
     limits(

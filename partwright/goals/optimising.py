@@ -15,6 +15,7 @@ from partwright.assembly import Assembly
 from partwright.atomic_io import replacing_files
 from partwright.goals.curves import curves
 from partwright.goals.flow import Air, Skin, simulate
+from partwright.goals.flow.wheels import surface_speeds
 from partwright.goals.pictures import before_and_after, trajectory
 from partwright.goals.problem import Options, Point, Problem
 from partwright.goals.report import report
@@ -40,10 +41,12 @@ class Optimised:
     """And the pressure on both."""
 
     def with_simulation(self, air: str | Air) -> Optimised:
-        """The same, with the drag of both ends by OpenFOAM: "x", "-y,ground,cells=64", or an `Air`.
+        """The same, with the drag of both ends by OpenFOAM: "x", "-y,ground,cells=64,turning=wheel_*", or an
+        `Air`.
 
         Raises:
             MissingDependencyError: OpenFOAM is not installed.
+            SettingError: no part is called as those that are to turn.
             SimulationError: a simulation failed, diverged or took too long.
         """
         air = Air.of(air, self.start.up) if isinstance(air, str) else air
@@ -52,7 +55,10 @@ class Optimised:
         skins = []
         with tempfile.TemporaryDirectory(prefix="partwright-") as folder:
             for name, point in ends.items():
-                one = simulate(point.surface, Path(folder, name), air, self.metres)
+                speeds = None
+                if air.turning:
+                    speeds = surface_speeds(point.assembly, point.surface, air, self.metres)
+                one = simulate(point.surface, Path(folder, name), air, self.metres, speeds)
                 found[name] = one.to_dict()
                 skins.append(one.skin)
         return replace(self, simulated=found, skins=tuple(skins))

@@ -14,6 +14,7 @@ from partwright.goals import Optimised, Options, Step, optimise
 from partwright.goals.flow.air import Air
 from partwright.goals.flow.programs import check_installed
 from partwright.goals.flow.surrogate import Surrogate
+from partwright.goals.flow.wheels import turning_parts
 from partwright.goals.objectives.surrogate import outside
 from partwright.methods import Cancellation
 
@@ -39,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
         still=arguments.still,
     )
     if arguments.simulate is not None:
-        Air.of(arguments.simulate, assembly.up)
+        turning_parts(assembly, Air.of(arguments.simulate, assembly.up))
         check_installed()
     cancel = Cancellation()
     with Count("optimising") as count, stopping(cancel.request):

@@ -18,7 +18,8 @@ class Air:
     """How a body is simulated.
 
     flow: the axis along which the air moves (x, -y ...). ground: the axis at whose lower end a ground moves
-    with the air ("z": below), or "" for free air. speed: m/s. cells: along the longest side, near it (4,
+    with the air ("z": below), or "" for free air. turning: pattern of the names of parts that roll on it, or
+    "". speed: m/s. cells: along the longest side, near it (4,
     8, 16, 32 ...). iterations: of the steady solver. time_limit: seconds, of all programs together.
 
     Raises:
@@ -31,6 +32,7 @@ class Air:
     cells: int = 32
     iterations: int = 200
     time_limit: float = 1800.0
+    turning: str = ""
 
     def __post_init__(self) -> None:
         if not (self.speed > 0 and self.cells >= BACKGROUND and self.iterations >= 1 and self.time_limit > 0):
@@ -42,16 +44,21 @@ class Air:
                 f"the ground along {self.ground} stands in the way of a flow along {self.flow}"
             )
 
+        if self.turning and not self.ground:
+            raise SettingError("air: what turns needs a ground to roll on: y,ground,turning=wheel_*")
+
     @classmethod
     def of(cls, text: str, up: str | None = None) -> Air:
-        """Of AXIS[,ground][,cells=N][,iterations=N][,speed=V][,seconds=S]. up: of the assembly.
+        """Of AXIS[,ground][,cells=N][,iterations=N][,speed=V][,seconds=S][,turning=PARTS].
+
+        up: of the assembly.
 
         Raises:
             SettingError: it says something else.
         """
         first, *others = [part.strip() for part in text.split(",")]
         values: dict[str, Any] = {}
-        kinds = {"cells": int, "iterations": int, "speed": float, "seconds": float}
+        kinds = {"cells": int, "iterations": int, "speed": float, "seconds": float, "turning": str}
         for other in others:
             name, _, value = other.partition("=")
             try:
@@ -61,8 +68,8 @@ class Air:
                     values["time_limit" if name == "seconds" else name] = kinds[name](value)
             except (KeyError, ValueError) as error:
                 raise SettingError(
-                    "air: expected AXIS[,ground][,cells=N][,iterations=N][,speed=V][,seconds=S], "
-                    f"got {text!r:.80}"
+                    "air: expected AXIS[,ground][,cells=N][,iterations=N][,speed=V][,seconds=S]"
+                    f"[,turning=PARTS], got {text!r:.80}"
                 ) from error
         axis(first, "x", "air")
         return cls(flow=first or "x", **values)

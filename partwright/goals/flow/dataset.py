@@ -19,7 +19,7 @@ import numpy as np
 import trimesh
 
 from partwright.atomic_io import replacing
-from partwright.errors import SimulationError, UnreadableFileError
+from partwright.errors import SettingError, SimulationError, UnreadableFileError
 from partwright.goals.flow.air import Air
 from partwright.goals.flow.simulation import PRESSURE, simulate
 from partwright.goals.flow.skin import Skin
@@ -69,7 +69,10 @@ def simulate_all(
 
     Raises:
         MissingDependencyError: OpenFOAM is not installed.
+        SettingError: parts are to turn, and these bodies have none.
     """
+    if air.turning:
+        raise SettingError("turning: these bodies are simulated as one; parts turn in partwright optimise")
     output.mkdir(parents=True, exist_ok=True)
     done = []
     for number, (name, body) in enumerate(bodies, 1):
@@ -97,6 +100,7 @@ def simulate_all(
 def key(body: trimesh.Trimesh, air: Air) -> str:
     """Of a body's content, the air around it, and the version of the format."""
     about = {**asdict(air), "time_limit": None, "version": VERSION}
+    del about["turning"]  # "" for bodies without parts
     digest = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
     digest.update(np.ascontiguousarray(body.vertices, np.float64).tobytes())
     digest.update(np.ascontiguousarray(body.faces, np.int64).tobytes())

@@ -16,6 +16,7 @@ from partwright.goals.flow.air import Air
 from partwright.goals.flow.case import write_case
 from partwright.goals.flow.programs import PROGRAMS, SAMPLER, SOLVER, check_installed, run
 from partwright.goals.flow.skin import Skin, read_vtk
+from partwright.goals.flow.wheels import turn_wall
 
 PRESSURE = "pressure"
 _LAST = 0.25  # of the iterations, over which the force is averaged
@@ -44,11 +45,16 @@ class Simulated:
 
 
 def simulate(
-    surface: trimesh.Trimesh, folder: Path, air: Air | None = None, metres: float = 1.0
+    surface: trimesh.Trimesh,
+    folder: Path,
+    air: Air | None = None,
+    metres: float = 1.0,
+    speeds: np.ndarray | None = None,
 ) -> Simulated:
     """The drag of a closed surface, and the pressure on it; the case is left in `folder`, which is made.
 
-    metres: length of the surface's unit.
+    metres: length of the surface's unit. speeds: (F, 3) m/s of its faces, where parts of it turn (see
+    `wheels`).
 
     Raises:
         MissingDependencyError: OpenFOAM is not installed.
@@ -58,6 +64,8 @@ def simulate(
     air, begun, log = air or Air(), time.monotonic(), ""
     blockage = write_case(surface, folder, air, metres)
     for command in PROGRAMS:
+        if command is SOLVER and speeds is not None:
+            turn_wall(folder, surface, speeds, metres)
         text = run(command, folder, air.time_limit - (time.monotonic() - begun))
         log = text if command is SOLVER else log
     area = drag_areas(folder, air)
