@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
-from partwright.partsdf.losses import clamped_error
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.targets import Target
@@ -51,7 +50,7 @@ def familiarity(shape: NeuralShape, target: Target) -> Familiarity:
     losses = replace(shape.model.config.losses, hard=0.0)
     rows = torch.linspace(0, len(target.sdf) - 1, min(_SAMPLES, len(target.sdf))).long()
     whole = torch.from_numpy(shape.distances(target.points[rows].numpy()))
-    residual = float(clamped_error(whole, target.sdf[rows], losses).mean()) / losses.clamp
+    residual = float(target.error(whole, rows, losses).mean()) / losses.clamp
     present = np.flatnonzero(shape.present.numpy()).tolist()
     latents = {shape.model.parts[p]: oddness(shape.model, p, shape.latents[p]) for p in present}
     return Familiarity(shape.model.name, residual, latents)

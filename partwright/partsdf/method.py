@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
-
-import numpy as np
 
 from partwright.assembly import Similarity
 from partwright.errors import SettingError
@@ -54,9 +51,8 @@ class LearnedParts(Method[Settings]):
         model = load_model(settings.model)
         checkpoint = Checkpoint(run.cancel)
         with timed(seconds, "prepare"):
-            target = Target.of_shape(shape, seed=run.seed)
-            rows = np.linspace(0, len(target.sdf) - 1, _PROBED).astype(int)
-            probe = replace(target, points=target.points[rows], sdf=target.sdf[rows])
+            target = Target.seen_in(shape, run.seed)
+            probe = Target.of_shape(shape, _PROBED, run.seed)
             inside = probe.sdf.numpy() < 0
             turns = ways_to_stand(shape.up) if settings.turn else [UPRIGHT]
             checkpoint()

@@ -20,7 +20,7 @@ from partwright.errors import CancelledError, ModelError
 from partwright.methods import Cancellation, Checkpoint
 from partwright.partsdf.config import LossSettings
 from partwright.partsdf.data import pose_tensors, present_parts
-from partwright.partsdf.losses import clamped_error, latent_penalty, terms
+from partwright.partsdf.losses import aggregate, intersection, latent_penalty, terms
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors
@@ -130,7 +130,7 @@ def reconstruct_from(
 def _filling(shape: NeuralShape, target: Target) -> Tensor:
     """(P,) parts that fill at least `LEAST` of the target's inside: what is less is a crumb of a part that
     should not be there (section 5)."""
-    inside = target.points[target.sdf < 0]
+    inside = target.points[target.sdf <= 0]
     if not len(inside):
         return shape.present
     owner = shape.part_distances(inside.numpy()).argmin(axis=0)
@@ -181,7 +181,7 @@ def mean_error(shape: NeuralShape, target: Target, count: int = 8192) -> float:
     """Mean error of the whole shape's distance, at `count` of the target's samples."""
     rows = torch.linspace(0, len(target.sdf) - 1, min(count, len(target.sdf))).long()
     whole = torch.from_numpy(shape.distances(target.points[rows].numpy()))
-    return float(clamped_error(whole, target.sdf[rows], shape.model.config.losses).mean())
+    return float(target.error(whole, rows, shape.model.config.losses).mean())
 
 
 def _optimised(
@@ -246,10 +246,15 @@ def _loss(
 ) -> Tensor:
     """Eq. 6 at some samples; with known parts the whole shape's loss waits for the second half."""
     each = shape.model.part_distances(latents, poses, target.points[rows])[None]
+    decoder = shape.model.config.decoder
+    if target.low is not None:
+        off = target.error(aggregate(each, decoder)[0], rows, losses).mean()
+        overlap = intersection(each, losses.temperature)
+        return losses.whole * off + losses.inter * overlap + latent_penalty(latents, losses, losses.ramp)
     sdf = target.sdf[rows][None]
     known = target.part is not None
     part = target.part[rows][None] if target.part is not None else torch.zeros_like(sdf).long()
-    found = terms(each, sdf, part, losses, shape.model.config.decoder)
+    found = terms(each, sdf, part, losses, decoder)
     weights = losses if late or not known else replace(losses, whole=0.0)
     return found.total(weights, known) + latent_penalty(latents, losses, losses.ramp)
 

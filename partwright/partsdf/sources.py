@@ -43,7 +43,7 @@ def found_in(
     Raises what `load_shape` raises.
     """
     shape = load_shape(path)
-    target = Target.of_shape(shape, seed=seed)
+    target = Target.seen_in(shape, seed)
     found, turn = reconstruct_standing(model, target, ways_to_stand(shape.up), settings, seed)
     return found, tuple(familiarity(found, target.turned(turn)).warnings())
 

@@ -18,7 +18,7 @@ from torch import Tensor
 from partwright.assembly.similarity import quaternion_product
 from partwright.errors import ModelError, SettingError
 from partwright.partsdf.encoder import Encoder, load_encoder
-from partwright.partsdf.losses import aggregate, clamped_error
+from partwright.partsdf.losses import aggregate
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors, local_points
@@ -190,12 +190,12 @@ def _rows(target: Target, count: int) -> Tensor:
 def errors_of(model: Model, latents: Tensor, poses: PoseTensors, target: Target, rows: Tensor) -> Tensor:
     """Mean error (S,) of the whole distance of shapes with latents (S, P, Z) and poses (S, P, ...), at the
     target's samples `rows`."""
-    points, sdf = target.points[rows], target.sdf[rows]
+    points = target.points[rows]
     errors = []
     for first in range(0, len(latents), _AT_ONCE):
         some = slice(first, first + _AT_ONCE)
         placed = poses.map(lambda t, some=some: t[some])
         each = model.condition(latents[some], placed)(local_points(points, placed))
         whole = aggregate(each, model.config.decoder)
-        errors.append(clamped_error(whole, sdf.expand_as(whole), model.config.losses).mean(dim=1))
+        errors.append(target.error(whole, rows, model.config.losses).mean(dim=1))
     return torch.cat(errors)

@@ -80,7 +80,7 @@ def source_of_points(name: str, points: NDArray[Any], normals: NDArray[Any] | No
         )
     notes.insert(0, f"the surface was reconstructed from {len(unit)} points (confidence {confidence:.2f})")
     piece = Piece(name, frame.from_unit(vertices), faces)
-    return Source(name, (piece,), repairs=tuple(notes), confidence=confidence)
+    return Source(name, (piece,), repairs=tuple(notes), confidence=confidence, points=points)
 
 
 def _usable(name: str, normals: NDArray[Any] | None, notes: list[str]) -> NDArray[np.float64] | None:

@@ -57,14 +57,14 @@ class NodeLeftOutWarning(UserWarning):
 class Shape:
     """What comes in. Build one with `load_shape`.
 
-    name: of the file, without its suffix, or of the node. file: its name with the suffix, None for what was
-    in memory. vertices (V, 3) float64 and faces (F, 3) int64: the
-    repaired outer surface in own units. input_vertices, input_faces: as read, before any repair; `nodes` are
-    ranges of input_faces. frame: to the unit frame and back. unit: "mm", "m" ... or None; up: "x", "y", "z",
-    "-z" ... or None. repairs: what was done to the surface, a sentence each. openings: how much of the
-    surface the input left out, and where the most of it, own units. confidence: 0 to 1, how sure inside and
-    outside are. reading_seconds: that `load_shape` took, 0 for a node. Results are cached by their arguments;
-    returned arrays are read-only.
+    name: of the file, without its suffix, or of the node. file: its name with the suffix, None for what
+    was in memory. vertices (V, 3) float64 and faces (F, 3) int64: the repaired outer surface in own
+    units. input_vertices, input_faces: as read, before any repair; `nodes` are ranges of input_faces.
+    frame: to the unit frame and back. unit: "mm", "m" ... or None; up: "x", "y", "z", "-z" ... or None.
+    points: (N, 3) as read, own units, where it came as points, else None. repairs: what was done to the
+    surface, a sentence each. openings: how much of the surface the input left out, and where the most of
+    it, own units. confidence: 0 to 1, how sure inside and outside are. reading_seconds: that `load_shape`
+    took, 0 for a node. Results are cached by their arguments; returned arrays are read-only.
     """
 
     def __init__(self, source: Source) -> None:
@@ -72,7 +72,7 @@ class Shape:
         offsets = np.cumsum([0] + [len(p.vertices) for p in pieces])
         ends = np.cumsum([0] + [len(p.faces) for p in pieces]).tolist()
         self.name, self.unit, self.up = name, source.unit, source.up
-        self.file = source.file
+        self.file, self.points = source.file, source.points
         self.input_vertices = np.concatenate([p.vertices for p in pieces])
         self.input_faces = np.concatenate([p.faces + o for p, o in zip(pieces, offsets[:-1], strict=True)])
         self.nodes = tuple(Node(p.name, a, b) for p, a, b in zip(pieces, ends[:-1], ends[1:], strict=True))

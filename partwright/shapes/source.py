@@ -23,7 +23,8 @@ class Source:
     """Named pieces, and what the file says of units.
 
     `repairs` and `confidence`: how the surface was made where the file holds none, and how sure it is. file:
-    the file's name with its suffix, None for what was in memory.
+    the file's name with its suffix, None for what was in memory. points: (N, 3) that the surface was laid
+    through, where it was.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Source:
     repairs: tuple[str, ...] = ()
     confidence: float = 1.0
     file: str | None = None
+    points: NDArray[np.float64] | None = None
 
 
 def in_utf8(name: str) -> str:
