@@ -58,9 +58,12 @@ def encoding(arguments: argparse.Namespace) -> None:
     for label, count, noise in CLOUDS:
         add(f"encoder, {label}", lambda s, c=count, n=noise: encoder.encode(cloud(s, c, n)[None])[0])
     seen = replace(settings, start="encoder")
+    at_once = replace(seen, iterations=1)
+    add("encoder, 2,048 points, one iteration", lambda s: reconstruct_unknown(model, target(s), at_once))
     add("encoder, 2,048 points, refined", lambda s: reconstruct_unknown(model, target(s), seen))
     nearest = replace(settings, start="nearest")
     add("nearest training shapes, refined", lambda s: reconstruct_unknown(model, target(s), nearest))
+    add("default: both, refined", lambda s: reconstruct_unknown(model, target(s), settings))
     write(f"encode-{family.name}", lines)
 
 

@@ -148,7 +148,9 @@ def _scouted(
     """From the start that a few iterations bring closest: one that is close as it is may be a dead end, as a
     tube with flanges is for one without. Then single parts are exchanged, and all are optimised."""
     few = replace(settings, iterations=max(1, settings.iterations // _SCOUTED), decay=1.0)
-    scouts = starts if len(starts) > 1 and settings.iterations else []
+    # What an encoder saw goes a little of the way by itself, too: its poses are near, its forms are not yet.
+    alone = len(starts) == 1 and not starts[0].encoded
+    scouts = starts if settings.iterations and not alone else []
     steps = settings.iterations + len(scouts) * few.iterations
 
     def after(done: int, start: Start) -> Told | None:
@@ -165,7 +167,7 @@ def _scouted(
         if not finished:
             return _closest(tried)
     best = _closest(tried or starts)
-    if settings.exchange and settings.iterations and settings.start != "encoder":
+    if settings.exchange and settings.iterations:
         best = replace(best, shape=exchanged_parts(best.shape, best.target, seed))
     ahead, poses = after(len(scouts) * few.iterations, best), best.shape.model.config.poses
     found = _optimised(best.shape, best.target, settings, seed, ahead, checkpoint, poses)[0]

@@ -19,7 +19,7 @@ from partwright.partsdf.encoder_training import train_encoder
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.part_vectors import PartVectors, quaternions
 from partwright.partsdf.poses import rotation_matrices
-from partwright.partsdf.reconstruction import ReconstructionSettings, mean_error, reconstruct_unknown
+from partwright.partsdf.reconstruction import ReconstructionSettings, Step, mean_error, reconstruct_unknown
 from partwright.partsdf.starts import UPRIGHT, find_starts
 from partwright.partsdf.targets import Target
 from partwright.shapes.sampling import sample_triangles
@@ -118,6 +118,12 @@ def test_reconstruction_begins_with_what_it_sees(encoder: Encoder, lamps: Prepar
         model, target, ReconstructionSettings(start="encoder", iterations=60, points=512)
     )
     assert mean_error(refined, target) < 0.5 * mean_error(as_seen, target)
+    # One iteration is enough to exchange parts for those of training shapes that fit better.
+    steps: list[Step] = []
+    at_once = ReconstructionSettings(start="encoder", iterations=1, points=512)
+    exchanged = reconstruct_unknown(model, target, at_once, told=steps.append)
+    assert mean_error(exchanged, target) < 0.9 * mean_error(as_seen, target)
+    assert [(step.number, step.of) for step in steps] == [(1, 2), (2, 2)]
     # By itself it is one of the starts, of which a few iterations choose.
     starts = find_starts(model, target, [UPRIGHT], ReconstructionSettings(starts=3))
     assert [one.encoded for one in starts] == [True, False, False]
