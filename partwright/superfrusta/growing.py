@@ -136,10 +136,10 @@ def _grown(samples: FitSamples, wanted: list[Region], rows: Rows, settings: Sett
 
 
 def _view(samples: FitSamples, region: Region) -> View:
-    voxels = samples.grid_points[region.voxels]
+    voxels = samples.grid_points[np.flatnonzero(region.voxels)]
     low, high = voxels.min(axis=0), voxels.max(axis=0)
     margin = max(0.06, region.margin * float((high - low).max()))
-    index = np.flatnonzero(((samples.points > low - margin) & (samples.points < high + margin)).all(axis=1))
+    index = samples.within(low - margin, high + margin)
     if len(index) > _MOST_SAMPLES:
         index = index[np.linspace(0, len(index) - 1, _MOST_SAMPLES).astype(np.int64)]
     index = np.concatenate([index, samples.far_indices])
@@ -201,7 +201,7 @@ def finalists(
 
 
 def _guesses(samples: FitSamples, region: Region, settings: Settings) -> Rows:
-    points, spacing = samples.grid_points[region.voxels], samples.grid.spacing
+    points, spacing = samples.grid_points[np.flatnonzero(region.voxels)], samples.grid.spacing
     if settings.family == "solid":
         return solid_starts.starts(points, spacing, region.sign, region.frames)
     rows = with_locked_values(

@@ -125,15 +125,27 @@ def owners(samples: FitSamples, rows: Rows) -> NDArray[np.int64]:
     owner = np.full(len(inside), -1, dtype=np.int64)
     added = rows[:, Column.SIGN] > 0
     voxels = np.flatnonzero(inside)
-    distance = samples.parts_of(rows, samples.grid_points[voxels])
-    owner[voxels] = np.where(added[:, None], distance, np.inf).argmin(axis=0)
+    owner[voxels] = _nearest(samples, rows, np.flatnonzero(added), samples.grid_points[voxels])
     if not added.all():
         voxels = np.flatnonzero(~inside)
-        distance = samples.parts_of(rows, samples.grid_points[voxels])
-        covered = (distance[added] < 0).any(axis=0)
-        cut = np.where(added[:, None], np.inf, distance)
-        owner[voxels[covered]] = cut.argmin(axis=0)[covered]
+        # With its blends the union of what is added covers no less than its parts do.
+        voxels = voxels[samples.distance_of(rows[added], samples.grid_points[voxels]) < 0]
+        covered = (samples.parts_of(rows[added], samples.grid_points[voxels]) < 0).any(axis=0)
+        voxels = voxels[covered]
+        owner[voxels] = _nearest(samples, rows, np.flatnonzero(~added), samples.grid_points[voxels])
     return owner
+
+
+def _nearest(
+    samples: FitSamples, rows: Rows, among: NDArray[np.int64], points: NDArray[np.float32]
+) -> NDArray[np.int64]:
+    """Which of the rows `among` (K,) each point (n, 3) lies deepest in or nearest to; the first of equals."""
+    nearest = np.full(len(points), among[0])
+    least, *others = samples.parts_of(rows[among], points)
+    for index, distance in zip(among[1:], others, strict=True):
+        nearest[distance < least] = index
+        np.minimum(least, distance, out=least)
+    return nearest
 
 
 def _depth(samples: FitSamples, owner: NDArray[np.int64], pair: tuple[int, int]) -> float:

@@ -118,6 +118,18 @@ class FitSamples:
         return self.distance < 0
 
     @cached_property
+    def _coordinates(self) -> NDArray[np.float32]:
+        """(3, N), each coordinate's in one piece."""
+        return np.ascontiguousarray(self.points.T)
+
+    def within(self, low: NDArray[np.float32], high: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Indices of the samples in a box."""
+        inside = np.ones(len(self.points), bool)
+        for along, least, most in zip(self._coordinates, low, high, strict=True):
+            inside &= (along > least) & (along < most)
+        return np.flatnonzero(inside)
+
+    @cached_property
     def grid_points(self) -> NDArray[np.float32]:
         """(X * Y * Z, 3), in the order of grid.values.ravel()."""
         return self.grid.points().astype(np.float32)

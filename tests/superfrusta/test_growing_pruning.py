@@ -12,6 +12,7 @@ from partwright.fields.columns import WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
 from partwright.superfrusta.growing import grow
+from partwright.superfrusta.merging import owners
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.pruning import cheapest_removal, neighbours, prune
 from partwright.superfrusta.refining import POLISH, refine
@@ -125,3 +126,22 @@ def test_refining_moves_the_marked_parts_only(pair: FitSamples, exact: np.ndarra
     np.testing.assert_array_equal(refine(pair, moved, POLISH, SETTINGS, nothing), moved)
     plain = Settings.for_quality("draft", smooth=False)
     np.testing.assert_array_equal(refine(pair, moved, POLISH, plain)[:, Column.BLEND], moved[:, Column.BLEND])
+
+
+def test_each_voxel_is_owned_by_the_part_it_is_deepest_in(pair: FitSamples, exact: np.ndarray) -> None:
+    hole = box_row((0.3, 0.3, 2.0), (0.2, 0.0, 0.0))
+    hole[Column.SIGN] = -1
+    beside = box_row((0.7, 0.4, 0.5), (0.4, 0.0, 0.0))  # covers some of the gap that the hole reaches into
+    rows = np.array([*exact, beside, hole])
+    distance = pair.parts_of(rows, pair.grid_points)
+    inside = pair.grid.values.ravel() < 0
+    cut = ~inside & (distance[:3] < 0).any(axis=0)
+    expected = np.where(inside, distance[:3].argmin(axis=0), np.where(cut, 3, -1))
+    assert cut.any()
+    assert np.array_equal(owners(pair, rows), expected)
+
+
+def test_samples_within_a_box(pair: FitSamples) -> None:
+    low, high = np.float32([-0.9, -0.2, 0.0]), np.float32([0.1, 0.3, 0.2])
+    expected = np.flatnonzero(((pair.points > low) & (pair.points < high)).all(axis=1))
+    assert len(expected) and np.array_equal(pair.within(low, high), expected)
