@@ -20,6 +20,8 @@ Floats = NDArray[np.float32]
 _ON = 0.004  # unit lengths: points this near to a surface are on it
 _CLOSE = 0.009  # unit lengths, half a hundredth of the longest side: what is nearer is not off
 _BESIDE = 0.005  # unit lengths from a surface at which a gap is looked for
+_AROUND = _BESIDE * np.concatenate([np.eye(3), -np.eye(3)])[:, None].astype(np.float32)
+_STEPS, _FLAT = 4, 0.1  # of a walk to the surface; least squared slope that a step is taken by
 _DEEPEST_BLEND = 0.08  # unit lengths: a quarter of the largest blend
 _POWER = 4.0  # of the norm over parts: near the largest, but with a word for the others
 
@@ -84,8 +86,7 @@ def _of_parts(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tupl
     off = np.where(distance > 0, distance - field, 0)
     # Deep inside, parts that touch leave no gap between them although the surfaces of both are met there.
     deep = np.flatnonzero(distance < -_CLOSE)
-    beside = _BESIDE * np.concatenate([np.eye(3), -np.eye(3)])[:, None].astype(np.float32)
-    around = samples.distance_of(rows, (points[deep] + beside).reshape(-1, 3)).reshape(len(beside), -1)
+    around = samples.distance_of(rows, (points[deep] + _AROUND).reshape(-1, 3)).reshape(len(_AROUND), -1)
     gap = deep[around.max(axis=0) > _BESIDE / 2]
     off[gap] = -distance[gap]
     return points, distance, off, part
@@ -96,7 +97,24 @@ def _of_shape(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tupl
     gap = samples.distance_of(rows, samples.surface)
     points, gap = samples.surface[gap > _CLOSE], gap[gap > _CLOSE]
     part = added[samples.parts_of(rows[added], points).argmin(axis=0)]
-    return points, np.zeros_like(gap), gap, part
+    return points, np.zeros_like(gap), walked(samples, rows, points, gap), part
+
+
+def walked(samples: FitSamples, rows: Rows, points: Floats, gap: Floats) -> Floats:
+    """How far points (n, 3) are from the surface of the assembly, whose field there is `gap` (n,).
+
+    Beside thin, bent and blended parts the field is less than the distance: what is missing of a tip counted
+    half. So points walk to the surface along the field's gradient, and the way that they are off is measured.
+    """
+    place, field = points, gap
+    for _ in range(_STEPS):
+        around = samples.distance_of(rows, (place + _AROUND).reshape(-1, 3)).reshape(len(_AROUND), -1)
+        slope = ((around[:3] - around[3:]) / (2 * _BESIDE)).T
+        steepness = np.maximum((slope**2).sum(axis=1), _FLAT)
+        place = place - (field / steepness)[:, None] * slope
+        field = samples.distance_of(rows, place)
+    arrived = np.abs(field) < _CLOSE
+    return np.where(arrived, np.maximum(gap, np.linalg.norm(place - points, axis=1)), gap)
 
 
 def _of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:

@@ -7,12 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 from partwright.fields import kernel
 from partwright.fields.columns import WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
-from partwright.superfrusta.deviations import deviations
+from partwright.superfrusta.deviations import deviations, walked
 from partwright.superfrusta.mending import Mending
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.part_surfaces import surface_points
@@ -113,6 +114,22 @@ def test_a_place_that_is_left_out_belongs_to_the_part_beside_it(
     short = exact.copy()
     short[1] = box_row((0.4, 0.2, 0.5), (0.5, 0.0, 0.0))
     assert deviations(samples, short).by_part == pytest.approx([0.0, 0.2], abs=0.02)
+
+
+def test_what_is_missing_beside_a_blend_is_as_far_off_as_it_looks(samples: FitSamples) -> None:
+    """The field of a blend is less than the distance; the surface itself says how far off a point is."""
+    rows = np.stack(
+        [row((0, 0, z), (1, 0, 0, 0), (size, size, 0.3)) for z, size in ((-0.2, 0.3), (0.2, 0.25))]
+    )
+    rows[1, Column.BLEND] = 0.3
+    drawn = np.random.default_rng(0).uniform(-0.55, 0.55, (600_000, 3)).astype(np.float32)
+    field = kernel.evaluate(rows, drawn)
+    surface = drawn[np.abs(field) < 0.005]
+    points = drawn[(field > 0.05) & (field < 0.15)][:500]
+    gap = kernel.evaluate(rows, points)
+    true, _ = cKDTree(surface).query(points)
+    assert np.quantile(gap / true, 0.25) < 0.95
+    assert walked(samples, rows, points, gap) == pytest.approx(true, rel=0.08, abs=0.02)
 
 
 def test_a_gap_inside_is_off_and_a_seam_is_not(samples: FitSamples, exact: np.ndarray) -> None:
