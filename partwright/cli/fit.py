@@ -81,7 +81,7 @@ def add_method(group: Group) -> None:
         action=argparse.BooleanOptionalAction,
         default=None,
         help="parts may also be subtracted: holes, slots, pockets (default: on for solids and capri, for "
-        "superfrusta where a hole would be covered)",
+        "superfrusta where that is clearly better)",
     )
 
 

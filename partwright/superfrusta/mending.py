@@ -186,36 +186,42 @@ class Mending:
         worst = off.worst(part)
         others, still = np.delete(rows, part, axis=0), np.delete(moving, part)
 
-        def with_new(rows: Rows, moving: Mask, *new: Rows) -> tuple[Rows, Mask]:
-            return np.concatenate([rows, *new]), np.append(moving, _all(np.concatenate(new)))
+        # In the part's own place, what is new is cut by what cuts the part.
+        cut = bool((rows[part:, Column.SIGN] < rows[part, Column.SIGN]).any())
+
+        def instead(*new: Rows) -> tuple[Rows, Mask]:
+            places = [part if cut else len(others)] * len(new)
+            return np.insert(others, places, np.concatenate(new), axis=0), np.insert(still, places, True)
+
+        def with_new(new: Rows) -> tuple[Rows, Mask]:
+            return np.concatenate([rows, new]), np.append(moving, _all(new))
 
         if len(others):
             yield others, still
         mine = owners(samples, rows) == part
         if mine.any():
-            yield with_new(others, still, self.fitted(mine, others, rows[part]))
+            yield instead(self.fitted(mine, others, rows[part], cut))
         if off.off[worst] > _FAR:
             grown = grow(samples, others, self.settings, _REGROWN)
             if len(grown):
                 begun = np.insert(still, [self.locked] * len(grown.first), True)
                 yield grown.joined(others, self.locked), np.append(begun, _all(grown.last))
         if self.settings.carving and off.distance[worst] > 0:
-            cut = carve(samples, rows, self.settings, self.settings.regions)
-            if len(cut):
-                yield with_new(rows, moving, cut.last)
+            carved = carve(samples, rows, self.settings, self.settings.regions)
+            if len(carved):
+                yield with_new(carved.last)
         missed = self.missed(rows, off.points[worst]) if off.distance[worst] <= 0 else None
         if missed is not None:
-            yield with_new(rows, moving, self.fitted(missed, rows, rows[part]))
+            yield with_new(self.fitted(missed, rows, rows[part]))
         if np.count_nonzero(mine) > _LEAST_HALVED:
-            halves = [self.fitted(half, others, rows[part]) for half in _halves(samples, mine)]
-            yield with_new(others, still, *halves)
+            yield instead(*(self.fitted(half, others, rows[part], cut) for half in _halves(samples, mine)))
 
-    def fitted(self, voxels: Mask, others: Rows, like: NDArray[np.float32]) -> Rows:
-        """The best part (1, 17) for the voxels, beside the others; `like` gives a frame to start from."""
+    def fitted(self, voxels: Mask, others: Rows, like: NDArray[np.float32], under: bool = False) -> Rows:
+        """The best part (1, 17) for the voxels, beside the others and before those that are subtracted if it
+        goes `under` them; `like` gives a frame to start from."""
         depth = float(np.abs(self.samples.grid.values.ravel()[voxels]).max())
-        region = Region(
-            voxels, others, depth, 0.2, 0.3, frames=like[None, ROTATION], sign=float(like[Column.SIGN])
-        )
+        sign, frames = float(like[Column.SIGN]), like[None, ROTATION]
+        region = Region(voxels, others, depth, 0.2, 0.3, frames, sign, under)
         found, _, losses = finalists(self.samples, [region], self.settings, self.settings.overlap)
         return found[[int(losses.argmin())]]
 

@@ -39,6 +39,12 @@ from partwright.superfrusta.symmetry import symmetries
 GROWTH_ALPHA = 1e-3
 PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
 _OPENING = 4  # rounds
+_GOOD = 0.93  # of the objective: what comes out worse is tried again with parts to subtract
+_WORTH_CUTS = 0.01  # of the objective that such an attempt must gain, for it is the harder to edit
+_BEHIND, _ROUNDS_BEHIND = (
+    0.06,
+    6,
+)  # of the objective; rounds after which it is given up where it is so far off
 _MENDED = 0.9  # of the work is done when mending begins
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
 
@@ -118,6 +124,7 @@ class ResidualFit:
     `locked` never change.
 
     report: told of each step. assembled: makes the assembly of rows. number: of the attempt, from 0.
+    rival: the objective that an attempt to carve must reach to be kept.
     """
 
     samples: FitSamples
@@ -129,6 +136,7 @@ class ResidualFit:
     number: int = 0
     best: Rows | None = None
     best_objective: float = -np.inf
+    rival: float | None = None
     earlier: Rows | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
@@ -145,6 +153,8 @@ class ResidualFit:
         for self.number in range(settings.attempts):
             converged = self.attempt(start) and converged
             self.choose()
+        if self.best is not None and not len(start):
+            converged = self.carved() and converged
         if self.best is None:
             return "converged"
         if self.mending:
@@ -168,9 +178,11 @@ class ResidualFit:
         if self.best is not None:
             self.earlier = self.best
             self.best, self.best_objective = None, -np.inf
-        if self.settings.subtract and not len(start):
+        if self.settings.subtract and not len(start) and self.rival is None:
             start = self.opening()
         rows, converged = self.growth(start)
+        if self.outdone(self.settings.rounds):
+            return converged
         for cycle in range(self.settings.cycles if self.best is not None else 0):
             rows = self.thinning(rows)
             if not self.keep(rows, "thin", cycle + 1) and cycle:
@@ -197,6 +209,35 @@ class ResidualFit:
             if opening.best is not None:
                 tried.append(opening.best)
         return max(tried, key=self.objective) if tried else NOTHING
+
+    @property
+    def may_carve(self) -> bool:
+        settings = self.settings
+        return settings.subtract is None and settings.carving and settings.rounds >= _ROUNDS_BEHIND
+
+    def carved(self) -> bool:
+        """An attempt with parts to subtract, where the shape may have holes or be hollow; says whether the
+        growth of what is kept converged.
+
+        What it makes of other shapes is worse or takes more parts, and is left as soon as that shows.
+        """
+        assert self.best is not None
+        settings = self.settings
+        if self.best_objective > _GOOD or not self.may_carve:
+            return True
+        self.settings = replace(settings, subtract=True, regions=max(1, settings.regions - 2))
+        self.number = settings.attempts
+        self.rival = self.best_objective + _WORTH_CUTS
+        whole, converged = self.best, True
+        try:
+            converged = self.attempt(NOTHING)
+        finally:
+            if self.best_objective < self.rival:
+                self.best = None
+            self.choose()
+            if self.best is whole:
+                self.settings = settings
+        return converged or self.best is whole
 
     def choose(self) -> None:
         """Goes back to the earlier attempts' best where this one's is no better."""
@@ -227,11 +268,16 @@ class ResidualFit:
             with self.timed("prune"):
                 rows = prune(self.samples, rows, min(GROWTH_ALPHA, settings.price), self.locked)
             stale = 0 if self.keep(rows, "grow", round_ + 1) else stale + 1
-            if stale >= settings.patience:
+            if stale >= settings.patience or self.outdone(round_):
                 return rows, True
             if settings.min_iou is not None and volume_iou(self.samples, rows) > settings.min_iou + _SPARE:
                 return rows, True
         return rows, False
+
+    def outdone(self, round_: int) -> bool:
+        """Whether this attempt stays too far behind the other for more rounds to help."""
+        behind = self.rival is not None and self.best_objective < self.rival - _BEHIND
+        return behind and round_ + 1 >= _ROUNDS_BEHIND
 
     def thinning(self, rows: Rows) -> Rows:
         """Merges and removes parts while the objective, the part budget or the target asks for it."""
@@ -265,6 +311,8 @@ class ResidualFit:
     @property
     def regions(self) -> int:
         """Regions a round: each further attempt takes fewer or more, which leads it to other assemblies."""
+        if self.rival is not None:
+            return self.settings.regions
         aside = (self.number + 1) // 2 * (2 if self.number % 2 == 0 else -2)
         return max(1, self.settings.regions + aside)
 
@@ -287,7 +335,7 @@ class ResidualFit:
     @property
     def mending(self) -> bool:
         settings = self.settings
-        return bool(settings.mends) and not settings.subtract and settings.family != "solid"
+        return bool(settings.mends) and settings.family != "solid"
 
     def mend(self, rows: Rows) -> None:
         def improved(better: Rows) -> None:
@@ -338,7 +386,8 @@ class ResidualFit:
         total = settings.rounds + settings.cycles
         done = min(1.0, (settings.rounds + round_ if stage == "thin" else round_) / total)
         reached, iou = score(self.samples, rows), volume_iou(self.samples, rows)
-        fraction = (self.number + done) / settings.attempts * (_MENDED if self.mending else 1.0)
+        attempts = settings.attempts + (self.may_carve or self.rival is not None)
+        fraction = (self.number + done) / attempts * (_MENDED if self.mending else 1.0)
         self.report_progress(stage, round_, len(rows), reached, iou, fraction)
         return progressed
 

@@ -40,7 +40,7 @@ class Settings:
     """Weight of the union loss (eq. 8), likewise."""
     subtract: bool | None = None
     """Whether parts may also be taken away from what came before them, where too much is covered: from the
-    first round on, never, or (None) only where mending finds that a hole is covered."""
+    first round on, never, or (None) where that is clearly better."""
     smooth: bool = True
     """Parts blend into each other (eq. 4); otherwise unions are plain."""
     family: Family = "superfrustum"
@@ -117,8 +117,8 @@ class Settings:
 
     @property
     def carving(self) -> bool:
-        """Whether mending may subtract parts although growth does not."""
-        return self.subtract is None and self.optimiser == "newton"
+        """Whether mending may subtract parts."""
+        return self.subtract is not False and self.optimiser == "newton"
 
     @property
     def price(self) -> float:

@@ -43,3 +43,13 @@ def half_torus() -> trimesh.Trimesh:
     section = CrossSection.circle(0.2, 32).translate((1.0, 0.0))
     made = Manifold.revolve(section, 64, 180).to_mesh()
     return trimesh.Trimesh(np.asarray(made.vert_properties)[:, :3], np.asarray(made.tri_verts))
+
+
+def drilled_block() -> trimesh.Trimesh:
+    """A block with three holes through it and a pocket: five solids, four of them taken away."""
+    holes = [
+        trimesh.creation.cylinder(radius, 2).apply_translation((x, y, 0))
+        for radius, x, y in ((0.25, -0.6, 0.2), (0.2, 0.1, -0.3), (0.3, 0.6, 0.25))
+    ]
+    cut = [*holes, box((0.7, 0.3, 0.4), (-0.45, -0.4, 0.3))]
+    return trimesh.boolean.difference([box((2, 1.4, 0.6)), *cut], engine="manifold")

@@ -144,4 +144,5 @@ def test_each_voxel_is_owned_by_the_part_it_is_deepest_in(pair: FitSamples, exac
 def test_samples_within_a_box(pair: FitSamples) -> None:
     low, high = np.float32([-0.9, -0.2, 0.0]), np.float32([0.1, 0.3, 0.2])
     expected = np.flatnonzero(((pair.points > low) & (pair.points < high)).all(axis=1))
-    assert len(expected) and np.array_equal(pair.within(low, high), expected)
+    assert len(expected)
+    assert np.array_equal(pair.within(low, high), expected)

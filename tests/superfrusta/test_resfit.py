@@ -14,11 +14,12 @@ from partwright.methods import Cancellation, FitRequest, Fitted, Progress, Run
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import iou
 from partwright.shapes import Shape, load_shape
-from partwright.superfrusta import Settings
+from partwright.superfrusta import Settings, resfit
+from partwright.superfrusta.flat_tree import flattened
 from partwright.superfrusta.outcome import Step, chosen
-from partwright.superfrusta.resfit import ResidualFit
-from partwright.superfrusta.samples import FitSamples
-from tests.superfrusta.meshes import box, bracket, corner_tie, half_torus, pipe, table, union
+from partwright.superfrusta.resfit import ResidualFit, fit
+from partwright.superfrusta.samples import NOTHING, FitSamples
+from tests.superfrusta.meshes import box, bracket, corner_tie, drilled_block, half_torus, pipe, table, union
 
 OUTCOMES = {"converged", "budget_reached", "target_reached", "interrupted"}
 
@@ -223,3 +224,52 @@ def test_an_interruption_in_a_later_attempt_keeps_the_earlier_ones_result(table_
     assert stopped.outcome == "interrupted"
     assert len(stopped.assembly) <= len(alone.assembly)
     assert reached(stopped.assembly, table_shape) > reached(alone.assembly, table_shape) - 0.01
+
+
+BRIEF = {"near": 8000, "uniform": 8000, "resolution": 64, "mends": 0, "symmetry": False}
+
+
+def test_a_shape_full_of_holes_is_a_body_and_its_holes() -> None:
+    shape = load_shape(drilled_block())
+    fitted = fit(FitRequest(shape, Settings(**BRIEF), Run(threads=1)))
+    added = [part for part, plus in flattened(fitted.assembly) if plus]
+    assert (len(added), len(fitted.assembly)) == (1, 5)
+    assert reached(fitted.assembly, shape) > 0.99
+
+
+def test_holes_are_built_around_where_nothing_may_be_subtracted() -> None:
+    brief = Settings(**BRIEF | {"rounds": 3, "resolution": 48}, subtract=False)
+    fitted = fit(FitRequest(load_shape(drilled_block()), brief, Run(threads=1)))
+    assert all(plus for _, plus in flattened(fitted.assembly))
+
+
+def test_an_attempt_to_carve_that_does_not_pay_changes_nothing(
+    table_shape: Shape, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = Settings(**BRIEF)
+    samples = FitSamples.of(table_shape, settings, Run(threads=1))
+    search = ResidualFit(samples, settings)
+    search.attempt(NOTHING)
+    best, objective = search.best, search.best_objective
+    monkeypatch.setattr(resfit, "_GOOD", 1.0)  # so that it is tried although the table is whole
+    assert search.carved()
+    assert search.rival is not None
+    assert search.best is best
+    assert (search.best_objective, search.settings) == (objective, settings)
+
+
+def test_an_interruption_while_carving_keeps_what_was_there() -> None:
+    cancel = Cancellation()
+    seen: list[float] = []
+
+    def stop(step: Progress) -> None:
+        seen.append(step.fraction)
+        if step.fraction > 0.5:
+            cancel.request()
+
+    shape = load_shape(drilled_block())
+    stopped = fit(FitRequest(shape, Settings(**BRIEF), Run(threads=1, progress=stop, cancel=cancel)))
+    assert stopped.outcome == "interrupted"
+    assert reached(stopped.assembly, shape) > 0.9
+    assert seen == sorted(seen)
+    assert max(seen) < 0.7
