@@ -80,6 +80,7 @@ def _run(
 ) -> Ending:
     radius, now = _RADIUS, found.points[0]
     slope, jacobian = problem.slopes(now)
+    bent: np.ndarray | None = None  # by how much more than foreseen the refused step broke
     if not np.abs(slope).max() > _NOTHING and not (now.broken > 0).any():
         raise SettingError(
             "no number that is free changes an objective: free other parts, or give another objective"
@@ -88,13 +89,20 @@ def _run(
         checkpoint()
         room = problem.lower - now.change, problem.upper - now.change
         lower, upper = (np.where(problem.free, side, 0.0) for side in room)
-        step = best_step(slope, now.broken, jacobian, np.minimum(lower, 0), np.maximum(upper, 0), radius)
+        broken = now.broken if bent is None else now.broken + bent
+        step = best_step(slope, broken, jacobian, np.minimum(lower, 0), np.maximum(upper, 0), radius)
         if np.abs(step).max() < _LEAST / 10:
-            return "converged"
+            if bent is None:
+                return "converged"
+            bent, radius = None, _SHRINK * radius
+            continue
         point = problem.at(now.change + step)
         better = point is not None and _merit(point) < _merit(now) - _MARGIN * abs(_merit(now))
         found.steps.append(_told(number, problem, point, better, radius, told))
         if not better or point is None:
+            bent = _bent(now, point, jacobian @ step) if bent is None and point is not None else None
+            if bent is not None:
+                continue  # once more, where constraints that bend are foreseen to
             radius *= _SHRINK
             if radius < _LEAST:
                 return "converged"
@@ -104,7 +112,7 @@ def _run(
         ):
             found.reason = "the next step would leave what the model was trained on"
             return "left_trained_region"
-        now = point
+        now, bent = point, None
         found.points.append(now)
         radius = min(_WIDEST, _GROW * radius)
         if len(found.points) > _PATIENCE:
@@ -113,6 +121,17 @@ def _run(
                 return "converged"
         slope, jacobian = problem.slopes(now)
     return "budget_reached"
+
+
+def _bent(now: Point, point: Point, foreseen: np.ndarray) -> np.ndarray | None:
+    """What constraints are broken by beyond what their slopes foresaw, where the step was refused for that;
+    else None.
+
+    The step is then tried again with that added (a second-order correction: Nocedal and Wright, 2006, 18.3).
+    """
+    more = np.maximum(point.broken - now.broken - foreseen, 0.0)
+    straight = point.value + PENALTY * float(np.maximum(point.broken - more, 0).sum())
+    return more if straight < _merit(now) and more.any() else None
 
 
 def _values(problem: Problem, point: Point) -> np.ndarray:

@@ -44,14 +44,15 @@ def test_a_target_is_met_and_frozen_parts_keep_their_bits() -> None:
 
 
 def test_what_touched_still_does_and_nothing_comes_loose() -> None:
-    """The post is pulled up and away; only the contact holds it."""
+    """The post is pulled up and away; only the contact holds it (by an edge, where it tilts)."""
     assembly = Assembly((PLATE, POST))
     (touch,) = contacts(assembly)
     assert touch.depth == pytest.approx(-0.1, abs=0.01)
     options = Options(steps=8, resolution=24, anchor=0.0, reach=1.0)
     result = optimise(assembly, "centre@z:-1", freeze=["plate", "post:form"], options=options)
     moved = result.assembly["post"].translation[2]
-    assert 0.62 < moved <= 0.68
+    assert 0.62 < moved <= 0.7
+    assert result.kept
     assert contacts(result.assembly)
     free = Options(steps=8, resolution=24, anchor=0.0, reach=1.0, contacts=False)
     loose = optimise(assembly, "centre@z:-1", freeze=["plate", "post:form"], options=free)
