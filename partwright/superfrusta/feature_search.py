@@ -44,6 +44,7 @@ _MOST_LOOKED = 150  # pieces whose candidates are made: a part of hundreds is no
 _PERFECT = 0.985  # R from which on no other base is tried
 _COPY = 0.4  # of what the first gains, that a copy has to
 _BATCH = 64
+_OWN, _ASKEW = 2, 0.9995  # directions of a piece, and the cosine to others that a new one has at most
 _CHORD = 1e-3  # unit lengths: how far chords of a cut with moved sides may be off
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
@@ -252,8 +253,15 @@ class FeatureSearch:
         if key not in self._of_piece:
             if len(self._of_piece) >= _MOST_LOOKED:
                 return []
-            self._of_piece[key] = candidates(piece, self.frames, holes=True)
+            self._of_piece[key] = candidates(piece, [*self.frames, *self._own_frames(piece)], holes=True)
         return self._of_piece[key]
+
+    def _own_frames(self, piece: Manifold) -> list[NDArray[np.float64]]:
+        """The piece's own directions that are none of the whole's: of a small hole askew."""
+        mesh = piece.to_mesh64()
+        own = frames(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
+        known = np.array([frame[:, 2] for frame in self.frames])
+        return [frame for frame in own[:_OWN] if np.abs(known @ frame[:, 2]).max() < _ASKEW]
 
     def _mask(self, candidate: Candidate) -> NDArray[np.float32]:
         """(N,) 1 at the samples within."""

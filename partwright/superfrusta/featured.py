@@ -17,6 +17,7 @@ from partwright.errors import CancelledError
 from partwright.fields import Cylinder
 from partwright.methods import Checkpoint, FitRequest, Progress
 from partwright.shapes import Shape
+from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_search import Feature, FeatureSearch, FeatureTree
 from partwright.superfrusta.flat_tree import nested
 from partwright.superfrusta.samples import FitSamples
@@ -71,7 +72,7 @@ def feature_tree(
             raise
         return seen[-1], True
     if tree is None or settings.min_iou is None:
-        return tree, False
+        return (with_pockets(tree, samples.points) if tree is not None else None), False
     for count in range(1, len(tree.features) + 1):
         shorter = tree.first(count)
         if volume_iou(shorter, samples) >= settings.min_iou:

@@ -17,11 +17,13 @@ from partwright.approximation.sketches.rims import SHARP, limited, measured_rims
 from partwright.approximation.sketches.sections import Region, View, profile_of
 from partwright.approximation.sketches.turned import turned
 from partwright.errors import ParameterError
-from partwright.fields.profile import Profile
+from partwright.fields.profile import Profile, circle_of
 from partwright.fields.rims import Rim
 
 _INSIDE = 0.02  # of a section: what of it may lie outside of the next slab's, and it still goes on
 _MOST_REGIONS = 4  # of a section
+_ELSEWHERE = (0.1, 0.9)  # of a slab, where it is looked at, too
+_SAME_AREA = 0.01
 _LEAST_SHARE = 0.01  # of the largest region's area
 _AXES = 2
 _LEAST_AXIS = 0.2  # of the area of all walls, that those about an axis have
@@ -49,23 +51,37 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
     thick = sorted(range(len(slabs)), key=lambda i: slabs[i][0] - slabs[i][1])[:_MOST_SLABS]
     done: set[tuple[int, int, int]] = set()
     for i in sorted(thick):
-        z = middles[i]
-        regions = view.regions(z)[:_MOST_REGIONS]
-        for region in regions:
-            if region.area < _LEAST_SHARE * regions[0].area:
-                continue
+        for region in _regions(view, *slabs[i]):
             first = last = i
             while first > 0 and _goes_on(region, view.regions(middles[first - 1])):
                 first -= 1
             while last + 1 < len(slabs) and _goes_on(region, view.regions(middles[last + 1])):
                 last += 1
             spans = {(first, last), (i, i)}
+            if _is_round(region) and all(_goes_on(o, [region]) for m in middles for o in view.regions(m)):
+                spans.add((0, len(slabs) - 1))  # the ends of a hole through a round wall are not flat
             for a, b in spans:
                 key = (a, b, round(region.area * 1e5))
                 if key not in done:
                     done.add(key)
                     yield from _extruded(view, region, slabs[a][0], slabs[b][1], holes)
                     yield from _rounded(view, region, slabs, a, b, holes)
+
+
+def _is_round(region: Region) -> bool:
+    return region.profile is not None and circle_of(region.profile.outline) is not None
+
+
+def _regions(view: View, low: float, high: float) -> Iterator[Region]:
+    """Of a slab: those in its middle, and others elsewhere in it that hold these, where a hole across it has
+    cut the middle."""
+    middle = view.regions((low + high) / 2)[:_MOST_REGIONS]
+    yield from (region for region in middle if region.area >= _LEAST_SHARE * middle[0].area)
+    for share in _ELSEWHERE:
+        for region in view.regions(low + share * (high - low))[:1]:
+            larger = not any(region.area < (1 + _SAME_AREA) * other.area for other in middle)
+            if larger and all(_goes_on(other, [region]) for other in middle):
+                yield region
 
 
 def _goes_on(region: Region, others: Sequence[Region]) -> bool:

@@ -25,6 +25,7 @@ _ROUND = 0.4  # of what any half section has, that all have
 _SAME = 0.03  # of the area
 _LEAST = 4e-4  # unit areas
 _MOST_PARTIAL = 4
+_CORE = 2e-3  # unit lengths: so near to the axis is at it
 _SNAP = 0.012
 _DOMED = 3e-3  # unit lengths that an arc may move to become part of a sphere
 _OFFSET = 0.0137  # radians: no plane along faces
@@ -83,10 +84,33 @@ def turned(view: View, centre: np.ndarray) -> Iterator[Candidate]:
         alike = any((half - d).area() + (d - half).area() < _SAME * half.area() for d in distinct)
         if half.area() > _LEAST and not alike:
             distinct.append(half)
-    for half in distinct:
+    solid = _solid_at_the_axis(whole)
+    for half in [*distinct, *([solid] if solid is not None else [])]:
         for region in half.decompose():
             if region.area() > 0.05 * half.area():
                 yield from _revolved(axis, region, 0.0, 2 * math.pi)
+
+
+def _solid_at_the_axis(half: CrossSection) -> CrossSection | None:
+    """A half section without what is missing along the axis between two places where it reaches it: no plane
+    through the axis passes by a hole that crosses it. None where nothing is."""
+    if half.is_empty():
+        return None
+    low, high = float(half.bounds()[1]), float(half.bounds()[3])
+    core = CrossSection([[(0.0, low), (_CORE, low), (_CORE, high), (0.0, high)]], FillRule.Positive)
+    reached = sorted(
+        float(v) for piece in (half ^ core).decompose() for v in (piece.bounds()[1], piece.bounds()[3])
+    )
+    filled = half
+    for start, end in zip(reached[1:-1:2], reached[2::2], strict=True):
+        reach = float(half.bounds()[2])
+        below, above = start - 2 * _CORE, end + 2 * _CORE
+        band = CrossSection([[(0.0, below), (reach, below), (reach, above), (0.0, above)]], FillRule.Positive)
+        missing = [piece for piece in (band - half).decompose() if piece.bounds()[0] < _CORE]
+        # What goes on to the outside is a groove, or the gap between two bodies.
+        if end > start and missing and all(piece.bounds()[2] < reach - _CORE for piece in missing):
+            filled = sum(missing, filled)
+    return filled if filled is not half else None
 
 
 def _partly(axis: Axis) -> Iterator[Candidate]:

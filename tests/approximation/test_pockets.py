@@ -1,0 +1,100 @@
+"""What a person draws as one solid with a pocket or a cross hole is read so."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+from partwright.approximation.sketches.candidates import candidates
+from partwright.approximation.sketches.pockets import as_pocket
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution
+from partwright.fields.profile import circle
+from partwright.meshing import mesh_assembly
+from partwright.meshing.named_solids import named_solid
+
+QUARTER = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+OVER = (0.0, 1.0, 0.0, 0.0)
+WALL = Extrusion(Profile(Profile.rectangle(1.2, 0.8, 0.1).outline, [Profile.rectangle(1, 0.6).outline]), 0.4)
+
+
+@pytest.mark.parametrize("turn", [QUARTER, OVER], ids=["turned", "upside down"])
+@pytest.mark.parametrize(
+    "floor",
+    [Box((1.1, 0.7, 0.1)), Extrusion(Profile(Profile.rectangle(1.1, 0.7).outline, [circle(0.05)]), 0.1)],
+)
+def test_a_wall_and_a_floor_are_a_solid_with_a_pocket(turn: tuple, floor: Box | Extrusion) -> None:
+    at = (0.0, 0.0, -0.15)
+    parts = Part(WALL), Part(floor, at, OVER)
+    whole = Assembly(parts)
+    found = as_pocket(parts[0].transformed(_turn(turn)), parts[1].transformed(_turn(turn)))
+    assert found is not None
+    body, pockets, holes = found
+    assert isinstance(body.field, Extrusion)
+    assert not body.field.profile.holes
+    assert len(pockets) == 1
+    assert len(holes) == isinstance(floor, Extrusion)
+    made = Assembly((body, *pockets, *holes), "difference")
+    points = np.random.default_rng(0).uniform(-0.8, 0.8, (5000, 3))
+    same = (made.distance(_turn(turn)(points)) < 0) == (whole.distance(points) < 0)
+    assert same.mean() > 0.999
+
+
+def _turn(rotation: tuple) -> Similarity:
+    return Similarity(rotation=rotation)
+
+
+@pytest.mark.parametrize(
+    "floor",
+    [
+        Part(Box((0.8, 0.5, 0.1)), (0, 0, -0.15)),  # closes a part of the hole
+        Part(Box((1.4, 0.7, 0.1)), (0, 0, -0.15)),  # reaches beyond the wall
+        Part(Box((1.1, 0.7, 0.1))),  # in the middle
+        Part(Box((1.1, 0.7, 0.1)), (0, 0, -0.15), (0.9, 0.1, 0, 0)),  # leans
+    ],
+)
+def test_other_parts_stay(floor: Part) -> None:
+    assert as_pocket(Part(WALL), floor) is None
+
+
+def test_a_wall_is_seen_though_a_hole_cuts_the_middle() -> None:
+    wall = named_solid(WALL, 1e-3) - named_solid(Cylinder(0.1, 2), 1e-3).rotate((90, 0, 0))
+    areas = [one.volume for one in candidates(wall, [np.eye(3)], holes=False)]
+    assert max(areas) == pytest.approx(WALL.profile.area * 0.4, rel=2e-3)
+
+
+def test_a_shaft_is_whole_though_a_hole_crosses_its_axis() -> None:
+    shaft = Revolution(Profile([(0, -0.9), (0.2, -0.9), (0.2, 0), (0.15, 0), (0.15, 0.9), (0, 0.9)]))
+    drilled = named_solid(shaft, 1e-4) - named_solid(Cylinder(0.05, 2), 1e-4).rotate((90, 0, 0)).translate(
+        (0, 0, 0.5)
+    )
+    turned = [one.part.field for one in candidates(drilled, [np.eye(3)], holes=True)]
+    profiles = [f.profile for f in turned if isinstance(f, Revolution)]
+    assert any(
+        len(p.outline) == 6 and p.area == pytest.approx(shaft.profile.area, rel=1e-3) for p in profiles
+    )
+    # A groove goes on to the outside, and stays.
+    apart = named_solid(shaft, 1e-4) - named_solid(Cylinder(0.5, 0.1), 1e-4).translate((0, 0, 0.5))
+    turned = [one.part.field for one in candidates(apart, [np.eye(3)], holes=True)]
+    assert all(f.profile.area < 0.97 * shaft.profile.area for f in turned if isinstance(f, Revolution))
+
+
+def test_a_hole_through_a_round_wall_is_a_cylinder() -> None:
+    piece: Manifold = named_solid(Cylinder(0.05, 1), 1e-4).rotate((90, 0, 0)) ^ named_solid(
+        Cylinder(0.2, 1), 1e-4
+    )
+    frame = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]).T
+    found = [one.part.field for one in candidates(piece, [frame], holes=True)]
+    assert any(isinstance(f, Cylinder) and f.height == pytest.approx(0.4, rel=0.02) for f in found)
+
+
+def test_volumes_are_those_of_the_pieces() -> None:
+    whole = Assembly((Part(WALL), Part(Box((1.1, 0.7, 0.1)), (0, 0, -0.15))))
+    found = as_pocket(*whole.parts)
+    assert found is not None
+    body, pockets, _ = found
+    made = mesh_assembly(Assembly((body, *pockets), "difference"), 64)
+    assert made.volume == pytest.approx(mesh_assembly(whole, 64).volume, rel=1e-6)
