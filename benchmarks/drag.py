@@ -125,8 +125,8 @@ def learned(arguments: argparse.Namespace, path: Path) -> list[str]:
         "## Cars that it improves",
         "",
         f"Training shapes of the car model that ships, {LENGTH} m long, wheels frozen, volume kept to 95 %. "
-        "Wheels moved: by themselves, without the body beside them. In the whole the model lets parts see "
-        "one another: see [optimise.md](optimise.md).",
+        "Wheels moved: by themselves, without the body beside them. In the whole, where the model lets parts "
+        "see one another, they are held to a thousandth of the longest side (`--still`).",
         "",
         "| car | steps accepted | ending | outside | by the network | OpenFOAM, 32 cells | "
         "OpenFOAM, 64 cells | volume | wheels moved |",

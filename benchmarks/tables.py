@@ -93,7 +93,7 @@ TABLES = (
           "--shapes {data} --names parts/robot_arm/ur5e/forearm,cad/ttt_angle_bracket,toys/mug,toys/hammer,"
           "cad/bd_rod_end,parts/robot_arm/ur3/forearm,parts/robot_arm/ur5e/upper_arm,"
           "parts/robot_arm/ur3/upper_arm,parts/robot_arm/ur10/shoulder,parts/robot_arm/ur10/base,"
-          "toys/armchair,cad/f360_clamp_block --rows build/collision.jsonl", 30),
+          "toys/armchair,toys/chair_kk --rows build/collision.jsonl", 30),
     Table("collision-cad.md", "collision.py", None, 0,
           "--shapes {data} --names cad/bdw_weld_neck_flange,cad/ttt_corner_tie,cad/prusa_y_rod_holder,"
           "cad/f360_clamp_block --unit mm --method solids --clean --rows build/collision-cad.jsonl "
@@ -103,9 +103,10 @@ TABLES = (
     Table("optimise.md", "optimise.py", None, 0,
           "--shapes {data} --output benchmarks/results/optimise.md", 30),
     Table("drag.md", "drag.py", None, 0,
-          "--flows flows --cars 3 --convergence --output benchmarks/results/drag.md", 20,
+          "--flows flows --cars 2 --convergence --output benchmarks/results/drag.md", 20,
           "OpenFOAM, and flows/ by partwright parts simulate cars -o flows --count 57 --seed 20 "
           "--air y,ground,iterations=100"),
+    Table("adjoint.md", "adjoint.py", None, 0, "--rows build/adjoint.jsonl", 10, "OpenFOAM"),
     Table("anchors.md", "anchors.py", "--names bracket --peers coacd", 2, "", 20, "the peers"),
     Table("batch.md", "batch.py", "--shapes 8 --kills 4", 3,
           "--shapes 200 --kills 20 --output benchmarks/results/batch.md", 30),
