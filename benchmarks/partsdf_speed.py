@@ -1,6 +1,6 @@
 """How fast PartSDF is beside a plain implementation: training steps, reconstruction, meshing, memory.
 
-One thread by processor time. The plain implementation (partwright/partsdf/reference.py, a convolution as
+One thread by processor time. The plain implementation (partwright/partsdf/paper.py, a convolution as
 cross-part layer, dense grid) is timed on slices and extrapolated, as the table says. Each way runs in a
 process of its own: this file, run with the way's name, prints what it measured.
 """
@@ -154,7 +154,7 @@ def child(way: str, model: str | None = None) -> dict[str, float]:
 def speed(arguments: argparse.Namespace) -> None:
     lines = [
         "# PartSDF: speed", "",
-        "Processor seconds of one thread. The plain implementation (partsdf/reference.py) is timed "
+        "Processor seconds of one thread. The plain implementation (partsdf/paper.py) is timed "
         "on slices and extrapolated: a step from 3 times 1,024 points of one shape, a reconstruction from 3 "
         "iterations, the grid from 1/64 of its points. So are the steps and iterations of ours, in turns, "
         f"the fastest of {ROUNDS}; our meshes are whole.", "", command_line(), "",
