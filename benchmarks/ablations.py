@@ -200,7 +200,8 @@ def document(rows: list[Variant], entries: list[Entry], runs: list[Run], options
 def main() -> int:
     options = parser().parse_args()
     rows, entries = chosen(options.rows), shapes(options)
-    cache = RESULT.with_suffix(".csv")
+    result = RESULT.with_stem(f"{RESULT.stem}-{options.tag}") if options.tag else RESULT
+    cache = result.with_suffix(".csv")
     known = {} if options.fresh else load(cache)
     todo = planned(rows, entries)
     keys = [(row.name, entry.name, digest(row)) for row, entry in todo]
@@ -220,8 +221,8 @@ def main() -> int:
             pool.shutdown(cancel_futures=True)
             return 130
     runs = [known[key] for key in keys if key in known]
-    write_bytes(RESULT, document(rows, entries, runs, options).encode())
-    print(f"written to {RESULT} and {cache.name}")
+    write_bytes(result, document(rows, entries, runs, options).encode())
+    print(f"written to {result} and {cache.name}")
     return int(any(one.failure for one in runs))
 
 
@@ -235,7 +236,7 @@ def _command(options: argparse.Namespace) -> str:
     """What to type to get this; of the folder of shapes only its name, wherever it lies."""
     given = {"--shapes": options.shapes.name if options.shapes != OWN_SHAPES else ""}
     given |= {"--rows": f'"{options.rows}"' if options.rows else "", "--names": options.names}
-    given |= {"--jobs": options.jobs}
+    given |= {"--tag": options.tag, "--jobs": options.jobs}
     return " ".join(["python benchmarks/ablations.py", *(f"{k} {v}" for k, v in given.items() if v)])
 
 
@@ -247,6 +248,7 @@ def parser() -> argparse.ArgumentParser:
     option("--shapes", type=Path, default=OWN_SHAPES, metavar="FOLDER", help="an index.json, or meshes")
     option("--names", default="", metavar="A,B", help="only these shapes")
     option("--rows", default="", metavar="A,B", help="only rows with one of these in their name")
+    option("--tag", default="", metavar="TAG", help="writes ablations-TAG.md")
     option("--jobs", type=int, default=2, metavar="N", help="fits at a time, each of one thread")
     option("--fresh", action="store_true", help="forget earlier runs")
     return result

@@ -31,6 +31,7 @@ QUADRICS = "Superquadrics (Table 2), on few samples"
 PIECES = "Decomposition and fitting (Table 3)"
 LOSSES = "Losses and targets"
 SEARCH = "Search"
+BEYOND = "Carving and mending"
 OPTIMISERS = "The paper's optimiser"
 TERMS = "The paper's losses"
 # section -> what its reader has to know
@@ -198,6 +199,9 @@ def variants() -> list[Variant]:
         Variant(SEARCH, "no thinning (0 cycles)", default, replace(BASE, cycles=0)),
         Variant(SEARCH, "one start", default, BASE, single_starts),
         Variant(SEARCH, "no symmetry", default, replace(BASE, symmetry=False)),
+        Variant(BEYOND, "nothing subtracted", default, replace(BASE, subtract=False)),
+        Variant(BEYOND, "not mended", default, replace(BASE, mends=0)),
+        Variant(BEYOND, "neither subtracted nor mended", default, replace(BASE, subtract=False, mends=0)),
         Variant(OPTIMISERS, short, short, SHORT, few=True),
         Variant(OPTIMISERS, "the paper's, 300 steps", short, descent, few=True),
         Variant(TERMS, quick, quick, descent, quick_adam(), few=True),
