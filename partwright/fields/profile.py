@@ -141,7 +141,7 @@ class Profile:
 
     @cached_property
     def area(self) -> float:
-        return sum(map(_area, self.loops))
+        return sum(map(loop_area, self.loops))
 
     @cached_property
     def size(self) -> float:
@@ -288,7 +288,7 @@ def _loop(given: object, what: str) -> Loop:
 
 
 def _oriented(loop: Loop, sign: float) -> Loop:
-    area = _area(loop)
+    area = loop_area(loop)
     extent = max(max(v) - min(v) for v in zip(*loop, strict=True))
     if abs(area) <= 1e-12 * extent**2:
         raise ParameterError("profile: a loop encloses no area")
@@ -309,8 +309,8 @@ def _sides(loop: Loop) -> Iterator[Side]:
         yield Side((ax, ay), (bx, by), b, centre, radius, 4 * math.atan(b))
 
 
-def _area(loop: Loop) -> float:
-    """Positive where it runs counter-clockwise."""
+def loop_area(loop: Loop) -> float:
+    """With its arcs; positive where it runs counter-clockwise."""
     total = 0.0
     x0, y0, _ = loop[0]
     for side in _sides(loop):

@@ -8,7 +8,7 @@ from collections.abc import Collection
 import numpy as np
 
 from partwright.errors import ParameterError
-from partwright.fields.profile import Corner, Loop, Profile, Side
+from partwright.fields.profile import Corner, Loop, Profile, Side, loop_area
 from partwright.fields.profile_offset import Point, kept_bulge, parallels_cross, turn_between
 
 _NEARLY_SMOOTH = 0.02  # radians: where sides run into one another, their corner moves along their normal
@@ -29,7 +29,7 @@ def grown_profile(profile: Profile, by: float, still: Collection[int] = ()) -> P
         loops.append(_grown_loop(sides, depths))
         at += len(sides)
     result = Profile(loops[0], tuple(loops[1:]))
-    if any(_area(a) * _area(b) <= 0 for a, b in zip(loops, profile.loops, strict=True)):
+    if any(loop_area(a) * loop_area(b) <= 0 for a, b in zip(loops, profile.loops, strict=True)):
         raise ParameterError(f"profile: nothing is left of a loop {-by:.6g} further inside")
     return result
 
@@ -56,15 +56,3 @@ def _corner(before: Side, after: Side, deep: float, deeper: float) -> Point:
     inwards = np.array([-y, x]) / math.hypot(x, y)
     px, py = (np.array(after.start) + (deep + deeper) / 2 * inwards).tolist()
     return px, py
-
-
-def _area(loop: Loop) -> float:
-    """Signed, of its chords with what is between these and the arcs."""
-    chords = sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(loop, (*loop[1:], loop[0]), strict=True)) / 2
-    arcs = 0.0
-    for a, b in zip(loop, (*loop[1:], loop[0]), strict=True):
-        if a[2]:
-            sweep, half = 4 * math.atan(a[2]), math.dist(a[:2], b[:2]) / 2
-            radius = half * (1 + a[2] ** 2) / (2 * abs(a[2]))
-            arcs += radius**2 / 2 * (sweep - math.sin(sweep))
-    return chords + arcs

@@ -29,7 +29,7 @@ class Wall(NamedTuple):
 def offset(profile: Profile, depth: float, curved: bool = False) -> tuple[Profile, list[list[Wall]]]:
     """The points at least `depth` > 0 inside of the profile, and how their boundary grows out of it.
 
-    Walls are listed loop by loop, side by side. Corners that turn outwards stay corners, those that turn
+    Walls are listed loop by loop, side by side. Corners that turn outwards stay corners, those that
     turn inwards become arcs. Every side has to be left. curved: also corners that turn outwards at an arc,
     which then move along a curve as the depth grows.
 

@@ -25,24 +25,27 @@ def extruded(field: Extrusion, tolerance: float) -> Manifold:
     """The extrusion in its own frame."""
     vertices: list[np.ndarray] = []
     faces: list[np.ndarray] = []
-    ends: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
+    lids: tuple[list[int], list[int]] = ([], [])  # vertices around the bottom and the top
+    rings: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
     count = 0
     for levels in _loops(field, tolerance):
-        rows = []
+        rows, starts = [], []
         for points, height, index in levels:
             vertices.append(np.column_stack([points, np.full(len(points), height)]))
             rows.append(index + count)
+            starts.append(count)
             count += len(points)
-        ends[0].append(levels[0][0])
-        ends[1].append(levels[-1][0])
+        for end in (0, -1):
+            points = levels[end][0]
+            rings[end].append(points)
+            lids[end].extend(range(starts[end], starts[end] + len(points)))
         for low, high in pairwise(rows):
             after, above = np.roll(low, -1), np.roll(high, -1)
             faces += [np.stack([low, after, above], 1), np.stack([low, above, high], 1)]
     corners = np.concatenate(vertices)
-    for rings, height, turned in zip(ends, (-field.height / 2, field.height / 2), (True, False), strict=True):
-        own = np.flatnonzero(corners[:, 2] == height)
-        lid = own[np.asarray(triangulate(rings))]
-        faces.append(lid[:, ::-1] if turned else lid)
+    for end in (0, -1):
+        lid = np.array(lids[end])[np.asarray(triangulate(rings[end]))]
+        faces.append(lid if end else lid[:, ::-1])
     mesh = np.concatenate(faces)
     distinct = (mesh != np.roll(mesh, 1, axis=1)).all(axis=1)
     return closed(corners, mesh[distinct])

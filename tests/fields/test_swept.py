@@ -144,6 +144,18 @@ def test_beyond_mitres_the_distance_never_says_too_much(field: Extrusion) -> Non
     assert ((found < 0) == (truth < 0))[np.abs(truth) > 1e-3].all()
 
 
+@pytest.mark.parametrize("rims", [{"bottom_fillet": 0.3}, {"top_chamfer": 0.2, "bottom_chamfer": 0.1}])
+@pytest.mark.parametrize("height", [0.1 * 3, 0.3, 0.3 + 1e-10])
+def test_rims_that_take_all_but_the_last_digits_of_the_height_leave_a_closed_mesh(
+    rims: dict[str, float], height: float
+) -> None:
+    field = Extrusion(Profile.rectangle(2, 1.2), height, **rims)
+    mesh = mesh_part(Part(field), 64)
+    assert mesh.is_watertight
+    plain = mesh_part(Part(replace(field, height=0.5)), 64)
+    assert mesh.volume == pytest.approx(plain.volume - (0.5 - height) * 2 * 1.2, rel=1e-3)
+
+
 def test_rims_take_the_volume_that_they_should() -> None:
     """A chamfer c around a box takes prisms along its edges, less where these meet; rims that meet leave half
     a torus around a disc."""
