@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Assembly, Part, Similarity
 from partwright.errors import SettingError, SimulationError
 from partwright.fields import Box, Cylinder
 from partwright.goals.flow import Air
@@ -46,6 +47,15 @@ def test_wheels_roll_on_the_ground() -> None:
     assert speeds[rim & (z > 0.55)].mean(axis=0)[0] < -9
     normals = surface.face_normals
     assert np.abs((speeds * normals).sum(axis=1)[rim]).max() < 1.0  # along the rim, to its facets
+
+
+def test_copies_of_a_wheel_turn_about_axles_of_their_own() -> None:
+    rear = Similarity(translation=(-1.2, 0.0, 0.0))
+    copied = Assembly((CART.parts[0], replace(CART["wheel_front"], instances=(rear,))))
+    surface = surface_of(copied, 48)
+    speeds = surface_speeds(copied, surface, AIR, 1.0)
+    np.testing.assert_allclose(speeds, surface_speeds(CART, surface, AIR, 1.0), atol=1e-9)
+    assert np.linalg.norm(speeds, axis=1).max() < 10.5
 
 
 def test_the_length_of_the_unit_plays_no_part() -> None:

@@ -1,8 +1,9 @@
 """Wheels that turn: the speed of a body's surface, and a case whose wall moves with it.
 
-A wheel rolls on the ground: it turns about an axle through the middle of its part, across the flow, so fast
-that its lowest point goes with the ground. The body's mesh stands still; its wall has a speed
-(as OpenFOAM's rotatingWallVelocity, face by face, so that wheels need no patches of their own).
+A wheel rolls on the ground: it turns about an axle through the middle of its part, each copy of it about its
+own, across the flow, so fast that its lowest point goes with the ground. The body's mesh stands still; its
+wall has a speed (as OpenFOAM's rotatingWallVelocity, face by face, so that wheels need no patches of their
+own).
 """
 
 from __future__ import annotations
@@ -38,13 +39,17 @@ def surface_speeds(assembly: Assembly, surface: trimesh.Trimesh, air: Air, metre
     labels = face_labels(assembly, surface)
     speeds = np.zeros_like(centres)
     for i in turning_parts(assembly, air):
-        middle = metres * np.asarray(assembly.parts[i].translation, dtype=float)
-        radius = float(middle @ up) - ground
-        if radius <= 0:
-            raise SettingError(f"air: the middle of {assembly.parts[i].name} is not above the ground")
-        rate = air.speed / radius * np.cross(air.direction, up)
-        own = labels == i
-        speeds[own] = np.cross(rate, centres[own] - middle)
+        copies = assembly.parts[i].copies
+        own = np.flatnonzero(labels == i)
+        nearest = Assembly(copies).nearest_parts(np.asarray(surface.triangles_center)[own])
+        for k, copy in enumerate(copies):
+            middle = metres * np.asarray(copy.translation, dtype=float)
+            radius = float(middle @ up) - ground
+            if radius <= 0:
+                raise SettingError(f"air: the middle of {copy.name} is not above the ground")
+            rate = air.speed / radius * np.cross(air.direction, up)
+            mine = own[nearest == k]
+            speeds[mine] = np.cross(rate, centres[mine] - middle)
     return speeds
 
 
