@@ -21,7 +21,7 @@ from partwright.cleaning.segmentation import segment_faces
 from partwright.cleaning.splitting import split_at_borders
 from partwright.datasets.matching import COMMON, Matching, Regions, match, regions_of
 from partwright.datasets.preparing import Refused
-from partwright.errors import CancelledError, FamilyError, PartwrightError
+from partwright.errors import CancelledError, FamilyError
 from partwright.export.label_files import write_segments
 from partwright.fitting import Result
 from partwright.methods import Progress
@@ -99,15 +99,16 @@ def find_parts(
         CancelledError: it was cancelled.
     """
     results = fit_many(shapes, at_once, progress=progress, **options)
+    # What a fit had when it was stopped is no ground to tell parts by.
+    if any(one is None or (isinstance(one, Result) and one.outcome == "interrupted") for one in results):
+        raise CancelledError("cancelled before all shapes were fitted")
     cuts, refused = [], []
     for shape, result in zip(shapes, results, strict=True):
         name = shape.name if isinstance(shape, Shape) else Path(shape).stem
         if isinstance(result, Result):
             cuts.append(cut_surface(name, result.shape, result.assembly))
-        elif isinstance(result, PartwrightError):
-            refused.append(Refused(name, str(result)))
         else:
-            raise CancelledError("cancelled before all shapes were fitted")
+            refused.append(Refused(name, str(result)))
     if len(cuts) < 2:
         why = "".join(f"; {one.name}: {one.reason}" for one in refused)
         raise FamilyError(f"{len(cuts)} shapes could be fitted; a family needs at least two{why}")

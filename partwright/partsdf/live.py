@@ -18,11 +18,11 @@ _LEAST, _SHARE = 20.0, 0.05  # seconds between pictures, and what they may take 
 class LivePicture:
     """Drawn anew at the end of an epoch, whenever enough time has passed; and at the last."""
 
-    def __init__(self, path: Path, family: PreparedFamily, up: str = "z") -> None:
+    def __init__(self, path: Path, family: PreparedFamily, camera: Camera) -> None:
         trained = family.split("train")
         chosen = [trained[i * len(trained) // _SHAPES] for i in range(min(_SHAPES, len(trained)))]
         self._shapes = [family.load(i) for i in chosen]
-        self._path, self._camera = path, Camera(up=up)
+        self._path, self._camera = path, camera
         self._above = [target_picture(shape, _PANEL, self._camera) for shape in self._shapes]
         self._due = 0.0
 

@@ -17,6 +17,7 @@ from partwright.errors import FamilyError, SettingError
 from partwright.partsdf.config import Config, DecoderSettings, LossSettings, TrainingSettings, write_config
 from partwright.partsdf.live import LivePicture
 from partwright.partsdf.training import EpochReport, Trained, train, trainer
+from partwright.render import Camera
 
 FAMILY, CHECK, CONFIG, PICTURE = "family", "check.md", "training.toml", "live.png"
 STEPS = 20_000
@@ -58,7 +59,7 @@ def learn_family(
 
     Raises:
         FamilyError: the folder holds no shapes, or too few; names that conflict; or shapes of one part.
-        SettingError: fewer steps than one, or a name of the folder that no model can have.
+        SettingError: fewer steps than one, no such axis, or a name of the folder that no model can have.
         As `prepare` and `train`.
     """
     if steps < 1:
@@ -69,6 +70,7 @@ def learn_family(
     if output.resolve() == source.resolve():
         raise SettingError(f"{output}: holds the shapes; write the model into another folder")
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", output.absolute().name)
+    camera = Camera(up=up)
     check_folder(output)
     made = prepare(source, output / FAMILY, samples=samples, seed=seed, workers=workers, progress=prepared)
     family = made.family
@@ -83,7 +85,7 @@ def learn_family(
     write_config(output / CONFIG, config)
     if planned is not None:
         planned(Plan(family, tuple(findings), config, steps, steps * seconds_a_step(config)))
-    picture = LivePicture(output / PICTURE, family, up)
+    picture = LivePicture(output / PICTURE, family, camera)
 
     def told(report: EpochReport) -> None:
         picture.show(report)

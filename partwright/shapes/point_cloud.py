@@ -56,7 +56,7 @@ def source_of_points(name: str, points: NDArray[Any], normals: NDArray[Any] | No
 
     Raises NeedsSurfaceError when the points are too few or show no inside, NotFiniteError, FlatShapeError.
     """
-    points = np.asarray(points, dtype=np.float64)
+    points = np.array(points, dtype=np.float64)  # the shape keeps them
     if not np.isfinite(points).all():
         bad = np.count_nonzero(~np.isfinite(points).all(axis=1))
         raise NotFiniteError(f"{name}: {bad} of {len(points)} points have a NaN or infinite coordinate")

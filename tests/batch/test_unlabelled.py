@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ import trimesh
 from PIL import Image
 
 import partwright as pw
-from partwright.batch.unlabelled import meshes_of
+from partwright.batch import unlabelled
+from partwright.batch.unlabelled import find_parts, meshes_of
 from partwright.cli.main import main
-from partwright.errors import FamilyError
+from partwright.errors import CancelledError, FamilyError
+from partwright.fitting import Result
 from partwright.shapes.labels import read_labels
 
 
@@ -65,3 +68,13 @@ def test_bad_folders_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert main(["parts", "match", str(tmp_path), "-o", str(tmp_path / "out"), "--at-once", "1"]) == 2
     assert "0 shapes could be fitted; a family needs at least two; one: " in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("last", ["interrupted", None])
+def test_stopped_fits_are_not_matched(last: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second shape whose fit was stopped on its way, or never begun."""
+    nothing: Any = None
+    whole, stopped = (Result(nothing, nothing, how, nothing, nothing, {}) for how in ("converged", str(last)))
+    monkeypatch.setattr(unlabelled, "fit_many", lambda *_, **__: [whole, stopped if last else None])
+    with pytest.raises(CancelledError, match="before all shapes were fitted"):
+        find_parts(["a.ply", "b.ply"])

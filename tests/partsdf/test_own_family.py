@@ -111,6 +111,8 @@ def test_bad_folders_are_told_in_one_line(tmp_path: Path, capsys: pytest.Capture
         learn_family(tmp_path, tmp_path / "." / "")
     with pytest.raises(SettingError, match="steps is 0"):
         learn_family(tmp_path, tmp_path / "out", steps=0)
+    with pytest.raises(SettingError, match="up axis is 'w'"):
+        learn_family(tmp_path, tmp_path / "out", up="w")
     assert not (tmp_path / "out").exists()
 
 

@@ -66,6 +66,8 @@ def test_a_shape_that_came_as_points_is_known_by_them() -> None:
     assert target.surface is not None
     assert len(target.surface) == SURFACE
     np.testing.assert_allclose(target.surface.norm(dim=1), RADIUS, atol=0.02)
+    points *= 2  # the shape's are its own
+    np.testing.assert_allclose(np.ptp(seen.points, axis=0), 60 * RADIUS, rtol=0.01)
     mesh = pw.load_shape(trimesh.creation.icosphere(2))
     assert mesh.points is None
     assert Target.seen_in(mesh).low is None
