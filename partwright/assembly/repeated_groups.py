@@ -86,12 +86,16 @@ def repeats(node: Node) -> list[Repeat]:
     """Groups among the children of a node that stand for one another; in a difference not its first child."""
     if node.is_part:
         return []
-    first = 1 if node.operation == "difference" else 0
-    left = [i for i, child in enumerate(node.children) if i >= first and not child.is_part]
+    return repeats_among(node.children, 1 if node.operation == "difference" else 0)
+
+
+def repeats_among(nodes: Sequence[Node], first: int = 0) -> list[Repeat]:
+    """Groups among nodes, from the given one on, that stand for one another."""
+    left = [i for i, node in enumerate(nodes) if i >= first and not node.is_part]
     found = []
     while left:
         own, *others = left
-        moves = {i: move_between(node.children[own], node.children[i]) for i in others}
+        moves = {i: move_between(nodes[own], nodes[i]) for i in others}
         copies = {i: move for i, move in moves.items() if move is not None}
         if copies:
             found.append(Repeat(own, tuple(copies), tuple(copies.values())))

@@ -3,7 +3,8 @@
 glTF is in metres with Y up, so the root of the scene converts; where the assembly knows no unit or up axis
 its numbers stay as they are, and `asset.extras` says so. Each part is meshed in its own frame and placed by
 its node, so that a far place costs no digits and a node turns about the part's own origin. The copies of a
-repeated part are nodes below the part's own, named leg/2, leg/3 ..., and share its mesh. An intersection of
+repeated part are nodes below the part's own, named leg/2, leg/3 ..., and share its mesh; a group that is a
+copy of another is a node with its move, and nodes below it share the other's meshes. An intersection of
 quadrics (a convex of CAPRI-Net's) is one node, since its leaves alone have no end; its `extras` list them.
 glTF knows no booleans: of a difference each part is shown as what is left of it, and what is subtracted is
 there without a mesh, for its parameters. Nor does it know blends: `joined` writes the surface that parts make
@@ -13,6 +14,7 @@ together, shared out among their nodes.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +40,7 @@ from partwright.export.glb_colliders import (
 )
 from partwright.export.glb_joined import add_patches
 from partwright.export.identifiers import free_name
+from partwright.export.shared_groups import Shared, shared
 from partwright.meshing import mesh_part
 from partwright.textures import part_map
 from partwright.textures.maps import KEY
@@ -89,7 +92,9 @@ def write(
         if collide is not None:
             collide(tree)
 
-    made = _Scene(assembly, resolution or (_WHOLE if joined else _PART), bodily=physics == KHR, joined=joined)
+    cells = resolution or (_WHOLE if joined else _PART)
+    # Engines find colliders by the names of nodes, so nodes that share a mesh would be without.
+    made = _Scene(assembly, cells, bodily=physics == KHR, joined=joined, sharing=physics in (None, KHR))
     scene, collide = made.scene, None
     require_some(assembly, list(scene.geometry))
     if physics is not None:
@@ -123,13 +128,19 @@ class _Scene:
     """Adds nodes to a scene."""
 
     def __init__(
-        self, assembly: Assembly, resolution: int, bodily: bool = False, joined: bool = False
+        self,
+        assembly: Assembly,
+        resolution: int,
+        bodily: bool = False,
+        joined: bool = False,
+        sharing: bool = True,
     ) -> None:
-        """bodily: all is below a node `body`, in metres. joined: nodes have parts of the one surface."""
+        """bodily: all is below a node `body`, in metres. joined: nodes have parts of the one surface.
+        sharing: groups that are copies of one another share meshes."""
         import trimesh
 
         self.scene = trimesh.Scene(base_frame="world")
-        self.assembly, self.resolution = assembly, resolution
+        self.assembly, self.resolution, self.sharing = assembly, resolution, sharing
         self.shown: dict[tuple[str, ...], str] = {}  # parts of which a node has the mesh -> its name
         self.colours = dict(zip((p.name for p in assembly.parts), palette(len(assembly)), strict=True))
         self.taken = {"world", *self.colours}
@@ -142,36 +153,62 @@ class _Scene:
         else:
             self.add(assembly, self.body, pose, {})
 
-    def add(self, node: Node, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> None:
-        """A node below another. A difference holds what is left of it, and what it subtracts without mesh."""
+    def add(self, node: Node, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> str:
+        """A node below another, and its name. A difference holds what is left of it, and what it subtracts
+        without mesh."""
         if is_atomic(node) or is_operation(node, "intersection"):
-            self._add_whole(node, parent, pose, extras)
-            return
+            return self._add_whole(node, parent, pose, extras)
         if isinstance(node, Part):
-            self._add_part(node, parent, pose, extras)
-            return
+            return self._add_part(node, parent, pose, extras)
         name = free_name(node.name or "assembly", self.taken)
         about = extras | {"operation": node.operation, "blend": node.blend}
         self.scene.graph.update(frame_to=name, frame_from=parent, matrix=pose, metadata=about)
         subtracts = is_operation(node, "difference")
-        for child in separated(node) if subtracts else node.children:
-            add = self._add_whole if is_operation(child, "difference") and subtracts else self.add
-            add(child, name, np.eye(4), {})
+        children = list(separated(node)) if subtracts else node.children
+        for each in shared(children) if self.sharing else map(Shared, children):
+            add = self._add_whole if is_operation(each.node, "difference") and subtracts else self.add
+            like = add(each.node, name, np.eye(4), {})
+            for copy, move in each.copies:
+                leaves = dict(zip((part.name for part in each.node.parts), copy.parts, strict=True))
+                self._add_copy(like, name, leaves, (copy.name, move))
         for cutter in node.children[1:] if subtracts else ():
             back = subtracted_names(cutter)
             for part in (cutter,) if isinstance(cutter, Part) else cutter.parts:
                 placed = Similarity(1.0, part.rotation, part.translation).matrix()
                 about = _extras(part) | ({} if part.name in back else _SUBTRACTED)
                 self.scene.graph.update(frame_to=part.name, frame_from=name, matrix=placed, metadata=about)
+        return name
 
-    def _add_part(self, part: Part, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> None:
+    def _add_copy(
+        self, like: str, parent: str, leaves: Mapping[str, Part], moved: tuple[str, Similarity] | None = None
+    ) -> None:
+        """A node, and all below it, like one that is there, with its meshes.
+
+        leaves: by the name of a leaf, the one of the copy in its place. moved: of the copy's own node, its
+        name and move.
+        """
+        graph = self.scene.graph.transforms
+        edge = graph.edge_data[(graph.parents[like], like)]
+        about, matrix = _as_of(edge.get("metadata", {}), like, leaves), edge.get("matrix", np.eye(4))
+        wanted = re.sub(r"_\d+$", "", like)
+        if moved is not None:
+            wanted, matrix = moved[0] or wanted, moved[1].matrix() @ matrix
+            about |= {"role": "copy"}
+        name = leaves[like].name if like in leaves else free_name(wanted, self.taken)
+        mesh = graph.node_data[like].get("geometry")
+        own = {} if mesh is None else {"geometry": mesh}
+        self.scene.graph.update(frame_to=name, frame_from=parent, matrix=matrix, metadata=about, **own)
+        for child in list(graph.children.get(like, ())):
+            self._add_copy(child, name, leaves)
+
+    def _add_part(self, part: Part, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> str:
         own = Similarity(1.0, part.rotation, part.translation)
         about = _extras(part) | extras
         try:
             mesh = mesh_part(Part(part.field), self.resolution)
         except NoSurfaceError:  # it only shows where it blends
             self._add_bare(part.name, parent, pose @ own.matrix(), about)
-            return
+            return part.name
         mesh = self._looking(mesh, part)
         self.scene.add_geometry(mesh, part.name, part.name, parent, pose @ own.matrix(), metadata=about)
         self.shown[(part.name,)] = part.name
@@ -182,8 +219,9 @@ class _Scene:
             self.scene.graph.update(
                 frame_to=copy, frame_from=part.name, matrix=within, geometry=part.name, metadata=about
             )
+        return part.name
 
-    def _add_whole(self, node: Node, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> None:
+    def _add_whole(self, node: Node, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> str:
         """One mesh in the assembly's own frame, in the colour of what is left of it or comes first."""
         parts = (node,) if isinstance(node, Part) else node.parts
         operation = "intersection" if isinstance(node, Part) else node.operation
@@ -200,6 +238,7 @@ class _Scene:
         else:
             self.scene.add_geometry(mesh, name, name, parent, pose, metadata=about)
             self.shown.setdefault(tuple(p.name for p in parts), name)
+        return name
 
     def _looking(self, mesh: trimesh.Trimesh, part: Part, placed: bool = False) -> trimesh.Trimesh:
         """The mesh in the part's map, or in its colour; placed: it is where the part is, not in its frame."""
@@ -241,6 +280,14 @@ class _Scene:
 
 def _role(name: str, subtracted: frozenset[str]) -> dict[str, Any]:
     return _SUBTRACTED if name in subtracted else {}
+
+
+def _as_of(about: Mapping[str, Any], name: str, leaves: Mapping[str, Part]) -> dict[str, Any]:
+    """What a node says, said of a copy's leaves instead."""
+    if "parts" in about:
+        own = [(leaves[entry["name"]], entry) for entry in about["parts"]]
+        return {**about, "parts": [{**entry, "name": leaf.name, **_extras(leaf)} for leaf, entry in own]}
+    return dict(about) | (_extras(leaves[name]) if name in leaves else {})
 
 
 def _extras(part: Part) -> dict[str, Any]:

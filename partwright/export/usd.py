@@ -3,12 +3,13 @@
 The numbers are the assembly's own; `metersPerUnit` and `upAxis` say what they mean. USD knows Y and Z up
 only: an assembly of another up axis is turned to Z. Of a difference each part is shown as what is left of it;
 subtracted parts are there with the purpose "guide", which renderers leave out. An intersection is one mesh.
+Copies, of a part or of a group, are instances.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
 from partwright.export.axes import to_metres_z_up
 from partwright.export.formats import Format, Holds
+from partwright.export.shared_groups import shared
 from partwright.export.usd_physics import add_physics, body_of, check_physics
 from partwright.export.usd_prims import define_mesh, define_xform, exported, place, to_linear
 from partwright.meshing import mesh_part
@@ -85,33 +87,52 @@ class _Writer:
         linear = to_linear(palette(len(assembly)) / 255.0)
         self.colours = dict(zip((p.name for p in assembly.parts), linear, strict=True))
 
-    def add(self, node: Node, parent: str, *, subtracted: bool) -> None:
-        """A node below another. A difference shows what is left of it; what it subtracts is a guide."""
+    def add(self, node: Node, parent: str, *, subtracted: bool) -> Any:
+        """A node below another, as a prim. A difference shows what is left of it; what it subtracts is a
+        guide."""
         if is_atomic(node) or is_operation(node, "intersection"):
-            self._add_whole(node, parent, subtracted)
-            return
+            return self._add_whole(node, parent, subtracted)
         prim = define_xform(self.stage, parent, node.name or "assembly")
         if isinstance(node, Part):
             self._add_part(prim, node, parent, subtracted)
-            return
+            return prim
         about: dict[str, Any] = {"operation": node.operation, "blend": node.blend, **dict(node.metadata)}
         if node is self.assembly and node.unit is None:
             about["note"] = _UNKNOWN_UNIT
         prim.SetCustomData({"partwright": _plain(about)})
         below = str(prim.GetPath())
         if not is_operation(node, "difference"):
-            for child in node.children:
-                self.add(child, below, subtracted=subtracted)
-            return
-        for piece in separated(node):
-            if is_operation(piece, "difference"):
-                self._add_whole(piece, below, subtracted)
-            else:
-                self.add(piece, below, subtracted=subtracted)
-        for cutter in node.children[1:]:
-            self.add(cutter, below, subtracted=True)
+            self._add_all(node.children, below, self.add, subtracted)
+            return prim
+        self._add_all(list(separated(node)), below, self._add_piece, subtracted)
+        self._add_all(node.children[1:], below, self.add, subtracted=True)
+        return prim
 
-    def _add_whole(self, node: Node, parent: str, subtracted: bool) -> None:
+    def _add_all(self, nodes: Sequence[Node], parent: str, add: Callable[..., Any], subtracted: bool) -> None:
+        """Nodes below another, groups that are copies of others as instances of them."""
+        from pxr import Vt
+
+        for each in shared(nodes):
+            prim = add(each.node, parent, subtracted=subtracted)
+            for copy, move in each.copies:
+                made = define_xform(self.stage, parent, copy.name or prim.GetName())
+                names = Vt.StringArray([part.name for part in copy.parts])
+                made.SetCustomData({"partwright": {"copy_of": prim.GetName(), "copied_parts": names}})
+                self._refer(made, prim, move)
+
+    def _add_piece(self, piece: Node, parent: str, *, subtracted: bool) -> Any:
+        """One of the solids that a difference leaves."""
+        if is_operation(piece, "difference"):
+            return self._add_whole(piece, parent, subtracted)
+        return self.add(piece, parent, subtracted=subtracted)
+
+    def _refer(self, copy: Any, prim: Any, pose: Similarity) -> None:
+        """Make a prim an instance of another, in a place of its own."""
+        place(copy, pose)
+        copy.GetReferences().AddInternalReference(prim.GetPath())
+        copy.SetInstanceable(True)
+
+    def _add_whole(self, node: Node, parent: str, subtracted: bool) -> Any:
         """One mesh in the assembly's own frame, in the colour of what is left of it or comes first."""
         parts = (node,) if isinstance(node, Part) else node.parts
         prim = define_xform(self.stage, parent, node.name or ("convex" if is_atomic(node) else "cut"))
@@ -125,6 +146,7 @@ class _Writer:
         else:
             self._add_mesh(f"{prim.GetPath()}/mesh", mesh, self.colours[parts[0].name], subtracted)
         prim.SetCustomData({"partwright": _plain(about)})
+        return prim
 
     def _add_part(self, prim: Any, part: Part, parent: str, subtracted: bool) -> None:
         about = _about(part, subtracted)
@@ -141,9 +163,7 @@ class _Writer:
         for i, move in enumerate(part.instances, start=2):
             copy = define_xform(self.stage, parent, f"{part.name}_{i}")
             copy.SetCustomData({"partwright": {"copy_of": part.name}})
-            place(copy, move @ pose)
-            copy.GetReferences().AddInternalReference(prim.GetPath())
-            copy.SetInstanceable(True)
+            self._refer(copy, prim, move @ pose)
 
     def _add_mesh(self, path: str, mesh: Any, colour: np.ndarray, subtracted: bool) -> None:
         from pxr import UsdGeom
