@@ -53,7 +53,7 @@ def with_numbers(assembly: Assembly, values: Mapping[str, float], alone: bool = 
     values: by "part.number", lengths in the assembly's unit and angles in degrees; the part's name may be a
     pattern ("hole*.diameter"). Copies of a part change with it.
     alone: parts in the same place of groups that are copies of one another stay as they are; otherwise they
-    change alike, and move alike.
+    change alike, and move alike, but for those that the pattern names, too: each of these has the number.
 
     Raises:
         ParameterError: no part or number has the name, or a field does not allow its number.
@@ -63,15 +63,13 @@ def with_numbers(assembly: Assembly, values: Mapping[str, float], alone: bool = 
     for name, value in values.items():
         wanted, number = _split(assembly, name)
         alike = {} if alone else alike_leaves(assembly)
-        done: set[str] = set()
+        done = set(wanted)  # what is named has the number itself, wherever its like is
         for part_name in wanted:
-            if part_name in done:
-                continue
             before = assembly[part_name]
             after = _with_number(before, number, value)
             old = numbers_of(before)[number]
             changed.append(f"{part_name}.{number}: {old:.6g} to {value:.6g}")
-            copies = alike.get(part_name, ())
+            copies = [one for one in alike.get(part_name, ()) if one[0] not in done]
             if copies:
                 followed.append(
                     f"{_listed([copy for copy, _ in copies])}, copies of {part_name}, change with it"

@@ -36,7 +36,7 @@ def line(count: int, step: Sequence[float]) -> tuple[Similarity, ...]:
     """The moves of `count` in a line, (count - 1,), each a step (3,) further than the one before.
 
     Raises:
-        ParameterError: the count is less than 2.
+        ParameterError: the count is no whole number, or less than 2.
     """
     _check(count)
     x, y, z = (float(v) for v in step)
@@ -47,7 +47,7 @@ def ring(count: int, axis: str = "z", centre: Sequence[float] = (0.0, 0.0, 0.0))
     """The moves of `count` by equal turns about an axis "x", "y" or "z" through a centre (3,), (count - 1,).
 
     Raises:
-        ParameterError: the count is less than 2, or there is no such axis.
+        ParameterError: the count is no whole number, or less than 2, or there is no such axis.
     """
     _check(count)
     if axis not in ("x", "y", "z"):
@@ -64,8 +64,8 @@ def ring(count: int, axis: str = "z", centre: Sequence[float] = (0.0, 0.0, 0.0))
 
 
 def _check(count: int) -> None:
-    if count < 2:
-        raise ParameterError(f"count: expected at least 2, got {count}")
+    if isinstance(count, bool) or not isinstance(count, int) or count < 2:
+        raise ParameterError(f"count: expected a whole number, at least 2, got {count!r}")
 
 
 def copies_of(group: Assembly, moves: Sequence[Similarity]) -> tuple[Assembly, ...]:

@@ -21,7 +21,7 @@ from partwright.errors import FamilyError
 PRICE = 0.2  # of a region and a slot that stay alone, as a mean difference of box sides
 COMMON = 0.3  # share of the shapes that fill a slot, at least
 _CRUMB = 0.01  # share of a shape's surface: smaller regions only join others
-_GUESSES, _ROUNDS = 16, 20
+_GUESSES, _ROUNDS = 16, 20  # every k-th shape is a first guess, so that 16 to 31 of many are
 _EVERYWHERE = 0.9  # share of the shapes: what more of them have is a piece of nothing
 _COVERED, _MORE = 0.8, 0.25  # share of a slot's box that another covers, and by how much less beside it
 _THIN = 0.01  # of the shape's box: what walls are thickened by before shares are taken

@@ -230,7 +230,7 @@ def read_config(path: str | Path) -> Config:
 
 def write_config(path: str | Path, config: Config) -> None:
     """Write what `read_config` reads, each value that is not the default's; raises OutputError."""
-    lines = [f"{name} = {json.dumps(getattr(config, name))}" for name in ("family", "name")]
+    lines = [f"{name} = {_toml(getattr(config, name))}" for name in ("family", "name")]
     lines += _changed(config, Config(config.family, config.name))
     for table in ("decoder", "losses", "training"):
         mine = getattr(config, table)
@@ -241,7 +241,12 @@ def write_config(path: str | Path, config: Config) -> None:
 
 def _changed(mine: Any, plain: Any) -> list[str]:
     pairs = {f.name: getattr(mine, f.name) for f in fields(mine) if not is_dataclass(getattr(mine, f.name))}
-    return [f"{k} = {json.dumps(v)}" for k, v in pairs.items() if v != getattr(plain, k)]
+    return [f"{k} = {_toml(v)}" for k, v in pairs.items() if v != getattr(plain, k)]
+
+
+def _toml(value: Any) -> str:
+    # Of JSON's strings TOML takes all but pairs of surrogates.
+    return json.dumps(value, ensure_ascii=False)
 
 
 def config_from(data: Mapping[str, Any]) -> Config:

@@ -66,6 +66,8 @@ def test_one_edit_changes_all_copies_and_keeps_what_follows() -> None:
     alone = with_numbers(table(), {"hole.diameter": 5}, alone=True).assembly
     assert [alone[f"hole{k}"].field.radius for k in ("", "_02")] == [2.5, 2]  # type: ignore[attr-defined]
     assert len(repeats(alone)[0].copies) == 2  # the other three go on being one another's
+    named = with_numbers(table(), {"foot*.x": 5}).assembly
+    assert [named[f"foot{k}"].translation[0] for k in ("", "_02", "_03", "_04")] == pytest.approx([5] * 4)
     taller = with_numbers(table(), {"foot_02.height": 12}).assembly
     assert {taller[f"foot{k}"].field.height for k in ("", "_02", "_03", "_04")} == {12}  # type: ignore[attr-defined]
 
@@ -100,5 +102,7 @@ def test_build123d_has_each_once(tmp_path: Path) -> None:
 def test_bad_patterns_are_named() -> None:
     with pytest.raises(ParameterError, match="count"):
         line(1, (1, 0, 0))
+    with pytest.raises(ParameterError, match=r"count: .* got 2\.5"):
+        ring(2.5)  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="axis"):
         ring(3, "w")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -129,6 +130,9 @@ def test_settings_are_written_as_they_are_read(lamps: PreparedFamily, tmp_path: 
     from partwright.partsdf.config import write_config
 
     config = settings_for(lamps, "lamps", 1000, seed=3)
+    elsewhere = replace(config, family='C:\\möbel "neu"/\U0001fa91')
+    write_config(tmp_path / "c.toml", elsewhere)
+    assert read_config(tmp_path / "c.toml") == elsewhere
     write_config(tmp_path / "c.toml", config)
     assert read_config(tmp_path / "c.toml") == config
     assert json.dumps(str(lamps.folder)) in (tmp_path / "c.toml").read_text()
