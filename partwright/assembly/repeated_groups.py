@@ -103,6 +103,14 @@ def repeats_among(nodes: Sequence[Node], first: int = 0) -> list[Repeat]:
     return found
 
 
+def parts_once(node: Node) -> tuple[Part, ...]:
+    """The leaves of a tree, without those of groups that are copies of others."""
+    if node.is_part:
+        return (node,)
+    copies = {i for repeat in repeats(node) for i in repeat.copies}
+    return tuple(p for i, child in enumerate(node.children) if i not in copies for p in parts_once(child))
+
+
 def move_between(one: Node, other: Node) -> Similarity | None:
     """The rigid move that takes a node to another of the same fields in the same tree; None where none."""
     leaves: list[tuple[Part, Part]] = []

@@ -10,7 +10,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
         "describe",
         help="print an assembly's tree",
-        description="Prints the tree of an assembly, a line a part: its kind, its numbers and its place.",
+        description="Prints the tree of an assembly, a line a part: its kind, its numbers and its place. "
+        "What is there several times is said once, with how often, and a last line counts.",
     )
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     command.add_argument("--digits", metavar="N", type=int, default=4, help="of each number (default: 4)")

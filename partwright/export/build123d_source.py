@@ -18,6 +18,7 @@ from partwright.approximation.nearest import Approximation, compared
 from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.euler_angles import own_axes_angles
+from partwright.assembly.repeated_groups import parts_once
 from partwright.atomic_io import write_bytes
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
@@ -29,7 +30,6 @@ from partwright.export.solid_source import (
     children_once,
     drawn,
     plain_unions,
-    said_once,
     source_parts,
     superfrustum_source,
 )
@@ -70,7 +70,7 @@ def write(assembly: Assembly, path: str | Path) -> None:
     tree, changes = solid_tree(assembly, keep=_lofted, source=True)
     changes += _sharpened(tree.parts)
     plain = plain_unions(tree)
-    parts = source_parts(said_once(plain), own_axes_angles, _RESERVED)
+    parts = source_parts(parts_once(plain), own_axes_angles, _RESERVED)
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     drawing = superfrustum_source(parts, "build123d_superfrustum.txt")
     swept = [field for part in parts if isinstance(field := part.part.field, Swept)]

@@ -22,6 +22,7 @@ from partwright.approximation.nearest import Approximation
 from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.euler_angles import fixed_axes_angles
+from partwright.assembly.repeated_groups import parts_once
 from partwright.atomic_io import write_bytes
 from partwright.errors import ParameterError
 from partwright.export.export_report import write_report
@@ -35,7 +36,6 @@ from partwright.export.solid_source import (
     drawn,
     number,
     plain_unions,
-    said_once,
     source_parts,
     superfrustum_source,
 )
@@ -103,7 +103,7 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
     sliced = [part for part in tree.parts if _has_rims(part.field)]
     changes += [Change((part.name,), "slices", note="its fillets and chamfers are slices") for part in sliced]
     plain = plain_unions(tree)
-    parts = source_parts(said_once(plain), fixed_axes_angles, _RESERVED.split())
+    parts = source_parts(parts_once(plain), fixed_axes_angles, _RESERVED.split())
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     lines = [
         f"// {comment(assembly.name) or 'Assembly'}: {len(parts)} parts. "

@@ -238,14 +238,6 @@ def plain_unions(node: Node) -> Node:
     return children[0] if len(children) == 1 else dataclasses.replace(node, children=tuple(children))
 
 
-def said_once(node: Node) -> tuple[Part, ...]:
-    """The leaves of a tree, without those of groups that are copies of others."""
-    if isinstance(node, Part):
-        return (node,)
-    copies = {i for repeat in repeats(node) for i in repeat.copies}
-    return tuple(p for i, child in enumerate(node.children) if i not in copies for p in said_once(child))
-
-
 def children_once(
     node: Assembly, turn: Callable[[np.ndarray], tuple[float, ...]], brackets: str
 ) -> list[tuple[Node, str]]:

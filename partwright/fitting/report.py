@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from partwright import __version__
 from partwright.assembly import Assembly, Similarity
+from partwright.assembly.repeated_groups import parts_once
 from partwright.errors import SettingError
 from partwright.fitting.structure_warnings import structure_warnings
 from partwright.methods import Fitted, Run
@@ -50,7 +51,7 @@ def report(
         "threads": run.threads,
         "input": about_input(shape),
         "seconds": {stage: round(spent, 3) for stage, spent in seconds.items()},
-        "parts": len(assembly),
+        "parts": len(parts_once(assembly)),
         "instances": sum(len(part.copies) for part in assembly.parts),
         "scores": scores.to_dict(),
         "mass_properties": masses(surface, shape, None),

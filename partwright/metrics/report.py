@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from partwright.assembly.repeated_groups import parts_once
 from partwright.metrics.cad import CadScores, cad_scores
 from partwright.metrics.chamfer import chamfer_floor
 from partwright.metrics.comparison import Comparison
@@ -85,7 +86,7 @@ def evaluate(
         chamfer_floor=chamfer_floor(pair),
         emd=of("emd") if emd else None,
         overlap=of("overlap"),
-        parts=len(assembly),
+        parts=len(parts_once(assembly)),
         max_deviation=largest,
         max_protrusion=beyond,
         deviation_95=most,

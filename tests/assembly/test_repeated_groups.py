@@ -12,7 +12,8 @@ import pytest
 
 from partwright.assembly import Assembly, Part, Similarity, copies_of, line, load_assembly, ring
 from partwright.assembly.numbers import with_numbers
-from partwright.assembly.repeated_groups import alike_leaves, move_between, repeats
+from partwright.assembly.repeated_groups import alike_leaves, move_between, parts_once, repeats
+from partwright.cli.main import main
 from partwright.errors import ParameterError
 from partwright.export import export
 from partwright.fields import Box, Cylinder
@@ -79,6 +80,16 @@ def test_a_description_and_a_file_say_and_keep_them(tmp_path: Path) -> None:
     assert text.count("cylinder") == 2
     table().save(tmp_path / "t.json")
     assert load_assembly(tmp_path / "t.json") == table()
+
+
+def test_counts_are_of_each_once_and_of_every_copy(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert [part.name for part in parts_once(table())] == ["plate", "foot", "hole", "rib", "tip"]
+    assert len(table()) == 15
+    table().save(tmp_path / "t.json")
+    assert main(["describe", str(tmp_path / "t.json")]) == 0
+    assert capsys.readouterr().out.endswith("\n5 parts, 15 with every copy\n")
 
 
 def test_openscad_has_each_once(tmp_path: Path) -> None:

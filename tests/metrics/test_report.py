@@ -121,3 +121,9 @@ def test_same_seed_same_scores_and_a_given_mesh_is_used() -> None:
 def test_nothing_left_is_named() -> None:
     with pytest.raises(NoSurfaceError):
         evaluate(ball(0.5) - Part(Sphere(1.0)), ball_shape())
+
+
+def test_groups_that_are_copies_count_once() -> None:
+    group = Assembly((Part(Box((0.4, 0.4, 0.4)), (0.5, 0, 0)), Part(Sphere(0.3), (0.5, 0, 0.3))))
+    both = Assembly((Part(Sphere(1.0)), group, group.translated((-1, 0, 0))))
+    assert evaluate(both, ball_shape(), emd=False).parts == 3
