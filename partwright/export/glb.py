@@ -194,7 +194,9 @@ class _Scene:
         if moved is not None:
             wanted, matrix = moved[0] or wanted, moved[1].matrix() @ matrix
             about |= {"role": "copy"}
-        name = leaves[like].name if like in leaves else free_name(wanted, self.taken)
+        own_name = leaves[like].name if like in leaves else ""  # which copies of a repeated part share
+        there = not own_name or own_name in self.scene.graph.nodes
+        name = free_name(own_name or wanted, self.taken) if there else own_name
         mesh = graph.node_data[like].get("geometry")
         own = {} if mesh is None else {"geometry": mesh}
         self.scene.graph.update(frame_to=name, frame_from=parent, matrix=matrix, metadata=about, **own)

@@ -70,6 +70,26 @@ def test_glb_copies_are_where_and_what_they_were(tmp_path: Path) -> None:
     assert nodes["row_02"]["matrix"][12:15] == pytest.approx([0, -20, 0])
 
 
+def test_glb_copies_of_a_part_that_are_cut_alike_are_all_there(tmp_path: Path) -> None:
+    """The pieces are copies of one another, and have one part's name."""
+    leg = Part(Box((2, 2, 8)), name="leg", instances=line(3, (5, 0, 0)))
+    holes = [Part(Cylinder(0.5, 4), (5 * i, 0, 0), (1, 1, 0, 0), name=f"hole_{i}") for i in range(3)]
+    whole = Assembly((Assembly((leg, Part(Box((1, 1, 1)), (0, 9, 0), name="pin"))), *holes), "difference")
+    export(whole, tmp_path / "t.glb")
+    tree = header(tmp_path / "t.glb")
+    assert len(tree["meshes"]) == 2
+    assert {"leg", "leg_02", "leg_03"} < {node["name"] for node in tree["nodes"]}
+    scene = trimesh.load_scene(tmp_path / "t.glb")
+    assert sum(m.volume for m in scene.dump()) == pytest.approx(whole_volume(whole), rel=1e-3)
+    assert np.allclose(scene.bounds, whole.bounds(), atol=1e-2)
+
+
+def whole_volume(whole: Assembly) -> float:
+    from partwright.meshing import mesh_assembly
+
+    return float(mesh_assembly(whole).volume)
+
+
 def test_engines_get_colliders_for_every_copy(tmp_path: Path) -> None:
     export(rows(), tmp_path / "t.glb", physics="godot")
     names = [node["name"] for node in header(tmp_path / "t.glb")["nodes"]]
