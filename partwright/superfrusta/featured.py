@@ -23,10 +23,8 @@ from partwright.superfrusta.flat_tree import nested
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 
-_SHARE, _HALFWAY = (
-    0.3,
-    10,
-)  # of a fit's work that features are at most, and steps after which half of it is done
+_SHARE = 0.3  # of a fit's work that features are at most
+_HALFWAY = 10  # steps after which half of that is done
 _PLAIN = 1e-4  # unit lengths: how far numbers are moved to become plain
 SURE = 0.95
 """R from which on a tree of features is the result, and no other is looked for."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from partwright.methods import Ability, FitRequest, Fitted, Method
-from partwright.superfrusta import resfit
+from partwright.superfrusta.fit import fit
 from partwright.superfrusta.settings import Settings
 
 
@@ -21,7 +21,7 @@ class SuperFrusta(Method[Settings]):
         return replace(settings, alpha=settings.alpha * share)
 
     def fit(self, request: FitRequest[Settings]) -> Fitted:
-        return resfit.fit(request)
+        return fit(request)
 
 
 METHOD = SuperFrusta()

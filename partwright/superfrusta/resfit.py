@@ -14,24 +14,21 @@ from functools import partial
 import numpy as np
 
 from partwright.assembly import Assembly
-from partwright.errors import CancelledError, EmptyShapeError
-from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outcome, Progress, timed
+from partwright.errors import CancelledError
+from partwright.methods import Outcome, Progress, timed
 from partwright.shapes import Shape
-from partwright.superfrusta.feature_search import FeatureTree
-from partwright.superfrusta.featured import SURE, assembly, feature_tree, wants_features
 from partwright.superfrusta.growing import grow
 from partwright.superfrusta.hull_start import convex_hull_start
 from partwright.superfrusta.mending import Mending
 from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
-from partwright.superfrusta.outcome import Step, assembly_of, chosen
+from partwright.superfrusta.outcome import Step, chosen
 from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
 from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimise
 from partwright.superfrusta.repeated_parts import repeat
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.simplification import extend_cuts, simplify_kinds
-from partwright.superfrusta.starting import starting_rows
 from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded
 from partwright.superfrusta.symmetry import symmetries
 
@@ -41,81 +38,10 @@ PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
 _OPENING = 4  # rounds
 _GOOD = 0.93  # of the objective: what comes out worse is tried again with parts to subtract
 _WORTH_CUTS = 0.01  # of the objective that such an attempt must gain, for it is the harder to edit
-_BEHIND, _ROUNDS_BEHIND = (
-    0.06,
-    6,
-)  # of the objective; rounds after which it is given up where it is so far off
+_BEHIND = 0.06  # of the objective: what is so far behind
+_ROUNDS_BEHIND = 6  # after so many rounds is given up
 _MENDED = 0.9  # of the work is done when mending begins
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
-
-
-def fit(request: FitRequest[Settings]) -> Fitted:
-    """Fits an assembly of SuperFrusta to a shape.
-
-    The start is refined and continued; its locked parts come first and stay bit for bit.
-
-    Raises:
-        EmptyShapeError: nothing could be fitted (the shape is thinner than the samples can see).
-        CancelledError: cancelled before there was a part.
-        SettingError: the start is no union of SuperFrusta, or a locked name is none of its parts.
-    """
-    shape, settings, run = request.shape, request.settings, request.run
-    rows, fixed = starting_rows(shape, request.start, request.locked, settings)
-    seconds: dict[str, float] = {}
-    checkpoint = Checkpoint(run.cancel)
-    with timed(seconds, "prepare"):
-        samples = FitSamples.of(shape, settings, run, checkpoint)
-    features: FeatureTree | None = None
-    if wants_features(request):
-        with timed(seconds, "features"):
-            features, interrupted = feature_tree(request, samples, checkpoint)
-        if features is not None and (interrupted or features.score >= SURE or settings.min_iou is not None):
-            return Fitted(
-                assembly(shape, features), "interrupted" if interrupted else "converged", seconds, []
-            )
-    assembled = partial(assembly_of, shape, settings=settings, fixed=fixed)
-    search = ResidualFit(samples, settings, run.told, len(fixed), assembled, checkpoint, seconds=seconds)
-    try:
-        outcome = search.run(rows)
-        if settings.symmetry and search.best is not None:
-            search.find_repeats(shape)
-    except CancelledError:
-        if search.best is None and search.earlier is None:
-            raise
-        outcome = "interrupted"
-        search.choose()
-    search.enforce_budget()
-    if search.best is None:
-        raise EmptyShapeError(
-            f"{shape.name}: no part could be placed; the shape has no volume that {settings.near} samples "
-            "can see. Check its thickness, or use --quality high"
-        )
-    leaves = search.leaves or [RepeatedPart(row) for row in search.best]
-    if features is not None and features.objective - features.off >= search.objective(
-        search.best, len(leaves)
-    ):
-        return Fitted(assembly(shape, features), outcome, search.seconds, search.history)
-    whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
-    whole = _with_locked(whole, request)
-    curve: list[CurvePoint] = []
-    for step in search.curve:
-        smaller = curve[-1].assembly if curve else None
-        one = assembled(step.rows, smaller=smaller)
-        curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
-    return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)))
-
-
-def _with_locked(whole: Assembly, request: FitRequest[Settings]) -> Assembly:
-    """With the locked parts' own numbers: the way to the unit frame and back rounds them."""
-    for name in request.locked:
-        given = request.start[name] if request.start is not None else None
-        if given is None or given.instances:
-            continue
-        found = replace(
-            whole[name], field=given.field, translation=given.translation, rotation=given.rotation
-        )
-        whole = whole.replace_part(name, found)
-    return whole
 
 
 @dataclass

@@ -15,9 +15,10 @@ from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import iou
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Settings, resfit
+from partwright.superfrusta.fit import fit
 from partwright.superfrusta.flat_tree import flattened
 from partwright.superfrusta.outcome import Step, chosen
-from partwright.superfrusta.resfit import ResidualFit, fit
+from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import NOTHING, FitSamples
 from tests.superfrusta.meshes import box, bracket, corner_tie, drilled_block, half_torus, pipe, table, union
 
