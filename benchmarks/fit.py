@@ -184,6 +184,32 @@ def table(rows: list[Run]) -> Iterator[str]:
         yield f"| **{name}: {total.name}** | {cells} |"
 
 
+def apart(runs: list[list[Run]]) -> Iterator[str]:
+    """Markdown: how far the seeds of a shape are apart (largest less smallest), a row a set."""
+    yield "| over the seeds | IoU, mean | IoU, most | parts, mean | parts, most | by over 2 and a tenth |"
+    yield "|---|---:|---:|---:|---:|---:|"
+    for name in dict.fromkeys(of[0].set for of in runs):
+        members = [of for of in runs if of[0].set == name and all(run.iou is not None for run in of)]
+        if not members:
+            continue
+        ious, parts = ([_range(of, number) for of in members] for number in ("iou", "parts"))
+        many = [of for of, wide in zip(members, parts, strict=True) if wide > max(2.0, 0.1 * _most(of))]
+        iou_at, parts_at = (members[wide.index(max(wide))][0].name for wide in (ious, parts))
+        yield (
+            f"| {name} | {mean(ious):.4f} | {max(ious):.4f} ({iou_at}) | {mean(parts):.1f} "
+            f"| {max(parts):g} ({parts_at}) | {len(many)} of {len(members)} |"
+        )
+
+
+def _range(runs: list[Run], number: str) -> float:
+    values = [getattr(run, number) for run in runs]
+    return max(values) - min(values)
+
+
+def _most(runs: list[Run]) -> float:
+    return max(run.parts or 0.0 for run in runs)
+
+
 def worst(rows: list[Run]) -> Iterator[str]:
     """A sentence a set on the shape with the lowest IoU."""
     for name in dict.fromkeys(row.set for row in rows):
@@ -202,7 +228,9 @@ def machine() -> str:
     return f"{cores} cores, {platform.machine()}{level}"
 
 
-def document(rows: list[Run], command: str, seeds: list[int], planned: int) -> str:
+def document(runs: list[list[Run]], command: str, seeds: list[int], planned: int) -> str:
+    """The whole page, of the shapes (S, seeds) that are done."""
+    rows = [over_seeds(of) for of in runs]
     done = "" if len(rows) == planned else f" Unfinished: {len(rows)} of {planned} shapes."
     lines = [
         "# `partwright fit`, shape by shape",
@@ -216,6 +244,7 @@ def document(rows: list[Run], command: str, seeds: list[int], planned: int) -> s
         "",
         *table(rows),
         "",
+        *([*apart(runs), ""] if len(seeds) > 1 else []),
         *worst(rows),
     ]
     return "\n".join(lines) + "\n"
@@ -251,7 +280,7 @@ def main() -> int:
         for count, (entry, run) in enumerate(measure(entries, seeds, passed, options.jobs), 1):
             runs[entry].append(replace(run, seconds=None) if options.untimed else run)
             print(f"{count}/{len(entries) * len(seeds)} {_line(run)}", flush=True)
-            finished = [over_seeds(of) for of in runs.values() if len(of) == len(seeds)]
+            finished = [of for of in runs.values() if len(of) == len(seeds)]
             text = document(finished, _command(options), seeds, len(entries))
             write_bytes(target, text.encode())
             write_bytes(

@@ -53,3 +53,19 @@ def test_the_list_of_tables_names_scripts_and_options_that_are_there() -> None:
         script = (FOLDER / table.script).read_text()
         for name in re.findall(r"--[a-z-]+", f"{table.quick or ''} {table.full or ''}"):
             assert f'"{name}"' in script or table.script == "partsdf.py", f"{table.script} has no {name}"
+
+
+def test_how_far_seeds_are_apart_is_told() -> None:
+    sys.path.insert(0, str(FOLDER))
+    module = import_module("fit")
+    sys.path.remove(str(FOLDER))
+
+    def runs(name: str, *seen: tuple[float, float]) -> list:
+        return [
+            module.Run("toys", name, str(i), "converged", iou, parts=n) for i, (iou, n) in enumerate(seen)
+        ]
+
+    many = runs("many", (0.9, 30.0), (0.92, 32.0), (0.91, 33.0))  # three of 33 are a tenth
+    few = runs("few", (0.95, 5.0), (0.95, 8.0), (0.96, 6.0))
+    *_, row = module.apart([many, few])
+    assert row == "| toys | 0.0150 | 0.0200 (many) | 3.0 | 3 (many) | 1 of 2 |"
