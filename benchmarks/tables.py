@@ -41,10 +41,10 @@ class Table:
 
 TABLES = (
     Table("guard.json", "guard.py", "", 0.5, "--record", 0.5),
-    Table("fit.md", "fit.py", "--quality draft", 2, "--shapes {data} --sets toys,cad", 45),
+    Table("fit.md", "fit.py", "--quality draft", 2, "--shapes {data} --sets toys,cad --seeds 0,1,2", 45),
     Table("ablations.md", "ablations.py", "--names mug --rows default,cuboid", 2, "--shapes {data}", 240),
     Table("ablations-carving.md", "ablations.py", "--names mug --rows default,mended --tag carving", 1,
-          '--shapes {data} --rows "default,subtracted,mended" --tag carving', 8),
+          '--shapes {data} --rows "default,subtracted,mended" --tag carving --jobs 2', 8),
     Table("solids.md", "solids.py", "--shapes examples/shapes --sets shapes --names bracket", 2,
           "--shapes {data} --sets cad", 90),
     Table("capri.md", "capri.py", "--names bracket --rows mesh,planes", 2,
