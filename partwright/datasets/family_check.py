@@ -17,7 +17,7 @@ from partwright.atomic_io import write_bytes
 from partwright.datasets.poses import mean_rotation
 from partwright.datasets.prepared import PreparedFamily, PreparedShape, read_about
 from partwright.datasets.preparing import Refused
-from partwright.shapes.topology import components
+from partwright.shapes.topology import components, doubled_areas
 
 LEFT_OUT, ODD = "left out", "look at it"
 FEWEST = 4  # shapes that tell what is usual
@@ -108,8 +108,7 @@ def _surface(family: PreparedFamily, index: int) -> list[str]:
 
 def _pieces(shape: PreparedShape, parts: int) -> list[int]:
     """In how many pieces each part shows on the surface, crumbs left out."""
-    corners = shape.vertices[shape.faces].astype(np.float64)
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = doubled_areas(shape.vertices.astype(np.float64), shape.faces)
     counts = []
     for p in range(parts):
         mine = np.flatnonzero(shape.label == p)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.errors import FamilyError
+from partwright.shapes.topology import doubled_areas
 
 PRICE = 0.2  # of a region and a slot that stay alone, as a mean difference of box sides
 COMMON = 0.3  # share of the shapes that fill a slot, at least
@@ -55,9 +56,7 @@ def regions_of(vertices: Array, faces: NDArray[np.int64], labels: NDArray[np.int
     corners = vertices[faces]
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     corners = (corners - low) / np.maximum(high - low, 1e-12)
-    sides = np.diff(vertices[faces], axis=1)
-    across = np.cross(sides[:, 0], sides[:, 1])
-    areas = np.bincount(labels, weights=np.linalg.norm(across, axis=1), minlength=count)
+    areas = np.bincount(labels, weights=doubled_areas(vertices, faces), minlength=count)
     boxes = np.tile([np.inf] * 3 + [-np.inf] * 3, (count, 1))
     for axis in range(3):
         np.minimum.at(boxes[:, axis], labels, corners[:, :, axis].min(axis=1))

@@ -20,6 +20,7 @@ from partwright.partsdf.part_vectors import quaternions
 from partwright.partsdf.poses import PoseTensors, local_points, rotation_matrices
 from partwright.shapes import LONGEST_SIDE
 from partwright.shapes.sampling import sample_triangles
+from partwright.shapes.topology import doubled_areas
 
 KEPT = 512  # surface points of each part
 _EXCHANGED = 0.5  # of the clouds have parts of several shapes, a quarter of their parts
@@ -64,8 +65,7 @@ class PartClouds:
                 faces = shape.faces[shape.label == p].astype(np.int64)
                 if not len(faces):
                     continue
-                sides = corners[faces[:, 1:]] - corners[faces[:, :1]]
-                area[s, p] = float(np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1).sum()) / 2
+                area[s, p] = float(doubled_areas(corners, faces).sum()) / 2
                 sampled, _ = sample_triangles(corners, faces, KEPT, s)
                 pose = model.poses.map(lambda t, s=s, p=p: t[s, p][None])
                 points[s, p] = local_points(torch.from_numpy(sampled).float(), pose)[0]

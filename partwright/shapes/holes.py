@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from partwright.shapes.cleaning import counted
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.sampling import uniform_box
-from partwright.shapes.topology import EdgeTable, boundary_loops, components
+from partwright.shapes.topology import EdgeTable, boundary_loops, components, doubled_areas
 
 _HALF = 0.3  # a lid over a true opening sees a winding number within 0.5 +- this on both of its sides
 _STEP = 1e-4
@@ -93,8 +93,4 @@ def _is_opening(source: MeshDistance, rim: NDArray[np.float64], middle: NDArray[
 
 
 def _area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
-    corners = vertices[faces]
-    return float(
-        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-        / 2
-    )
+    return float(doubled_areas(vertices, faces).sum() / 2)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.shapes.cleaning import counted
-from partwright.shapes.topology import EdgeTable, signed_volumes
+from partwright.shapes.topology import EdgeTable, doubled_areas, signed_volumes
 
 _PROBES = 32  # vertices of a body that are looked at to see whether another body contains it
 _MAJORITY = 0.75  # share of a patch's triangles that must agree before its facing in the file is believed
@@ -68,9 +68,7 @@ def _facing(vertices: NDArray[np.float64], a: NDArray[np.int64], b: NDArray[np.i
 def _areas(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], label: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    corners = vertices[faces]
-    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return np.bincount(label, doubled) / 2
+    return np.bincount(label, doubled_areas(vertices, faces)) / 2
 
 
 def containers(

@@ -18,7 +18,7 @@ from partwright.shapes.distance import MeshDistance
 from partwright.shapes.holes import Openings, fill_holes, with_what_stays_open
 from partwright.shapes.orientation import orient
 from partwright.shapes.sampling import sample_triangles
-from partwright.shapes.topology import EdgeTable, components, signed_volumes
+from partwright.shapes.topology import EdgeTable, components, doubled_areas, signed_volumes
 from partwright.shapes.winding import winding_grid
 
 _FLAT = 1e-6  # thickness under which the vertices count as one plane
@@ -139,12 +139,11 @@ def _drop_shared_walls(
     if edges.valence.max() == 2:
         return faces
     patch = components(len(faces), *edges.pairs[1].T)
-    corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = doubled_areas(vertices, faces)
     order = np.lexsort((-area, patch))
     rank = np.arange(len(order)) - np.searchsorted(patch[order], patch[order])
     probe = order[rank < _PROBES]
-    parts = _facing(MeshDistance(vertices, faces, faces, closed=True), corners[probe]) != 0
+    parts = _facing(MeshDistance(vertices, faces, faces, closed=True), vertices[faces[probe]]) != 0
     kept = faces[(np.bincount(patch[probe], parts) > 0)[patch]]
     if len(kept) in (0, len(faces)) or EdgeTable(kept).balance.any():
         return faces

@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.shapes.topology import doubled_areas
+
 NEAR_SIGMA = (0.02, 0.005)  # unit lengths; half of the near samples each
 _ENLARGED = 0.05  # unit lengths that the box of the uniform samples reaches beyond the bounding box
 
@@ -49,13 +51,11 @@ def sample_triangles(
     Stratified along the running area, so that the number of points on any part is as even as it can be.
     """
     rng = np.random.default_rng(seed)
-    corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    running = np.cumsum(area)
+    running = np.cumsum(doubled_areas(vertices, faces))
     target = (np.arange(count) + rng.random(count)) * (running[-1] / max(count, 1))
     face = np.minimum(np.searchsorted(running, target, side="right"), len(faces) - 1)
     root, second = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
-    a, b, c = corners[face, 0], corners[face, 1], corners[face, 2]
+    a, b, c = vertices[faces[face]].transpose(1, 0, 2)
     return (1 - root) * a + root * ((1 - second) * b + second * c), face
 
 

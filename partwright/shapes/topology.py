@@ -4,9 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+
+def doubled_areas(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[Any]:
+    """Twice the area (F,) of each triangle, in squared units of the vertices (V, 3): enough for weights."""
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(np.linalg.norm(normals, axis=1))
 
 
 @dataclass(frozen=True)

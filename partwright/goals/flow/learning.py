@@ -16,6 +16,7 @@ from partwright.goals.flow.network import POINTS, DragNetwork, neighbours
 from partwright.goals.flow.simulation import PRESSURE
 from partwright.goals.flow.surrogate import Spread, Surrogate, drag_area, placed, rank_correlation
 from partwright.methods import Cancellation
+from partwright.shapes.topology import doubled_areas
 
 _VIEWS = 4  # draws of points that are kept of each body
 _BATCH = 4
@@ -144,8 +145,7 @@ def _views(samples: Sequence[Sample], seeds: Sequence[int] | range, air: Air, co
     for sample in samples:
         vertices = torch.tensor(sample.vertices, dtype=torch.float32)
         faces = torch.tensor(sample.faces)
-        corners = sample.vertices[sample.faces]
-        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        areas = doubled_areas(sample.vertices, sample.faces)
         drag = torch.tensor(sample.drag_area)
         for seed in seeds:
             spread = Spread.over(areas, seed, count)

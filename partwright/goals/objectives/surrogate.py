@@ -17,6 +17,7 @@ from partwright.errors import SettingError
 from partwright.goals.flow.surrogate import Spread, Surrogate, placed
 from partwright.goals.objective import Measure, Objective, Start
 from partwright.shapes import METRES
+from partwright.shapes.topology import doubled_areas
 
 _DRAWS = 4  # of points, of which the mean is taken
 
@@ -39,8 +40,7 @@ def predicted(
 
 def drawn(vertices: np.ndarray, faces: np.ndarray) -> list[Spread]:
     """Draws of points over a surface."""
-    corners = vertices[faces]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas = doubled_areas(vertices, faces)
     return [Spread.over(areas, seed) for seed in range(_DRAWS)]
 
 
