@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly.placed import placed_quadric
-from partwright.assembly.repeated_groups import repeats
+from partwright.assembly.repeated_groups import children_once
 from partwright.fields import NormalForm, Profile, normal_form
 from partwright.fields.extrusion import RIMS
 
@@ -31,18 +31,15 @@ def _lines(node: Node, digits: int, first: str, rest: str) -> Iterator[str]:
         return
     blend = f", blend {_number(node.blend, digits)}" if node.blend else ""
     yield f"{first}{node.operation}{' ' + node.name if node.name else ''}{blend}"
-    times = {repeat.first: len(repeat.copies) + 1 for repeat in repeats(node)}
-    copies = {i for repeat in repeats(node) for i in repeat.copies}
-    shown = [i for i in range(len(node.children)) if i not in copies]
-    for i in shown:
-        last = i == shown[-1]
+    shown = children_once(node)
+    for i, (child, moves) in enumerate(shown):
+        last = i == len(shown) - 1
         sign = "- " if node.operation == "difference" and i else ""
-        child = node.children[i]
         said = _lines(
             child, digits, rest + ("└─ " if last else "├─ ") + sign, rest + ("   " if last else "│  ")
         )
-        if i in times:
-            yield f"{next(said)}, {times[i]} times"
+        if moves:
+            yield f"{next(said)}, {len(moves) + 1} times"
         yield from said
 
 

@@ -103,12 +103,22 @@ def repeats_among(nodes: Sequence[Node], first: int = 0) -> list[Repeat]:
     return found
 
 
+def children_once(node: Node) -> list[tuple[Node, tuple[Similarity, ...]]]:
+    """The children of a node without those that are copies of others, each with the moves to its copies."""
+    found = {repeat.first: repeat for repeat in repeats(node)}
+    copies = {i for repeat in found.values() for i in repeat.copies}
+    return [
+        (child, found[i].moves if i in found else ())
+        for i, child in enumerate(node.children)
+        if i not in copies
+    ]
+
+
 def parts_once(node: Node) -> tuple[Part, ...]:
     """The leaves of a tree, without those of groups that are copies of others."""
     if node.is_part:
         return (node,)
-    copies = {i for repeat in repeats(node) for i in repeat.copies}
-    return tuple(p for i, child in enumerate(node.children) if i not in copies for p in parts_once(child))
+    return tuple(part for child, _ in children_once(node) for part in parts_once(child))
 
 
 def move_between(one: Node, other: Node) -> Similarity | None:

@@ -27,7 +27,7 @@ from partwright.export.instance_patterns import Poses, Row
 from partwright.export.profile_source import BUILD123D, BUILD123D_SOURCE, draws_loops, loops
 from partwright.export.solid_source import (
     SourcePart,
-    children_once,
+    children_and_poses,
     drawn,
     plain_unions,
     source_parts,
@@ -194,7 +194,7 @@ def _tree(node: Node, functions: dict[str, str], indent: str) -> str:
     inner = indent + "    "
     first, *others = (
         _repeated(_tree(child, functions, inner), poses)
-        for child, poses in children_once(node, own_axes_angles, "()")
+        for child, poses in children_and_poses(node, own_axes_angles, "()")
     )
     operator = _OPERATORS[node.operation]
     rest = "".join(f"\n{inner}{operator} {other}" for other in others)

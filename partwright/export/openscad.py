@@ -32,7 +32,7 @@ from partwright.export.instance_patterns import Poses, Ring, Row
 from partwright.export.profile_source import SCAD, SCAD_RIMS, SCAD_SOURCE, draws_loops, loops
 from partwright.export.solid_source import (
     SourcePart,
-    children_once,
+    children_and_poses,
     drawn,
     number,
     plain_unions,
@@ -227,7 +227,7 @@ def _tree(node: Node, modules: dict[str, str], indent: str) -> Iterator[str]:
         yield f"{indent}{modules[node.name]}();"
         return
     yield f"{indent}{node.operation}() {{" + (f"  // {comment(node.name)}" if node.name else "")
-    for child, poses in children_once(node, fixed_axes_angles, "[]"):
+    for child, poses in children_and_poses(node, fixed_axes_angles, "[]"):
         inner = indent + "    "
         if poses:
             yield f"{inner}for (pose = {poses}) translate(pose[0]) rotate(pose[1])"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from partwright.approximation.nearest import Approximation
 from partwright.approximation.recognise import SAME, exact_solid
 from partwright.assembly import Assembly, Node, Part
-from partwright.assembly.repeated_groups import repeats
+from partwright.assembly.repeated_groups import children_once, repeats
 from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.export.identifiers import comment, identifiers
 from partwright.export.instance_patterns import Poses, Ring, Row, pattern
@@ -238,17 +238,13 @@ def plain_unions(node: Node) -> Node:
     return children[0] if len(children) == 1 else dataclasses.replace(node, children=tuple(children))
 
 
-def children_once(
+def children_and_poses(
     node: Assembly, turn: Callable[[np.ndarray], tuple[float, ...]], brackets: str
-) -> list[tuple[Node, str]]:
+) -> Iterator[tuple[Node, str]]:
     """The children without those that are copies of others, and the places and turns of a group and its
     copies as a list in such brackets, empty where it is not repeated."""
-    found = {repeat.first: repeat for repeat in repeats(node)}
-    copies = {i for repeat in found.values() for i in repeat.copies}
-    result: list[tuple[Node, str]] = []
-    for i, child in enumerate(node.children):
-        if i not in copies:
-            moves = (Similarity(), *found[i].moves) if i in found else ()
-            poses = tuple((_tidy(m.translation), turn(rotation_matrix(m.rotation))) for m in moves)
-            result.append((child, literal(poses, brackets) if poses else ""))
-    return result
+    for child, moves in children_once(node):
+        poses = tuple(
+            (_tidy(m.translation), turn(rotation_matrix(m.rotation))) for m in (Similarity(), *moves)
+        )
+        yield child, literal(poses, brackets) if moves else ""
