@@ -52,15 +52,8 @@ def ring(count: int, axis: str = "z", centre: Sequence[float] = (0.0, 0.0, 0.0))
     _check(count)
     if axis not in ("x", "y", "z"):
         raise ParameterError(f"axis: expected x, y or z, got {axis!r}")
-    moves = []
-    for i in range(1, count):
-        half = math.pi * i / count
-        rotation = [math.cos(half), 0.0, 0.0, 0.0]
-        rotation[1 + "xyz".index(axis)] = math.sin(half)
-        turn = Similarity(rotation=(rotation[0], rotation[1], rotation[2], rotation[3]))
-        x, y, z = (np.asarray(centre, float) - turn(np.asarray(centre, float))).tolist()
-        moves.append(Similarity(1.0, turn.rotation, (x, y, z)))
-    return tuple(moves)
+    direction = np.eye(3)["xyz".index(axis)].tolist()
+    return tuple(Similarity.turn(direction, 2 * math.pi * i / count, centre) for i in range(1, count))
 
 
 def _check(count: int) -> None:
@@ -103,7 +96,7 @@ def repeats_among(nodes: Sequence[Node], first: int = 0) -> list[Repeat]:
     return found
 
 
-def children_once(node: Node) -> list[tuple[Node, tuple[Similarity, ...]]]:
+def children_once(node: Assembly) -> list[tuple[Node, tuple[Similarity, ...]]]:
     """The children of a node without those that are copies of others, each with the moves to its copies."""
     found = {repeat.first: repeat for repeat in repeats(node)}
     copies = {i for repeat in found.values() for i in repeat.copies}

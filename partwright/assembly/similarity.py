@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -57,6 +58,15 @@ class Similarity:
         object.__setattr__(self, "scale", scale)
         object.__setattr__(self, "rotation", unit_quaternion(self.rotation, "rotation"))
         object.__setattr__(self, "translation", vector(self.translation, "translation"))
+
+    @classmethod
+    def turn(cls, axis: Sequence[float], angle: float, about: Sequence[float] = ORIGIN) -> Similarity:
+        """By an angle in radians, about an axis (3,), a unit vector, through a point (3,)."""
+        c, s = math.cos(angle / 2), math.sin(angle / 2)
+        x, y, z = (s * component for component in axis)
+        rotation = (c, x, y, z)
+        dx, dy, dz = (np.asarray(about, float) - cls(rotation=rotation)(np.asarray(about, float))).tolist()
+        return cls(rotation=rotation, translation=(dx, dy, dz))
 
     @classmethod
     def from_matrix(cls, matrix: np.ndarray) -> Similarity:

@@ -52,11 +52,7 @@ def _turn(start: np.ndarray, end: np.ndarray, axis: np.ndarray, about: np.ndarra
     ):
         return None
     angle = math.atan2(float(np.cross(a, b) @ axis), float(a @ b))
-    c, s = math.cos(angle / 2), math.sin(angle / 2)
-    x, y, z = (s * axis).tolist()
-    turn = Similarity(rotation=(c, x, y, z))
-    dx, dy, dz = (about - turn(about)).tolist()
-    return Similarity(rotation=turn.rotation, translation=(dx, dy, dz))
+    return Similarity.turn(axis.tolist(), angle, about.tolist())
 
 
 def _apart(one: Manifold, other: Manifold) -> float:
