@@ -6,6 +6,11 @@ import signal
 
 from hypothesis import settings
 
+# Here, not where it is used: Playwright runs once a process, so a process has one fixture of it.
+from tests.browsers import browser
+
+__all__ = ["browser"]
+
 # A busy machine is no defect: how long an example takes is measured by benchmarks, not by tests.
 # The same examples each time, so that a change is judged by what it changes; others are drawn by
 # `--hypothesis-profile=search`.

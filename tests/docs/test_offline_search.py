@@ -8,9 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.studio.conftest import PATIENCE, browser
-
-__all__ = ["browser"]
+from tests.browsers import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -1,9 +1,8 @@
-"""One browser for all tests of the page. Without Debian's chromium they are skipped."""
+"""The page in a browser, and the server behind it."""
 
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import socket
 import subprocess
@@ -17,30 +16,7 @@ import pytest
 
 from partwright.assembly import Assembly
 from partwright.export import export
-
-# Drawn by the processor, and with no network but what a test allows.
-ARGUMENTS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-]
-PATIENCE = 180.0  # seconds, on a machine that does much else
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    sync_api = pytest.importorskip(
-        "playwright.sync_api", reason="playwright is not installed: pip install playwright"
-    )
-    path = os.environ.get("PARTWRIGHT_CHROMIUM") or shutil.which("chromium")
-    if path is None:
-        pytest.skip("chromium is not installed (Debian: apt-get install chromium)")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
-        yield browser
-        browser.close()
+from tests.browsers import PATIENCE
 
 
 class Page:
