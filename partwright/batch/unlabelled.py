@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ class Cut:
     names: tuple[str, ...]
     assembly: Assembly
 
-    @property
+    @cached_property
     def regions(self) -> Regions:
         """For `match`."""
         return regions_of(self.vertices, self.faces, self.region, len(self.names))

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from partwright.cli.outputs import add_output, given
 
+CHANGE = 0.4  # of `--change`, where it is not given
+
 _EPILOG = """\
 SHAPE is an assembly of neural parts (.json), or MODEL:NAME for a shape that the model was trained on, by name
 or number: mixers:3. The same seed makes the same shapes, and fewer of them the first of more.
@@ -38,8 +40,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--change",
         metavar="X",
         type=float,
-        default=0.4,
-        help="how far from --like: near 0 hardly, at 1 nothing of it is left (default: %(default)s)",
+        help=f"how far from --like: near 0 hardly, at 1 nothing of it is left (default: {CHANGE})",
     )
     command.set_defaults(run="parts_generate")
 

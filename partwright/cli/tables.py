@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from partwright.cli.interrupts import INTERRUPTED
 from partwright.cli.terminal import counted, printable, say, warn
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def finish_fit(result: Result, folder: Path) -> int:
     warn(result.warnings)
     if result.outcome == "interrupted":
         warn([f"interrupted: {folder} holds the best assembly so far"])
-        return 130
+        return INTERRUPTED
     return 0
 
 

@@ -83,13 +83,13 @@ def match(shapes: Sequence[Regions], common: float = COMMON, template: int | Non
     found = [slots for slots in found if len(slots)]
     if not found:
         raise FamilyError("no part is alike in enough of the shapes; are they one family, and stand alike?")
-    return _finished(shapes, min(found, key=lambda slots: _cost(shapes, slots)))
+    return _finished(shapes, min(found, key=lambda slots: _cost(shapes, _pairs(shapes, slots), slots)))
 
 
 def _settled(shapes: Sequence[Regions], slots: Array, common: float) -> Array:
     """Slots that stay as they are when they become the medians of what is assigned to them."""
     for _ in range(_ROUNDS):
-        pairs = [_assigned(one, slots) for one in shapes]
+        pairs = _pairs(shapes, slots)
         new = []
         for k in range(len(slots)):
             mine = [one.boxes[rows[k]] for one, rows in zip(shapes, pairs, strict=True) if rows[k] >= 0]
@@ -121,6 +121,11 @@ def _left_over(shapes: Sequence[Regions], pairs: Sequence[NDArray[np.int64]], co
     return best
 
 
+def _pairs(shapes: Sequence[Regions], slots: Array) -> list[NDArray[np.int64]]:
+    """Of each shape, the region (K,) of each slot."""
+    return [_assigned(one, slots) for one in shapes]
+
+
 def _assigned(one: Regions, slots: Array) -> NDArray[np.int64]:
     """(K,) the region of each slot, -1 for none."""
     from scipy.optimize import linear_sum_assignment
@@ -147,12 +152,11 @@ def _apart(boxes: Array, slots: Array) -> Array:
     return np.asarray(np.abs(boxes[:, None] - slots[None]).mean(axis=2))
 
 
-def _cost(shapes: Sequence[Regions], slots: Array) -> float:
+def _cost(shapes: Sequence[Regions], pairs: Sequence[NDArray[np.int64]], slots: Array) -> float:
     """Of a family by these slots: what is assigned is apart by so much, what stays alone has its price; by
     area, so that a slot for each splinter does not pay."""
     total = 0.0
-    for one in shapes:
-        rows = _assigned(one, slots)
+    for one, rows in zip(shapes, pairs, strict=True):
         held = rows[rows >= 0]
         total += float((one.areas[held] * _apart(one.boxes[held], slots[rows >= 0]).diagonal()).sum())
         total += PRICE * (1 - float(one.areas[held].sum()))
@@ -161,8 +165,8 @@ def _cost(shapes: Sequence[Regions], slots: Array) -> float:
 
 def _finished(shapes: Sequence[Regions], slots: Array) -> Matching:
     """With slots that are pieces of others joined to those, and with what was left over; sorted by area."""
-    pairs = [_assigned(one, slots) for one in shapes]
-    cost = _cost(shapes, slots)
+    pairs = _pairs(shapes, slots)
+    cost = _cost(shapes, pairs, slots)
     into = _pieces(shapes, pairs, slots)
     kept = np.unique(into)
     number = np.searchsorted(kept, into)

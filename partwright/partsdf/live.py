@@ -36,14 +36,13 @@ class LivePicture:
         for shape in self._shapes:
             made = NeuralShape.trained(model, shape.name)
             below.append(picture(made, _CELLS, _PANEL, self._camera))
-        left = report.seconds / report.epoch * (report.epochs - report.epoch)
-        write_png(self._path, sheet([*self._above, *below], columns=len(below), title=_said(report, left)))
+        write_png(self._path, sheet([*self._above, *below], columns=len(below), title=_said(report)))
         took = time.monotonic() - start
         self._due = start + max(_LEAST, took / _SHARE)
 
 
-def _said(report: EpochReport, left: float) -> str:
-    rest = f"about {duration(left)} left" if report.epoch < report.epochs else "done"
+def _said(report: EpochReport) -> str:
+    rest = f"about {duration(report.seconds_left)} left" if report.epoch < report.epochs else "done"
     return f"epoch {report.epoch} of {report.epochs}, error {report.part:.4f}, {rest}"
 
 

@@ -57,6 +57,11 @@ class EpochReport:
     seconds: float
     model: Callable[[], Model]
 
+    @property
+    def seconds_left(self) -> float:
+        """As long as the epochs until now make expect."""
+        return self.seconds / self.epoch * (self.epochs - self.epoch)
+
 
 @dataclass(frozen=True)
 class Trained:

@@ -86,6 +86,8 @@ def test_a_wall_gets_the_speed_of_the_nearest_face(tmp_path: Path) -> None:
     top, under = (np.array(row.split(), float) for row in listed.groups())
     assert not top.any()
     assert under == pytest.approx([10, 0, 0], abs=1.0)
+    with pytest.raises(SimulationError, match=r"stands still.*none to turn"):
+        turn_wall(tmp_path, surface, speeds, 1.0)
     (mesh / "boundary").write_text("patch { }")
     with pytest.raises(SimulationError, match="nothing of the body"):
         body_faces(tmp_path)

@@ -84,6 +84,7 @@ def test_encoder_and_generator(
     assert about["samples"][0]["parts"] == ["plate", "ball", "knob"]
     assert Image.open("made/samples.png").width == 480  # itself first
     assert main([*make, "--like", f"{file}:lamp0", "--change", "0"]) == 2
+    assert main([*make, "--change", "0.2"]) == 2
     assert main([*make, "--keep", "plate"]) == 2
     assert main([*make, "--poses", f"{file}:0", "--keep", "plate", "--of", f"{file}:0"]) == 2
     assert main([*make, "-n", "0"]) == 2

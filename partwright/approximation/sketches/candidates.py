@@ -128,8 +128,9 @@ def _rounded(
     lows = [slabs[i][0] for i in (first, first - 1) if i >= 0]
     highs = [slabs[i][1] for i in (last, last + 1) if i < len(slabs)]
     for section, profile in _outlines(region, holes):
-        for low, high in product(lows, highs) if profile is not None else ():
-            assert profile is not None
+        if profile is None:
+            continue
+        for low, high in product(lows, highs):
             bottom, top = limited(measured_rims(view.leaning, profile, low, high), profile)
             further = (lows[0] - low, high - highs[0])
             if all(rim.depth >= _ALL_RIM * more for rim, more in zip((bottom, top), further, strict=True)):

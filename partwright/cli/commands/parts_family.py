@@ -30,8 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
             with Count("preparing") as count, Count("learning") as epochs:
 
                 def told(report: EpochReport) -> None:
-                    left = report.seconds / report.epoch * (report.epochs - report.epoch)
-                    what = f"error {report.part:.4f}  {duration(left)} left"
+                    what = f"error {report.part:.4f}  {duration(report.seconds_left)} left"
                     epochs.show(report.epoch, report.epochs, what)
 
                 trained = learn_family(

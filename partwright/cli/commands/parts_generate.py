@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 
 from partwright.atomic_io import replacing_files
-from partwright.cli.parts_generate import sample_name
+from partwright.cli.parts_generate import CHANGE, sample_name
 from partwright.cli.progress import Work
 from partwright.cli.terminal import counted, say, warn
 from partwright.errors import SettingError
@@ -33,12 +33,13 @@ def run(arguments: argparse.Namespace) -> int:
     model = load_model(arguments.model)
     generator = load_generator(model)
     _check(arguments)
+    change = (CHANGE if arguments.change is None else arguments.change) if arguments.like else 0.0
     with Work("reading") as work:
         source, keep = _kept(arguments, model)
         work.stage("making")
         samples = generator.generate(
             arguments.count, arguments.seed, source, keep, keep_layout=arguments.poses is not None,
-            change=arguments.change if arguments.like else 0.0,
+            change=change,
         )  # fmt: skip
         work.stage("comparing")
         nearest = [nearest_training_shape(one) for one in samples]
@@ -55,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
             "model": {"name": model.name, "hash": model.hash},
             "seed": arguments.seed,
             "kept": list(keep) or ("poses" if arguments.poses else []),
-            "like": {"shape": arguments.like, "change": arguments.change} if arguments.like else None,
+            "like": {"shape": arguments.like, "change": change} if arguments.like else None,
             "samples": [
                 {
                     "file": sample_name(i, len(samples)),
@@ -95,7 +96,9 @@ def _check(arguments: argparse.Namespace) -> None:
         )
     if bool(arguments.keep) != bool(arguments.of):
         raise SettingError("--keep PARTS and --of SHAPE go together: which parts stay, and of which shape")
-    if not 0 < arguments.change <= 1:
+    if arguments.change is not None and not arguments.like:
+        raise SettingError("--change says how far from --like; give --like SHAPE, too")
+    if arguments.change is not None and not 0 < arguments.change <= 1:
         raise SettingError(f"--change is {arguments.change}; expected above 0 and at most 1")
 
 

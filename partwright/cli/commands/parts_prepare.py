@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from partwright.cli.interrupts import raising
+from partwright.cli.interrupts import INTERRUPTED, raising
 from partwright.cli.progress import Count
 from partwright.cli.terminal import note, say, warn
 from partwright.datasets import Preparation, prepare
@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
                 f"interrupted; shapes that are done are kept in {arguments.output}, and the same command "
                 "goes on from there"
             )
-            return 130
+            return INTERRUPTED
     _report(made, arguments.output)
     return 0
 

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from partwright.batch.items import items_of
-from partwright.cli.interrupts import raising
+from partwright.cli.interrupts import INTERRUPTED, raising
 from partwright.cli.progress import Count
 from partwright.cli.terminal import counted, note, say, warn
 from partwright.datasets.families import FAMILIES, family
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
             )
         except KeyboardInterrupt:
             note(f"interrupted; what is done is kept in {arguments.output}, and the same command goes on")
-            return 130
+            return INTERRUPTED
     failed = [one for one in done if one.reason]
     warn(f"{one.name} is left out: {one.reason}" for one in failed)
     if len(failed) == len(done):

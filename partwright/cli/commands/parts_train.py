@@ -6,7 +6,7 @@ import argparse
 import sys
 from dataclasses import replace
 
-from partwright.cli.interrupts import raising
+from partwright.cli.interrupts import INTERRUPTED, raising
 from partwright.cli.terminal import say, warn
 from partwright.partsdf.config import read_config
 from partwright.partsdf.training import EpochReport, train
@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace) -> int:
     say(f"{trained.model.name}: {len(trained.model.shapes)} shapes, written to {trained.path}")
     if trained.outcome == "interrupted":
         warn(["interrupted: the same command goes on from here"])
-        return 130
+        return INTERRUPTED
     return 0
 
 

@@ -67,7 +67,11 @@ def turning_parts(assembly: Assembly, air: Air) -> list[int]:
 
 
 def turn_wall(folder: Path, surface: trimesh.Trimesh, speeds: np.ndarray, metres: float) -> None:
-    """Give the wall of a case that is meshed the speeds (F, 3) of the surface's nearest faces."""
+    """Give the wall of a case that is meshed the speeds (F, 3) of the surface's nearest faces.
+
+    Raises:
+        SimulationError: the mesh cannot be read, or the case has no wall that stands still.
+    """
     centres = np.array([corners.mean(axis=0) for corners in body_faces(folder)])
     vertices, faces = metres * np.asarray(surface.vertices), np.asarray(surface.faces)
     middle, scale = vertices.mean(axis=0), 1 / float(np.ptp(vertices, axis=0).max())
@@ -76,6 +80,8 @@ def turn_wall(folder: Path, surface: trimesh.Trimesh, speeds: np.ndarray, metres
     rows = "\n".join("({:.9g} {:.9g} {:.9g})".format(*speeds[i]) for i in nearest)
     path = folder / "0" / "U"
     text = path.read_text(encoding="utf-8")
+    if _STILL not in text:
+        raise SimulationError(f"{path}: expected a wall that stands still, {_STILL!r}; there is none to turn")
     moving = f"body {{ type fixedValue; value nonuniform List<vector>\n{len(centres)}\n(\n{rows}\n);\n }}"
     path.write_text(text.replace(_STILL, moving), encoding="utf-8")
 
