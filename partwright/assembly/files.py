@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from partwright.assembly.file_text import FORMAT, VERSION
+from partwright.assembly.group_copies import GroupCopy, numbered_names
 from partwright.assembly.similarity import Similarity
 from partwright.assembly.tree import MAX_DEPTH, Assembly, Node, Part
 from partwright.errors import AssemblyFileError, NewerVersionError, ParameterError, UnreadableFileError
@@ -21,6 +22,7 @@ MAX_PARTS = 100_000
 
 _PART_KEYS = {"name", "field", "translation", "rotation", "blend", "metadata", "instances"}
 _INSTANCE_KEYS = {"translation", "rotation"}
+_COPY_KEYS = {*_INSTANCE_KEYS, "mirror", "names"}
 _ASSEMBLY_KEYS = {"name", "operation", "blend", "unit", "up", "metadata", "children"}
 
 
@@ -75,17 +77,47 @@ class _Reader:
     """Walks the JSON, naming the place of whatever is wrong."""
 
     def __init__(self) -> None:
-        self.names: list[tuple[str, str]] = []  # (place, name) of each leaf
+        self.names: list[tuple[str, str]] = []  # of each leaf: the place of its name, and that
         self.copies = 0
 
-    def node(self, data: Any, place: str, depth: int) -> Node:
+    def nodes(self, data: Any, place: str, depth: int, copied: bool) -> list[Node]:
+        """A node, and its copies where it is a group that has such; copied: whether it may."""
         if not isinstance(data, dict):
             _fail(place, f"expected an object, got {_shown(data)}")
-        return self.assembly(data, place, depth) if "children" in data else self.part(data, place)
+        if "children" not in data:
+            return [self.part(data, place)]
+        copies = data.get("instances", [])
+        if not isinstance(copies, list):
+            _fail(f"{place}.instances", f"expected a list, got {_shown(copies)}")
+        if copies and not copied:
+            _fail(f"{place}.instances", "only groups in a union, or taken away in a difference, have copies")
+        before = self.copies
+        own = {key: value for key, value in data.items() if key != "instances"}
+        group = self.assembly(own, place, depth)
+        self.copies += (self.copies - before) * len(copies)
+        if self.copies > MAX_PARTS:
+            _fail(place, f"more than {MAX_PARTS:,} parts, counting every instance")
+        made = (self.copy(group, one, f"{place}.instances[{i}]", i + 2) for i, one in enumerate(copies))
+        return [group, *made]
+
+    def copy(self, group: Assembly, data: Any, place: str, number: int) -> Assembly:
+        move = self.instance(data, place, _COPY_KEYS)
+        if data.get("mirror", "x") not in ("x", "y", "z"):
+            _fail(f"{place}.mirror", f"expected x, y or z, got {_shown(data['mirror'])}")
+        names = data.get("names", [])
+        if not isinstance(names, list):
+            _fail(f"{place}.names", f"expected a list of names, got {_shown(names)}")
+        try:
+            made = GroupCopy(move, data.get("mirror"), tuple(names)).of(group, number)
+        except ParameterError as error:
+            raise AssemblyFileError(f"{place}: {error}") from error
+        wanted = names or numbered_names(group, number)
+        self.names += [(f"{place}.names[{i}]", name) for i, name in enumerate(wanted)]
+        return made
 
     def part(self, data: dict[str, Any], place: str) -> Part:
         _check_keys(data, place, _PART_KEYS, required=("field", "name"))
-        self.names.append((place, data["name"]))
+        self.names.append((f"{place}.name", data["name"]))
         instances = data.get("instances", [])
         if not isinstance(instances, list):
             _fail(f"{place}.instances", f"expected a list, got {_shown(instances)}")
@@ -102,12 +134,13 @@ class _Reader:
         )
         return self.build(Part, values, place)
 
-    def instance(self, data: Any, place: str) -> Similarity:
+    def instance(self, data: Any, place: str, known: set[str] = _INSTANCE_KEYS) -> Similarity:
         if not isinstance(data, dict):
             _fail(place, f"expected an object, got {_shown(data)}")
-        _check_keys(data, place, _INSTANCE_KEYS, required=())
+        _check_keys(data, place, known, required=())
         _check_lists(data, place)
-        result: Similarity = self.build(Similarity, data, place)
+        values = {key: data[key] for key in _INSTANCE_KEYS if key in data}
+        result: Similarity = self.build(Similarity, values, place)
         return result
 
     def assembly(self, data: dict[str, Any], place: str, depth: int) -> Assembly:
@@ -117,10 +150,12 @@ class _Reader:
         children = data["children"]
         if not isinstance(children, list):
             _fail(_join(place, "children"), f"expected a list, got {_shown(children)}")
-        nodes = tuple(
-            self.node(child, _join(place, f"children[{i}]"), depth + 1) for i, child in enumerate(children)
-        )
-        return self.build(Assembly, {**data, "children": nodes}, place)
+        operation = data["operation"]
+        nodes: list[Node] = []
+        for i, child in enumerate(children):
+            copied = operation == "union" or (operation == "difference" and i > 0)
+            nodes += self.nodes(child, _join(place, f"children[{i}]"), depth + 1, copied)
+        return self.build(Assembly, {**data, "children": tuple(nodes)}, place)
 
     def build(self, kind: Any, values: dict[str, Any], place: str) -> Any:
         metadata = values.get("metadata", {})
@@ -135,7 +170,7 @@ class _Reader:
         """The assembly has renamed leaves without a name of their own; in a file that is an error."""
         for (place, name), part in zip(self.names, assembly.parts, strict=True):
             if name != part.name:
-                _fail(f"{place}.name", f"expected a name that no other part has, got {_shown(name)}")
+                _fail(place, f"expected a name that no other part has, got {_shown(name)}")
 
 
 def _check_keys(data: dict[str, Any], place: str, known: set[str], required: tuple[str, ...]) -> None:

@@ -6,7 +6,6 @@ their fields and places. Edits, descriptions and sources tell it by `repeats` an
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.assembly.group_copies import GroupCopy, settled
 from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.errors import ParameterError
 
@@ -63,16 +63,7 @@ def _check(count: int) -> None:
 
 def copies_of(group: Assembly, moves: Sequence[Similarity]) -> tuple[Assembly, ...]:
     """The group moved by each of the moves; leaves of the first copy are called NAME_02, and so on."""
-    return tuple(_numbered(group.transformed(move), i) for i, move in enumerate(moves, start=2))
-
-
-def _numbered(node: Assembly, number: int) -> Assembly:
-    def renamed(child: Node) -> Node:
-        if child.is_part:
-            return dataclasses.replace(child, name=f"{child.name}_{number:02d}")
-        return _numbered(child, number)
-
-    return dataclasses.replace(node, children=tuple(map(renamed, node.children)))
+    return tuple(GroupCopy(settled(group, move)).of(group, i) for i, move in enumerate(moves, start=2))
 
 
 def repeats(node: Node) -> list[Repeat]:

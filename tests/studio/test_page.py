@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from partwright.assembly import Assembly, Part, Similarity, load_assembly
+from partwright.assembly import Assembly, Part, Similarity, copies_of, load_assembly, mirrored
+from partwright.assembly.file_text import to_text
 from partwright.assembly.files import from_text
 from partwright.fields import (
     Box,
@@ -312,6 +313,17 @@ def test_a_mirrored_part_is_the_mirror_image(shared: Callable[..., Page]) -> Non
         flipped[:, axis] = 2 * found["middle"] - flipped[:, axis]
         off = np.abs(from_text(found["text"]).distance(flipped) - assembly.distance(points))
         assert off.max() < 1e-3
+
+
+def test_copies_of_groups_are_where_their_moves_take_them(shared: Callable[..., Page]) -> None:
+    group = Assembly(tuple(part for part in many_kinds().parts if part.field.kind != "quadric"))
+    move = Similarity(1.0, (0.5, 0.5, -0.5, 0.5), (70, 5, -20))
+    made = Assembly((group, *copies_of(group, [move]), mirrored(group, "y", 30)))
+    assert to_text(made).count('"kind"') == len(group)
+    read = load_assembly_text(shared(made))
+    assert [part.name for part in read.parts] == [part.name for part in made.parts]
+    points = np.random.default_rng(5).uniform(-120, 120, (500, 3))
+    np.testing.assert_allclose(read.distance(points), made.distance(points), atol=1e-3)
 
 
 def test_without_webgl_the_page_says_so_and_still_edits(shared: Callable[..., Page], tmp_path: Path) -> None:

@@ -125,8 +125,30 @@ function readGroup(data: Json, place: string, depth: number, known: Images): Gro
     unit: (data.unit ?? null) as string | null,
     up: (data.up ?? null) as string | null,
     metadata: (data.metadata ?? {}) as Record<string, string | number>,
-    children: data.children.map((child, i) => readNode(child, `${place}.children[${i}]`, depth + 1, known)),
+    children: data.children.flatMap((child, i) => {
+      const own = `${place}.children[${i}]`;
+      const node = readNode(child, own, depth + 1, known);
+      const entries = isGroup(node) ? (((child as Json).instances ?? []) as Json[]) : [];
+      return [node, ...entries.map((entry, k) => copyOf(node as Group, entry, `${own}.instances[${k}]`, k + 2))];
+    }),
   };
+}
+
+/** A copy of a group, as a file's entry has it: mirrored, if it is that, then moved. */
+function copyOf(group: Group, entry: Json, place: string, number: number): Group {
+  const axis = entry.mirror === undefined ? null : ["x", "y", "z"].indexOf(String(entry.mirror));
+  if (axis === -1) throw new AssemblyError(`${place}.mirror: expected x, y or z`);
+  const names = (entry.names ?? []) as string[];
+  if (names.length && names.length !== [...leaves(group)].length)
+    throw new AssemblyError(`${place}.names: expected one for each part`);
+  const { translation, rotation } = readMove(entry, place);
+  const image = axis === null ? group : mirrored(group, axis, 0);
+  const left = [...names];
+  const renamed = (node: Node): Node =>
+    isGroup(node)
+      ? { ...node, id: newId(), children: node.children.map(renamed) }
+      : { ...node, id: newId(), name: left.shift() ?? `${node.name}_${String(number).padStart(2, "0")}` };
+  return renamed(moved(image, { pivot: [0, 0, 0], rotation, scale: 1, offset: translation })) as Group;
 }
 
 /** The assembly file's text: what the package reads. */
