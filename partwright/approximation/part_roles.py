@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
+from partwright.assembly.group_copies import in_runs, numbered_names
 from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Frustum, Profile, Revolution, Sphere
@@ -37,10 +38,19 @@ def with_role_names(assembly: Assembly) -> Assembly:
     def renamed(node: Node) -> Node:
         if isinstance(node, Part):
             return dataclasses.replace(node, name=fresh[node.name])
-        children = tuple(map(renamed, node.children))
+        children: list[Node] = []
+        for child, copies in in_runs(node):
+            own = renamed(child)
+            children.append(own)
+            if isinstance(child, Assembly) and isinstance(own, Assembly):
+                for k, copy in enumerate(copies, start=2):  # groups within are called as in the first
+                    known = copy.names or numbered_names(child, k)
+                    children.append(
+                        dataclasses.replace(copy, names=tuple(fresh[name] for name in known)).of(own, k)
+                    )
         first = children[0]
         after = f"{first.name}_cut" if node.operation == "difference" and first.is_part else node.name
-        return dataclasses.replace(node, children=children, name=after)
+        return dataclasses.replace(node, children=tuple(children), name=after)
 
     result = renamed(ordered)
     assert isinstance(result, Assembly)

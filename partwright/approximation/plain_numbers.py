@@ -42,7 +42,7 @@ def with_plain_numbers(part: Part, within: float) -> Part:
         field = _plain_field(part.field, within)
     except ParameterError:
         field = part.field
-    moves = tuple(_plain_move(move, within) for move in part.instances)
+    moves = tuple(plain_move(move, within) for move in part.instances)
     plain_part = dataclasses.replace(part, field=field, translation=(x, y, z), instances=moves)
     return _between_plain_ends(part, plain_part, within)
 
@@ -101,9 +101,9 @@ def _plain_profile(profile: Profile, within: float) -> Profile:
     return Profile(loop(profile.outline), tuple(loop(hole) for hole in profile.holes))
 
 
-def _plain_move(move: Similarity, within: float) -> Similarity:
+def plain_move(move: Similarity, within: float) -> Similarity:
     """A shift alone; the foot of a turn stays where the turn needs it."""
-    if move.rotation != (1.0, 0.0, 0.0, 0.0):
+    if abs(move.rotation[0]) != 1.0:
         return move
     x, y, z = (plain(v, within) for v in move.translation)
     return dataclasses.replace(move, translation=(x, y, z))

@@ -14,7 +14,8 @@ from manifold3d import Manifold
 from partwright.approximation.sketches.bodies import bodies
 
 if TYPE_CHECKING:
-    from partwright.superfrusta.feature_search import FeatureSearch, FeatureTree
+    from partwright.superfrusta.feature_search import FeatureSearch
+    from partwright.superfrusta.feature_steps import FeatureTree
 
 FAR = 0.054
 """Unit lengths: 3 % of the longest side, by which nothing may be off."""

@@ -9,7 +9,7 @@ most beyond its price joins, with as many copies as stand for other pieces, unti
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from manifold3d import Manifold, Mesh
@@ -19,14 +19,13 @@ from partwright.approximation.sketches.bodies import bodies
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames
-from partwright.approximation.sketches.open_sides import with_open_sides
-from partwright.approximation.sketches.repeats import moves_between
-from partwright.assembly import Part, Similarity
-from partwright.assembly.similarity import rotation_matrix
-from partwright.meshing.csg import solid_of
+from partwright.fields import Swept
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
+from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_mending import farthest, mended
+from partwright.superfrusta.feature_steps import FeatureTree, covers
+from partwright.superfrusta.feature_symmetry import symmetries
 from partwright.superfrusta.samples import FitSamples
 
 _FREE_SIDES = 4
@@ -42,66 +41,14 @@ _MOST = 24
 _FOR_MENDING = 10
 _MOST_LOOKED = 150  # pieces whose candidates are made: a part of hundreds is no part that was drawn
 _PERFECT = 0.985  # R from which on no other base is tried
-_COPY = 0.4  # of what the first gains, that a copy has to
+_TIE = 3e-4  # of the objective: of those that are as good, the plainest is taken
+_LOOKED, _OF_A_KIND = 40, 2  # candidates, by what they gain alone
+_RIVALS, _SHARE = 8, 0.25  # candidates that are tried with their copies, and their gain over the best's alone
 _BATCH = 64
 _OWN, _ASKEW = 2, 0.9995  # directions of a piece, and the cosine to others that a new one has at most
-_CHORD = 1e-3  # unit lengths: how far chords of a cut with moved sides may be off
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
-
-
-@dataclass(frozen=True)
-class Feature:
-    """One step of the tree. covers: (N,) the samples within any copy."""
-
-    added: bool
-    part: Part
-    covers: NDArray[np.bool_]
-    sides: int
-
-
-@dataclass
-class FeatureTree:
-    """Features in order, and the samples (N,) within their fold.
-
-    missed, excess: what of the shape the fold lacks, and what it has too much, as bodies without the skins
-    that chords leave. objectives: after each step. off: how far a place is off that nothing mends, unit
-    lengths; 0 where none is.
-    """
-
-    features: list[Feature] = field(default_factory=list)
-    covered: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
-    missed: Manifold = field(default_factory=Manifold)
-    excess: Manifold = field(default_factory=Manifold)
-    score: float = 0.0
-    price: float = 0.0
-    objectives: tuple[float, ...] = ()
-    off: float = 0.0
-
-    def at(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """(N,) whether points (N, 3) lie within the fold."""
-        covered = np.zeros(len(points), bool)
-        for feature in self.features:
-            within = covers(feature.part, points)
-            covered = covered | within if feature.added else covered & ~within
-        return covered
-
-    def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(N,) of the fold at points (N, 3); beyond edges a bound."""
-        result = np.full(len(points), np.float32(10))
-        for feature in self.features:
-            own = feature.part.distance(points)
-            result = np.minimum(result, own) if feature.added else np.maximum(result, -own)
-        return result
-
-    def first(self, count: int) -> FeatureTree:
-        """The tree of the first features; its scores are not known."""
-        return FeatureTree(self.features[:count])
-
-    @property
-    def objective(self) -> float:
-        return self.score - self.price
 
 
 class FeatureSearch:
@@ -126,6 +73,8 @@ class FeatureSearch:
         self.points = samples.points[::_EVERY]
         self.weights = _weights(samples)[::_EVERY]
         self.inside = samples.inside[::_EVERY]
+        directions = [frame[:, 2] for frame in self.frames]
+        self.turns, self.mirrors = symmetries(self.body, directions, samples.surface, samples.measure)
         self._masks: dict[int, tuple[Candidate, NDArray[np.float32]]] = {}
         self._of_piece: dict[tuple[float, ...], list[Candidate]] = {}
 
@@ -176,61 +125,32 @@ class FeatureSearch:
         excess = self._pieces(tree.excess, ~self.inside & tree.covered)
         adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
         cutting = [c for piece in excess for c in self.candidates_of(piece)]
-        best: tuple[float, Candidate, bool] | None = None
+        rivals: list[tuple[float, Candidate, bool]] = []
         for pool, added in ((adding, True), (cutting, False)):
-            if not pool:
-                continue
-            gains = self._gains(tree, pool, added)
-            index = int(gains.argmax())
-            if best is None or gains[index] > best[0]:
-                best = (float(gains[index]), pool[index], added)
-        if best is None or best[0] <= 0:
-            return None
-        _, chosen, added = best
-        return self.extended(tree, chosen, added, missed if added else excess)
+            if pool:
+                gains = self._gains(tree, pool, added)
+                rivals += [(float(gains[i]), pool[i], added) for i in np.argsort(-gains)[:_LOOKED]]
+        rivals.sort(key=lambda rival: -rival[0])
+        steps = [
+            with_copies(self, tree, chosen, added, missed if added else excess)
+            for gain, chosen, added in _various(rivals)
+            if gain > max(0.0, _SHARE * rivals[0][0])
+        ]
+        least = max((step.objective for step in steps), default=0.0) - _TIE
+        good = [step for step in steps if step.objective >= least]
+        plain = min(
+            good, key=lambda step: (step.chosen.sides, isinstance(step.part.field, Swept)), default=None
+        )
+        return joined_by(self, tree, plain) if plain is not None else None
 
     def extended(
         self, tree: FeatureTree, chosen: Candidate, added: bool, pieces: Sequence[Manifold] = ()
     ) -> FeatureTree:
         """The tree and a candidate, with the copies that stand for other pieces."""
-        within = self._mask(chosen) > 0
-        covered = tree.covered | within if added else tree.covered & ~within
-        reached = self._score(covered)
-        gain = reached - tree.score
-        inner, outer = chosen.bodies
-        instances = []
-        for move in () if chosen.cuts else moves_between(inner, pieces, self.frames, self.body):
-            copy = chosen.part.transformed(move)
-            mask = covers(copy, self.points)
-            more = covered | mask if added else covered & ~mask
-            better = self._score(more)
-            if better - reached < _COPY * gain:
-                continue
-            covered, reached, within = more, better, within | mask
-            instances.append(move)
-            inner, outer = (
-                body + own.transform(_matrix(move))
-                for body, own in zip((inner, outer), chosen.bodies, strict=True)
-            )
-        part = replace(chosen.part, instances=tuple(instances))
-        opened = part if added else with_open_sides(part, self.samples.measure)
-        if opened is not part:
-            part, whole = opened, solid_of(opened, _CHORD)
-            inner, outer = inner + whole, outer + whole
-        feature = Feature(added, part, within, chosen.sides)
-        if added:
-            missed, excess = tree.missed - outer, tree.excess + (inner - self.body)
-        else:
-            missed, excess = tree.missed + (inner ^ self.body), tree.excess - outer
-        for body in (missed, excess):
-            body.num_tri()  # now, and not with every later step again
-        cuts = (Feature(False, cut, within, 0) for cut in chosen.cuts)
-        features = [*tree.features, feature, *cuts]
-        price = tree.price + self._price(chosen.sides)
-        steps = (*tree.objectives, reached - price)
-        return FeatureTree(features, covered, missed, excess, reached, price, steps)
+        return joined_by(self, tree, with_copies(self, tree, chosen, added, pieces))
 
-    def _price(self, sides: int) -> float:
+    def price(self, sides: int) -> float:
+        """Of a feature whose profile has so many sides, with all its copies."""
         return self.alpha * (1 + _SIDE_PRICE * max(0, sides - _FREE_SIDES))
 
     def _pieces(self, residual: Manifold, wrong: NDArray[np.bool_]) -> list[Manifold]:
@@ -263,7 +183,7 @@ class FeatureSearch:
         known = np.array([frame[:, 2] for frame in self.frames])
         return [frame for frame in own[:_OWN] if np.abs(known @ frame[:, 2]).max() < _ASKEW]
 
-    def _mask(self, candidate: Candidate) -> NDArray[np.float32]:
+    def mask(self, candidate: Candidate) -> NDArray[np.float32]:
         """(N,) 1 at the samples within."""
         known = self._masks.get(id(candidate))
         if known is None:
@@ -284,22 +204,35 @@ class FeatureSearch:
         sign = 1.0 if added else -1.0
         scores = []
         for start in range(0, len(pool), _BATCH):
-            masks = np.stack([self._mask(c) for c in pool[start : start + _BATCH]])
+            masks = np.stack([self.mask(c) for c in pool[start : start + _BATCH]])
             change = sign * (masks @ columns)
             ratio = (both + change[:, :2]) / np.maximum(either + change[:, 2:], 1e-9)
             scores.append(ratio.mean(axis=1))
-        price = np.array([self._price(c.sides) for c in pool])
+        price = np.array([self.price(c.sides) for c in pool])
         return np.concatenate(scores) - tree.score - price
 
     def scored(self, tree: FeatureTree) -> FeatureTree:
         """The tree with its score and price."""
-        price = sum(self._price(feature.sides) for feature in tree.features)
-        return replace(tree, score=self._score(tree.at(self.points)), price=price)
+        price = sum(self.price(feature.sides) for feature in tree.features)
+        return replace(tree, score=self.score_of(tree.at(self.points)), price=price)
 
-    def _score(self, covered: NDArray[np.bool_]) -> float:
+    def score_of(self, covered: NDArray[np.bool_]) -> float:
+        """R of what covers such samples (N,)."""
         both = self.weights[covered & self.inside].sum(axis=0)
         either = self.weights[covered | self.inside].sum(axis=0)
         return float((both / np.maximum(either, 1e-9)).mean())
+
+
+def _various(rivals: Sequence[tuple[float, Candidate, bool]]) -> list[tuple[float, Candidate, bool]]:
+    """The first, few of a kind: what is small, but there more often, is tried beside what is large."""
+    kept: list[tuple[float, Candidate, bool]] = []
+    counts: dict[tuple[str, int, bool], int] = {}
+    for gain, chosen, added in rivals:
+        kind = chosen.part.field.kind, chosen.sides, added
+        counts[kind] = counts.get(kind, 0) + 1
+        if counts[kind] <= _OF_A_KIND and len(kept) < _RIVALS:
+            kept.append((gain, chosen, added))
+    return kept
 
 
 def _weights(samples: FitSamples) -> NDArray[np.float64]:
@@ -308,19 +241,3 @@ def _weights(samples: FitSamples) -> NDArray[np.float64]:
     weights[: samples.near, 0] = samples.weight[: samples.near]
     weights[samples.near :, 1] = samples.weight[samples.near :]
     return weights
-
-
-def _matrix(move: Similarity) -> NDArray[np.float64]:
-    return np.column_stack([rotation_matrix(move.rotation), move.translation])
-
-
-def covers(part: Part, points: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """(N,) whether points (N, 3) lie within the part or one of its copies."""
-    result = np.zeros(len(points), bool)
-    for copy in part.copies:
-        low, high = copy.bounds()
-        near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
-        if len(near):
-            local = (points[near] - copy.translation) @ rotation_matrix(copy.rotation)
-            result[near] |= copy.field(local) < 0
-    return result

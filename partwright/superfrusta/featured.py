@@ -9,17 +9,19 @@ from functools import partial
 import numpy as np
 
 from partwright.approximation.part_roles import with_role_names
-from partwright.approximation.plain_numbers import with_plain_numbers
+from partwright.approximation.plain_numbers import plain_move, with_plain_numbers
 from partwright.approximation.sketches.ends import with_open_ends
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Assembly, Node, Part
+from partwright.assembly.group_copies import in_runs
 from partwright.errors import CancelledError
 from partwright.fields import Cylinder
 from partwright.methods import Checkpoint, FitRequest, Progress
 from partwright.shapes import Shape
+from partwright.superfrusta.feature_groups import grouped
 from partwright.superfrusta.feature_pockets import with_pockets
-from partwright.superfrusta.feature_search import Feature, FeatureSearch, FeatureTree
-from partwright.superfrusta.flat_tree import nested
+from partwright.superfrusta.feature_search import FeatureSearch
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, image_of
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 
@@ -88,19 +90,23 @@ def volume_iou(tree: FeatureTree, samples: FitSamples) -> float:
 def assembly(shape: Shape, tree: FeatureTree) -> Assembly:
     """The features as a tree of unions and differences, named, in the shape's own units."""
     features = _numbered(tree.features, shape)
-    parts = [feature.part for feature in features]
-    whole = nested(parts, [feature.added for feature in features], plain=True)
-    whole = whole.scaled(1 / shape.frame.scale).translated(shape.frame.centre)
+    whole = grouped(features).scaled(1 / shape.frame.scale).translated(shape.frame.centre)
     whole = _with_plain_numbers(whole, _PLAIN / shape.frame.scale)
     return with_role_names(dataclasses.replace(whole, unit=shape.unit))
 
 
 def _with_plain_numbers(node: Assembly, within: float) -> Assembly:
-    children = tuple(
-        with_plain_numbers(child, within) if isinstance(child, Part) else _with_plain_numbers(child, within)
-        for child in node.children
-    )
-    return dataclasses.replace(node, children=children)
+    children: list[Node] = []
+    for child, copies in in_runs(node):
+        if isinstance(child, Part):
+            children.append(with_plain_numbers(child, within))
+            continue
+        plain = _with_plain_numbers(child, within)
+        children.append(plain)
+        for k, copy in enumerate(copies, start=2):  # exactly what the first is
+            move = plain_move(copy.move, within)
+            children.append(dataclasses.replace(copy, move=move).of(plain, k))
+    return dataclasses.replace(node, children=tuple(children))
 
 
 def _numbered(features: Sequence[Feature], shape: Shape) -> list[Feature]:
@@ -111,13 +117,20 @@ def _numbered(features: Sequence[Feature], shape: Shape) -> list[Feature]:
     drilled: list[Part] = []
     for i, feature in enumerate(features):
         part, holes = holes_apart(feature.part) if feature.added else (feature.part, ())
+        if i and not all(is_empty(hole, distance) for hole in holes):
+            part, holes = feature.part, ()  # cut by themselves they would open what is there before
         parts = [(part, feature.added), *((hole, False) for hole in holes)]
         for k, (one, added) in enumerate(parts):
             longer = one if i == k == 0 else with_open_ends(one, added, distance)
+            if feature.image is not None and longer is not one:
+                image = with_open_ends(image_of(one, feature.image), added, distance)
+                if image.field.bounds()[1][2] != longer.field.bounds()[1][2]:
+                    longer = one  # which goes on in but one of both places
+            own = dataclasses.replace(feature, part=longer, added=added)
             if not added and isinstance(longer.field, Cylinder) and is_empty(longer, distance):
-                drilled.append(longer)
+                drilled += own.parts
             else:
-                result.append(dataclasses.replace(feature, part=longer, added=added))
+                result.append(own)
     none = np.zeros(0, bool)
     result += [Feature(False, hole, none, 0) for hole in merged_holes(drilled, distance)]
     stems = {True: "part", False: "cut"}

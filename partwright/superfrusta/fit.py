@@ -10,7 +10,7 @@ import numpy as np
 from partwright.assembly import Assembly
 from partwright.errors import CancelledError, EmptyShapeError
 from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, timed
-from partwright.superfrusta.feature_search import FeatureTree
+from partwright.superfrusta.feature_steps import FeatureTree
 from partwright.superfrusta.featured import SURE, assembly, feature_tree, wants_features
 from partwright.superfrusta.outcome import assembly_of
 from partwright.superfrusta.resfit import ResidualFit

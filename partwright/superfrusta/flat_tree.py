@@ -44,6 +44,11 @@ def nested(parts: Sequence[Part], added: Sequence[bool], plain: bool) -> Assembl
     return Assembly(tuple(nodes))
 
 
+def joined_by_cuts(parts: Sequence[Part], added: Sequence[bool]) -> list[list[int]]:
+    """Indices of added parts that belong together because something is subtracted from both, and of that."""
+    return _groups(added, _meetings(parts, added))
+
+
 def flattened(node: Node) -> list[tuple[Part, bool]]:
     """The leaves in the order of the fold, and whether each is added.
 

@@ -9,7 +9,7 @@ import pytest
 from manifold3d import Manifold
 
 from partwright.approximation.sketches.candidates import candidates
-from partwright.approximation.sketches.pockets import as_pocket
+from partwright.approximation.sketches.pockets import as_pockets
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution
 from partwright.fields.profile import circle
@@ -30,9 +30,7 @@ def test_a_wall_and_a_floor_are_a_solid_with_a_pocket(turn: tuple, floor: Box | 
     at = (0.0, 0.0, -0.15)
     parts = Part(WALL), Part(floor, at, OVER)
     whole = Assembly(parts)
-    found = as_pocket(parts[0].transformed(_turn(turn)), parts[1].transformed(_turn(turn)))
-    assert found is not None
-    body, pockets, holes = found
+    ((body, pockets, holes),) = as_pockets(*(part.transformed(_turn(turn)) for part in parts))
     assert isinstance(body.field, Extrusion)
     assert not body.field.profile.holes
     assert len(pockets) == 1
@@ -52,12 +50,27 @@ def _turn(rotation: tuple) -> Similarity:
     [
         Part(Box((0.8, 0.5, 0.1)), (0, 0, -0.15)),  # closes a part of the hole
         Part(Box((1.4, 0.7, 0.1)), (0, 0, -0.15)),  # reaches beyond the wall
-        Part(Box((1.1, 0.7, 0.1))),  # in the middle
+        Part(Box((1.1, 0.7, 0.1)), (0, 0, -0.3)),  # outside
+        Part(Box((1.1, 0.7, 0.1)), (0, 0, -0.15), instances=(Similarity(translation=(3, 0, 0)),)),  # one more
         Part(Box((1.1, 0.7, 0.1)), (0, 0, -0.15), (0.9, 0.1, 0, 0)),  # leans
     ],
 )
 def test_other_parts_stay(floor: Part) -> None:
-    assert as_pocket(Part(WALL), floor) is None
+    assert not list(as_pockets(Part(WALL), floor))
+
+
+def test_a_floor_in_the_middle_leaves_pockets_above_and_below_of_every_copy() -> None:
+    """Of which one may be within another solid; the copies of the floor come in any order."""
+    turn, far = Similarity(rotation=(0.0, 0.0, 0.0, 1.0)), Similarity(translation=(2, 0, 0))
+    walls = Part(WALL, (1, 0, 0), instances=(turn,))
+    floors = Part(Box((1.1, 0.7, 0.1)), (-1, 0, 0.05), instances=(far,))
+    found = list(as_pockets(walls, floors))
+    assert [len(pockets) for _, pockets, _ in found] == [1, 1, 2]
+    body, pockets, _ = found[2]
+    made = Assembly((body, *pockets), "difference")
+    whole = Assembly((walls, floors))
+    points = np.random.default_rng(0).uniform(-1.8, 1.8, (9000, 3)) * [1, 0.5, 0.2]
+    assert ((made.distance(points) < 0) == (whole.distance(points) < 0)).all()
 
 
 def test_a_wall_is_seen_though_a_hole_cuts_the_middle() -> None:
@@ -93,8 +106,6 @@ def test_a_hole_through_a_round_wall_is_a_cylinder() -> None:
 
 def test_volumes_are_those_of_the_pieces() -> None:
     whole = Assembly((Part(WALL), Part(Box((1.1, 0.7, 0.1)), (0, 0, -0.15))))
-    found = as_pocket(*whole.parts)
-    assert found is not None
-    body, pockets, _ = found
+    ((body, pockets, _),) = as_pockets(*whole.parts)
     made = mesh_assembly(Assembly((body, *pockets), "difference"), 64)
     assert made.volume == pytest.approx(mesh_assembly(whole, 64).volume, rel=1e-6)

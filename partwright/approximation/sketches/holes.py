@@ -16,7 +16,9 @@ from partwright.fields import Cylinder, Extrusion
 from partwright.fields.profile import Loop, Profile, circle_of
 
 _SAME = 2e-3  # of its size, by which holes that are alike may differ
+_PARALLEL = 1e-12  # of a cosine
 _ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and heights of copies differ
+_LATTICE = 12  # points along a side of what is no round hole
 _BURR = 5e-3  # unit lengths: how deep within the shape a point of an empty hole may seem to lie
 
 
@@ -91,8 +93,21 @@ def _shift(frame: np.ndarray, offset: np.ndarray) -> Similarity:
 
 
 def is_empty(hole: Part, distance: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Whether a cylinder holds nothing of the shape, all copies; distance: as of `merged_holes`."""
-    return all(bool((distance(_Drilled.of(copy).points()) > -_BURR).all()) for copy in hole.copies)
+    """Whether a cut holds nothing of the shape, all copies; distance: as of `merged_holes`."""
+    return all(bool((distance(_within(copy)) > -_BURR).all()) for copy in hole.copies)
+
+
+def _within(hole: Part) -> np.ndarray:
+    """(N, 3) points within a cut."""
+    if isinstance(hole.field, Cylinder):
+        return _Drilled.of(hole).points()
+    low, high = hole.field.bounds()
+    steps = (np.arange(_LATTICE) + 0.5) / _LATTICE
+    grid = low + np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3) * (
+        high - low
+    )
+    inside = grid[hole.field(grid) < -_BURR]
+    return np.asarray(inside @ rotation_matrix(hole.rotation).T + hole.translation)
 
 
 def merged_holes(holes: Sequence[Part], distance: Callable[[np.ndarray], np.ndarray]) -> list[Part]:
@@ -171,7 +186,8 @@ def _is_copy(one: Part, other: Part) -> bool:
     """Whether a shift takes one hole to the other."""
     assert isinstance(one.field, Cylinder)
     assert isinstance(other.field, Cylinder)
-    parallel = np.allclose(rotation_matrix(one.rotation), rotation_matrix(other.rotation), atol=1e-6)
+    own, axis = (rotation_matrix(part.rotation)[:, 2] for part in (one, other))
+    parallel = abs(float(own @ axis)) > 1 - _PARALLEL
     near = _SAME * one.field.radius
     return bool(
         parallel

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 
 from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.holes import hole_parts
-from partwright.assembly import Part
+from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Cylinder, Extrusion
 from partwright.fields.profile import Loop, Profile, circle
@@ -20,26 +21,54 @@ _LATTICE = 20
 _THICKEST = 0.9  # of the wall's height, that the floor has
 
 
-def as_pocket(wall: Part, floor: Part) -> tuple[Part, tuple[Part, ...], tuple[Part, ...]] | None:
-    """The wall without the holes that the floor closes at one end, the pockets that are left of these, and
-    the floor's own holes. None where the floor closes none, or reaches beyond the wall.
+Pocketed = tuple[Part, tuple[Part, ...], tuple[Part, ...]]
 
+
+def as_pockets(wall: Part, floor: Part) -> Iterator[Pocketed]:
+    """The wall without the holes that the floor closes, the pockets that are left of these, and the floor's
+    own holes; nothing where the floor closes none, or reaches beyond the wall.
+
+    A floor that ends where the wall does leaves one pocket. Another may have more than itself on either side,
+    so it gives several possibilities; what of it is beyond the wall's ends is left out. Of walls that are
+    there more than once each has a copy of the floor.
     Lengths in the unit frame.
     """
+    if len(wall.copies) != len(floor.copies):
+        return
+    alone = dataclasses.replace(wall, instances=())
+    for copy in floor.copies:
+        for body, *cuts in _pocketed(alone, copy):
+            pockets, holes = ([_repeated(cut, wall) for cut in own] for own in cuts)
+            yield _repeated(body, wall), tuple(pockets), tuple(holes)
+
+
+def _repeated(part: Part, like: Part) -> Part:
+    """With the copies of another part, and of each its own."""
+    own = part.instances
+    moves = (*own, *(move @ inner for move in like.instances for inner in (Similarity(), *own)))
+    return dataclasses.replace(part, instances=moves)
+
+
+def _pocketed(wall: Part, floor: Part) -> Iterator[Pocketed]:
     field, lid = wall.field, _upright(floor)
-    if not isinstance(field, Extrusion) or field.taper or field.has_rims or wall.instances or lid is None:
-        return None
+    if not isinstance(field, Extrusion) or field.taper or field.has_rims or lid is None:
+        return
     frame, other = rotation_matrix(wall.rotation), rotation_matrix(floor.rotation)
-    if abs(float(frame[:, 2] @ other[:, 2])) < 1 - _PARALLEL or lid.height > _THICKEST * field.height:
-        return None
+    if abs(float(frame[:, 2] @ other[:, 2])) < 1 - _PARALLEL:
+        return
     at = float(frame[:, 2] @ np.subtract(floor.translation, wall.translation))
-    low, high, half = at - lid.height / 2, at + lid.height / 2, field.height / 2
+    half = field.height / 2
+    low, high = max(at - lid.height / 2, -half), min(at + lid.height / 2, half)
+    if not 0 < high - low < _THICKEST * field.height:
+        return
+    below, above = (-half, low), (high, half)
+    choices: list[tuple[tuple[float, float], ...]]
     if abs(low + half) < _FLUSH:
-        left = (high, half)
+        choices = [(above,)]
     elif abs(high - half) < _FLUSH:
-        left = (-half, low)
+        choices = [(below,)]
     else:
-        return None
+        choices = [(above,), (below,), (below, above)]
 
     def onto_floor(flat: np.ndarray) -> np.ndarray:
         """(N,) of the floor's outline at points of the wall's plane (N, 2)."""
@@ -55,7 +84,7 @@ def as_pocket(wall: Part, floor: Part) -> tuple[Part, tuple[Part, ...], tuple[Pa
     edge = np.concatenate(Profile(lid.profile.outline).polylines(1e-2))
     closed = [loop for loop in field.profile.holes if (onto_floor(_within(loop)) < _FLUSH).all()]
     if not closed or (onto_wall(edge) > _FLUSH).any():
-        return None
+        return
     rest = tuple(loop for loop in field.profile.holes if loop not in closed)
     middle = frame.T @ np.array(wall.translation)
 
@@ -63,15 +92,14 @@ def as_pocket(wall: Part, floor: Part) -> tuple[Part, tuple[Part, ...], tuple[Pa
         return extruded_part(profile.moved(middle[:2]), frame, middle[2] + ends[0], middle[2] + ends[1])
 
     body = extruded(Profile(field.profile.outline, rest), (-half, half))
-    pockets = tuple(extruded(Profile(loop), left) for loop in closed)
     holes = hole_parts(dataclasses.replace(floor, field=lid)) if lid.profile.holes else ()
-    return dataclasses.replace(body, name=wall.name), pockets, holes
+    for left in choices:
+        pockets = tuple(extruded(Profile(loop), ends) for loop in closed for ends in left)
+        yield dataclasses.replace(body, name=wall.name), pockets, holes
 
 
 def _upright(part: Part) -> Extrusion | None:
     field = part.field
-    if part.instances:
-        return None
     if isinstance(field, Box):
         return Extrusion(Profile.rectangle(*field.size[:2]), field.size[2])
     if isinstance(field, Cylinder):

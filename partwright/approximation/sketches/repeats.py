@@ -40,6 +40,20 @@ def moves_between(
                 break
 
 
+def planes_between(body: Manifold, pieces: Sequence[Manifold]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Normals (3,) and points (3,) of the planes midway between the piece that `body` stands for and those
+    that are as large."""
+    own = min(pieces, key=lambda piece: _apart(body, piece), default=None)
+    if own is None:
+        return
+    centre, volume = _middle(own), own.volume()
+    for other in pieces[:_MOST]:
+        way = _middle(other) - centre
+        far = float(np.linalg.norm(way))
+        if other is not own and far > _NEAR and abs(other.volume() - volume) < _ALIKE * volume:
+            yield way / far, (centre + _middle(other)) / 2
+
+
 def _turn(start: np.ndarray, end: np.ndarray, axis: np.ndarray, about: np.ndarray) -> Similarity | None:
     """The turn about an axis that takes one point to another; None where none does."""
     a, b = start - about, end - about

@@ -1,0 +1,148 @@
+"""A candidate with its copies, and its mirror image where that is another solid: what one price brings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from manifold3d import Manifold
+from numpy.typing import NDArray
+
+from partwright.approximation.sketches.candidate import Candidate
+from partwright.approximation.sketches.open_sides import with_open_sides
+from partwright.approximation.sketches.repeats import moves_between, planes_between
+from partwright.assembly import Part, Similarity
+from partwright.assembly.similarity import rotation_matrix
+from partwright.meshing.csg import solid_of
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, as_move, covers, image_of
+from partwright.superfrusta.feature_symmetry import reflected, reflection
+
+if TYPE_CHECKING:
+    from partwright.superfrusta.feature_search import FeatureSearch
+
+_COPY = 0.4  # of what the first gains, that a copy has to
+_AROUND = 5e-3  # unit lengths: from a part to points of the surface that are its own
+_EXACT = 1e-4  # unit lengths: moves whose means differ by less are as good
+_POINTS = 200
+_DIGITS = 9  # of shifts that are told apart
+_CHORD = 1e-3  # unit lengths: how far chords of a cut with moved sides may be off
+
+
+@dataclass(frozen=True)
+class Step:
+    """A candidate with its copies.
+
+    covered: (N,) the samples within the tree with them; within: those within them. score: R of that tree.
+    planes: mirrors that may make another solid of the part.
+    """
+
+    chosen: Candidate
+    added: bool
+    part: Part
+    covered: NDArray[np.bool_]
+    within: NDArray[np.bool_]
+    score: float
+    objective: float
+    image: Similarity | None = None
+
+
+def with_copies(
+    search: FeatureSearch, tree: FeatureTree, chosen: Candidate, added: bool, pieces: Sequence[Manifold] = ()
+) -> Step:
+    """The candidate with copies where the whole's symmetries or pieces that are alike have it again."""
+    within = search.mask(chosen) > 0
+    covered = tree.covered | within if added else tree.covered & ~within
+    reached = search.score_of(covered)
+    least = _COPY * (reached - tree.score)
+    wrong = search.inside & ~tree.covered if added else ~search.inside & tree.covered
+    few, hits = search.points[wrong], _COPY * float(within[wrong].sum())
+
+    def may_pay(copy: Part) -> bool:
+        return float(covers(copy, few).sum()) > hits
+
+    def joined(copy: Part, count: int = 1) -> bool:
+        """Whether that many further copies gain enough, which they then do."""
+        nonlocal covered, reached, within
+        mask = covers(copy, search.points)
+        more = covered | mask if added else covered & ~mask
+        better = search.score_of(more)
+        if better - reached < least * count:
+            return False
+        covered, reached, within = more, better, within | mask
+        return True
+
+    part, image = chosen.part, None
+    if not chosen.cuts:  # of which there is but one
+        inner, _ = chosen.bodies
+        planes = [*search.mirrors, *(reflection(*plane) for plane in planes_between(inner, pieces))]
+        moves = [*search.turns, *(move for plane in planes if (move := as_move(part, plane)) is not None)]
+        moves += moves_between(inner, pieces, search.frames, search.body)
+        moves += _shifts(part, search.turns, search.mirrors)
+        moves = _nearest_first(search, part, [m for m in moves if may_pay(part.transformed(m))])
+        part = replace(part, instances=tuple(move for move in moves if joined(part.transformed(move))))
+        images = ((plane, image_of(part, plane)) for plane in planes)
+        image = next((p for p, one in images if may_pay(one) and joined(one, len(part.copies))), None)
+    objective = reached - tree.price - search.price(chosen.sides)
+    return Step(chosen, added, part, covered, within, reached, objective, image)
+
+
+def _shifts(part: Part, turns: Sequence[Similarity], mirrors: Sequence[Similarity]) -> list[Similarity]:
+    """To where symmetries take the middle of a part, which itself may not be turned: a foot with a hole."""
+    middle = np.array(part.translation)
+    places = [*(move(middle) for move in turns), *(reflected(move, middle) for move in mirrors)]
+    ways = np.unique(np.round(np.reshape(places, (-1, 3)) - middle, _DIGITS) + 0.0, axis=0)
+    return [
+        Similarity(translation=(x, y, z)) for x, y, z in ways.tolist() if abs(x) + abs(y) + abs(z) > _EXACT
+    ]
+
+
+def _nearest_first(search: FeatureSearch, part: Part, moves: Sequence[Similarity]) -> list[Similarity]:
+    """Those first that take the surface around the part to the surface most exactly; symmetries of a whole
+    that is not quite symmetric, and middles of pieces with skins, are a little off."""
+    if len(moves) < 2:
+        return list(moves)
+    surface = search.samples.surface
+    around = surface[np.abs(part.distance(surface)) < _AROUND]
+    points = around[:: max(1, len(around) // _POINTS)].astype(np.float64)
+    if not len(points):
+        return list(moves)
+
+    def off(move: Similarity) -> float:
+        away = np.abs(search.samples.measure(move(points).astype(np.float32)))
+        return round(float(np.minimum(away, _AROUND).mean()) / _EXACT)
+
+    return sorted(moves, key=off)
+
+
+def joined_by(search: FeatureSearch, tree: FeatureTree, step: Step) -> FeatureTree:
+    """The tree and a candidate with its copies."""
+    chosen, added, image = step.chosen, step.added, step.image
+    part = step.part if added else with_open_sides(step.part, search.samples.measure)
+    inner, outer = chosen.bodies
+    moves = [_matrix(move) for move in step.part.instances]
+    if part is not step.part:
+        whole = solid_of(replace(part, instances=()), _CHORD)
+        inner, outer = inner + whole, outer + whole
+    inner, outer = (sum((body.transform(move) for move in moves), body) for body in (inner, outer))
+    if image is not None:
+        flip = _matrix(image) * [-1.0, 1.0, 1.0, 1.0]
+        inner, outer = (body + body.transform(flip) for body in (inner, outer))
+    if added:
+        missed, excess = tree.missed - outer, tree.excess + (inner - search.body)
+    else:
+        missed, excess = tree.missed + (inner ^ search.body), tree.excess - outer
+    for body in (missed, excess):
+        body.num_tri()  # now, and not with every later step again
+    feature = Feature(added, part, step.within, chosen.sides, image)
+    cuts = (Feature(False, cut, step.within, 0) for cut in chosen.cuts)
+    price = tree.price + search.price(chosen.sides)
+    steps = (*tree.objectives, step.objective)
+    return FeatureTree(
+        [*tree.features, feature, *cuts], step.covered, missed, excess, step.score, price, steps
+    )
+
+
+def _matrix(move: Similarity) -> NDArray[np.float64]:
+    return np.column_stack([rotation_matrix(move.rotation), move.translation])

@@ -1,0 +1,115 @@
+"""The steps of a tree of features: parts that are added or cut, each with its copies and its mirror image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from manifold3d import Manifold
+from numpy.typing import NDArray
+
+from partwright.assembly import Assembly, Part, Similarity, mirrored
+from partwright.assembly.similarity import rotation_matrix
+from partwright.fields import Extrusion
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One step of the tree. covers: (N,) the samples within any copy.
+
+    image: where the part and all its copies are there as a mirror image, too: what comes after the mirror in
+    the plane x = 0.
+    """
+
+    added: bool
+    part: Part
+    covers: NDArray[np.bool_]
+    sides: int
+    image: Similarity | None = None
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The part, and its mirror image where there is one."""
+        return (self.part,) if self.image is None else (self.part, image_of(self.part, self.image))
+
+
+@dataclass
+class FeatureTree:
+    """Features in order, and the samples (N,) within their fold.
+
+    missed, excess: what of the shape the fold lacks, and what it has too much, as bodies without the skins
+    that chords leave. objectives: after each step. off: how far a place is off that nothing mends, unit
+    lengths; 0 where none is.
+    """
+
+    features: list[Feature] = field(default_factory=list)
+    covered: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+    missed: Manifold = field(default_factory=Manifold)
+    excess: Manifold = field(default_factory=Manifold)
+    score: float = 0.0
+    price: float = 0.0
+    objectives: tuple[float, ...] = ()
+    off: float = 0.0
+
+    def at(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """(N,) whether points (N, 3) lie within the fold."""
+        covered = np.zeros(len(points), bool)
+        for feature in self.features:
+            for part in feature.parts:
+                within = covers(part, points)
+                covered = covered | within if feature.added else covered & ~within
+        return covered
+
+    def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(N,) of the fold at points (N, 3); beyond edges a bound."""
+        result = np.full(len(points), np.float32(10))
+        for feature in self.features:
+            for part in feature.parts:
+                own = part.distance(points)
+                result = np.minimum(result, own) if feature.added else np.maximum(result, -own)
+        return result
+
+    def first(self, count: int) -> FeatureTree:
+        """The tree of the first features; its scores are not known."""
+        return FeatureTree(self.features[:count])
+
+    @property
+    def objective(self) -> float:
+        return self.score - self.price
+
+
+def image_of(part: Part, move: Similarity) -> Part:
+    """The part and its copies mirrored in the plane x = 0, then moved."""
+    return mirrored(Assembly((part,)), "x", suffix="").parts[0].transformed(move)
+
+
+def as_move(part: Part, plane: Similarity) -> Similarity | None:
+    """The rigid move that makes the same of a part as a mirror does, of a box, say, if there is one."""
+    alone = replace(part, instances=())
+    image = image_of(alone, plane)
+    turn = Similarity()
+    if (
+        isinstance(part.field, Extrusion)
+        and not part.field.taper
+        and part.field.rims[0] == part.field.rims[1]
+    ):
+        turn = Similarity(rotation=(0.0, 1.0, 0.0, 0.0))  # upside down it is its own mirror image
+    elif image.field != part.field:
+        return None
+    return _pose(image) @ turn @ _pose(alone).inverse()
+
+
+def _pose(part: Part) -> Similarity:
+    return Similarity(1.0, part.rotation, part.translation)
+
+
+def covers(part: Part, points: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """(N,) whether points (N, 3) lie within the part or one of its copies."""
+    result = np.zeros(len(points), bool)
+    for copy in part.copies:
+        low, high = copy.bounds()
+        near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
+        if len(near):
+            local = (points[near] - copy.translation) @ rotation_matrix(copy.rotation)
+            result[near] |= copy.field(local) < 0
+    return result

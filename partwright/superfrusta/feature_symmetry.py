@@ -1,0 +1,106 @@
+"""Turns and mirror planes of a shape, by which what is drawn once may be there again.
+
+All of them keep the centre of volume where it is, which a closed mesh tells exactly, and their directions are
+those that the surface's own faces have: so copies are exact, and symmetries fitted to samples are not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from manifold3d import Manifold
+from numpy.typing import NDArray
+
+from partwright.assembly import Similarity
+
+Floats = NDArray[np.float64]
+Measure = Callable[[NDArray[np.float32]], NDArray[np.float32]]
+
+_ORDERS = range(12, 1, -1)
+_ERROR = 1e-2  # unit lengths: mean distance from the surface to its image; each copy is looked at anyway
+_RIVAL, _NOISE = 2.0, 2e-4  # of the least error of an axis, and unit lengths, that another order may have
+_POINTS = 300
+_PARALLEL = 0.9999
+_APART, _NEAR = 1e-5, 0.05  # unit lengths between the middles of volume and box, to try both
+_MOST = 48
+
+
+def centre_of_volume(body: Manifold) -> Floats:
+    """(3,) of a closed body, exactly."""
+    mesh = body.to_mesh64()
+    corners = np.asarray(mesh.vert_properties)[:, :3][np.asarray(mesh.tri_verts, np.int64)]
+    sixths = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    return np.asarray((corners.sum(axis=1) / 4 * sixths[:, None]).sum(axis=0) / sixths.sum())
+
+
+def reflection(normal: Floats, point: Floats) -> Similarity:
+    """What comes after mirroring in the plane x = 0, so that both are the mirror image in the plane through
+    `point` (3,) with a unit normal (3,)."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = (np.eye(3) - 2 * np.outer(normal, normal)) @ np.diag([-1.0, 1.0, 1.0])
+    matrix[:3, 3] = 2 * normal * (normal @ point)
+    return Similarity.from_matrix(matrix)
+
+
+def reflected(move: Similarity, points: Floats) -> Floats:
+    """Points (N, 3) mirrored in the plane x = 0, then moved."""
+    return move(points * [-1.0, 1.0, 1.0])
+
+
+def turn(axis: Floats, angle: float, point: Floats) -> Similarity:
+    """By an angle about the unit axis (3,) through a point (3,)."""
+    x, y, z = (math.sin(angle / 2) * axis).tolist()
+    rotation = (math.cos(angle / 2), x, y, z)
+    dx, dy, dz = (point - Similarity(rotation=rotation)(point)).tolist()
+    return Similarity(1.0, rotation, (dx, dy, dz))
+
+
+def symmetries(
+    body: Manifold,
+    directions: Sequence[Floats],
+    surface: NDArray[np.float32],
+    measure: Measure,
+) -> tuple[list[Similarity], list[Similarity]]:
+    """Turns, and reflections as of `reflection`, that take a body to itself, about and along directions (3,).
+
+    surface: (N, 3) points on it. measure: signed distance (n,) at points. A body that is not quite symmetric,
+    as of holes that are askew, may be so about the middle of its box and not of its volume: both are tried.
+    """
+    turns: list[Similarity] = []
+    mirrors: list[Similarity] = []
+    if body.is_empty() or body.volume() <= 0:
+        return turns, mirrors
+    points = surface[:: max(1, len(surface) // _POINTS)].astype(np.float64)
+    centre, middle = centre_of_volume(body), np.reshape(body.bounding_box(), (2, 3)).mean(axis=0)
+    for axis in _distinct(directions):
+        along = axis * float(axis @ (middle - centre))
+        turns += _turns(axis, centre, points, measure)
+        planes = [reflection(axis, centre)]
+        if _APART < float(np.linalg.norm(middle - centre - along)) < _NEAR:
+            turns += _turns(axis, middle, points, measure)
+        if _APART < float(np.linalg.norm(along)) < _NEAR:
+            planes.append(reflection(axis, middle))
+        mirrors += [one for one in planes if _error(reflected(one, points), measure) < _ERROR]
+    return turns[:_MOST], mirrors
+
+
+def _turns(axis: Floats, centre: Floats, points: Floats, measure: Measure) -> list[Similarity]:
+    errors = {n: _error(turn(axis, 2 * math.pi / n, centre)(points), measure) for n in _ORDERS}
+    limit = min(_ERROR, _RIVAL * min(errors.values()) + _NOISE)
+    orders = [n for n, own in errors.items() if own < limit]
+    largest = [n for n in orders if not any(other % n == 0 for other in orders if other > n)]
+    return [turn(axis, 2 * math.pi * k / n, centre) for n in largest for k in range(1, n)]
+
+
+def _error(image: Floats, measure: Measure) -> float:
+    return float(np.abs(measure(image.astype(np.float32))).mean())
+
+
+def _distinct(directions: Sequence[Floats]) -> list[Floats]:
+    kept: list[Floats] = []
+    for direction in [*np.eye(3), *directions]:
+        if all(abs(float(direction @ other)) < _PARALLEL for other in kept):
+            kept.append(direction)
+    return kept
