@@ -26,6 +26,7 @@ from partwright.export.brep_bent import bent_solid
 from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_mended_profile import mended
 from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
+from partwright.export.brep_rims import shallower
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
 from partwright.export.brep_swept_profile import swept_profile
@@ -63,12 +64,13 @@ def built(part: Part) -> Approximation | None:
 
 
 def _built_swept(part: Part, field: Swept) -> Approximation:
-    """Exact, or with the nearest profile that OpenCASCADE takes; where there is none it is left to facets."""
+    """Exact, or with the nearest rims or profile that OpenCASCADE takes; where there are none it is left to
+    facets."""
     exact = Approximation(field, part, 0.0, 0.0)
     with suppress(NoSurfaceError):
         solid_of(field)
         return exact
-    for near, off in mended(field):
+    for near, off in (*shallower(field), *mended(field)):
         with suppress(NoSurfaceError):
             volume, area = volume_and_area(solid_of(near))
             return Approximation(near, dataclasses.replace(part, field=near), area * off / volume, off)

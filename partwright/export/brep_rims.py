@@ -6,19 +6,24 @@ About a sharp corner that points inwards they meet in a mitre, where the field's
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
-from partwright.fields import Extrusion
+from partwright.fields import Extrusion, Swept
+from partwright.fields.extrusion import RIMS
 from partwright.fields.rims import Rim
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Edge, TopoDS_Shape
 
-_SHARES = (1.0, 1 - 1e-5, 1 - 1e-3)
-"""Of a rim's depth: where two rims meet, or one takes all of a side, OpenCASCADE wants something left."""
+_SHARES = (1.0, 1 - 1e-5)
+"""Of a rim's depth: where two rims meet, or one takes all of a side, OpenCASCADE wants something left. As
+little as this counts as nothing, here and where solids are recognised."""
+_SHALLOW = 1e-3  # of its depth, by which a rim may be less deep and say so
+SHALLOW = "its fillets and chamfers are a thousandth less deep: OpenCASCADE builds no others"
 
 
 def with_rims(field: Extrusion, solid: TopoDS_Shape, bottom: TopoDS_Shape, top: TopoDS_Shape) -> TopoDS_Shape:
@@ -37,6 +42,15 @@ def with_rims(field: Extrusion, solid: TopoDS_Shape, bottom: TopoDS_Shape, top: 
             continue
         return result
     raise NoSurfaceError(f"OpenCASCADE cannot build the rims of an {field.kind} {field.profile}")
+
+
+def shallower(field: Swept) -> Iterator[tuple[Extrusion, float]]:
+    """The field with rims that leave something of the wall, or of the end, and how far off it is; nothing
+    where it has no rims."""
+    if isinstance(field, Extrusion) and field.has_rims:
+        depths = {name: getattr(field, name) for name in RIMS}
+        less = {name: (1 - _SHALLOW) * depth for name, depth in depths.items()}
+        yield dataclasses.replace(field, **less), _SHALLOW * max(depths.values())
 
 
 def _with_rim(solid: TopoDS_Shape, face: TopoDS_Shape, rim: Rim, share: float) -> TopoDS_Shape:

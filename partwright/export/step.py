@@ -8,6 +8,7 @@ exact mesh stand for its result. Blends become sharp edges. FILE.report.json lis
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +21,7 @@ from partwright.assembly import Assembly
 from partwright.atomic_io import replacing
 from partwright.errors import OutputError
 from partwright.export.brep import built
+from partwright.export.brep_rims import SHALLOW
 from partwright.export.brep_tree import Compromises, combined
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
@@ -45,6 +47,7 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     scale = METRES[unit] / _WORKING if unit else 1.0
     scaled, changes = solid_tree(assembly.scaled(scale), built, 1 / scale)
+    changes = [_with_note(change, assembly.scaled(scale), scaled) for change in changes]
     mitred = [part.name for part in scaled.parts if _is_mitred(part.field)]
     if mitred:
         note = "about sharp inner corners its fillets and chamfers meet in a mitre"
@@ -69,6 +72,16 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
         wrong = "OpenCASCADE gets their boolean operations wrong"
         changes.append(Change(tuple(made.faceted), "flat facets", note=wrong))
     write_report(assembly, path, changes, notes)
+
+
+def _with_note(change: Change, assembly: Assembly, made: Assembly) -> Change:
+    """Which says so where rims are less deep."""
+    given, own = ({part.name: part.field for part in one.parts} for one in (assembly, made))
+    for name in change.what:
+        before, after = given.get(name), own.get(name)
+        if isinstance(before, Extrusion) and isinstance(after, Extrusion) and before.rims != after.rims:
+            return dataclasses.replace(change, note=SHALLOW)
+    return change
 
 
 def _is_mitred(field: Field) -> bool:

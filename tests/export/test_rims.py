@@ -96,3 +96,20 @@ def test_mitres_about_inner_corners_are_told(tmp_path: Path) -> None:
         (change,) = json.loads(report_path(tmp_path / f"a{suffix}").read_text())["approximated"]
         assert change["parts"] == ["b"]
         assert "corners" in change["note"]
+
+
+def test_rims_that_take_all_of_a_side_are_a_little_less_deep_and_say_so(tmp_path: Path) -> None:
+    """OpenCASCADE gets a dome as wide as its slot wrong, and facets stood for it."""
+    bd = pytest.importorskip("build123d")
+    slot = Extrusion(Profile.rectangle(20, 6, 3), 8, top_fillet=3, bottom_chamfer=1)
+    whole = Assembly((Part(slot, name="slot"), Part(ROUND, (30, 0, 0), name="block")), unit="cm")
+    export(whole, tmp_path / "a.step")
+    (change,) = json.loads(report_path(tmp_path / "a.step").read_text())["approximated"]
+    assert change["parts"] == ["slot"]
+    assert change["to"] == "extrusion"
+    assert change["max_deviation"] == pytest.approx(0.003)
+    assert "a thousandth less deep" in change["note"]
+    read = bd.import_step(tmp_path / "a.step")
+    assert read.is_valid
+    assert read.volume == pytest.approx(1000 * mesh_assembly(whole, 512).volume, rel=2e-3)
+    assert len(read.faces()) < 50
