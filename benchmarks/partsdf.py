@@ -3,6 +3,7 @@
     python benchmarks/partsdf.py speed [--model MODEL]
     python benchmarks/partsdf.py reconstruct --family FOLDER --model MODEL [--config CONFIG] [--shapes N]
     python benchmarks/partsdf.py encode --family FOLDER --model MODEL [--shapes N]
+    python benchmarks/partsdf.py images --family FOLDER --model MODEL [--shapes N] [--views N]
     python benchmarks/partsdf.py scans --family FOLDER --model MODEL [--shapes N] [--surface]
     python benchmarks/partsdf.py generate --family FOLDER --model MODEL [--samples N]
     python benchmarks/partsdf.py ablations --family FOLDER [--epochs N] [--width N] [--shapes N]
@@ -11,8 +12,8 @@
     python benchmarks/partsdf.py robots --parts FOLDER --held A,B [--epochs N]
 
 `reconstruct` with CONFIG also trains the same on all parts as one ("1P"), in --work, for a row of its own.
-`encode` has held-out shapes from points by the model's encoder, `scans` from few points, noise and missing
-halves, `generate` new ones against held-out ones.
+`encode` has held-out shapes from points by the model's encoder, `images` from one render each by its image
+encoder, `scans` from few points, noise and missing halves, `generate` new ones against held-out ones.
 `decoders` trains the paper's and the local one for the same seconds. `ablations` trains every variant in
 --work, one after another. `training` tables trainings in FOLDER/mixers, chairs and cars, and keeps their
 logs. Trainings go on where they were stopped, and every shape's scores are kept in
@@ -32,6 +33,7 @@ from partsdf_ablations import ablations
 from partsdf_decoders import decoders
 from partsdf_encoder import encoding
 from partsdf_generation import generation
+from partsdf_images import imaging
 from partsdf_reconstruct import reconstruction, robots
 from partsdf_scans import scanning
 from partsdf_speed import speed
@@ -77,6 +79,10 @@ def main() -> None:
     one = measuring("encode", encoding)
     one.add_argument("--family", required=True)
     one.add_argument("--model", required=True)
+    one = measuring("images", imaging)
+    one.add_argument("--family", required=True, help="beside those whose pictures are of something else")
+    one.add_argument("--model", required=True)
+    one.add_argument("--views", type=int, default=3, help="pictures of each shape")
     one = measuring("scans", scanning)
     one.add_argument("--family", required=True)
     one.add_argument("--model", required=True)

@@ -6,6 +6,8 @@ exits with `exit_code`; a traceback that reaches a user is a defect.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 LONGEST_MESSAGE = 1000  # characters; what is quoted of a user's data may be of any length
 
 
@@ -138,7 +140,16 @@ class ObjectiveError(PartwrightError):
 
 
 class SimulationError(PartwrightError):
-    """A flow simulation failed, diverged, or did not end in its time."""
+    """A flow simulation failed or diverged. log: the file that says more, where there is one; message: all
+    but that."""
+
+    def __init__(self, message: object = "", log: Path | None = None) -> None:
+        super().__init__(message if log is None else f"{message}: see {log}")
+        self.message, self.log = message, log
+
+
+class SimulationLimitError(SimulationError):
+    """A flow simulation ran out of time or disk: with more of it, it may end well."""
 
 
 class WorkerError(PartwrightError):

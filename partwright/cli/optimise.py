@@ -113,6 +113,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "longest side; 0 sets no limit (default: %(default)s)",
     )
     limits(
+        "--symmetric",
+        metavar="AXIS",
+        default="",
+        help="change both sides alike: x, y or z, across the plane through the middle (default: none)",
+    )
+    limits(
         "--neighbours",
         metavar="W",
         type=float,

@@ -35,7 +35,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option("--keep", metavar="PARTS", help="these parts of --of stay: names, separated by commas")
     option("--of", metavar="SHAPE", help="the shape whose parts are kept")
     option("--poses", metavar="SHAPE", help="a shape whose parts' poses are kept, but none of their forms")
-    option("--like", metavar="SHAPE", help="samples near a shape, or near what is found in a mesh or points")
+    option(
+        "--like",
+        metavar="SHAPE",
+        help="samples near a shape, or near what is found in a mesh, points or a picture",
+    )
     option(
         "--change",
         metavar="X",

@@ -11,15 +11,24 @@ from partwright.cli.outputs import add_output_folder
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
         "reconstruct",
-        help="find the parts of a shape with a trained model",
+        help="find the parts of a shape, or in a picture, with a trained model",
         description="Finds latents and poses of a model's parts that make up a plain shape, without labels. "
         "Writes assembly.json, parts.glb, surface.ply, report.json and preview.png. The shape may be turned "
         "about its up axis, and lie on any side if that is unknown. A shape that is none of the model's "
-        "family is told so.",
+        "family is told so. In a picture the parts are seen by the model's image encoder, as its family "
+        "stands, and what was seen is held against the silhouette.",
     )
-    command.add_argument("model", metavar="MODEL", help="a model that ships, or a file (.safetensors)")
-    command.add_argument("shape", metavar="SHAPE", type=Path, help="mesh, points, grid or STEP file")
+    # Suppressed: an absent MODEL is not to undo --model.
+    command.add_argument(
+        "model",
+        metavar="MODEL",
+        nargs="?",
+        default=argparse.SUPPRESS,
+        help="a model that ships, or a file (.safetensors); here, or as --model",
+    )
+    command.add_argument("shape", metavar="SHAPE", type=Path, help="mesh, points, grid, STEP file or picture")
     option = command.add_argument
+    option("--model", dest="model", metavar="MODEL", help=argparse.SUPPRESS)
     add_output_folder(command)
     option(
         "--iterations",

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from partwright.assembly import Assembly, Similarity
 from partwright.errors import NoSurfaceError
@@ -56,6 +58,20 @@ def contacts(assembly: Assembly, pairs: list[tuple[int, int]] | None = None) -> 
 def allowed(contact: Contact, longest: float) -> float:
     """The depth that is to be kept of a contact at the start; of a shallow one, that it touches."""
     return _KEPT * contact.depth if _KEPT * contact.depth < -_TOUCH * longest else _TOUCH * longest
+
+
+def pieces_by(found: list[Contact], assembly: Assembly) -> int:
+    """Into how many pieces an assembly falls by these contacts, where they reach into one another.
+
+    Meshes join what is nearer than a cell, or do not, as the cells happen to lie. Copies of parts that touch
+    nothing but copies are pieces of their own.
+    """
+    count = len(assembly)
+    pairs = np.array([(c.a, c.b) for c in found if c.depth < 0], int).reshape(-1, 2)
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (count, count))
+    total, group = connected_components(links, directed=False)
+    copies = np.array([1 + len(part.instances) for part in assembly.parts])
+    return int(sum(copies[group == k].min() for k in range(total)))
 
 
 def contact_gradients(parameters: Parameters, found: list[Contact]) -> np.ndarray:

@@ -87,9 +87,14 @@ def measured(name: str, measure: Measure, surface: trimesh.Trimesh, labels: np.n
             f"objective {name}: it gives no gradient; return a number and its derivative by the vertices "
             "(V, 3), or wrap a function of tensors by partwright.goals.by_torch"
         )
-    if slope.shape != vertices.shape or not np.isfinite(slope).all():
+    if slope.shape != vertices.shape:
         raise ObjectiveError(
-            f"objective {name}: its derivative is of shape {slope.shape}, or not finite; expected finite "
-            f"numbers of shape {vertices.shape}"
+            f"objective {name}: its derivative is of shape {slope.shape}; expected that of the vertices, "
+            f"{vertices.shape}"
+        )
+    if not np.isfinite(slope).all():
+        count = int((~np.isfinite(slope).all(axis=1)).sum())
+        raise ObjectiveError(
+            f"objective {name}: its derivative is not finite at {count} of {len(vertices)} vertices"
         )
     return Measured(number, slope)

@@ -13,8 +13,10 @@ import trimesh
 
 from partwright.assembly import Assembly
 from partwright.atomic_io import replacing_files
+from partwright.errors import SimulationError
 from partwright.goals.curves import curves
 from partwright.goals.flow import Air, Skin, simulate
+from partwright.goals.flow.programs import keep_log
 from partwright.goals.flow.wheels import surface_speeds
 from partwright.goals.pictures import before_and_after, trajectory
 from partwright.goals.problem import Options, Point, Problem
@@ -40,14 +42,14 @@ class Optimised:
     skins: tuple[Skin, ...] = ()
     """And the pressure on both."""
 
-    def with_simulation(self, air: str | Air) -> Optimised:
+    def with_simulation(self, air: str | Air, log: Path | None = None) -> Optimised:
         """The same, with the drag of both ends by OpenFOAM: "x", "-y,ground,cells=64,turning=wheel_*", or an
-        `Air`.
+        `Air`. log: a file for what a program that fails has to say; without it that is lost.
 
         Raises:
             MissingDependencyError: OpenFOAM is not installed.
             SettingError: no part is called as those that are to turn.
-            SimulationError: a simulation failed, diverged or took too long.
+            SimulationError: a simulation failed, diverged, or ran out of time or disk.
         """
         air = Air.of(air, self.start.up) if isinstance(air, str) else air
         ends = {"before": self.found.points[0], "after": self._best}
@@ -58,7 +60,10 @@ class Optimised:
                 speeds = None
                 if air.turning:
                     speeds = surface_speeds(point.assembly, point.surface, air, self.metres)
-                one = simulate(point.surface, Path(folder, name), air, self.metres, speeds)
+                try:
+                    one = simulate(point.surface, Path(folder, name), air, self.metres, speeds)
+                except SimulationError as error:
+                    raise keep_log(error, log) from error
                 found[name] = one.to_dict()
                 skins.append(one.skin)
         return replace(self, simulated=found, skins=tuple(skins))

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import trimesh
 
 from partwright.assembly import Assembly
 from partwright.errors import NoSurfaceError, SettingError
-from partwright.goals.contacts import Contact, allowed, contact_gradients, contacts
+from partwright.goals.contacts import Contact, allowed, contact_gradients, contacts, pieces_by
 from partwright.goals.entry import BLEND, FORM, LATENT, Entry
 from partwright.goals.gradient import parameter_gradient
 from partwright.goals.objective import Measure, Measured, Start, measured
+from partwright.goals.objectives.axes import axis
 from partwright.goals.parameters import Parameters
 from partwright.goals.regions import TrainedRegion
 from partwright.goals.steady import broken_by, gradients, held_parts
 from partwright.goals.surface import face_labels, pieces, surface_of, thin_parts
+from partwright.goals.symmetry import Mirror
 from partwright.goals.wanted import Bound, Wanted, asks_for_labels, bounded, frozen_entries, measure_of
 from partwright.methods import check_count, check_number
 
 # What counts as the size of a share that is small, and of a length that is 0, as a share of the longest side.
 _SHARE, _LENGTH = 0.2, 0.05
+_ROUNDING = 1e-12  # of a natural size: a start below is 0, and no size to divide by
 _THIN = 1.3  # cells: walls at the start that leave a part no room to become thinner
 
 
@@ -35,7 +38,8 @@ class Options:
     share of itself a size may change. anchor: weight of the squared distance from the start (L2). neighbours:
     weight of the distance of latents from those of the training (kNN). contacts: parts that touch go on to.
     still: how far the surface of a learned part that is frozen may follow the others, as a share of the
-    longest side; 0 sets no limit.
+    longest side; 0 sets no limit. symmetric: an axis (x, y, z), to whose both sides changes are to be the
+    same; "" for none.
     """
 
     steps: int = 60
@@ -46,6 +50,7 @@ class Options:
     neighbours: float = 0.1
     contacts: bool = True
     still: float = 1e-3
+    symmetric: str = ""
 
     def __post_init__(self) -> None:
         check_count("steps", self.steps, low=1)
@@ -55,6 +60,8 @@ class Options:
         check_number("anchor", self.anchor, 0.0)
         check_number("neighbours", self.neighbours, 0.0)
         check_number("still", self.still, 0.0)
+        if self.symmetric:
+            axis(self.symmetric, "x", "symmetric")
 
 
 @dataclass
@@ -107,7 +114,8 @@ class Problem:
         self.bounds = [b for b in bounds if not b.of_parameter]
         self.region = TrainedRegion(self.parameters)
         surface = surface_of(assembly, options.resolution)
-        self.pieces = pieces(surface)
+        touching = contacts(assembly)
+        self.pieces = max(pieces(surface), pieces_by(touching, assembly))
         start = Start(assembly, surface, self.parameters.longest)
         self.measures: dict[str, Measure] = {}
         self.terms: dict[str, tuple[Measured, float]] = {}  # at the start, and a natural size of its numbers
@@ -115,10 +123,14 @@ class Problem:
         for name in dict.fromkeys([w.name for w in self.wanted] + [b.name for b in self.bounds]):
             self.labelled |= asks_for_labels(name)
             self.measures[name], power = measure_of(name, start)
-            self.terms[name] = (self._measured(name, assembly, surface), start.longest**power)
-        touching = contacts(assembly) if options.contacts else []
-        self.touching = [c for c in touching if self._moves(c.a) or self._moves(c.b)]
+            begin, natural = self._measured(name, assembly, surface), start.longest**power
+            if power and abs(begin.value) < _ROUNDING * natural:
+                begin = replace(begin, value=0.0)
+            self.terms[name] = (begin, natural)
+        kept = touching if options.contacts else []
+        self.touching = [c for c in kept if self._moves(c.a) or self._moves(c.b)]
         self.held = held_parts(assembly, [self._moves(i) for i in range(len(assembly))])
+        self.mirror = Mirror.of(assembly, surface, options.symmetric) if options.symmetric else None
         self.depths = [allowed(contact, self.parameters.longest) for contact in self.touching]
 
     def _moves(self, part: int) -> bool:
@@ -193,6 +205,8 @@ class Problem:
             slopes.append(scale * found[bound.name].sensitivity)
         if self.options.still:
             broken += broken_by(self.held, assembly, self.options.still, p.longest)
+        if self.mirror is not None:
+            broken += self.mirror.broken_by(assembly, p.longest)
         pairs = [(c.a, c.b) for c in self.touching]
         touching = contacts(assembly, pairs) if pairs else []
         broken += [(c.depth - d) / p.longest for c, d in zip(touching, self.depths, strict=True)]
@@ -211,8 +225,10 @@ class Problem:
         stacked = np.stack([point.sensitivity, *point.bounds])
         rows = parameter_gradient(here, point.surface.vertices, point.surface.faces, stacked)
         still = gradients(self.held, here, self.parameters.longest) if self.options.still else rows[:0]
-        touching = contact_gradients(here, point.touching) / self.parameters.longest
-        rows = np.concatenate([rows, still, touching]) * units
+        longest = self.parameters.longest
+        alike = rows[:0] if self.mirror is None else self.mirror.gradients(here, longest)
+        touching = contact_gradients(here, point.touching) / longest
+        rows = np.concatenate([rows, still, alike, touching]) * units
         slope = rows[0] + 2 * self.options.anchor * np.where(self.free, point.change, 0.0)
         if self.region.parts:
             slope = slope + self.options.neighbours * self.region.measure(here.values)[1] * units

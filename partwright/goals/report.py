@@ -9,6 +9,7 @@ from partwright import __version__
 from partwright.goals.problem import Problem
 from partwright.goals.search import Found
 from partwright.goals.steady import moved
+from partwright.goals.symmetry import asymmetry
 
 
 def report(problem: Problem, found: Found, seconds: float, kept: bool) -> dict[str, Any]:
@@ -48,6 +49,7 @@ def report(problem: Problem, found: Found, seconds: float, kept: bool) -> dict[s
         "contacts": len(problem.touching),
         "unchanged_parts": same,
         "surfaces_held": moved(problem.held, best.assembly, problem.parameters.longest),
+        "asymmetry": _asymmetry(problem, found),
         "too_thin_to_change": [assembly.parts[i].name for i in problem.thin],
         "free_parameters": int(problem.free.sum()),
         "parameters": _changes(problem, found),
@@ -65,6 +67,13 @@ def report(problem: Problem, found: Found, seconds: float, kept: bool) -> dict[s
         ],
         "seconds": {"all": seconds, "a_step": seconds / len(found.steps)},
     }
+
+
+def _asymmetry(problem: Problem, found: Found) -> list[float] | None:
+    """Before and after; None where both sides may change apart."""
+    name = problem.options.symmetric
+    ends = (found.points[0], found.points[-1])
+    return [asymmetry(one.assembly, one.surface, name) for one in ends] if name else None
 
 
 def _changes(problem: Problem, found: Found) -> dict[str, list[float]]:

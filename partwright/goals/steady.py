@@ -20,7 +20,7 @@ from partwright.goals.parameters import Parameters
 _POINTS = 32  # of each part's surface, well apart, at which it is held
 _SHARE = 0.5  # of the limit that they may use: between them it moves a little further
 # A tenth of the longest side counts as much as all of it does of a contact: the limit is so much smaller.
-_WEIGHT = 10.0
+WEIGHT = 10.0
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def held_parts(assembly: Assembly, moves: Sequence[bool]) -> list[Held]:
     for i, key in enumerate(keys):
         if key is None or moves[i] or key not in moving:
             continue
-        points = _well_apart_first(part_surface(assembly, i))
+        points = well_apart_first(part_surface(assembly, i), _POINTS)
         if len(points):
             found.append(Held(i, points, assembly.part_distances(points)[i]))
     return found
@@ -53,7 +53,7 @@ def broken_by(held: Sequence[Held], assembly: Assembly, limit: float, longest: f
     rows: list[float] = []
     for off in _moved(held, assembly, _POINTS):
         for side in (off, -off):
-            rows += (_WEIGHT * (side / longest - _SHARE * limit)).tolist()
+            rows += (WEIGHT * (side / longest - _SHARE * limit)).tolist()
     return rows
 
 
@@ -66,7 +66,7 @@ def gradients(held: Sequence[Held], parameters: Parameters, longest: float) -> n
         distance = composite.part(one.part, points, theta)
         each = [torch.autograd.grad(d, theta, retain_graph=True)[0].numpy() for d in distance]
         rows += [*each, *(-row for row in each)]
-    return _WEIGHT / longest * np.array(rows).reshape(-1, len(parameters))
+    return WEIGHT / longest * np.array(rows).reshape(-1, len(parameters))
 
 
 def moved(held: Sequence[Held], assembly: Assembly, longest: float) -> dict[str, float]:
@@ -90,12 +90,12 @@ def _shape_of(assembly: Assembly, index: int) -> object:
     return part.field.shape_key if is_joint(part) else None
 
 
-def _well_apart_first(points: np.ndarray) -> np.ndarray:
-    """The points (K, 3) with those first that are each the furthest from all before it."""
+def well_apart_first(points: np.ndarray, count: int) -> np.ndarray:
+    """The points (K, 3) with so many first that are each the furthest from all before it."""
     if not len(points):
         return points
     chosen, away = [0], np.linalg.norm(points - points[0], axis=1)
-    while len(chosen) < min(_POINTS, len(points)):
+    while len(chosen) < min(count, len(points)):
         chosen.append(int(away.argmax()))
         away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
     return np.concatenate([points[chosen], np.delete(points, chosen, axis=0)])

@@ -14,8 +14,11 @@ from partwright.partsdf.assemblies import from_assembly, to_assembly
 from partwright.partsdf.config import Config, config_from, read_config
 from partwright.partsdf.encoder import Encoder, load_encoder
 from partwright.partsdf.encoder_training import train_encoder
+from partwright.partsdf.from_photo import PhotoParts, reconstruct_photo
 from partwright.partsdf.generator import Generator, load_generator
 from partwright.partsdf.generator_training import train_generator
+from partwright.partsdf.image_encoder import ImageEncoder, load_image_encoder
+from partwright.partsdf.image_encoder_training import train_image_encoder
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
@@ -27,8 +30,10 @@ __all__ = [
     "Config",
     "Encoder",
     "Generator",
+    "ImageEncoder",
     "Model",
     "NeuralShape",
+    "PhotoParts",
     "ReconstructionSettings",
     "Settings",
     "config_from",
@@ -36,12 +41,15 @@ __all__ = [
     "from_assembly",
     "load_encoder",
     "load_generator",
+    "load_image_encoder",
     "load_model",
     "mesh_shape",
     "read_config",
     "reconstruct",
+    "reconstruct_photo",
     "to_assembly",
     "train",
     "train_encoder",
     "train_generator",
+    "train_image_encoder",
 ]

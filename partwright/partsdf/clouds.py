@@ -7,13 +7,14 @@ is brought to the unit frame, as a shape that is read from a file is, and the po
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from partwright.datasets.prepared import PreparedFamily
+from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import FamilyError
 from partwright.partsdf.model import Model
 from partwright.partsdf.part_vectors import quaternions
@@ -44,22 +45,10 @@ class PartClouds:
         Raises:
             FamilyError: the family lacks one of them, or was prepared without surfaces.
         """
-        numbers = {entry.name: i for i, entry in enumerate(family.shapes)}
-        missing = [name for name in model.shapes if name not in numbers]
-        if missing or family.parts != model.parts:
-            raise FamilyError(
-                f"{family.folder}: is not what {model.name} was trained on: "
-                + (f"{missing[0]!r} is missing" if missing else "it has other parts")
-            )
         parts = len(model.parts)
         points = torch.zeros(len(model.shapes), parts, KEPT, 3)
         area = torch.zeros(len(model.shapes), parts)
-        for s, name in enumerate(model.shapes):
-            shape = family.load(numbers[name])
-            if not len(shape.faces):
-                raise FamilyError(
-                    f"{family.folder}: was prepared without surfaces, which an encoder learns from"
-                )
+        for s, shape in enumerate(training_shapes(family, model)):
             corners = shape.vertices.astype(np.float64)
             for p in range(parts):
                 faces = shape.faces[shape.label == p].astype(np.int64)
@@ -70,6 +59,37 @@ class PartClouds:
                 pose = model.poses.map(lambda t, s=s, p=p: t[s, p][None])
                 points[s, p] = local_points(torch.from_numpy(sampled).float(), pose)[0]
         return cls(points, area)
+
+
+def training_shapes(family: PreparedFamily, model: Model) -> Iterator[PreparedShape]:
+    """The shapes that a model was trained on, in its order, each with its surface.
+
+    Raises:
+        FamilyError: the family lacks one of them, or was prepared without surfaces.
+    """
+    numbers = {entry.name: i for i, entry in enumerate(family.shapes)}
+    missing = [name for name in model.shapes if name not in numbers]
+    if missing or family.parts != model.parts:
+        raise FamilyError(
+            f"{family.folder}: is not what {model.name} was trained on: "
+            + (f"{missing[0]!r} is missing" if missing else "it has other parts")
+        )
+    for name in model.shapes:
+        shape = family.load(numbers[name])
+        if not len(shape.faces):
+            raise FamilyError(f"{family.folder}: was prepared without surfaces, which an encoder learns from")
+        yield shape
+
+
+def donors_of(model: Model, shapes: Tensor, seen: Tensor, generator: torch.Generator) -> Tensor:
+    """(B, P) which training shape each part of the training shapes (B,) comes from: half of these have a
+    quarter of their parts exchanged for others'. seen: (S, P) whether a part has a surface."""
+    batch, parts = len(shapes), len(model.parts)
+    others = torch.randint(len(model.shapes), (batch, parts), generator=generator)
+    some = torch.rand(batch, 1, generator=generator) < _EXCHANGED
+    exchanged = some & (torch.rand(batch, parts, generator=generator) < 0.25)
+    exchanged &= model.present[shapes] & seen[others, torch.arange(parts)]
+    return torch.where(exchanged, others, shapes[:, None].expand(batch, parts))
 
 
 @dataclass(frozen=True)
@@ -97,13 +117,9 @@ def draw(
     def uniform(*size: int) -> Tensor:
         return torch.rand(*size, generator=generator)
 
-    donors = shapes[:, None].expand(batch, parts).clone()
+    donors = shapes[:, None].expand(batch, parts)
     if not plain:
-        others = torch.randint(len(model.shapes), (batch, parts), generator=generator)
-        exchanged = (uniform(batch, 1) < _EXCHANGED) & (uniform(batch, parts) < 0.25)
-        number = torch.arange(parts)
-        exchanged &= model.present[shapes] & (clouds.area[others, number] > 0)
-        donors = torch.where(exchanged, others, donors)
+        donors = donors_of(model, shapes, clouds.area > 0, generator)
     number = torch.arange(parts).expand(batch, parts)
     latents, present = model.latents[donors, number], model.present[shapes]
     poses = model.poses.map(lambda t: t[shapes])

@@ -31,6 +31,13 @@ def check_posed(model: Model, purpose: str) -> None:
         raise SettingError(f"{model.name} was trained without poses, which {purpose}")
 
 
+def follow(kept: nn.Module, made: nn.Module, step: int, most: float) -> None:
+    """Weights that are kept, a mean of the last steps', stay by `most` of what they were, less at first."""
+    share = min(most, step / (step + 10))
+    for old, new in zip(kept.parameters(), made.parameters(), strict=True):
+        old.lerp_(new.detach(), 1 - share)
+
+
 def descend(
     parameters: Iterable[nn.Parameter],
     terms: Callable[[], Tensor],

@@ -1,7 +1,7 @@
 """Files that lie beside a model's: networks that were trained for it, and only for it.
 
-MODEL.encoder.safetensors and MODEL.generator.safetensors are found by the model's file, and say by its hash
-which model they are for.
+MODEL.encoder.safetensors, MODEL.image-encoder.safetensors and MODEL.generator.safetensors are found by the
+model's file, and say by its hash which model they are for.
 """
 
 from __future__ import annotations
@@ -19,7 +19,11 @@ from partwright.input_files import check_file
 from partwright.partsdf.model import SUFFIX, Model, about_file, file_of
 
 VERSION = 1
-KINDS = ("encoder", "generator")
+_TRAINED_BY = {
+    "encoder": "parts train-encoder",
+    "image-encoder": "parts train-encoder --from images",
+    "generator": "parts train-generator",
+}
 
 T = TypeVar("T")
 
@@ -59,13 +63,13 @@ def load_companion(
         data = path.read_bytes()
         tensors, about = load(data), about_file(data)
         if about.get("format") != f"partwright-{kind}":
-            raise ModelError(f"{path}: holds no {kind}; expected one that `parts train-{kind}` wrote")
+            raise ModelError(f"{path}: holds no {kind}; expected one that `{_TRAINED_BY[kind]}` wrote")
         if about["version"] > VERSION:
             raise NewerVersionError(f"{path}: version {about['version']}; upgrade Partwright to open it")
         if about["model"] != model.hash:
             raise ModelError(
                 f"{path}: was trained for another model than {model.name}; train it again with "
-                f"`parts train-{kind}`, or remove it"
+                f"`{_TRAINED_BY[kind]}`, or remove it"
             )
         return made(about["settings"], {name: value.float() for name, value in tensors.items()})
     except OSError as error:

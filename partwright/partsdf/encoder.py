@@ -41,15 +41,13 @@ class EncoderSettings:
     beside: int = 12
 
 
-class EncoderNetwork(nn.Module):
-    """Clouds (B, N, 3) to vectors (B, P, K + 12 + 1): latents, poses, and the logit of presence."""
+class PartQueries(nn.Module):
+    """Tokens (B, T, width) of what is seen to vectors (B, P, K + 12 + 1): latents, poses, and the logit of
+    presence."""
 
     def __init__(self, parts: int, latent: int, settings: EncoderSettings) -> None:
         super().__init__()
         self.parts, width = parts, settings.width
-        self.point = nn.Sequential(
-            nn.Linear(3 + 6 * _OCTAVES, width), nn.GELU(), nn.Linear(width, width), nn.GELU()
-        )
         self.query = nn.Parameter(0.1 * torch.randn(parts + settings.beside, width))
         self.heard = nn.LayerNorm(width)
         self.cross = nn.ModuleList(
@@ -68,14 +66,34 @@ class EncoderNetwork(nn.Module):
         )
         self.out = nn.Sequential(nn.LayerNorm(width), nn.Linear(width, latent + POSE + 1))
 
-    def forward(self, points: Tensor) -> Tensor:
-        seen = self.heard(self.point(positional_encoding(points, _OCTAVES)))
-        tokens = self.query.expand(len(points), -1, -1)
+    def asked(self, tokens: Tensor) -> Tensor:
+        """(B, P + beside, width): what all queries have heard of the tokens, and of one another."""
+        seen = self.heard(tokens)
+        queries = self.query.expand(len(seen), -1, -1)
         for norm, cross, talk in zip(self.asking, self.cross, self.talk, strict=True):
-            tokens = tokens + cross(norm(tokens), seen, seen, need_weights=False)[0]
-            tokens = talk(tokens)
-        result: Tensor = self.out(tokens[:, : self.parts])
+            queries = queries + cross(norm(queries), seen, seen, need_weights=False)[0]
+            queries = talk(queries)
+        return queries
+
+    def told(self, queries: Tensor) -> Tensor:
+        """The vectors (B, P, K + 12 + 1) of what queries have heard."""
+        result: Tensor = self.out(queries[:, : self.parts])
         return result
+
+
+class EncoderNetwork(PartQueries):
+    """Clouds (B, N, 3) to vectors (B, P, K + 12 + 1)."""
+
+    def __init__(self, parts: int, latent: int, settings: EncoderSettings) -> None:
+        width = settings.width
+        point = nn.Sequential(
+            nn.Linear(3 + 6 * _OCTAVES, width), nn.GELU(), nn.Linear(width, width), nn.GELU()
+        )
+        super().__init__(parts, latent, settings)
+        self.point = point
+
+    def forward(self, points: Tensor) -> Tensor:
+        return self.told(self.asked(self.point(positional_encoding(points, _OCTAVES))))
 
 
 @dataclass(frozen=True)
@@ -110,26 +128,26 @@ class Encoder:
         rows = torch.linspace(0, points.shape[1] - 1, min(MOST, points.shape[1])).long()
         framed = unit_cloud(points.float())
         found = self.network(framed[:, rows])
-        latents, poses, logits = self.split(found)
+        latents, poses, logits = self.vectors.split(found)
         # Back from the cloud's unit frame to the points'.
         ratio = (size / (framed.amax(dim=1) - framed.amin(dim=1)).amax(dim=1)).float()[:, None, None]
         centre = ((low + high) / 2).float()[:, None]
         poses = PoseTensors(poses.translation * ratio + centre, poses.rotation, poses.scale * ratio)
-        present = logits > 0
-        present[torch.arange(len(present)), logits.argmax(dim=1)] = True  # one at least
-        return [
-            NeuralShape.of(self.model, latents[i], poses.map(lambda t, i=i: t[i]), present[i])
-            for i in range(len(points))
-        ]
-
-    def split(self, found: Tensor) -> tuple[Tensor, PoseTensors, Tensor]:
-        """Latents (B, P, Z), poses (B, P, ...) and logits (B, P) of what the network gives."""
-        latents, poses, logits = found.split((self.vectors.width, POSE, 1), dim=-1)
-        return self.vectors.latents(latents), self.vectors.poses(poses), logits.squeeze(-1)
+        return shapes_of(self.model, latents, poses, logits)
 
     def save(self, path: str | Path) -> None:
         """Write it; raises OutputError."""
         save_companion(path, KIND, self.model, asdict(self.settings), self.network.state_dict())
+
+
+def shapes_of(model: Model, latents: Tensor, poses: PoseTensors, logits: Tensor) -> list[NeuralShape]:
+    """Shapes of latents (B, P, Z), poses (B, P, ...) and logits (B, P) of presence; none is without parts."""
+    present = logits > 0
+    present[torch.arange(len(present)), logits.argmax(dim=1)] = True
+    return [
+        NeuralShape.of(model, latents[i], poses.map(lambda t, i=i: t[i]), present[i])
+        for i in range(len(latents))
+    ]
 
 
 def load_encoder(model: Model, path: str | Path | None = None) -> Encoder | None:

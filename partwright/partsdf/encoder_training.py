@@ -10,11 +10,12 @@ from torch import Tensor
 
 from partwright.datasets.prepared import PreparedFamily
 from partwright.methods import Cancellation
-from partwright.partsdf.clouds import Drawn, PartClouds, draw
+from partwright.partsdf.clouds import PartClouds, draw
 from partwright.partsdf.companion_training import check_trainable, descend
 from partwright.partsdf.encoder import Encoder, EncoderNetwork, EncoderSettings
 from partwright.partsdf.model import Model
 from partwright.partsdf.part_vectors import POSE, PartVectors
+from partwright.partsdf.poses import PoseTensors
 
 _BATCH = 24
 _POINTS = (64, 128, 256, 512)  # of a step's clouds
@@ -64,7 +65,7 @@ def train_encoder(
         shapes = torch.randint(len(model.shapes), (_BATCH,), generator=generator)
         count = _POINTS[int(torch.randint(len(_POINTS), (), generator=generator))]
         drawn = draw(clouds, model, shapes, count, generator)
-        return losses(network(drawn.points), drawn, vectors)
+        return losses(network(drawn.points), vectors, drawn.latents, drawn.poses, drawn.present)
 
     def heard(number: int, means: list[float]) -> None:
         if told is not None:
@@ -77,16 +78,19 @@ def train_encoder(
     return Encoder(model, settings, network.requires_grad_(False).eval(), vectors)
 
 
-def losses(found: Tensor, drawn: Drawn, vectors: PartVectors) -> Tensor:
-    """(3,) of latents, poses and presence, of what a network gave (B, P, K + 12 + 1) for clouds."""
-    latents, poses, logits = found.split((vectors.width, POSE, 1), dim=-1)
-    there = drawn.present.float()
+def losses(
+    found: Tensor, vectors: PartVectors, latents: Tensor, poses: PoseTensors, present: Tensor
+) -> Tensor:
+    """(3,) of latents, poses and presence, of what a network gave, (B, P, K + 12 + 1).
+
+    latents (B, P, Z), poses (B, P, ...) and present (B, P): of what it saw.
+    """
+    seen, posed, logits = found.split((vectors.width, POSE, 1), dim=-1)
+    there = present.float()
     count = there.sum().clamp(min=1)
-    off = (latents - vectors.of_latents(drawn.latents)) * vectors.spread  # each direction as it tells
+    off = (seen - vectors.of_latents(latents)) * vectors.spread  # each direction as it tells
     unexplained = off.square().sum(-1) / vectors.spread.square().sum(-1)
-    missed = torch.nn.functional.smooth_l1_loss(
-        poses, vectors.of_poses(drawn.poses), reduction="none", beta=0.3
-    )
+    missed = torch.nn.functional.smooth_l1_loss(posed, vectors.of_poses(poses), reduction="none", beta=0.3)
     presence = torch.nn.functional.binary_cross_entropy_with_logits(logits.squeeze(-1), there)
     return torch.stack(
         [(unexplained * there).sum() / count, (missed.mean(-1) * there).sum() / count, presence]

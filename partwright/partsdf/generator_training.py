@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from partwright.errors import SettingError
 from partwright.methods import Cancellation
-from partwright.partsdf.companion_training import check_posed, check_trainable, descend
+from partwright.partsdf.companion_training import check_posed, check_trainable, descend, follow
 from partwright.partsdf.diffusion import noised
 from partwright.partsdf.generator import Generator, GeneratorSettings, networks, tidy
 from partwright.partsdf.model import Model
@@ -65,10 +65,8 @@ def train_generator(
         return _errors(made, layouts[rows], forms[rows], generator)
 
     def averaged(step: int) -> None:
-        share = min(_AVERAGE, step / (step + 10))
         for name, one in made.items():
-            for old, new in zip(kept[name].parameters(), one.parameters(), strict=True):
-                old.lerp_(new.detach(), 1 - share)
+            follow(kept[name], one, step, _AVERAGE)
 
     def heard(number: int, means: list[float]) -> None:
         if told is not None:

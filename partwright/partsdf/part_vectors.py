@@ -78,6 +78,12 @@ class PartVectors:
         columns = (first, second, torch.linalg.cross(first, second))
         return PoseTensors(place, quaternions(torch.stack(columns, dim=-1)), size.exp())
 
+    def split(self, found: Tensor) -> tuple[Tensor, PoseTensors, Tensor]:
+        """Latents (..., P, Z), poses (..., P, ...) and logits of presence (..., P) of what a network gives,
+        vectors (..., P, K + 12 + 1)."""
+        latents, poses, logits = found.split((self.width, POSE, 1), dim=-1)
+        return self.latents(latents), self.poses(poses), logits.squeeze(-1)
+
 
 def pose_numbers(poses: PoseTensors) -> Tensor:
     """(..., 12): place, the first two columns of the rotation matrix, logarithms of half-lengths."""

@@ -6,7 +6,7 @@ from partwright.shapes.distance import DistanceSource, MeshDistance
 from partwright.shapes.frame import LONGEST_SIDE, UnitFrame
 from partwright.shapes.grid import DistanceGrid
 from partwright.shapes.holes import Openings
-from partwright.shapes.reading import MESH_SUFFIXES, SUFFIXES
+from partwright.shapes.reading import MESH_SUFFIXES, PICTURE_SUFFIXES, SUFFIXES
 from partwright.shapes.sampling import Samples, SurfaceSamples
 from partwright.shapes.shape import Node, NodeLeftOutWarning, Shape, load_shape
 from partwright.shapes.units import METRES, UP_AXES, canonical_unit, canonical_up
@@ -15,6 +15,7 @@ __all__ = [
     "LONGEST_SIDE",
     "MESH_SUFFIXES",
     "METRES",
+    "PICTURE_SUFFIXES",
     "SUFFIXES",
     "UP_AXES",
     "DistanceGrid",

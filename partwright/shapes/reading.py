@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import trimesh
 
 MESH_SUFFIXES = (*READ_BY_TRIMESH, ".3mf")
-_PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".tif", ".tiff")
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".tif", ".tiff")
 _UNIT_NORMAL = (0.9, 1.1)  # lengths between which the columns behind the coordinates are normals, not colours
 
 
@@ -34,9 +34,11 @@ def read_source(path: Path) -> Source:
     FlatShapeError or GridError.
     """
     suffix = path.suffix.lower()
-    if suffix in _PICTURES:
+    if suffix in PICTURE_SUFFIXES:
         raise UnsupportedFormatError(
-            f"{path}: is a picture; a generator must make a mesh of it first: partwright fit --via GENERATOR"
+            f"{path}: is a picture; a generator must make a mesh of it first (partwright fit "
+            "--via GENERATOR), or a model of its family find parts in it ("
+            "partwright parts reconstruct MODEL PICTURE)"
         )
     if suffix not in _READERS:
         raise UnsupportedFormatError(

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from partwright.assembly import Assembly, Part
-from partwright.errors import MissingDependencyError, SettingError, SimulationError, UnreadableFileError
+from partwright.assembly import Assembly, Part, load_assembly
+from partwright.cli.main import main
+from partwright.errors import (
+    MissingDependencyError,
+    SettingError,
+    SimulationError,
+    SimulationLimitError,
+    UnreadableFileError,
+)
 from partwright.fields import Box
 from partwright.goals.flow import Air, simulate
 from partwright.goals.flow.case import write_case
 from partwright.goals.flow.dataset import read, read_all, simulate_all
 from partwright.goals.flow.programs import PROGRAMS
 from partwright.goals.flow.simulation import PRESSURE
+from partwright.goals.optimising import FILES
 from partwright.goals.surface import surface_of
 
 CUBE = surface_of(Assembly((Part(Box((1.0, 1.0, 1.0))),)), 8)
@@ -173,6 +183,64 @@ def test_what_failed_is_written_down_and_not_tried_again(stand_in: Path, tmp_pat
     assert again.reason == first.reason
     with pytest.raises(UnreadableFileError, match="there is none"):
         list(read_all(tmp_path))
+
+
+def test_what_ran_out_of_time_or_disk_is_tried_again(
+    stand_in: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(stand_in / "simpleFoam", "sleep 30\n")
+    late = simulate_all([("a", CUBE)], tmp_path, Air(time_limit=0.5))[0]
+    assert "time limit" in late.reason
+    assert late.reason.endswith(".failed.log")
+    write(stand_in / "simpleFoam", "echo 'no room'; exit 1\n")
+    with monkeypatch.context() as full:
+        full.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=4096))
+        filled = simulate_all([("a", CUBE)], tmp_path, Air())[0]
+    assert "is full" in filled.reason
+    assert filled.path.with_suffix(".failed.log").read_text() == "no room\n"  # the case itself is gone
+    write(stand_in / "simpleFoam", SOLVED)
+    assert simulate_all([("a", CUBE)], tmp_path, Air())[0].drag_area == 1.0
+
+
+def test_a_case_that_cannot_be_written_is_told(stand_in: Path, tmp_path: Path) -> None:
+    (tmp_path / "case").write_text("a file")
+    with pytest.raises(SimulationLimitError, match="cannot be written: "):
+        simulate(CUBE, tmp_path / "case")
+
+
+def test_a_simulation_that_fails_leaves_what_was_optimised_and_its_log(
+    stand_in: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(stand_in / "simpleFoam", "echo 'all about it'; exit 3\n")
+    assembly = Assembly((Part(Box((1.0, 1.0, 1.0)), name="box"),))
+    assembly.save(tmp_path / "box.json")
+    out = tmp_path / "out"
+    code = main(
+        ["optimise", str(tmp_path / "box.json"), "-o", str(out), "--objective", "volume", "--steps", "1",
+         "--resolution", "8", "--simulate", "x"]
+    )  # fmt: skip
+    assert code == 2
+    said = capsys.readouterr()
+    assert "volume" in said.out
+    assert f"see {out / 'simulation.log'}; {out} holds what was optimised" in said.err
+    assert (out / "simulation.log").read_text() == "all about it\n"
+    assert load_assembly(out / "assembly.json") != assembly
+
+
+def test_ctrl_c_in_a_simulation_leaves_what_was_optimised(
+    stand_in: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The signal is sent by the solver, while it is waited for."""
+    write(stand_in / "simpleFoam", f"kill -INT {os.getpid()}; sleep 30\n")
+    Assembly((Part(Box((1.0, 1.0, 1.0)), name="box"),)).save(tmp_path / "box.json")
+    out = tmp_path / "out"
+    code = main(
+        ["optimise", str(tmp_path / "box.json"), "-o", str(out), "--objective", "volume", "--steps", "1",
+         "--resolution", "8", "--simulate", "x"]
+    )  # fmt: skip
+    assert code == 130
+    assert "holds what was optimised" in capsys.readouterr().err
+    assert {path.name for path in out.iterdir()} == set(FILES)
 
 
 def test_files_that_are_no_simulated_bodies_are_named(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,12 @@ from partwright.cli.optimise import FILES as SAID
 from partwright.errors import ObjectiveError, SettingError
 from partwright.fields import Box, Cylinder, Sphere, SuperFrustum
 from partwright.goals import Options, Step, optimise
-from partwright.goals.contacts import contacts
+from partwright.goals.contacts import contacts, pieces_by
 from partwright.goals.optimising import FILES
+from partwright.goals.problem import Problem
+from partwright.goals.surface import pieces, surface_of
+from partwright.goals.symmetry import asymmetry
+from partwright.goals.wanted import Wanted
 from partwright.methods import Cancellation
 
 PLATE = Part(Box((2.0, 1.0, 0.4)), name="plate")
@@ -57,6 +62,50 @@ def test_what_touched_still_does_and_nothing_comes_loose() -> None:
     free = Options(steps=8, resolution=24, anchor=0.0, reach=1.0, contacts=False)
     loose = optimise(assembly, "centre@z:-1", freeze=["plate", "post:form"], options=free)
     assert loose.assembly["post"].translation[2] < 0.72  # kept by the rule that nothing comes loose
+
+
+def test_what_was_apart_by_less_than_a_cell_may_go_where_the_mesh_sees_it() -> None:
+    """The mesh joins what a gap of a fifth of a cell parts: that is no piece that came loose."""
+    apart = Part(SuperFrustum((0.5, 0.5, 0.4), 0.3), (0.1, 0.03, 0.415), name="apart")
+    assembly = Assembly((PLATE, apart))
+    options = Options(resolution=28)
+    problem = Problem(assembly, [Wanted.of("volume")], [], ["plate"], options)
+    names = [problem.parameters.name(k) for k in range(len(problem.parameters))]
+    change = np.zeros(len(names))
+    change[names.index("apart.tz")] = 0.06 / problem.parameters.units[names.index("apart.tz")]
+    assert pieces(surface_of(assembly, 28)) == 1
+    moved = problem.at(change)
+    assert moved is not None
+    assert pieces(moved.surface) == 2
+
+
+def test_pieces_are_counted_by_what_touches() -> None:
+    """Two wheels, each with its tyre, stand apart from a plate with its post."""
+    move = Similarity(1.0, (0.0, 0.0, 0.0, 1.0))
+    wheel = Part(Cylinder(0.2, 0.2), (0.8, 2.0, 0.0), name="wheel", instances=(move,))
+    tyre = Part(Cylinder(0.3, 0.1), (0.8, 2.0, 0.0), name="tyre", instances=(move,))
+    assembly = Assembly((PLATE, wheel, POST, tyre))
+    assert pieces_by(contacts(assembly), assembly) == 3
+    assert pieces(surface_of(assembly, 32)) == 3
+    assert pieces_by(contacts(Assembly((PLATE, POST))), Assembly((PLATE, POST))) == 1
+
+
+def test_changes_are_the_same_on_both_sides() -> None:
+    """Mass is pulled to one side, where it is 0 but for rounding; and both sides may only change alike."""
+    sides = [Part(Cylinder(0.25, 1.0), (x, 0.0, 0.6), name=f"side{x}") for x in (-0.6, 0.6)]
+    assembly = Assembly((PLATE, *sides))
+    goals, bounds = ["volume", "centre@x:-0.5"], ["volume>=80%"]
+    options = Options(steps=3, resolution=12, anchor=0.0)
+    apart = optimise(assembly, goals, bounds=bounds, freeze=["plate"], options=options)
+    assert 0.01 < apart.numbers["centre@x"][1] < 1.0
+    both = replace(options, symmetric="x")
+    alike = optimise(assembly, goals, bounds=bounds, freeze=["plate"], options=both)
+    assert abs(alike.numbers["centre@x"][1]) < 5e-3
+    assert alike.numbers["volume"][1] < 0.98 * alike.numbers["volume"][0]
+    before, after = alike.to_dict()["asymmetry"]
+    assert before < 1e-4
+    assert after < 1e-3 < asymmetry(apart.assembly, apart.surface, "x")
+    assert apart.to_dict()["asymmetry"] is None
 
 
 def test_copies_stay_copies() -> None:

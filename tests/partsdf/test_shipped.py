@@ -13,6 +13,7 @@ from partwright.cli.main import main
 from partwright.datasets.families.recipes import FAMILIES, make_shape
 from partwright.partsdf.encoder import load_encoder
 from partwright.partsdf.generator import load_generator
+from partwright.partsdf.image_encoder import load_image_encoder
 from partwright.partsdf.model import SHIPPED, Model, load_model
 from partwright.partsdf.neural import NeuralShape
 
@@ -37,7 +38,11 @@ def test_companions_are_small_and_belong_to_their_models() -> None:
     for path in files:
         assert path.stat().st_size < 5e6
         name, kind = path.stem.split(".")
-        load = {"encoder": load_encoder, "generator": load_generator}[kind]
+        load = {
+            "encoder": load_encoder,
+            "image-encoder": load_image_encoder,
+            "generator": load_generator,
+        }[kind]
         assert load(load_model(name)) is not None
 
 

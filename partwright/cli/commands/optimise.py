@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 
 from partwright.assembly import load_assembly
-from partwright.cli.interrupts import INTERRUPTED, stopping
+from partwright.cli.interrupts import INTERRUPTED, raising, stopping
 from partwright.cli.progress import Count
 from partwright.cli.terminal import counted, note, say, warn
 from partwright.errors import ObjectiveError, SimulationError
@@ -18,6 +18,7 @@ from partwright.goals.flow.wheels import turning_parts
 from partwright.goals.objectives.surrogate import outside
 from partwright.methods import Cancellation
 
+LOG = "simulation.log"  # of a program that failed
 _ENDINGS = {
     "converged": "converged",
     "budget_reached": "all steps done",
@@ -38,6 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
         neighbours=arguments.neighbours,
         contacts=not arguments.no_contacts,
         still=arguments.still,
+        symmetric=arguments.symmetric,
     )
     if arguments.simulate is not None:
         turning_parts(assembly, Air.of(arguments.simulate, assembly.up))
@@ -53,15 +55,26 @@ def run(arguments: argparse.Namespace) -> int:
             progress=lambda step: count.show(step.number, step.of, _shown(step)),
             cancel=cancel,
         )
+    failed: SimulationError | None = None
+    stopped = False
     if arguments.simulate is not None and result.ending not in ("failed", "interrupted"):
+        result.save(arguments.output)  # of minutes: kept, whatever becomes of the simulation
         note("simulating before and after")
         try:
-            result = result.with_simulation(arguments.simulate)
-        except SimulationError:
-            result.save(arguments.output)
-            raise
+            with raising():
+                result = result.with_simulation(arguments.simulate, arguments.output / LOG)
+        except SimulationError as error:
+            failed = error
+        except KeyboardInterrupt:
+            stopped = True
     result.save(arguments.output)
-    return _finish(result, arguments)
+    code = _finish(result, arguments)
+    if failed is not None:
+        raise SimulationError(f"{failed}; {arguments.output} holds what was optimised, without a simulation")
+    if stopped:
+        warn([f"interrupted: {arguments.output} holds what was optimised, without a simulation"])
+        return INTERRUPTED
+    return code
 
 
 def _finish(result: Optimised, arguments: argparse.Namespace) -> int:

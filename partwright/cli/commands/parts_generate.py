@@ -14,6 +14,7 @@ from partwright.cli.progress import Work
 from partwright.cli.terminal import counted, say, warn
 from partwright.errors import SettingError
 from partwright.partsdf.assemblies import to_assembly
+from partwright.partsdf.from_photo import reconstruct_photo
 from partwright.partsdf.generator import load_generator
 from partwright.partsdf.meshing import resolution_for_wall
 from partwright.partsdf.model import Model, load_model
@@ -22,7 +23,7 @@ from partwright.partsdf.novelty import nearest_training_shape
 from partwright.partsdf.pictures import picture
 from partwright.partsdf.sources import found_in, open_source
 from partwright.render import Camera, sheet, write_png
-from partwright.shapes import SUFFIXES
+from partwright.shapes import PICTURE_SUFFIXES, SUFFIXES
 
 _PANEL, _COLUMNS = 240, 4  # pixels
 _COARSE, _FINEST = 64, 192  # cells
@@ -104,7 +105,12 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _kept(arguments: argparse.Namespace, model: Model) -> tuple[NeuralShape | None, list[str]]:
     """The shape of which something stays, and its parts that do."""
-    if arguments.like and Path(arguments.like).suffix.lower() in SUFFIXES:
+    suffix = Path(arguments.like or "").suffix.lower()
+    if suffix in PICTURE_SUFFIXES:
+        seen = reconstruct_photo(model, arguments.like)
+        warn(seen.warnings)
+        return seen.shape, []
+    if suffix in SUFFIXES:
         found, warnings = found_in(model, arguments.like, seed=arguments.seed)
         warn(warnings)
         return found, []

@@ -5,15 +5,34 @@ from __future__ import annotations
 import argparse
 
 from partwright.cli.interrupts import stopping
-from partwright.cli.progress import Display
+from partwright.cli.progress import Display, Work
 from partwright.cli.tables import finish_fit
+from partwright.cli.terminal import counted, say, warn
+from partwright.errors import SettingError
 from partwright.fitting import fit
 from partwright.methods import Cancellation
+from partwright.partsdf.from_photo import reconstruct_photo
+from partwright.partsdf.model import load_model
 from partwright.partsdf.settings import Settings
-from partwright.shapes import load_shape
+from partwright.shapes import PICTURE_SUFFIXES, load_shape
+
+# What is for shapes alone, and how it is when it is not given.
+_OF_SHAPES = {
+    "iterations": 400,
+    "points": 2048,
+    "start": "auto",
+    "as_it_stands": False,
+    "unit": None,
+    "up": None,
+    "seed": 0,
+}
 
 
 def run(arguments: argparse.Namespace) -> int:
+    if not arguments.model:
+        raise SettingError("which model's parts? Name it before the shape, or as --model: --model chairs")
+    if arguments.shape.suffix.lower() in PICTURE_SUFFIXES:
+        return _of_picture(arguments)
     settings = Settings(
         arguments.model,
         arguments.resolution,
@@ -30,3 +49,22 @@ def run(arguments: argparse.Namespace) -> int:
         display.stage("writing")
         result.save(arguments.output)
     return finish_fit(result, arguments.output)
+
+
+def _of_picture(arguments: argparse.Namespace) -> int:
+    given = [name for name, plain in _OF_SHAPES.items() if getattr(arguments, name) != plain]
+    if given:
+        option = given[0].replace("_", "-")
+        raise SettingError(f"--{option} is for meshes and points; of a picture there is --resolution alone")
+    with Work("looking") as work:
+        found = reconstruct_photo(load_model(arguments.model), arguments.shape, arguments.resolution)
+        work.stage("writing")
+        found.save(arguments.output)
+    camera, covered = found.report["camera"], found.report["silhouette_iou"]
+    say(
+        f"{counted(len(found.report['parts']), 'part')} of {found.shape.model.name} seen in "
+        f"{arguments.shape.name}, from azimuth {camera['azimuth']:.0f}, elevation "
+        f"{camera['elevation']:.0f}; silhouettes agree to {100 * covered:.0f} %: {arguments.output}"
+    )
+    warn(found.warnings)
+    return 0

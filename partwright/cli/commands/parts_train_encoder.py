@@ -8,29 +8,35 @@ from partwright.cli.commands.companions import train_beside
 from partwright.cli.progress import Count
 from partwright.datasets.prepared import PreparedFamily
 from partwright.methods import Cancellation
-from partwright.partsdf.encoder import KIND, Encoder
+from partwright.partsdf import encoder, image_encoder
+from partwright.partsdf.encoder import Encoder
 from partwright.partsdf.encoder_training import EncoderStep, train_encoder
+from partwright.partsdf.image_encoder import ImageEncoder
+from partwright.partsdf.image_encoder_training import ImageStep, train_image_encoder
 from partwright.partsdf.model import Model
 
 
 def run(arguments: argparse.Namespace) -> int:
-    last: list[EncoderStep] = []
+    last: list[EncoderStep | ImageStep] = []
 
-    def train(model: Model, count: Count, cancel: Cancellation) -> Encoder:
-        def told(step: EncoderStep) -> None:
+    def train(model: Model, count: Count, cancel: Cancellation) -> Encoder | ImageEncoder:
+        def told(step: EncoderStep | ImageStep) -> None:
             last[:] = [step]
             count.show(step.number, step.of, f"latents {step.latents:.3f}  poses {step.poses:.3f}")
 
-        return train_encoder(
-            model,
-            PreparedFamily(arguments.family),
-            steps=arguments.steps,
-            seed=arguments.seed,
-            told=told,
-            cancel=cancel,
+        family, steps, seed = PreparedFamily(arguments.family), arguments.steps, arguments.seed
+        if arguments.sees == "points":
+            return train_encoder(model, family, steps=steps, seed=seed, told=told, cancel=cancel)
+
+        def drawn(done: int, of: int) -> None:
+            count.show(done, of, "views drawn")
+
+        return train_image_encoder(
+            model, family, steps=steps, seed=seed, drawn=drawn, told=told, cancel=cancel
         )
 
     def about(_: Model) -> str:
         return f": {1 - last[0].latents:.0%} of what latents vary by are told;" if last else ";"
 
-    return train_beside(arguments, KIND, train, about)
+    kind = encoder.KIND if arguments.sees == "points" else image_encoder.KIND
+    return train_beside(arguments, kind, train, about)

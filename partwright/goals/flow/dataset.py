@@ -19,8 +19,9 @@ import numpy as np
 import trimesh
 
 from partwright.atomic_io import replacing
-from partwright.errors import SettingError, SimulationError, UnreadableFileError
+from partwright.errors import SettingError, SimulationError, SimulationLimitError, UnreadableFileError
 from partwright.goals.flow.air import Air
+from partwright.goals.flow.programs import keep_log
 from partwright.goals.flow.simulation import PRESSURE, simulate
 from partwright.goals.flow.skin import Skin
 
@@ -64,8 +65,9 @@ def simulate_all(
 ) -> list[Done]:
     """Simulate named bodies (in metres) into files of a folder, which may hold some of them already.
 
-    A body that fails is written down with its reason (NAME.failed.json) and not tried again while that file
-    is there. told: after each. count: of the bodies, where known.
+    A body that fails is written down with its reason (NAME.failed.json, NAME.failed.log) and not tried again
+    while that file is there; one that ran out of time or disk is. told: after each. count: of the bodies,
+    where known.
 
     Raises:
         MissingDependencyError: OpenFOAM is not installed.
@@ -87,6 +89,8 @@ def simulate_all(
             made = True
             try:
                 area = _simulated(name, body, path, air)
+            except SimulationLimitError as error:
+                reason = str(error)
             except SimulationError as error:
                 reason = str(error)
                 with replacing(failed) as staging:
@@ -109,7 +113,10 @@ def key(body: trimesh.Trimesh, air: Air) -> str:
 
 def _simulated(name: str, body: trimesh.Trimesh, path: Path, air: Air) -> float:
     with tempfile.TemporaryDirectory(prefix="partwright-") as folder:
-        found = simulate(body, Path(folder, "case"), air)
+        try:
+            found = simulate(body, Path(folder, "case"), air)
+        except SimulationError as error:
+            raise keep_log(error, path.with_suffix(".failed.log")) from error
     about = {
         "version": VERSION,
         "name": name,

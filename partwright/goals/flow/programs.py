@@ -7,14 +7,16 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
-from partwright.errors import MissingDependencyError, SimulationError
+from partwright.errors import MissingDependencyError, SimulationError, SimulationLimitError
 
 MESHER, SNAPPER = ("blockMesh",), ("snappyHexMesh", "-overwrite")
 SOLVER = ("simpleFoam",)
 SAMPLER = ("postProcess", "-func", "sample", "-latestTime")
 PROGRAMS = (MESHER, SNAPPER, SOLVER, SAMPLER)
+_FULL = 1 << 20  # bytes: a disk with less left has stopped a program
 _HOME = "/usr/share/openfoam"  # of Debian's package, which sets no environment
 
 
@@ -32,7 +34,7 @@ def run(command: Sequence[str], folder: Path, seconds: float) -> str:
     """Run a command in the case's folder; its log, which is also written there.
 
     Raises:
-        SimulationError: it failed, or did not end within the time limit; the message names the log.
+        SimulationError: it failed, ran out of time or of disk; the message names the log.
     """
     log = folder / f"log.{command[0]}"
     environment = {"WM_PROJECT_DIR": _HOME, **os.environ} if Path(_HOME).is_dir() else dict(os.environ)
@@ -46,14 +48,25 @@ def run(command: Sequence[str], folder: Path, seconds: float) -> str:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
             if isinstance(error, subprocess.TimeoutExpired):
-                raise SimulationError(f"{command[0]} did not end within the time limit: see {log}") from error
+                raise SimulationLimitError(f"{command[0]} did not end within the time limit", log) from error
             raise
     text = log.read_text(errors="replace")
+    if code and shutil.disk_usage(folder).free < _FULL:
+        raise SimulationLimitError(f"{command[0]} failed: the disk of {folder} is full", log)
     if code:
         crashed = "sigFpe::" in text  # of the stack; the log's head says that such errors are caught
         why = "it diverged" if crashed else f"it ended with {code}"
-        raise SimulationError(f"{command[0]} failed ({why}): {_complaint(text)} See {log}")
+        raise SimulationError(f"{command[0]} failed ({why}) {_complaint(text)}".rstrip(), log)
     return text
+
+
+def keep_log(error: SimulationError, place: Path | None) -> SimulationError:
+    """The error of a case that is deleted: its log is copied to `place`, or is lost."""
+    log = None
+    if error.log is not None and place is not None:
+        with suppress(OSError):
+            log = Path(shutil.copyfile(error.log, place))
+    return type(error)(error.message, log)
 
 
 def _complaint(log: str) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from partwright.errors import SimulationError
+from partwright.errors import SimulationError, SimulationLimitError
 from partwright.goals.flow.air import Air
 from partwright.goals.flow.case import write_case
 from partwright.goals.flow.programs import PROGRAMS, SAMPLER, SOLVER, check_installed, run
@@ -58,21 +58,24 @@ def simulate(
 
     Raises:
         MissingDependencyError: OpenFOAM is not installed.
-        SimulationError: it failed, diverged, or took too long; the message names the log.
+        SimulationError: it failed, diverged, or ran out of time or disk; the message names the log.
     """
     check_installed()
     air, begun, log = air or Air(), time.monotonic(), ""
-    blockage = write_case(surface, folder, air, metres)
-    for command in PROGRAMS:
-        if command is SOLVER and speeds is not None:
-            turn_wall(folder, surface, speeds, metres)
-        text = run(command, folder, air.time_limit - (time.monotonic() - begun))
-        log = text if command is SOLVER else log
+    try:
+        blockage = write_case(surface, folder, air, metres)
+        for command in PROGRAMS:
+            if command is SOLVER and speeds is not None:
+                turn_wall(folder, surface, speeds, metres)
+            text = run(command, folder, air.time_limit - (time.monotonic() - begun))
+            log = text if command is SOLVER else log
+    except OSError as error:
+        raise SimulationLimitError(f"{folder}: the case cannot be written: {error.strerror}") from error
     area = drag_areas(folder, air)
     longest = metres * float(np.ptp(surface.vertices, axis=0).max())
     if not len(area) or not np.isfinite(area).all() or abs(area[-1]) > _HUGE * longest**2:
         raise SimulationError(
-            f"the simulation diverged: no body has such a force. See {folder / f'log.{SOLVER[0]}'}"
+            "the simulation diverged: no body has such a force", folder / f"log.{SOLVER[0]}"
         )
     last = area[-max(1, round(_LAST * len(area))) :]
     residuals = {name: float(value) for name, value in _RESIDUAL.findall(log)}
@@ -84,7 +87,7 @@ def simulate(
 def _skin(folder: Path, air: Air) -> Skin:
     found = sorted(folder.glob("postProcessing/sample/*/body.vtk"))
     if not found:
-        raise SimulationError(f"nothing was read off the body. See {folder / f'log.{SAMPLER[0]}'}")
+        raise SimulationError("nothing was read off the body", folder / f"log.{SAMPLER[0]}")
     skin = read_vtk(found[-1])
     if "p" not in skin.fields:
         raise SimulationError(f"{found[-1]}: the pressure is missing")

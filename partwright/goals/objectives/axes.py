@@ -15,7 +15,7 @@ def axis(text: str, default: str, what: str) -> np.ndarray:
     """
     name = (text or default).lower().removeprefix("+")
     if name.removeprefix("-") not in ("x", "y", "z"):
-        raise SettingError(f"{what}: expected an axis (x, y, z, -x, -y or -z) after '@', got {text!r:.40}")
+        raise SettingError(f"{what}: expected an axis (x, y, z, -x, -y or -z), got {text!r:.40}")
     result = np.zeros(3)
     result["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
     return result

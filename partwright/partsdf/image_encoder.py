@@ -1,0 +1,143 @@
+"""A picture to parts: latents, poses and presence of all parts, the silhouette, and where the camera stood.
+
+A small convolutional network looks at the picture (appendix H has a ResNet-18); learned queries, as those of
+the encoder of points, hear of what it saw. The paper's tells neither silhouette nor camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from partwright.partsdf.companions import beside, check_tensors, load_companion, save_companion
+from partwright.partsdf.encoder import EncoderSettings, PartQueries, shapes_of
+from partwright.partsdf.lighting import MIDDLE, SPREAD
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.part_vectors import PartVectors
+from partwright.partsdf.views import SIDE
+
+KIND = "image-encoder"
+CAMERA = 3  # cosine and sine of the azimuth, elevation
+_GROUPS = 8
+
+
+_QUERIES = EncoderSettings(width=128, heads=4, rounds=1, blocks=2, beside=4)
+
+
+@dataclass(frozen=True)
+class ImageSettings:
+    """channels: of the three scales, a quarter, an eighth and a sixteenth of the picture's side; queries."""
+
+    channels: tuple[int, int, int] = (32, 64, 128)
+    queries: EncoderSettings = _QUERIES
+
+
+class _Block(nn.Module):
+    """Two convolutions beside a way past them."""
+
+    def __init__(self, before: int, after: int, step: int) -> None:
+        super().__init__()
+        self.convs = nn.Sequential(
+            nn.Conv2d(before, after, 3, step, 1, bias=False), nn.GroupNorm(_GROUPS, after), nn.GELU(),
+            nn.Conv2d(after, after, 3, 1, 1, bias=False), nn.GroupNorm(_GROUPS, after),
+        )  # fmt: skip
+        self.past = nn.Conv2d(before, after, 1, step) if step > 1 else nn.Identity()
+
+    def forward(self, x: Tensor) -> Tensor:
+        return nn.functional.gelu(self.past(x) + self.convs(x))
+
+
+class ImageNetwork(PartQueries):
+    """Pictures (B, 3, SIDE, SIDE) to vectors (B, P, K + 12 + 1), logits of the silhouette (B, SIDE / 2,
+    SIDE / 2) and cameras (B, CAMERA)."""
+
+    def __init__(self, parts: int, latent: int, settings: ImageSettings) -> None:
+        super().__init__(parts, latent, settings.queries)
+        near, middle, far = settings.channels
+        width = settings.queries.width
+        self.stem = nn.Sequential(
+            nn.Conv2d(3, near, 5, 2, 2, bias=False), nn.GroupNorm(_GROUPS, near), nn.GELU()
+        )
+        self.near = _Block(near, near, 2)
+        self.middle = _Block(near, middle, 2)
+        self.far = nn.Sequential(_Block(middle, far, 2), _Block(far, far, 1))
+        self.up_far, self.up_middle = nn.Conv2d(far, middle, 1), nn.Conv2d(middle, near, 1)
+        self.silhouette = nn.Sequential(nn.Conv2d(near, 4, 3, 1, 1), nn.PixelShuffle(2))
+        cells = SIDE // 8, SIDE // 16
+        self.token_middle, self.token_far = nn.Conv2d(middle, width, 1), nn.Conv2d(far, width, 1)
+        self.place = nn.Parameter(0.1 * torch.randn(sum(c * c for c in cells), width))
+        self.camera = nn.Sequential(nn.LayerNorm(width), nn.Linear(width, CAMERA))
+
+    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        near = self.near(self.stem((pictures - MIDDLE) / SPREAD))
+        middle = self.middle(near)
+        far = self.far(middle)
+        larger = nn.functional.interpolate
+        up = middle + larger(self.up_far(far), scale_factor=2)
+        silhouette = self.silhouette(near + larger(self.up_middle(up), scale_factor=2)).squeeze(1)
+        tokens = [self.token_middle(up).flatten(2), self.token_far(far).flatten(2)]
+        queries = self.asked(torch.cat(tokens, dim=2).transpose(1, 2) + self.place)
+        return self.told(queries), silhouette, self.camera(queries[:, self.parts])
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What is seen in a picture: the shape in its family's frame, how likely each cell (SIDE / 2, SIDE / 2)
+    of the picture is the shape, and where the camera stands, in degrees."""
+
+    shape: NeuralShape
+    silhouette: Tensor
+    azimuth: float
+    elevation: float
+
+
+@dataclass(frozen=True)
+class ImageEncoder:
+    """A trained network, with the model whose latents and poses it predicts."""
+
+    model: Model
+    settings: ImageSettings
+    network: ImageNetwork
+    vectors: PartVectors
+
+    @torch.no_grad()
+    def see(self, pictures: Tensor) -> list[Sight]:
+        """What is in pictures (B, 3, SIDE, SIDE), 0 to 1, that a shape nearly fills."""
+        found, silhouette, camera = self.network(pictures)
+        shapes = shapes_of(self.model, *self.vectors.split(found))
+        azimuth = torch.rad2deg(torch.atan2(camera[:, 1], camera[:, 0])).tolist()
+        elevation = torch.rad2deg(camera[:, 2]).tolist()
+        rows = zip(shapes, silhouette.sigmoid(), azimuth, elevation, strict=True)
+        return [Sight(*row) for row in rows]
+
+    def save(self, path: str | Path) -> None:
+        """Write it; raises OutputError."""
+        save_companion(path, KIND, self.model, asdict(self.settings), self.network.state_dict())
+
+
+def load_image_encoder(model: Model, path: str | Path | None = None) -> ImageEncoder | None:
+    """The image encoder of a file, or of the one beside the model's; None where there is none.
+
+    Raises:
+        UnreadableFileError, ModelError, NewerVersionError: as `load_companion`.
+    """
+    source = Path(path) if path is not None else beside(model, KIND)
+    if source is None or (path is None and not source.exists()):
+        return None
+
+    def made(settings: dict[str, Any], tensors: dict[str, Tensor]) -> ImageEncoder:
+        known = ImageSettings(tuple(settings["channels"]), EncoderSettings(**settings["queries"]))
+        vectors = PartVectors.of(model)
+        parts = len(model.parts)
+        with torch.device("meta"):  # shapes without memory
+            check_tensors(ImageNetwork(parts, vectors.width, known).state_dict(), tensors)
+        network = ImageNetwork(parts, vectors.width, known)
+        network.load_state_dict(tensors)
+        return ImageEncoder(model, known, network.requires_grad_(False).eval(), vectors)
+
+    return load_companion(source, KIND, model, made)

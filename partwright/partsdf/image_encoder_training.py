@@ -1,0 +1,111 @@
+"""How an image encoder learns, the decoder frozen: from views of the training shapes, lit anew each time."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn.functional import avg_pool2d, binary_cross_entropy_with_logits, smooth_l1_loss
+
+from partwright.datasets.prepared import PreparedFamily
+from partwright.methods import Cancellation
+from partwright.partsdf.companion_training import check_trainable, descend, follow
+from partwright.partsdf.encoder_training import losses
+from partwright.partsdf.image_encoder import ImageEncoder, ImageNetwork, ImageSettings
+from partwright.partsdf.lighting import lit
+from partwright.partsdf.model import Model
+from partwright.partsdf.part_vectors import PartVectors
+from partwright.partsdf.views import PartMeshes, Views, draw_views
+
+VIEWS = 8_000
+_BATCH = 32
+_AVERAGE = 0.995  # what is kept of the averaged weights each step
+_STEEPEST = 1.0  # norm of the gradients
+_TOLD = 20  # steps
+
+
+@dataclass(frozen=True)
+class ImageStep:
+    """latents: share of their variance that is not predicted yet; poses: mean error, in their spreads;
+    presence and silhouette: cross-entropies; camera: mean error, radians."""
+
+    number: int
+    of: int
+    latents: float
+    poses: float
+    presence: float
+    silhouette: float
+    camera: float
+
+
+def train_image_encoder(
+    model: Model,
+    family: PreparedFamily,
+    *,
+    steps: int = 5000,
+    views: int = VIEWS,
+    rate: float = 1e-3,
+    seed: int = 0,
+    settings: ImageSettings | None = None,
+    drawn: Callable[[int, int], None] | None = None,
+    told: Callable[[ImageStep], None] | None = None,
+    cancel: Cancellation | None = None,
+) -> ImageEncoder:
+    """An image encoder for a model, from the prepared family that it was trained on; after a cancellation, as
+    far as it has come.
+
+    drawn: told how many of the `views` there are, of which steps then take some each.
+
+    Raises:
+        FamilyError: it is another family, or was prepared without surfaces.
+        SettingError: fewer than one step, or a model of one part, which has no poses.
+    """
+    check_trainable(model, steps, "an encoder predicts")
+    meshes = PartMeshes.of(family, model)
+    settings = settings or ImageSettings()
+    torch.manual_seed(seed)
+    vectors = PartVectors.of(model)
+    network = ImageNetwork(len(model.parts), vectors.width, settings)
+    kept = copy.deepcopy(network).requires_grad_(False)
+    generator = torch.Generator().manual_seed(seed)
+    views = min(views, steps * _BATCH)  # no more than are looked at
+    count = (lambda done: drawn(done, views)) if drawn else None
+    seen = draw_views(meshes, model, views, generator, count, cancel)
+
+    def terms() -> Tensor:
+        rows = torch.randint(len(seen.label), (_BATCH,), generator=generator)
+        return picture_losses(network, vectors, model, seen, rows, generator)
+
+    def heard(number: int, means: list[float]) -> None:
+        if told is not None:
+            told(ImageStep(number, steps, *means))
+
+    descend(
+        network.parameters(), terms, steps=steps, rate=rate, told=heard, every=_TOLD, cancel=cancel,
+        steepest=_STEEPEST, after=lambda step: follow(kept, network, step, _AVERAGE),
+    )  # fmt: skip
+    return ImageEncoder(model, settings, kept.eval(), vectors)
+
+
+def picture_losses(
+    network: ImageNetwork,
+    vectors: PartVectors,
+    model: Model,
+    views: Views,
+    rows: Tensor,
+    generator: torch.Generator,
+) -> Tensor:
+    """(5,) of latents, poses, presence, silhouette and camera, of pictures made of the views `rows` (B,)."""
+    pictures, silhouette = lit(views, rows, generator)
+    with torch.autocast("cpu", torch.bfloat16):
+        found, logits, camera = network(pictures.contiguous(memory_format=torch.channels_last))
+    donors = views.donors[rows]
+    latents = model.latents[donors, torch.arange(len(model.parts))]
+    poses, present = views.poses.map(lambda t: t[rows]), views.present[rows]
+    about_parts = losses(found.float(), vectors, latents, poses, present)
+    covered = binary_cross_entropy_with_logits(logits.float(), avg_pool2d(silhouette, 2))
+    stood = smooth_l1_loss(camera.float(), views.camera[rows], beta=0.1)
+    return torch.cat([about_parts, covered[None], stood[None]])

@@ -1,0 +1,161 @@
+"""A photograph or render, made ready for an image encoder: cut out where the shape is, by what it sees there.
+
+A picture with transparency says by itself where the shape is. In any other the encoder looks twice: for the
+silhouette first, then closely at that part of the picture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from scipy import ndimage
+from torch import Tensor
+
+from partwright.errors import EmptyShapeError, UnreadableFileError
+from partwright.generators.generating import check_image
+from partwright.partsdf.image_encoder import ImageEncoder, Sight
+from partwright.partsdf.views import SIDE
+
+_LARGEST = 1024  # pixels along the longer side: more than anything here looks at
+_LEAST = 16  # pixels
+_OPAQUE = 128  # of 255
+_FILLED = 0.9  # of the picture that the silhouette is cut out to, as views are
+_CLOSER = 2  # times that it is cut out anew
+_SMALLEST = 6  # cells of a silhouette along its longer side, of SIDE / 2
+_LIGHT, _DARK = 0.97, 0.15  # backgrounds of what is transparent
+
+
+@dataclass(frozen=True)
+class Photo:
+    """pixels (H, W, 3) float32, 0 to 1; shape (H, W) bool where its transparency says that the shape is, None
+    where it has none."""
+
+    pixels: np.ndarray
+    shape: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class Looked:
+    """What was seen: the part of the photo that was looked at closely (SIDE, SIDE, 3), 0 to 1, the sight, and
+    the silhouette (SIDE / 2, SIDE / 2) bool there."""
+
+    closely: np.ndarray
+    sight: Sight
+    silhouette: np.ndarray
+
+
+def read_photo(path: str | Path) -> Photo:
+    """A picture file, upright as its camera says, no larger than is of use.
+
+    Raises:
+        UnreadableFileError: it is no picture, damaged, too large to be opened or too small to be seen.
+        EmptyShapeError: it is transparent all over.
+    """
+    from PIL import Image, ImageOps
+
+    path = Path(path)
+    check_image(path)
+    with Image.open(path) as opened:
+        if min(opened.size) < _LEAST:
+            raise UnreadableFileError(
+                f"{path}: is {opened.width} by {opened.height} pixels; {_LEAST} or more are needed each way"
+            )
+        opened.draft("RGB", (_LARGEST, _LARGEST))  # a JPEG may be read at a part of its size
+        picture = ImageOps.exif_transpose(_eight_bits(opened)).convert("RGBA")
+    picture.thumbnail((_LARGEST, _LARGEST), Image.Resampling.BOX)
+    rgba = np.asarray(picture, np.float32) / 255
+    pixels, opaque = rgba[..., :3], rgba[..., 3:]
+    shape = opaque[..., 0] * 255 >= _OPAQUE
+    if shape.all():
+        return Photo(pixels, None)
+    if not shape.any():
+        raise EmptyShapeError(f"{path}: is transparent all over; expected a picture of a shape")
+    behind = _LIGHT if pixels[shape].mean() < 0.6 else _DARK
+    return Photo(opaque * pixels + (1 - opaque) * behind, shape)
+
+
+def look_at(encoder: ImageEncoder, photo: Photo) -> Looked:
+    """What the encoder sees in a photo, where the shape is.
+
+    Raises:
+        EmptyShapeError: it sees none.
+    """
+    height, width = photo.pixels.shape[:2]
+    box = np.array([0.0, 0.0, height, width])
+    if photo.shape is not None:
+        rows, columns = (np.flatnonzero(photo.shape.any(axis=a)) for a in (1, 0))
+        box = _squared(np.array([rows[0], columns[0], rows[-1] + 1, columns[-1] + 1.0]), _FILLED)
+    else:
+        box = _squared(box, 1.0)
+    for again in range(1 + _CLOSER):
+        closely = _cut_out(photo.pixels, box)
+        (sight,) = encoder.see(_tensor(closely)[None])
+        seen = _largest(sight.silhouette.numpy() > 0.5)
+        if photo.shape is not None:
+            given = _cut_out(
+                np.repeat(photo.shape[..., None], 3, axis=2).astype(np.float32), box, outside=0.0
+            )
+            return Looked(closely, sight, _halved(given[..., 0]) >= 0.5)
+        rows, columns = (np.flatnonzero(seen.any(axis=a)) for a in (1, 0))
+        if max(len(rows), len(columns)) < _SMALLEST:
+            raise EmptyShapeError("no shape is seen in the picture; cut it out, or make what is around plain")
+        if again < _CLOSER:
+            cell = (box[2] - box[0]) / len(seen)
+            corners = np.array([rows[0], columns[0], rows[-1] + 1, columns[-1] + 1]) * cell
+            box = _squared(np.tile(box[:2], 2) + corners, _FILLED)
+    return Looked(closely, sight, seen)
+
+
+def _eight_bits(picture):  # type: ignore[no-untyped-def]  # Pillow's images, which are heavy to import
+    """A picture of 16 bits a pixel, or of floats, in 8: Pillow would cut off what is brighter."""
+    if not picture.mode.startswith(("I", "F")):
+        return picture
+    from PIL import Image
+
+    values = np.asarray(picture, np.float64)
+    low, high = values.min(), values.max()
+    return Image.fromarray(np.uint8(255 * (values - low) / max(high - low, 1e-9)))
+
+
+def _squared(box: np.ndarray, filled: float) -> np.ndarray:
+    """The square about a box (top, left, bottom, right) whose longer side then fills this share of it."""
+    middle, side = (box[:2] + box[2:]) / 2, (box[2:] - box[:2]).max() / filled
+    return np.concatenate([middle - side / 2, middle + side / 2])
+
+
+def _cut_out(pixels: np.ndarray, box: np.ndarray, outside: float | None = None) -> np.ndarray:
+    """(SIDE, SIDE, 3) of a square box of the picture; around it, `outside`, or its edge goes on."""
+    from PIL import Image
+
+    top, left, bottom, right = np.rint(box).astype(int)
+    bottom, right = max(bottom, top + 1), max(right, left + 1)
+    height, width = pixels.shape[:2]
+    around = [(max(0, -top), max(0, bottom - height)), (max(0, -left), max(0, right - width)), (0, 0)]
+    inner = pixels[max(0, top) : min(height, bottom), max(0, left) : min(width, right)]
+    whole = (
+        np.pad(inner, around, mode="edge")
+        if outside is None
+        else np.pad(inner, around, constant_values=outside)
+    )
+    levels = Image.fromarray(np.rint(255 * whole).astype(np.uint8))
+    return np.asarray(levels.resize((SIDE, SIDE), Image.Resampling.BOX), np.float32) / 255
+
+
+def _tensor(picture: np.ndarray) -> Tensor:
+    return torch.from_numpy(np.ascontiguousarray(picture.transpose(2, 0, 1)))
+
+
+def _halved(mask: np.ndarray) -> np.ndarray:
+    return np.asarray(mask.reshape(SIDE // 2, 2, SIDE // 2, 2).mean(axis=(1, 3)))
+
+
+def _largest(mask: np.ndarray) -> np.ndarray:
+    """Of the pieces of a mask, the largest and those that are a tenth of it: legs come apart where thin."""
+    pieces, count = ndimage.label(mask, np.ones((3, 3)))
+    if count < 2:
+        return mask
+    sizes = np.bincount(pieces.ravel())[1:]
+    return np.isin(pieces, 1 + np.flatnonzero(sizes >= 0.1 * sizes.max()))

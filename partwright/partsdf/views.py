@@ -1,0 +1,177 @@
+"""Views that an image encoder learns from: training shapes, ray cast from all around, not yet lit.
+
+As clouds do, shapes may have parts of several training shapes, each placed in the pose of the one that it
+stands in for; the whole is stretched a little along its axes. What a pixel sees is kept (a normal, a part,
+whether a light reaches it), so that each view can be lit and coloured many times.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from partwright.datasets.prepared import PreparedFamily
+from partwright.methods import Cancellation
+from partwright.partsdf.clouds import donors_of, training_shapes
+from partwright.partsdf.model import Model
+from partwright.partsdf.poses import PoseTensors, local_points, rotation_matrices
+from partwright.render.camera import Camera, View
+from partwright.render.raycast import Scene, cast
+from partwright.shapes import LONGEST_SIDE
+
+SIDE = 64  # pixels
+FAMILY_UP = "z"
+SHADED = 128  # added to a pixel's label where the light does not reach it
+_EACH = 4  # views of a shape once it is put together
+_ELEVATION, _FIELD = (-8.0, 50.0), (8.0, 50.0)  # degrees
+_ROLL = math.radians(2.5)
+_STRETCH = 0.1  # standard deviation of the logarithm
+_CLOSE = 0.8  # of the views are cut out closely, as a found silhouette is; the rest anyhow
+_FILLED, _LOOSE = (0.82, 0.98), (0.4, 0.82)  # shares of the picture
+
+
+@dataclass(frozen=True)
+class PartMeshes:
+    """Triangles of each part of S training shapes: corners (V, 3) in the part's frame, faces (F, 3)."""
+
+    corners: list[list[np.ndarray]]
+    faces: list[list[np.ndarray]]
+
+    @classmethod
+    def of(cls, family: PreparedFamily, model: Model) -> PartMeshes:
+        """Of the model's training shapes; raises FamilyError as `training_shapes`."""
+        corners: list[list[np.ndarray]] = []
+        faces: list[list[np.ndarray]] = []
+        for s, shape in enumerate(training_shapes(family, model)):
+            corners.append([])
+            faces.append([])
+            for p in range(len(model.parts)):
+                used, mine = np.unique(shape.faces[shape.label == p], return_inverse=True)
+                pose = model.poses.map(lambda t, s=s, p=p: t[s, p][None])
+                local = local_points(torch.from_numpy(shape.vertices[used]), pose)[0]
+                corners[-1].append(local.numpy())
+                faces[-1].append(mine.reshape(-1, 3))
+        return cls(corners, faces)
+
+    def seen(self) -> Tensor:
+        """(S, P) whether a part has a surface."""
+        return torch.tensor([[len(f) > 0 for f in each] for each in self.faces])
+
+
+@dataclass(frozen=True)
+class Views:
+    """V views: normal (V, SIDE, SIDE, 3) int8, world, in 127ths; label (V, SIDE, SIDE) uint8, 0 where nothing
+    is seen, else the part's number plus 1, and SHADED; light and back (V, 3), towards the light and the
+    viewer; camera (V, 3): cosine and sine of the azimuth, and elevation in radians; donors (V, P) that
+    latents are of; poses (V, P, ...) and present (V, P) of what is seen, in the unit frame."""
+
+    normal: Tensor
+    label: Tensor
+    light: Tensor
+    back: Tensor
+    camera: Tensor
+    donors: Tensor
+    poses: PoseTensors
+    present: Tensor
+
+
+def draw_views(
+    meshes: PartMeshes,
+    model: Model,
+    count: int,
+    generator: torch.Generator,
+    told: Callable[[int], None] | None = None,
+    cancel: Cancellation | None = None,
+) -> Views:
+    """`count` views, or those that there are once it is cancelled, but `_EACH` at least."""
+    shapes = torch.randint(len(model.shapes), (-(-count // _EACH),), generator=generator)
+    donors = donors_of(model, shapes, meshes.seen(), generator)
+    poses = _stretched(model.poses.map(lambda t: t[shapes]), generator)
+    rng = np.random.default_rng(int(torch.randint(1 << 40, (), generator=generator)))
+    label = np.zeros((len(shapes) * _EACH, SIDE, SIDE), np.uint8)
+    normal = np.zeros((*label.shape, 3), np.int8)
+    rows, framed = [], []
+    for i in range(len(shapes)):
+        mesh = _put_together(meshes, donors[i].tolist(), model.present[shapes[i]], poses, i)
+        framed.append(mesh[3])
+        scene = Scene(mesh[0], mesh[1])
+        for j in range(i * _EACH, (i + 1) * _EACH):
+            rows.append(_seen(scene, mesh[2], rng, normal[j].reshape(-1, 3), label[j].reshape(-1)))
+        if told is not None:
+            told(min(count, len(rows)))
+        if cancel is not None and cancel.requested:
+            break
+    made = len(rows)
+    each = torch.arange(made) // _EACH
+    light, back, camera = (torch.tensor(np.array(a), dtype=torch.float32) for a in zip(*rows, strict=True))
+    placed = PoseTensors(*(torch.stack(t) for t in zip(*framed, strict=True)))
+    return Views(
+        torch.from_numpy(normal[:made]), torch.from_numpy(label[:made]), light, back, camera,
+        donors[each], placed.map(lambda t: t[each]), model.present[shapes][each],
+    )  # fmt: skip
+
+
+def _stretched(poses: PoseTensors, generator: torch.Generator) -> PoseTensors:
+    """Along the axes of the whole; a part that is turned is stretched along its own as far as they go."""
+    factor = torch.exp(_STRETCH * torch.randn(len(poses.scale), 1, 3, generator=generator))
+    along = (factor[..., None] * rotation_matrices(poses.rotation)).norm(dim=-2)
+    return PoseTensors(poses.translation * factor, poses.rotation, poses.scale * along)
+
+
+def _put_together(
+    meshes: PartMeshes, donors: list[int], present: Tensor, poses: PoseTensors, i: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, PoseTensors]:
+    """Corners, faces and a part a face of the parts in the `i`th poses, brought to the unit frame, and the
+    poses there."""
+    matrix = rotation_matrices(poses.rotation[i]).numpy()
+    place, scale = poses.translation[i].numpy(), poses.scale[i].numpy()
+    corners, faces, labels, before = [], [], [], 0
+    for p, donor in enumerate(donors):
+        mine = meshes.faces[donor][p]
+        if not present[p] or not len(mine):
+            continue
+        corners.append((meshes.corners[donor][p] * scale[p]) @ matrix[p].T + place[p])
+        faces.append(mine + before)
+        labels.append(np.full(len(mine), p + 1, np.uint8))
+        before += len(corners[-1])
+    every = np.concatenate(corners)
+    low, high = every.min(axis=0), every.max(axis=0)
+    centre, larger = (low + high) / 2, LONGEST_SIDE / (high - low).max()
+    moved = PoseTensors(
+        (poses.translation[i] - torch.from_numpy(centre)) * larger, poses.rotation[i], poses.scale[i] * larger
+    )
+    return (every - centre) * larger, np.concatenate(faces), np.concatenate(labels), moved
+
+
+def _seen(
+    scene: Scene, labels: np.ndarray, rng: np.random.Generator, normal: np.ndarray, label: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A view from somewhere, written to normal and label; the light, the way back, and the camera."""
+    camera = Camera(rng.uniform(0, 360), rng.uniform(*_ELEVATION), rng.uniform(*_FIELD), FAMILY_UP, 0.0)
+    view = _rolled(camera.fitted(scene.vertices, SIDE, SIDE), _ROLL * rng.standard_normal())
+    filled = rng.uniform(*(_FILLED if rng.random() < _CLOSE else _LOOSE))
+    room = 0.9 * (1 - filled) / 2
+    place = (np.arange(SIDE) + 0.5) / SIDE - 0.5
+    across, down = (place / filled + 0.5 + rng.uniform(-room, room) / filled for _ in range(2))
+    rays = view.through(np.tile(across, SIDE), np.repeat(down, SIDE))
+    hits = cast(scene, view, rays)
+    light = (
+        view.back + 0.9 * rng.standard_normal() * view.right + (0.6 + 0.5 * rng.standard_normal()) * view.up
+    )
+    light /= np.linalg.norm(light)
+    start = hits.round + 1e-3 * scene.size * hits.normal
+    hidden = scene.occluded(start, np.broadcast_to(light, start.shape))
+    label[hits.pixel] = labels[hits.face] + SHADED * hidden.astype(np.uint8)
+    normal[hits.pixel] = np.rint(127 * hits.normal)
+    azimuth = math.radians(camera.azimuth)
+    return light, view.back, np.array([math.cos(azimuth), math.sin(azimuth), math.radians(camera.elevation)])
+
+
+def _rolled(view: View, angle: float) -> View:
+    c, s = math.cos(angle), math.sin(angle)
+    return View(view.eye, c * view.right + s * view.up, c * view.up - s * view.right, view.back, view.half)

@@ -1,0 +1,245 @@
+"""One picture to parts: views and their light, what is seen in renders, and pictures that are none."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+from PIL import Image
+
+import partwright as pw
+from partwright.cli.main import main
+from partwright.datasets.prepared import PreparedFamily
+from partwright.errors import EmptyShapeError, ModelError, SettingError, UnreadableFileError
+from partwright.partsdf import image_encoder_training
+from partwright.partsdf.companions import beside
+from partwright.partsdf.encoder import EncoderSettings, load_encoder
+from partwright.partsdf.from_photo import FILES, reconstruct_photo
+from partwright.partsdf.image_encoder import KIND, ImageEncoder, ImageSettings, load_image_encoder
+from partwright.partsdf.image_encoder_training import ImageStep, train_image_encoder
+from partwright.partsdf.lighting import lit
+from partwright.partsdf.model import Model, file_of
+from partwright.partsdf.photos import look_at, read_photo
+from partwright.partsdf.standpoint import boxed, find_standpoint, outline
+from partwright.partsdf.views import SHADED, SIDE, PartMeshes, draw_views
+from partwright.render import Camera, render_mesh
+from partwright.render.raycast import Scene
+
+SMALL = ImageSettings((16, 16, 32), EncoderSettings(width=32, heads=2, rounds=1, blocks=1, beside=2))
+
+
+@pytest.fixture(scope="module")
+def saved(model: Model, tmp_path_factory: pytest.TempPathFactory) -> Model:
+    """The model, from a file of its own."""
+    return model.save(tmp_path_factory.mktemp("seen") / "lamps.safetensors")
+
+
+@pytest.fixture(scope="module")
+def trained(saved: Model, lamps: PreparedFamily) -> tuple[ImageEncoder, list[ImageStep]]:
+    torch.set_num_threads(1)
+    steps: list[ImageStep] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(image_encoder_training, "_BATCH", 12)
+        made = train_image_encoder(
+            saved, lamps, steps=130, views=160, rate=4e-3, settings=SMALL, told=steps.append
+        )
+    path = beside(saved, KIND)
+    assert path is not None
+    made.save(path)
+    return made, steps
+
+
+@pytest.fixture(scope="module")
+def photo(lamps: PreparedFamily, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A render of the held-out lamp."""
+    held = lamps.load(lamps.split("test")[0])
+    mesh = trimesh.Trimesh(held.vertices, held.faces, process=False)
+    path = tmp_path_factory.mktemp("photos") / "lamp.png"
+    Image.fromarray(render_mesh(mesh, Camera(30.0, 20.0), (160, 120), (190, 90, 40))).save(path)
+    return path
+
+
+def test_views_see_the_parts_where_their_poses_say(saved: Model, lamps: PreparedFamily) -> None:
+    meshes = PartMeshes.of(lamps, saved)
+    views = draw_views(meshes, saved, 80, torch.Generator().manual_seed(0))
+    again = draw_views(meshes, saved, 80, torch.Generator().manual_seed(0))
+    assert all(torch.equal(a, b) for a, b in zip(views.poses, again.poses, strict=True))
+    assert torch.equal(views.label, again.label)
+    assert len(views.label) == 80
+    part = (views.label % SHADED).long()
+    assert part.max() == 3
+    # A knob is seen only where there is one, and hardly anywhere where it is all hidden.
+    knob = (part == 3).flatten(1).any(dim=1)
+    assert not knob[~views.present[:, 2]].any()
+    assert knob[views.present[:, 2]].float().mean() > 0.7
+    # Surfaces that are seen face the viewer; the ball's is a sphere, so what is seen of it bulges to there.
+    seen = part > 0
+    toward = (views.normal.float() / 127 * views.back[:, None, None]).sum(-1)
+    assert toward[seen].min() > -0.5
+    assert (toward[seen] > 0).float().mean() > 0.95
+    ball = (views.normal.float() / 127 * (part == 2)[..., None]).flatten(1, 2).sum(1)
+    open_ones = (part == 2).flatten(1).sum(1) > 200
+    assert open_ones.sum() > 20
+    along = (torch.nn.functional.normalize(ball, dim=1) * views.back).sum(1)[open_ones]
+    assert along.median() > 0.9
+    # In the unit frame: the plate's half-length is that of the whole along x.
+    longest = views.poses.scale[:, 0].amax(dim=1)
+    assert ((longest - 0.9).abs() < 0.02).float().mean() > 0.5
+    azimuth = torch.atan2(views.camera[:, 1], views.camera[:, 0])
+    torch.testing.assert_close(
+        views.back[:, :2],
+        views.camera[:, 2:].cos() * torch.stack([azimuth.sin(), -azimuth.cos()], dim=1),
+        atol=1e-5,
+        rtol=0,
+    )
+
+
+def test_light_and_colour_change_and_the_silhouette_does_not(saved: Model, lamps: PreparedFamily) -> None:
+    views = draw_views(PartMeshes.of(lamps, saved), saved, 8, torch.Generator().manual_seed(1))
+    generator = torch.Generator().manual_seed(2)
+    one, silhouette = lit(views, torch.arange(8), generator)
+    other, same = lit(views, torch.arange(8), generator)
+    assert one.shape == (8, 3, SIDE, SIDE)
+    assert one.min() >= 0
+    assert one.max() <= 1
+    assert torch.equal(silhouette, same)
+    assert torch.equal(silhouette > 0, views.label % SHADED > 0)
+    assert ((one - other).abs().mean(dim=(1, 2, 3)) > 0.03).all()
+
+
+def test_it_learns_and_sees_a_held_out_lamp(
+    trained: tuple[ImageEncoder, list[ImageStep]], photo: Path, lamps: PreparedFamily
+) -> None:
+    encoder, steps = trained
+    assert steps[-1].number == steps[-1].of == 130
+    assert steps[-1].silhouette < 0.5 * steps[0].silhouette
+    assert steps[-1].poses < 0.8 * steps[0].poses
+    found = reconstruct_photo(encoder.model, photo, 48)
+    held = lamps.load(lamps.split("test")[0])
+    assert found.shape.names() == list(np.array(lamps.parts)[held.present.astype(bool)])
+    assert found.standpoint.iou > 0.6
+    assert found.looked.silhouette.mean() > 0.25  # it was looked at closely
+    there = found.shape.present.numpy()
+    off = np.abs(found.shape.poses.translation.numpy() - held.translation)[there]
+    assert off[:2].max() < 0.35
+    assert found.assembly.up == "z"
+
+
+def test_a_standpoint_is_found_again(lamps: PreparedFamily) -> None:
+    held = lamps.load(0)
+    scene = Scene(held.vertices, held.faces)
+    seen = outline(scene, Camera(40.0, 20.0, 25.0, "z", 0.0))
+    aside = np.pad(seen, ((0, 40), (30, 10)))
+    assert (boxed(aside) == seen).all()  # it does not matter where in the picture it is
+    found = find_standpoint(held.vertices, held.faces, aside, 56.0, 4.0)
+    assert found.iou > 0.97
+    assert abs(found.camera.azimuth - 40) < 5
+    assert abs(found.camera.elevation - 20) < 5
+
+
+def test_transparency_says_where_the_shape_is(
+    trained: tuple[ImageEncoder, list[ImageStep]], tmp_path: Path
+) -> None:
+    rgba = np.zeros((300, 500, 4), np.uint8)
+    rgba[100:200, 50:250] = (200, 30, 30, 255)
+    Image.fromarray(rgba).save(tmp_path / "box.png")
+    photo = read_photo(tmp_path / "box.png")
+    assert photo.shape is not None
+    looked = look_at(trained[0], photo)
+    rows, columns = (
+        np.flatnonzero(looked.silhouette.any(axis=1)),
+        np.flatnonzero(looked.silhouette.any(axis=0)),
+    )
+    assert 27 <= len(columns) <= 30  # nine tenths of 32
+    assert len(rows) == pytest.approx(len(columns) / 2, abs=1)
+    assert looked.silhouette[rows[0] : rows[-1], columns[0] : columns[-1]].all()
+    # Turned on its side by what a camera wrote down, it is upright.
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    Image.fromarray(rgba[..., :3]).save(tmp_path / "turned.jpg", exif=exif)
+    assert read_photo(tmp_path / "turned.jpg").pixels.shape == (500, 300, 3)
+    Image.fromarray(np.uint16(60000 * (rgba[..., 3] > 0))).save(tmp_path / "deep.png")
+    assert read_photo(tmp_path / "deep.png").pixels.max() == 1
+
+
+def test_pictures_that_are_none_are_told(
+    trained: tuple[ImageEncoder, list[ImageStep]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = trained[0].model
+    with pytest.raises(UnreadableFileError, match="no such file"):
+        reconstruct_photo(model, tmp_path / "absent.png")
+    (tmp_path / "text.png").write_text("no picture")
+    with pytest.raises(UnreadableFileError, match="cannot be read as a picture"):
+        reconstruct_photo(model, tmp_path / "text.png")
+    Image.new("RGB", (200, 8)).save(tmp_path / "flat.png")
+    with pytest.raises(UnreadableFileError, match="200 by 8 pixels; 16 or more"):
+        reconstruct_photo(model, tmp_path / "flat.png")
+    Image.new("RGBA", (40, 40)).save(tmp_path / "nothing.png")
+    with pytest.raises(EmptyShapeError, match="transparent all over"):
+        reconstruct_photo(model, tmp_path / "nothing.png")
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
+    with pytest.raises(UnreadableFileError, match="too many pixels"):
+        reconstruct_photo(model, tmp_path / "nothing.png")
+    monkeypatch.undo()
+    # A cross is no lamp: what is found does not cover it.
+    cross = np.zeros((64, 64, 4), np.uint8)
+    cross[28:36, :] = cross[:, 28:36] = (90, 90, 90, 255)
+    Image.fromarray(cross).save(tmp_path / "cross.png")
+    (warning,) = reconstruct_photo(model, tmp_path / "cross.png", 48).warnings
+    assert "this may be no picture of a shape of the family that lamps knows" in warning
+    with pytest.raises(
+        ModelError, match="lamps has no image encoder; make one with `parts train-encoder --from"
+    ):
+        reconstruct_photo(replace(model, hash="3" * 64), tmp_path / "cross.png")
+
+
+def test_its_file_is_for_one_model_and_one_kind(
+    trained: tuple[ImageEncoder, list[ImageStep]], saved: Model, lamps: PreparedFamily
+) -> None:
+    again = load_image_encoder(saved)
+    assert again is not None
+    pictures = torch.rand(2, 3, SIDE, SIDE, generator=torch.Generator().manual_seed(0))
+    for one, two in zip(trained[0].see(pictures), again.see(pictures), strict=True):
+        torch.testing.assert_close(one.silhouette, two.silhouette, atol=0.02, rtol=0)  # half precision
+    path = beside(saved, KIND)
+    with pytest.raises(ModelError, match="holds no encoder; expected one that `parts train-encoder` wrote"):
+        load_encoder(saved, path)
+    with pytest.raises(ModelError, match="train it again with `parts train-encoder --from images`"):
+        load_image_encoder(replace(saved, hash="0" * 64), path)
+    with pytest.raises(SettingError, match="steps is 0"):
+        train_image_encoder(saved, lamps, steps=0)
+
+
+def test_commands(
+    trained: tuple[ImageEncoder, list[ImageStep]], lamps: PreparedFamily, photo: Path, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    file = str(file_of(trained[0].model))
+    reconstruct = ["parts", "reconstruct", str(photo), "--model", file]
+    assert main([*reconstruct, "-o", "found", "--resolution", "48"]) == 0
+    assert "3 parts of lamps seen in lamp.png, from azimuth" in capsys.readouterr().out.replace("\n", " ")
+    assert sorted(p.name for p in Path("found").iterdir()) == sorted(FILES)
+    report = json.loads(Path("found/report.json").read_text())
+    assert report["silhouette_iou"] > 0.6
+    names = [part.name for part in pw.load_assembly("found/assembly.json").parts]
+    assert names == ["plate", "ball", "knob"]
+    assert main(["parts", "train-generator", file, "--steps", "5"]) == 0
+    generate = ["parts", "generate", "--model", file, "-n", "1", "--change", "0.1", "-o", "made"]
+    assert main([*generate, "--like", str(photo)]) == 0
+    assert json.loads(Path("made/samples.json").read_text())["like"]["shape"] == str(photo)
+    assert main([*reconstruct, "--up", "y"]) == 2
+    assert "--up is for meshes and points" in capsys.readouterr().err
+    assert main(["parts", "reconstruct", str(photo)]) == 2
+    assert "which model's parts?" in capsys.readouterr().err
+    monkeypatch.setattr(image_encoder_training, "_BATCH", 4)
+    train = ["parts", "train-encoder", file, str(lamps.folder), "--from", "images", "--steps", "2"]
+    assert main([*train, "-o", "seen.safetensors"]) == 0
+    again = load_image_encoder(trained[0].model, "seen.safetensors")
+    assert again is not None
+    assert again.settings == ImageSettings()
