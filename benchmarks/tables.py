@@ -105,9 +105,10 @@ TABLES = (
     Table("optimise.md", "optimise.py", None, 0,
           "--shapes {data} --output benchmarks/results/optimise.md", 30),
     Table("drag.md", "drag.py", None, 0,
-          "--flows flows --cars 2 --convergence --output benchmarks/results/drag.md", 20,
-          "OpenFOAM, and flows/ by partwright parts simulate cars -o flows --count 57 --seed 20 "
-          "--air y,ground,iterations=100"),
+          "--flows flows --family families/cars --one-part cars-one-part/model.safetensors --convergence "
+          "--output benchmarks/results/drag.md", 60,
+          "OpenFOAM, families/, flows/ by partwright parts simulate cars -o flows --count 57 --seed 20 "
+          "--air y,ground,iterations=100, and a training of configs/cars-one-part.toml"),
     Table("adjoint.md", "adjoint.py", None, 0, "--rows build/adjoint.jsonl", 10, "OpenFOAM"),
     Table("anchors.md", "anchors.py", "--names bracket --peers coacd", 2, "", 20, "the peers"),
     Table("batch.md", "batch.py", "--shapes 8 --kills 4", 3,

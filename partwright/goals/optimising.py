@@ -104,7 +104,7 @@ class Optimised:
     def held(self) -> dict[str, float]:
         """How far the surface of each learned part that is frozen beside others that are not has moved at
         most, as a share of the longest side."""
-        return moved(self.problem.held, self.assembly, self.problem.parameters.longest)
+        return moved(self.problem.held, self.assembly, self.problem.length)
 
     @property
     def _best(self) -> Point:

@@ -116,13 +116,15 @@ class Problem:
         surface = surface_of(assembly, options.resolution)
         touching = contacts(assembly)
         self.pieces = max(pieces(surface), pieces_by(touching, assembly))
+        # Of the surface: boxes of learned parts are roomy.
+        self.length = float(surface.extents.max())
         start = Start(assembly, surface, self.parameters.longest)
         self.measures: dict[str, Measure] = {}
         self.terms: dict[str, tuple[Measured, float]] = {}  # at the start, and a natural size of its numbers
         self.labelled = False
         for name in dict.fromkeys([w.name for w in self.wanted] + [b.name for b in self.bounds]):
-            self.labelled |= asks_for_labels(name)
             self.measures[name], power = measure_of(name, start)
+            self.labelled |= asks_for_labels(name)
             begin, natural = self._measured(name, assembly, surface), start.longest**power
             if power and abs(begin.value) < _ROUNDING * natural:
                 begin = replace(begin, value=0.0)
@@ -204,9 +206,9 @@ class Problem:
             broken.append(scale * (found[bound.name].value - limit))
             slopes.append(scale * found[bound.name].sensitivity)
         if self.options.still:
-            broken += broken_by(self.held, assembly, self.options.still, p.longest)
+            broken += broken_by(self.held, assembly, self.options.still, self.length)
         if self.mirror is not None:
-            broken += self.mirror.broken_by(assembly, p.longest)
+            broken += self.mirror.broken_by(assembly, self.length)
         pairs = [(c.a, c.b) for c in self.touching]
         touching = contacts(assembly, pairs) if pairs else []
         broken += [(c.depth - d) / p.longest for c, d in zip(touching, self.depths, strict=True)]
@@ -224,10 +226,9 @@ class Problem:
         units = np.where(self.free, self.parameters.units, 0.0)
         stacked = np.stack([point.sensitivity, *point.bounds])
         rows = parameter_gradient(here, point.surface.vertices, point.surface.faces, stacked)
-        still = gradients(self.held, here, self.parameters.longest) if self.options.still else rows[:0]
-        longest = self.parameters.longest
-        alike = rows[:0] if self.mirror is None else self.mirror.gradients(here, longest)
-        touching = contact_gradients(here, point.touching) / longest
+        still = gradients(self.held, here, self.length) if self.options.still else rows[:0]
+        alike = rows[:0] if self.mirror is None else self.mirror.gradients(here, self.length)
+        touching = contact_gradients(here, point.touching) / self.parameters.longest
         rows = np.concatenate([rows, still, alike, touching]) * units
         slope = rows[0] + 2 * self.options.anchor * np.where(self.free, point.change, 0.0)
         if self.region.parts:

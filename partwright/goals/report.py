@@ -48,7 +48,7 @@ def report(problem: Problem, found: Found, seconds: float, kept: bool) -> dict[s
         "bounds_kept": kept,
         "contacts": len(problem.touching),
         "unchanged_parts": same,
-        "surfaces_held": moved(problem.held, best.assembly, problem.parameters.longest),
+        "surfaces_held": moved(problem.held, best.assembly, problem.length),
         "asymmetry": _asymmetry(problem, found),
         "too_thin_to_change": [assembly.parts[i].name for i in problem.thin],
         "free_parameters": int(problem.free.sum()),

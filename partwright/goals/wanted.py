@@ -99,6 +99,11 @@ def measure_of(name: str, start: Start) -> tuple[Measure, int]:
     if own is not None:
         return _function(Path(own["file"]), own["function"]), 0
     plain, _, argument = name.partition("@")
+    if plain == "drag":
+        raise SettingError(
+            "objective 'drag': expected surrogate_drag@FILE, by a network (parts train-surrogate), or "
+            "newtonian_drag@AXIS, by angles alone; --simulate says at the end what OpenFOAM finds"
+        )
     objective: Objective = OBJECTIVES[plain]
     return objective.prepare(argument, start), objective.power
 

@@ -165,6 +165,7 @@ def test_the_command_writes_all_its_files(tmp_path: Path, capsys: pytest.Capture
 @pytest.mark.parametrize(
     ("given", "said"),
     [
+        ({"objective": "drag"}, "expected surrogate_drag@FILE.*newtonian_drag@AXIS"),
         ({"freeze": ["*"]}, "everything is frozen"),
         ({"freeze": ["wheel_*"]}, "no part is named 'wheel_\\*'; the names are: plate, post"),
         ({"freeze": ["post:colour"]}, "expected after ':' one of pose"),
@@ -177,7 +178,7 @@ def test_the_command_writes_all_its_files(tmp_path: Path, capsys: pytest.Capture
 def test_questions_without_an_answer_are_refused(given: dict[str, Any], said: str) -> None:
     sphere = Part(Sphere(0.3), (0.6, 0.0, 0.4), name="post")
     with pytest.raises(SettingError, match=said):
-        optimise(Assembly((PLATE, sphere)), "volume", options=QUICK, **given)
+        optimise(Assembly((PLATE, sphere)), **{"objective": "volume", "options": QUICK, **given})
 
 
 def test_an_objective_without_a_number_at_the_start_is_refused_and_nothing_is_written(tmp_path: Path) -> None:

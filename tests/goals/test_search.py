@@ -52,6 +52,15 @@ def test_a_constraint_that_bends_is_met_by_a_second_try_of_the_same_length() -> 
     assert second.broken <= 1e-6
 
 
+def test_a_step_that_leaves_the_trained_region_ends_it_before() -> None:
+    valley: Any = Valley(30)
+    valley.region = SimpleNamespace(outside=lambda values: values[0] / 0.08)
+    found = search(valley)
+    assert found.ending == "left_trained_region"
+    assert "trained on" in found.reason
+    assert 0.04 < found.points[-1].change[0] <= 0.08
+
+
 def test_a_long_way_along_it_is_gone() -> None:
     valley: Any = Valley(30)
     found = search(valley)
