@@ -24,13 +24,14 @@ _ON = 1e-4  # a point whose distance is less lies on the surface
 _APART = 0.005  # unit lengths: surfaces that are nearer need no second look
 _BESIDE = 0.01  # unit lengths from a face at which open space is looked for
 _NARROW = 0.5  # of that: a distance that is less is no open space
+_FURTHEST = 500  # points whose side is asked for at once
 _MIDDLE = 1 / 3  # of a half extent: nearer to the middle than this a direction is not named
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """maximum, quantile_95: lengths, both ways. protrusion: the largest from the first surface to the second.
-    worst_point: (3,) where the maximum is."""
+    """maximum, quantile_95: lengths, both ways. protrusion: the furthest that the first surface is outside of
+    the second. worst_point: (3,) where the maximum is."""
 
     maximum: float
     protrusion: float
@@ -39,20 +40,34 @@ class Deviation:
 
 
 def deviation(
-    on_first: np.ndarray, to_second: np.ndarray, on_second: np.ndarray, to_first: np.ndarray
+    on_first: np.ndarray, to_second: np.ndarray, on_second: np.ndarray, to_first: np.ndarray, beyond: float
 ) -> Deviation:
-    """Unsigned distances between two surfaces, over dense samples of both (a sampled Hausdorff distance).
+    """Of dense samples of two surfaces; the maximum is the larger of both directions' (a sampled Hausdorff
+    distance), and so is the 95 % quantile.
 
-    The maximum is the larger of both directions', and so is the 95 % quantile.
-
-    on_first, on_second: (N, 3) and (M, 3) surface points; to_second, to_first: their distances across.
+    on_first, on_second: (N, 3) and (M, 3) surface points; to_second, to_first: their unsigned distances
+    across. beyond: the `protrusion`.
     """
-    there, back = np.abs(to_second), np.abs(to_first)
-    points, distances = (on_first, there) if there.max() >= back.max() else (on_second, back)
+    points, distances = (on_first, to_second) if to_second.max() >= to_first.max() else (on_second, to_first)
     worst = int(distances.argmax())
-    quantile = max(float(np.quantile(there, 0.95)), float(np.quantile(back, 0.95)))
+    quantile = max(float(np.quantile(to_second, 0.95)), float(np.quantile(to_first, 0.95)))
     at = np.asarray(points[worst], dtype=np.float64)
-    return Deviation(float(distances[worst]), float(there.max()), quantile, at)
+    return Deviation(float(distances[worst]), beyond, quantile, at)
+
+
+def protrusion(
+    signed: Callable[[np.ndarray], np.ndarray], points: np.ndarray, distances: np.ndarray
+) -> float:
+    """The largest of the distances (N,) among the points (N, 3) that lie outside; 0 where none does.
+
+    signed: distance of points (n, 3). Its sign costs most, so it is asked for the furthest points first.
+    """
+    order = np.argsort(-distances, kind="stable")
+    for some in np.split(order, range(_FURTHEST, len(order), _FURTHEST)):
+        outside = np.asarray(signed(points[some])) > 0
+        if outside.any():
+            return float(distances[some[outside.argmax()]])
+    return 0.0
 
 
 def surface_deviation(
@@ -88,7 +103,7 @@ def surface_deviation(
     far = to_shape >= np.quantile(to_shape, _NEARLY_ALL)
     result[far], _ = projected(distance, result[far])
     to_shape[far] = shape.unit_unsigned(result[far])
-    return deviation(result, to_shape, on_shape, to_result)
+    return deviation(result, to_shape, on_shape, to_result, protrusion(shape.unit_distance, result, to_shape))
 
 
 def buried(distance: Callable[[np.ndarray], np.ndarray], points: np.ndarray) -> np.ndarray:
@@ -97,12 +112,13 @@ def buried(distance: Callable[[np.ndarray], np.ndarray], points: np.ndarray) -> 
     They lie inside, as those of shells that overlap, or in a crack narrower than 0.5 % of the longest side.
     distance: signed, of points (n, 3).
     """
-    if not len(points):
-        return np.zeros(0, bool)
     corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3) / 3**0.5
-    beside = _BESIDE * np.concatenate([np.eye(3), -np.eye(3), corners])[:, None]
-    around = np.asarray(distance((points + beside).reshape(-1, 3))).reshape(len(beside), -1)
-    return np.asarray(around.max(axis=0) < _NARROW * _BESIDE)
+    closed = np.ones(len(points), bool)
+    for way in _BESIDE * np.concatenate([np.eye(3), -np.eye(3), corners]):
+        left = np.flatnonzero(closed)  # most points have open space in one of the first ways
+        if len(left):
+            closed[left] = np.asarray(distance(points[left] + way)) < _NARROW * _BESIDE
+    return closed
 
 
 def projected(

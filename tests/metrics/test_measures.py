@@ -14,7 +14,7 @@ from partwright.errors import SettingError
 from partwright.fields import Box, Sphere
 from partwright.metrics.bi_surface import bi_surface_iou
 from partwright.metrics.chamfer import chamfer
-from partwright.metrics.deviation import deviation, place_name
+from partwright.metrics.deviation import deviation, place_name, protrusion
 from partwright.metrics.emd import emd
 from partwright.metrics.iou import iou, occupancy_iou
 from partwright.metrics.overlap import overlap
@@ -130,10 +130,26 @@ def test_overlap_does_not_change_with_size_and_place(scale: float, x: float) -> 
 
 def test_deviation_takes_the_worse_direction() -> None:
     here, there = np.eye(3), 2 * np.eye(3)
-    found = deviation(here, np.array([0.1, -0.2, 0.1]), there, np.array([0.0, 0.0, -0.5]))
+    found = deviation(here, np.array([0.1, 0.2, 0.1]), there, np.array([0.0, 0.0, 0.5]), 0.1)
     assert found.maximum == 0.5
     np.testing.assert_array_equal(found.worst_point, there[2])
     assert found.quantile_95 == pytest.approx(max(0.19, 0.45))
+
+
+def test_what_sticks_out_is_the_furthest_that_lies_outside() -> None:
+    points = np.random.default_rng(0).normal(size=(1800, 3))
+    signed = np.linalg.norm(points, axis=1) - 2.5
+    away = np.abs(signed)
+    assert away.argmax() != signed.argmax()  # the furthest is inside
+    asked = []
+
+    def distance(some: np.ndarray) -> np.ndarray:
+        asked.append(len(some))
+        return np.linalg.norm(some, axis=1) - 2.5
+
+    assert protrusion(distance, points, away) == pytest.approx(signed.max())
+    assert sum(asked) < len(points)
+    assert protrusion(distance, 0.1 * points, away) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -56,6 +56,8 @@ def test_the_worst_place_is_where_a_part_sticks_out() -> None:
     assert scores.max_protrusion == scores.max_deviation
     missing = evaluate(ball(1.0) - Part(Box((1.0, 1.0, 1.0)), (0.0, 0.0, 1.0)), ball_shape(), emd=False)
     assert missing.worst_place == "upper"
+    assert missing.max_deviation == pytest.approx(0.5, abs=0.01)
+    assert missing.max_protrusion < 0.01  # its surface lies deep inside, but outside nowhere
 
 
 def test_what_is_left_out_does_not_stick_out() -> None:
