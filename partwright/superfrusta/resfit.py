@@ -36,7 +36,7 @@ from partwright.superfrusta.symmetry import symmetries
 GROWTH_ALPHA = 1e-3
 PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
 _OPENING = 4  # rounds
-_GOOD = 0.93  # of the objective: what comes out worse is tried again with parts to subtract
+_GOOD = 0.93  # of the objective at a usual price: what is worse is tried again with parts to subtract
 _WORTH_CUTS = 0.01  # of the objective that such an attempt must gain, for it is the harder to edit
 _BEHIND = 0.06  # of the objective: what is so far behind
 _ROUNDS_BEHIND = 6  # after so many rounds is given up
@@ -149,7 +149,8 @@ class ResidualFit:
         """
         assert self.best is not None
         settings = self.settings
-        if self.best_objective > _GOOD or not self.may_carve:
+        usual = score(self.samples, self.best) - Settings().alpha * len(self.best)
+        if usual > _GOOD or not self.may_carve:
             return True
         self.settings = replace(settings, subtract=True, regions=max(1, settings.regions - 2))
         self.number = settings.attempts

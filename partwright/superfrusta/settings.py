@@ -127,7 +127,7 @@ class Settings:
 
 
 PRESETS: dict[str, Settings] = {
-    "draft": Settings(rounds=2, regions=14, trials=1, mends=0, near=10_000, uniform=10_000, resolution=64),
+    "draft": Settings(rounds=4, regions=14, trials=1, mends=1, near=10_000, uniform=10_000, resolution=64),
     "normal": Settings(),
-    "high": Settings(attempts=3, cycles=2, mends=40, alpha=2e-3, near=45_000, uniform=45_000),
+    "high": Settings(attempts=3, cycles=2, mends=40, alpha=1e-3, near=45_000, uniform=45_000),
 }
