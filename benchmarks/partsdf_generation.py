@@ -1,4 +1,4 @@
-"""New shapes against held-out ones: MMD-CD, COV-CD and 1-NNA, whether parts touch, and how new they are."""
+"""New shapes against held-out ones: MMD-CD, COV-CD and 1-NNA, by parts, whether parts touch, how new."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import NoSurfaceError
-from partwright.metrics.sets import set_scores
+from partwright.metrics.sets import chamfer_matrix, set_scores
 from partwright.partsdf.generator import load_generator
 from partwright.partsdf.generator_training import gaussian_samples
 from partwright.partsdf.meshing import labelled_surface, mesh_shape
@@ -23,6 +23,7 @@ from partwright.partsdf.novelty import nearest_training_shape
 from partwright.shapes.sampling import sample_triangles
 
 POINTS, PART_POINTS = 2048, 1500
+MATCHED = 512  # of a part's points, where parts are compared
 TOUCH, USUAL = 0.04, 0.95  # unit lengths; the share of training shapes in which two parts touch
 
 
@@ -34,32 +35,47 @@ class Cloud:
     parts: list[np.ndarray]
 
 
+@dataclass(frozen=True)
+class Held:
+    """Held-out shapes: clouds (B,), the distances (B, B) among them, and which parts usually touch (P, P)."""
+
+    clouds: list[Cloud]
+    among: np.ndarray
+    usual: np.ndarray
+
+
 def generation(arguments: argparse.Namespace) -> None:
     """Diffusion, a Gaussian, and training shapes against as many held-out ones."""
     family, model = PreparedFamily(arguments.family), load_model(arguments.model)
-    held = family.split("test")[: arguments.samples]
-    real = [cloud_of_family(family, i) for i in held]
+    unknown = [(family, i) for i in family.split("test")]
+    if arguments.fresh:  # made with another seed, so all of them are unknown to the model
+        fresh = PreparedFamily(arguments.fresh)
+        unknown += [(fresh, i) for i in range(len(fresh))]
+    real = [cloud_of_family(source, i) for source, i in unknown[: arguments.samples]]
+    count = len(real)
     rng = np.random.default_rng(0)
     numbers = {entry.name: i for i, entry in enumerate(family.shapes)}
     training = [cloud_of_family(family, numbers[name]) for name in model.shapes]
-    usual = touching_pairs(training)
+    held = Held(real, chamfer_matrix([c.points for c in real]), touching_pairs(training))
     lines = [
         f"# PartSDF: new {family.name} against held-out ones", "",
-        f"Trained on {scale_of(model)}. {len(held)} samples of each kind against as many held-out shapes, "
-        f"meshed at {arguments.resolution}^3, {POINTS:,} points each; failures are left out and counted. "
+        f"Trained on {scale_of(model)}. {count} samples of each kind against as many held-out shapes, "
+        f"meshed at {arguments.resolution}^3, {POINTS:,} points each; failures are left out and counted. By "
+        f"part: the mean Chamfer distance of the parts that both have, {MATCHED} points each. "
         f"Touch: the share of shapes whose parts touch (within {TOUCH}) wherever those of {USUAL:.0%} of the "
         "training shapes do and both are there. New: the median of the mean difference of clamped distances "
         "to the nearest training shape, x1e4, and the least.", "",
         command_line(), "",
-        "| | MMD-CD x1e4 | COV-CD % | 1-NNA % | touch % | new, median | least | failed | s a sample |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| | MMD-CD x1e4 | COV-CD % | 1-NNA % | by part: MMD x1e4 | COV % | touch % | new, median | least | "
+        "failed | s a sample |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
-    chosen = [training[i] for i in rng.choice(len(training), len(held), replace=False)]
-    lines.append(row("training shapes", chosen, real, usual, [], 0, 0.0))
+    chosen = [training[i] for i in rng.choice(len(training), count, replace=False)]
+    lines.append(row("training shapes", chosen, held, [], 0, 0.0))
     generator = load_generator(model)
     for label, make in (
-        ("diffusion", lambda: generator.generate(len(held), arguments.seed)),
-        ("Gaussian", lambda: gaussian_samples(model, len(held), arguments.seed)),
+        ("diffusion", lambda: generator.generate(count, arguments.seed)),
+        ("Gaussian", lambda: gaussian_samples(model, count, arguments.seed)),
     ):
         start = time.process_time()
         shapes = make()
@@ -67,23 +83,37 @@ def generation(arguments: argparse.Namespace) -> None:
         seconds = (time.process_time() - start) / len(shapes)
         far = [nearest_training_shape(shape)[1] for shape in shapes]
         there = [cloud for cloud in clouds if cloud]
-        lines.append(row(label, there, real, usual, far, len(shapes) - len(there), seconds))
+        lines.append(row(label, there, held, far, len(shapes) - len(there), seconds))
         print(lines[-1], flush=True)
     write(f"generation-{family.name}", lines)
 
 
 def row(
-    label: str, clouds: Sequence[Cloud], real: Sequence[Cloud], usual: np.ndarray, far: list[float],
-    failed: int, seconds: float,
+    label: str, clouds: Sequence[Cloud], held: Held, far: list[float], failed: int, seconds: float
 ) -> str:  # fmt: skip
-    scores = set_scores([c.points for c in clouds], [c.points for c in real])
-    touch = np.mean([holds_together(cloud, usual) for cloud in clouds])
+    scores = set_scores([c.points for c in clouds], [c.points for c in held.clouds], held.among)
+    parts = part_distances(clouds, held.clouds)
+    covered = len(np.unique(parts.argmin(axis=1))) / len(held.clouds)
+    touch = np.mean([holds_together(cloud, held.usual) for cloud in clouds])
     new = f"{1e4 * np.median(far):.0f} | {1e4 * min(far):.0f}" if far else " | "
     return (
         f"| {label} | {1e4 * scores.mmd:.1f} | {100 * scores.coverage:.1f} | "
-        f"{100 * scores.nearest_accuracy:.1f} | {100 * touch:.0f} | {new} | {failed} | "
+        f"{100 * scores.nearest_accuracy:.1f} | {1e4 * parts.min(axis=0).mean():.1f} | "
+        f"{100 * covered:.1f} | {100 * touch:.0f} | {new} | {failed} | "
         f"{f'{seconds:.1f}' if seconds else ''} |"
     )
+
+
+def part_distances(made: Sequence[Cloud], real: Sequence[Cloud]) -> np.ndarray:
+    """(A, B) mean Chamfer distance of the parts that both have; infinite where there are none."""
+    total, count = np.zeros((len(made), len(real))), np.zeros((len(made), len(real)))
+    for p in range(len(real[0].parts)):
+        rows, columns = ([i for i, c in enumerate(clouds) if len(c.parts[p])] for clouds in (made, real))
+        first = [made[i].parts[p][:MATCHED] for i in rows]
+        second = [real[j].parts[p][:MATCHED] for j in columns]
+        total[np.ix_(rows, columns)] += chamfer_matrix(first, second)
+        count[np.ix_(rows, columns)] += 1
+    return np.where(count > 0, total / np.maximum(count, 1), np.inf)
 
 
 def cloud_of_family(family: PreparedFamily, index: int) -> Cloud:

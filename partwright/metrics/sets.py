@@ -28,19 +28,21 @@ class SetScores:
     nearest_accuracy: float
 
 
-def set_scores(made: Clouds, real: Clouds) -> SetScores:
+def set_scores(made: Clouds, real: Clouds, among_real: NDArray[np.float64] | None = None) -> SetScores:
     """Of clouds (N, 3) each.
+
+    among_real: (B, B) `chamfer_matrix` of the real ones, where several sets are compared with them.
 
     Raises:
         SettingError: either set has fewer than two.
     """
     if min(len(made), len(real)) < 2:
         raise SettingError(f"{len(made)} made and {len(real)} real shapes: two or more of either are needed")
-    every = [*made, *real]
-    distances = chamfer_matrix(every, every)
-    between = distances[: len(made), len(made) :]
+    between = chamfer_matrix(made, real)
+    among = chamfer_matrix(real) if among_real is None else among_real
+    distances = np.block([[chamfer_matrix(made), between], [between.T, among]])
     np.fill_diagonal(distances, np.inf)
-    is_made = np.arange(len(every)) < len(made)
+    is_made = np.arange(len(distances)) < len(made)
     alike = is_made[distances.argmin(axis=1)] == is_made
     return SetScores(
         float(between.min(axis=0).mean()),
@@ -49,12 +51,19 @@ def set_scores(made: Clouds, real: Clouds) -> SetScores:
     )
 
 
-def chamfer_matrix(first: Clouds, second: Clouds) -> NDArray[np.float64]:
-    """(A, B): the mean squared distance to the nearest point, from either cloud to the other, added up."""
-    trees = [cKDTree(cloud) for cloud in second]
+def chamfer_matrix(first: Clouds, second: Clouds | None = None) -> NDArray[np.float64]:
+    """(A, B): the mean squared distance to the nearest point, from either cloud to the other, added up; where
+    there are no second ones (A, A), among the first."""
+    rows = [(cloud, cKDTree(cloud)) for cloud in first]
 
     def distance(a: NDArray[np.floating], own: cKDTree, b: NDArray[np.floating], other: cKDTree) -> float:
         return float((other.query(a)[0] ** 2).mean() + (own.query(b)[0] ** 2).mean())
 
-    rows = [(a, cKDTree(a)) for a in first]
-    return np.array([[distance(a, own, b, t) for b, t in zip(second, trees, strict=True)] for a, own in rows])
+    if second is not None:
+        columns = [(cloud, cKDTree(cloud)) for cloud in second]
+        return np.array([[distance(*row, *column) for column in columns] for row in rows])
+    result = np.zeros((len(rows), len(rows)))
+    for i in range(len(rows)):
+        for j in range(i):
+            result[i, j] = result[j, i] = distance(*rows[i], *rows[j])
+    return result

@@ -19,6 +19,7 @@ def spheres(radii: np.ndarray, seed: int) -> list[np.ndarray]:
 def test_chamfer_of_a_moved_point() -> None:
     a, b = np.zeros((1, 3)), np.array([[3.0, 4.0, 0.0]])
     np.testing.assert_allclose(chamfer_matrix([a, b], [a]), [[0.0], [50.0]])
+    np.testing.assert_allclose(chamfer_matrix([a, b]), [[0.0, 50.0], [50.0, 0.0]])
 
 
 def test_sets_that_are_alike_apart_and_all_the_same() -> None:
@@ -33,5 +34,6 @@ def test_sets_that_are_alike_apart_and_all_the_same() -> None:
     same = set_scores(spheres(np.full(40, 0.75), 4), real)
     assert same.coverage < 0.5 * alike.coverage
     assert set_scores(real, real).mmd == 0.0
+    assert set_scores(real[:20], real, chamfer_matrix(real)) == set_scores(real[:20], real)
     with pytest.raises(SettingError, match="1 made and 40 real shapes"):
         set_scores(real[:1], real)
