@@ -63,7 +63,7 @@ TABLES = (
           "encode --family families/mixers --model mixers --shapes 5 --iterations 200 --threads 1", 2,
           "families/"),
     Table("partsdf-images-chairs.md", "partsdf.py", None, 0,
-          "images --family families/chairs --model chairs --shapes 8 --views 3 --resolution 96 "
+          "images --family families/chairs --model chairs --shapes 6 --views 2 --resolution 96 "
           "--threads 1", 5, "families/"),
     Table("partsdf-scans-mixers.md", "partsdf.py", None, 0,
           "scans --family families/mixers --model mixers --shapes 3 --iterations 200 --threads 1", 3,

@@ -16,7 +16,7 @@ from partwright.errors import ModelError
 from partwright.export import export
 from partwright.export.ply import write_mesh
 from partwright.partsdf.assemblies import to_assembly
-from partwright.partsdf.image_encoder import ImageEncoder, load_image_encoder
+from partwright.partsdf.image_encoder import ImageEncoder, Sight, load_image_encoder
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
@@ -29,7 +29,9 @@ from partwright.render import Camera, render_mesh, sheet, write_png
 if TYPE_CHECKING:
     import trimesh
 
-COVERED = 0.6  # IoU of silhouettes that nearly all pictures of the family reach
+# What nearly all pictures of training shapes keep to, and few of other things: IoU of silhouettes at least,
+# certainty of the side at least, oddness of the poses at most.
+COVERED, CERTAIN, ODD = 0.5, 0.6, 0.7
 FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
 _PANEL = 320  # pixels
 _UNSEEN = 0.25  # of its light that is left of what is not the shape, in the preview
@@ -128,21 +130,32 @@ def reconstruct_seen(
             "field_of_view": camera.field_of_view,
         },
         "silhouette_iou": round(standpoint.iou, 4),
+        "certainty": round(looked.sight.certainty, 4),
+        "oddness": round(looked.sight.oddness, 4),
         "resolution": meshed.resolution,
         "seconds": {"see": round(seen - start, 3), "mesh": round(time.perf_counter() - seen, 3)},
-        "warnings": _warnings(model, standpoint),
+        "warnings": warnings_of(model.name, looked.sight, standpoint),
     }
     assembly = to_assembly(shape, up=FAMILY_UP, source=name)
     return PhotoParts(shape, assembly, surface, looked, standpoint, report)
 
 
-def _warnings(model: Model, standpoint: Standpoint) -> list[str]:
-    if standpoint.iou >= COVERED:
+def warnings_of(name: str, sight: Sight, standpoint: Standpoint) -> list[str]:
+    """One line where a picture may show no shape of the family that the model `name` knows, else none."""
+    said = []
+    if standpoint.iou < COVERED:
+        said.append(
+            f"the outline of what was found covers but {100 * standpoint.iou:.0f} % of the silhouette"
+        )
+    if sight.certainty < CERTAIN:
+        said.append("it is not clear from which side it is seen")
+    if sight.oddness > ODD:
+        said.append("its parts are placed unlike those of the family")
+    if not said:
         return []
     return [
-        f"this may be no picture of a shape of the family that {model.name} knows: the outline of what was "
-        f"found covers {100 * standpoint.iou:.0f} % of the silhouette, where {100 * COVERED:.0f} and more "
-        "are usual; look at preview.png, or cut the shape out of the picture"
+        f"this may be no picture of a shape of the family that {name} knows: {', and '.join(said)}; look at "
+        "preview.png, or cut the shape out of the picture"
     ]
 
 

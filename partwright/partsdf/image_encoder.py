@@ -94,6 +94,10 @@ class Sight:
     silhouette: Tensor
     azimuth: float
     elevation: float
+    certainty: float
+    """About 1 where the network knows from which side it looks, less where several come into question."""
+    oddness: float
+    """Root mean square of the poses' numbers, off the family's mean and each in its spread there."""
 
 
 @dataclass(frozen=True)
@@ -110,9 +114,14 @@ class ImageEncoder:
         """What is in pictures (B, 3, SIDE, SIDE), 0 to 1, that a shape nearly fills."""
         found, silhouette, camera = self.network(pictures)
         shapes = shapes_of(self.model, *self.vectors.split(found))
-        azimuth = torch.rad2deg(torch.atan2(camera[:, 1], camera[:, 0])).tolist()
-        elevation = torch.rad2deg(camera[:, 2]).tolist()
-        rows = zip(shapes, silhouette.sigmoid(), azimuth, elevation, strict=True)
+        poses = found[..., self.vectors.width : -1]
+        numbers = (
+            torch.rad2deg(torch.atan2(camera[:, 1], camera[:, 0])),
+            torch.rad2deg(camera[:, 2]),
+            camera[:, :2].norm(dim=1),  # the mean of unit vectors is shorter, the more they differ
+            poses.square().mean(dim=(1, 2)).sqrt(),
+        )
+        rows = zip(shapes, silhouette.sigmoid(), *(n.tolist() for n in numbers), strict=True)
         return [Sight(*row) for row in rows]
 
     def save(self, path: str | Path) -> None:

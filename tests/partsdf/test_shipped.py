@@ -16,6 +16,8 @@ from partwright.partsdf.generator import load_generator
 from partwright.partsdf.image_encoder import load_image_encoder
 from partwright.partsdf.model import SHIPPED, Model, load_model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.photos import Photo, look_at
+from partwright.render import Camera, render_mesh
 
 # Mean IoU; walls of mixers are so thin that little of a cell more or less counts.
 LEAST = {"mixers": 0.75, "chairs": 0.93, "cars": 0.96}
@@ -71,6 +73,26 @@ def test_training_shapes_are_those_that_were_made(shipped: Model) -> None:
         found = NeuralShape.trained(shipped, name).distances(samples.points) < 0
         ious.append(np.count_nonzero(inside & found) / np.count_nonzero(inside | found))
     assert np.mean(ious) > LEAST[shipped.name]
+
+
+def test_a_chair_is_seen_in_one_picture() -> None:
+    """Chairs that no training saw, each from another side: closer than the mean chair, and where from."""
+    encoder = load_image_encoder(load_model("chairs"))
+    assert encoder is not None
+    mean = NeuralShape.mean(encoder.model)
+    off, seen, usual = [], [], []
+    for number, azimuth in ((400, 40.0), (401, 140.0), (402, 300.0)):
+        made = make_shape("chairs", FAMILIES["chairs"], 0, number)
+        image = render_mesh(made.whole, Camera(azimuth, 20.0), (192, 192), (150, 90, 50))
+        sight = look_at(encoder, Photo(image.astype(np.float32) / 255, None)).sight
+        off.append(abs((sight.azimuth - azimuth + 180) % 360 - 180))
+        samples = pw.load_shape(made.whole).samples(0, 5_000, 0)
+        inside = samples.distance < 0
+        for shape, ious in ((sight.shape, seen), (mean, usual)):
+            found = shape.distances(samples.points) < 0
+            ious.append(np.count_nonzero(inside & found) / np.count_nonzero(inside | found))
+    assert np.median(off) < 30
+    assert np.mean(seen) > 1.5 * np.mean(usual)
 
 
 def test_they_are_edited_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
