@@ -39,7 +39,8 @@ def _lines(node: Node, digits: int, first: str, rest: str) -> Iterator[str]:
             child, digits, rest + ("└─ " if last else "├─ ") + sign, rest + ("   " if last else "│  ")
         )
         if moves:
-            yield f"{next(said)}, {len(moves) + 1} times"
+            images = sum(move.mirror for move in moves)
+            yield f"{next(said)}, {len(moves) + 1} times" + (f", {images} mirrored" if images else "")
         yield from said
 
 

@@ -95,7 +95,7 @@ def in_runs(node: Assembly) -> list[tuple[Node, tuple[GroupCopy, ...]]]:
 
 def _copy(group: Assembly, other: Assembly, number: int) -> GroupCopy | None:
     """What makes the other of the group, but for rounding; None where nothing does."""
-    if not _alike(group, other):
+    if not may_be_copies(group, other):
         return None
     names = tuple(part.name for part in other.parts)
     if names == numbered_names(group, number):
@@ -122,13 +122,13 @@ def _by(
     return copy if again and _same(made, other, _SAME * size) else None
 
 
-def _alike(one: Node, other: Node) -> bool:
+def may_be_copies(one: Node, other: Node) -> bool:
     """Whether two nodes may be copies, seen from their forms alone."""
     if one.is_part and other.is_part:
         return one.field.kind == other.field.kind
     if one.is_part or other.is_part or len(one.children) != len(other.children):
         return False
-    return one.operation == other.operation and all(map(_alike, one.children, other.children))
+    return one.operation == other.operation and all(map(may_be_copies, one.children, other.children))
 
 
 def _same(one: Node, other: Node, near: float) -> bool:

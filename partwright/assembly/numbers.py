@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from partwright.assembly.motion import Motion
 from partwright.assembly.repeated_groups import alike_leaves
-from partwright.assembly.similarity import Similarity, rotation_matrix
+from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Assembly, Node, Part
 from partwright.errors import ParameterError
 
@@ -74,7 +75,7 @@ def with_numbers(assembly: Assembly, values: Mapping[str, float], alone: bool = 
                 followed.append(
                     f"{_listed([copy for copy, _ in copies])}, copies of {part_name}, change with it"
                 )
-            for own_name, move in ((part_name, Similarity()), *copies):
+            for own_name, move in ((part_name, Motion()), *copies):
                 done.add(own_name)
                 assembly = _changed(assembly, own_name, (before, after), move, number, followed)
     return Edited(assembly, tuple(changed), tuple(followed))
@@ -85,13 +86,15 @@ def _listed(names: list[str]) -> str:
 
 
 def _changed(
-    assembly: Assembly, name: str, change: tuple[Part, Part], move: Similarity, number: str, told: list[str]
+    assembly: Assembly, name: str, change: tuple[Part, Part], motion: Motion, number: str, told: list[str]
 ) -> Assembly:
-    """With a part changed as another one was, before and after, that a move takes to it."""
-    own, (before, after) = assembly[name], change
-    shift = rotation_matrix(move.rotation) @ np.subtract(after.translation, before.translation)
+    """With a part changed as another one was, before and after, that a motion takes to it."""
+    own, (before, after) = assembly[name], (motion.of(part) for part in change)
+    shift = np.subtract(after.translation, before.translation)
     x, y, z = (np.array(own.translation) + shift).tolist() if shift.any() else own.translation
     made = dataclasses.replace(own, field=after.field, translation=(x, y, z))
+    if after.rotation != before.rotation:  # of an image that begins where another ends
+        made = dataclasses.replace(made, rotation=after.rotation)
     moves = list(_moves(own, made))
     assembly = assembly.replace_part(name, made)
     return assembly if number in ("x", "y", "z") else _follow(assembly, own, moves, told)

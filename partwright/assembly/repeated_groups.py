@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.assembly.group_copies import GroupCopy, settled
+from partwright.assembly.group_copies import GroupCopy, may_be_copies, settled
+from partwright.assembly.mirroring import mirrored
+from partwright.assembly.motion import Motion
 from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.errors import ParameterError
 
@@ -25,11 +27,24 @@ _SAME = 1e-9  # of the lengths that occur, and of entries of rotations
 
 @dataclass(frozen=True)
 class Repeat:
-    """Children of a node: `first`, and those that are its copies, each by a rigid move."""
+    """Children of a node: `first`, its copies, each by a rigid move, and its mirror images, each mirrored in
+    the plane x = 0 and then moved."""
 
     first: int
     copies: tuple[int, ...]
     moves: tuple[Similarity, ...]
+    images: tuple[int, ...] = ()
+    moves_of_images: tuple[Similarity, ...] = ()
+
+    @property
+    def others(self) -> tuple[int, ...]:
+        """All but the first, copies before images."""
+        return (*self.copies, *self.images)
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """What takes the first to each of the others."""
+        return (*map(Motion, self.moves), *(Motion(move, True) for move in self.moves_of_images))
 
 
 def line(count: int, step: Sequence[float]) -> tuple[Similarity, ...]:
@@ -67,39 +82,56 @@ def copies_of(group: Assembly, moves: Sequence[Similarity]) -> tuple[Assembly, .
 
 
 def repeats(node: Node) -> list[Repeat]:
-    """Groups among the children of a node that stand for one another; in a difference not its first child."""
+    """Groups among the children of a node that stand for one another, mirror images among them; in a
+    difference not its first child."""
     if node.is_part:
         return []
-    return repeats_among(node.children, 1 if node.operation == "difference" else 0)
+    return repeats_among(node.children, 1 if node.operation == "difference" else 0, images=True)
 
 
-def repeats_among(nodes: Sequence[Node], first: int = 0) -> list[Repeat]:
-    """Groups among nodes, from the given one on, that stand for one another."""
+def repeats_among(nodes: Sequence[Node], first: int = 0, images: bool = False) -> list[Repeat]:
+    """Groups among nodes, from the given one on, that stand for one another; images: mirror images, too."""
     left = [i for i, node in enumerate(nodes) if i >= first and not node.is_part]
     found = []
     while left:
         own, *others = left
         moves = {i: move_between(nodes[own], nodes[i]) for i in others}
         copies = {i: move for i, move in moves.items() if move is not None}
-        if copies:
-            found.append(Repeat(own, tuple(copies), tuple(copies.values())))
-        left = [i for i in others if i not in copies]
+        group, rest = nodes[own], [i for i in others if i not in copies]
+        image = _image(group, [nodes[i] for i in rest]) if images and not group.is_part else None
+        seen = {i: move_between(image, nodes[i]) for i in rest} if image is not None else {}
+        mirrored_ones = {i: move for i, move in seen.items() if move is not None}
+        if copies or mirrored_ones:
+            by = (tuple(one) for one in (copies, copies.values(), mirrored_ones, mirrored_ones.values()))
+            found.append(Repeat(own, *by))  # type: ignore[arg-type]
+        left = [i for i in rest if i not in mirrored_ones]
     return found
 
 
-def children_once(node: Assembly) -> list[tuple[Node, tuple[Similarity, ...]]]:
-    """The children of a node without those that are copies of others, each with the moves to its copies."""
+def _image(group: Assembly, others: Sequence[Node]) -> Assembly | None:
+    """The mirror image of a group in the plane x = 0; None where none of the others can be that."""
+    if not any(may_be_copies(group, other) for other in others):
+        return None
+    try:
+        return mirrored(group, "x", suffix="")
+    except ParameterError:  # a learned part
+        return None
+
+
+def children_once(node: Assembly) -> list[tuple[Node, tuple[Motion, ...]]]:
+    """The children of a node without those that are copies or mirror images of others, each with the motions
+    to these."""
     found = {repeat.first: repeat for repeat in repeats(node)}
-    copies = {i for repeat in found.values() for i in repeat.copies}
+    others = {i for repeat in found.values() for i in repeat.others}
     return [
-        (child, found[i].moves if i in found else ())
+        (child, found[i].motions if i in found else ())
         for i, child in enumerate(node.children)
-        if i not in copies
+        if i not in others
     ]
 
 
 def parts_once(node: Node) -> tuple[Part, ...]:
-    """The leaves of a tree, without those of groups that are copies of others."""
+    """The leaves of a tree, without those of groups that are copies or mirror images of others."""
     if node.is_part:
         return (node,)
     return tuple(part for child, _ in children_once(node) for part in parts_once(child))
@@ -150,17 +182,17 @@ def _same_place(one: Similarity, other: Similarity, size: float) -> bool:
     return bool(turned < _SAME and moved < _SAME * size)
 
 
-def alike_leaves(node: Node) -> dict[str, tuple[tuple[str, Similarity], ...]]:
-    """By the name of a leaf: those in its place in groups that are copies of its own, and the moves there."""
-    found: dict[str, tuple[tuple[str, Similarity], ...]] = {}
+def alike_leaves(node: Node) -> dict[str, tuple[tuple[str, Motion], ...]]:
+    """By the name of a leaf: those in its place in copies and images of its group, and the motions there."""
+    found: dict[str, tuple[tuple[str, Motion], ...]] = {}
     if node.is_part:
         return found
     for child in node.children:
         found |= alike_leaves(child)
     within = dict(found)
     for repeat in repeats(node):
-        groups = [node.children[i] for i in (repeat.first, *repeat.copies)]
-        moves = [Similarity(), *repeat.moves]
+        groups = [node.children[i] for i in (repeat.first, *repeat.others)]
+        moves = [Motion(), *repeat.motions]
         for leaves in zip(*(group.parts for group in groups), strict=True):
             for k, leaf in enumerate(leaves):
                 back = moves[k].inverse()

@@ -193,16 +193,21 @@ def _tree(node: Node, functions: dict[str, str], indent: str) -> str:
         return f"{functions[node.name]}()"
     inner = indent + "    "
     first, *others = (
-        _repeated(_tree(child, functions, inner), poses)
-        for child, poses in children_and_poses(node, own_axes_angles, "()")
+        _repeated(_tree(child, functions, inner), poses, flips)
+        for child, poses, flips in children_and_poses(node, own_axes_angles, "()")
     )
     operator = _OPERATORS[node.operation]
     rest = "".join(f"\n{inner}{operator} {other}" for other in others)
     return f"(\n{inner}{first}{rest}\n{indent})"
 
 
-def _repeated(solid: str, poses: str) -> str:
-    return f"(bd.Part() + [bd.Location(*pose) * {solid} for pose in {poses}])" if poses else solid
+def _repeated(solid: str, poses: str, flips: bool) -> str:
+    if not poses:
+        return solid
+    if not flips:
+        return f"(bd.Part() + [bd.Location(*pose) * {solid} for pose in {poses}])"
+    image = "(bd.mirror(solid, about=bd.Plane.YZ) if flip else solid)"
+    return f"(bd.Part() + [bd.Location(*pose) * {image} for solid in [{solid}] for *pose, flip in {poses}])"
 
 
 FORMAT = Format(

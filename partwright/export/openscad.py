@@ -227,10 +227,11 @@ def _tree(node: Node, modules: dict[str, str], indent: str) -> Iterator[str]:
         yield f"{indent}{modules[node.name]}();"
         return
     yield f"{indent}{node.operation}() {{" + (f"  // {comment(node.name)}" if node.name else "")
-    for child, poses in children_and_poses(node, fixed_axes_angles, "[]"):
+    for child, poses, flips in children_and_poses(node, fixed_axes_angles, "[]"):
         inner = indent + "    "
         if poses:
-            yield f"{inner}for (pose = {poses}) translate(pose[0]) rotate(pose[1])"
+            flip = " mirror([pose[2], 0, 0])" if flips else ""
+            yield f"{inner}for (pose = {poses}) translate(pose[0]) rotate(pose[1]){flip}"
             inner += "    "
         yield from _tree(child, modules, inner)
     yield indent + "}"

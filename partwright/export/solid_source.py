@@ -14,8 +14,9 @@ import numpy as np
 from partwright.approximation.nearest import Approximation
 from partwright.approximation.recognise import SAME, exact_solid
 from partwright.assembly import Assembly, Node, Part
+from partwright.assembly.motion import Motion
 from partwright.assembly.repeated_groups import children_once, repeats
-from partwright.assembly.similarity import Similarity, rotation_matrix
+from partwright.assembly.similarity import rotation_matrix
 from partwright.export.identifiers import comment, identifiers
 from partwright.export.instance_patterns import Poses, Ring, Row, pattern
 from partwright.export.profile_source import meaning, swept_parameters
@@ -230,7 +231,7 @@ def plain_unions(node: Node) -> Node:
     if isinstance(node, Part):
         return node
     children: list[Node] = []
-    repeated = {i for repeat in repeats(node) for i in (repeat.first, *repeat.copies)}
+    repeated = {i for repeat in repeats(node) for i in (repeat.first, *repeat.others)}
     for i, child in enumerate(map(plain_unions, node.children)):
         is_union = isinstance(child, Assembly) and child.operation == node.operation == "union"
         inlined = is_union and i not in repeated
@@ -240,11 +241,14 @@ def plain_unions(node: Node) -> Node:
 
 def children_and_poses(
     node: Assembly, turn: Callable[[np.ndarray], tuple[float, ...]], brackets: str
-) -> Iterator[tuple[Node, str]]:
-    """The children without those that are copies of others, and the places and turns of a group and its
-    copies as a list in such brackets, empty where it is not repeated."""
-    for child, moves in children_once(node):
+) -> Iterator[tuple[Node, str, bool]]:
+    """The children without those that are copies or images of others, the places and turns of a group and
+    these as a list in such brackets, empty where it is not repeated, and whether some of them are mirror
+    images: then each has a third entry, 1 where it is first mirrored in the plane x = 0."""
+    for child, motions in children_once(node):
+        flips = any(motion.mirror for motion in motions)
         poses = tuple(
-            (_tidy(m.translation), turn(rotation_matrix(m.rotation))) for m in (Similarity(), *moves)
+            (_tidy(m.move.translation), turn(rotation_matrix(m.move.rotation)), *([float(m.mirror)] * flips))
+            for m in (Motion(), *motions)
         )
-        yield child, literal(poses, brackets) if moves else ""
+        yield child, literal(poses, brackets) if motions else "", flips

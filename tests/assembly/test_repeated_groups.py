@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from partwright.assembly import Assembly, Part, Similarity, copies_of, line, load_assembly, ring
+from partwright.assembly import Assembly, Part, Similarity, copies_of, line, load_assembly, mirrored, ring
+from partwright.assembly.motion import Motion
 from partwright.assembly.numbers import with_numbers
 from partwright.assembly.repeated_groups import alike_leaves, move_between, parts_once, repeats
 from partwright.cli.main import main
 from partwright.errors import ParameterError
 from partwright.export import export
-from partwright.fields import Box, Cylinder
+from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution
 from partwright.meshing import mesh_assembly
 from tests.export.test_openscad import rendered
 
@@ -90,6 +91,79 @@ def test_counts_are_of_each_once_and_of_every_copy(
     table().save(tmp_path / "t.json")
     assert main(["describe", str(tmp_path / "t.json")]) == 0
     assert capsys.readouterr().out.endswith("\n5 parts, 15 with every copy\n")
+
+
+HANDED = Assembly(
+    (
+        Part(Extrusion(Profile([(0, 0), (9, 0), (5, 4), (0, 3)]), 6, 5), (12, 2, 3), name="block"),
+        Part(Cylinder(1, 9), (14, 4, 3), name="hole"),
+        Part(Revolution(Profile([(1, 0), (2, 0), (2, 1)]), 100), (13, 3, 6), name="groove"),
+    ),
+    "difference",
+)
+
+
+def pair(axis: str = "y") -> Assembly:
+    """A base, and on it two blocks and their two mirror images."""
+    blocks = Assembly((HANDED, *copies_of(HANDED, line(2, (0, 12, 0)))))
+    images = mirrored(blocks, axis, -1, suffix="_left")
+    base = Part(Box((60, 60, 2)), (0, 0, -1), name="base")
+    return Assembly((base, *blocks.children, *images.children), unit="mm")
+
+
+def test_mirror_images_are_told_edited_and_counted_with_what_they_are_images_of() -> None:
+    whole = pair()
+    (found,) = repeats(whole)
+    assert (found.copies, found.images) == ((2,), (3, 4))
+    assert "difference, 4 times, 2 mirrored" in whole.describe()
+    assert [part.name for part in parts_once(whole)] == ["base", "block", "hole", "groove"]
+    points = np.random.default_rng(2).uniform(-30, 30, (2000, 3))
+    for values in ({"hole.diameter": 3}, {"block.height": 8}, {"hole.x": 15}, {"groove.angle": 140}):
+        edited = with_numbers(whole, values).assembly
+        (still,) = repeats(edited)
+        assert (still.copies, still.images) == ((2,), (3, 4))
+        ((name, value),) = values.items()
+        by_image = with_numbers(whole, {name.replace(".", "_left."): value}).assembly
+        np.testing.assert_allclose(edited.distance(points), by_image.distance(points), atol=1e-5)
+    assert with_numbers(whole, {"hole.y": 5}).assembly["hole_left"].translation[1] == pytest.approx(-7)
+    assert by_image["groove"].field.angle == 140  # type: ignore[attr-defined]
+    alone = with_numbers(whole, {"hole_left.diameter": 3}, alone=True).assembly
+    assert [one.images for one in repeats(alone)] == [(4,)]
+
+
+def test_motions_compose_as_the_maps_that_they_are() -> None:
+    rng = np.random.default_rng(4)
+    points = rng.normal(size=(5, 3))
+    one, two = (
+        Motion(Similarity(1.0, tuple(rng.normal(size=4)), tuple(rng.normal(size=3))), m)
+        for m in (True, False)
+    )
+    for first, then in ((one, two), (two, one), (one, one)):
+        np.testing.assert_allclose((then @ first)(points), then(first(points)), atol=1e-12)
+        np.testing.assert_allclose(first.inverse()(first(points)), points, atol=1e-12)
+        np.testing.assert_allclose(
+            first.linear @ points[0], first(points[0]) - first(np.zeros(3)), atol=1e-12
+        )
+
+
+def test_sources_draw_mirror_images_of_what_is_there_once(tmp_path: Path) -> None:
+    whole = pair("x")
+    solid = mesh_assembly(whole, 128)
+    export(whole, tmp_path / "p.scad", facets=48)
+    text = (tmp_path / "p.scad").read_text()
+    assert text.count("mirror([pose[2], 0, 0])") == 1
+    assert text.count("module ") == len(parts_once(whole))
+    mesh = rendered(tmp_path / "p.scad")
+    assert mesh.volume == pytest.approx(solid.volume, rel=5e-3)
+    assert np.abs(whole.distance(mesh.vertices)).max() < 0.1
+    pytest.importorskip("build123d")
+    export(whole, tmp_path / "p.build123d.py")
+    text = (tmp_path / "p.build123d.py").read_text()
+    assert text.count("bd.mirror") == 1
+    assert "left" not in text
+    made = runpy.run_path(str(tmp_path / "p.build123d.py"))["assembly"]
+    assert made.volume == pytest.approx(solid.volume, rel=5e-3)
+    assert tuple(made.center()) == pytest.approx(solid.center_mass, abs=0.05)
 
 
 def test_openscad_has_each_once(tmp_path: Path) -> None:

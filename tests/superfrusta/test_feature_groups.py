@@ -72,6 +72,8 @@ def test_a_left_and_a_right_block_are_a_group_and_its_mirror_image() -> None:
     assert image["mirror"] == "x"
     assert image["translation"] == pytest.approx([0, 0, 0], abs=1e-9)
     assert to_text(result.assembly).count('"kind"') == 4
+    assert (result.report["parts"], result.report["instances"]) == (4, 7)
+    assert ", 2 times, 1 mirrored" in result.assembly.describe()
     assert result.scores.max_deviation < 0.05
 
 
