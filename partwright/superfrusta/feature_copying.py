@@ -58,19 +58,19 @@ def with_copies(
     least = _COPY * (reached - tree.score)
     wrong = search.inside & ~tree.covered if added else ~search.inside & tree.covered
     few, hits = search.points[wrong], _COPY * float(within[wrong].sum())
+    left = ~within[wrong]
 
-    def may_pay(copy: Part) -> bool:
-        return float(covers(copy, few).sum()) > hits
-
-    def joined(copy: Part, count: int = 1) -> bool:
-        """Whether that many further copies gain enough, which they then do."""
-        nonlocal covered, reached, within
+    def joined(copy: Part, hit: NDArray[np.bool_], count: int = 1) -> bool:
+        """Whether that many further copies gain enough, which they then do. hit: those of `few` within."""
+        nonlocal covered, reached, within, left
+        if float((hit & left).sum()) <= hits:  # another is there
+            return False
         mask = covers(copy, search.points)
         more = covered | mask if added else covered & ~mask
         better = search.score_of(more)
         if better - reached < least * count:
             return False
-        covered, reached, within = more, better, within | mask
+        covered, reached, within, left = more, better, within | mask, left & ~hit
         return True
 
     part, image = chosen.part, None
@@ -80,10 +80,12 @@ def with_copies(
         moves = [*search.turns, *(move for plane in planes if (move := as_move(part, plane)) is not None)]
         moves += moves_between(inner, pieces, search.frames, search.body)
         moves += _shifts(part, search.turns, search.mirrors)
-        moves = _nearest_first(search, part, [m for m in moves if may_pay(part.transformed(m))])
-        part = replace(part, instances=tuple(move for move in moves if joined(part.transformed(move))))
+        found = ((move, copy := part.transformed(move), covers(copy, few)) for move in moves)
+        may_pay = {move: (copy, hit) for move, copy, hit in found if float((hit & left).sum()) > hits}
+        kept = (move for move in _nearest_first(search, part, list(may_pay)) if joined(*may_pay[move]))
+        part = replace(part, instances=tuple(kept))
         images = ((plane, image_of(part, plane)) for plane in planes)
-        image = next((p for p, one in images if may_pay(one) and joined(one, len(part.copies))), None)
+        image = next((p for p, one in images if joined(one, covers(one, few), len(part.copies))), None)
     objective = reached - tree.price - search.price(chosen.sides)
     return Step(chosen, added, part, covered, within, reached, objective, image)
 
