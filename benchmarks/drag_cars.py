@@ -26,10 +26,13 @@ from partwright.goals.objectives.surrogate import outside
 from partwright.goals.surface import surface_of
 from partwright.goals.symmetry import asymmetry
 from partwright.partsdf import ReconstructionSettings, load_model, reconstruct, to_assembly
+from partwright.render import Camera, render_mesh, sheet, write_png
 
 LENGTH = 4.5  # metres
 AIR = Air("y", "z", iterations=100, time_limit=3600)
 FINE = replace(AIR, iterations=150, cells=64)
+FAR = 0.01  # of the length: moved by this is red in a picture
+STILL, MOVED = np.array((214, 219, 226)), np.array((196, 52, 44))
 CONFIRMED = 0.01  # of the drag: a smaller gain is none
 FOUND_IN = ReconstructionSettings(iterations=200)
 OVERLAP = 60_000  # points in the box in which parts may overlap
@@ -96,8 +99,10 @@ def tables(
     family: Path,
     work: Path,
     steps: int,
+    pictures: Path | None = None,
 ) -> list[str]:
-    """Both tables. path: of the network; work: keeps what is done, pictures too, so that a run goes on."""
+    """Both tables. path: of the network; work: keeps what is done, so that a run goes on; pictures: a folder
+    for one of the last car that both have done."""
     prepared = PreparedFamily(family)
     numbers = prepared.split("test")[:cars]
     rows = [improved("cars", prepared, number, path, work, steps) for number in numbers]
@@ -122,6 +127,8 @@ def tables(
     if one_part is None:
         return lines
     alone = [improved(str(one_part), prepared, n, path, work, steps) for n in numbers[:one_part_cars]]
+    if pictures is not None:
+        picture(str(one_part), prepared, numbers[one_part_cars - 1], work, pictures / "optimise-parts.png")
     return [
         *lines,
         "## The same without parts",
@@ -196,6 +203,22 @@ def car(model: str, family: PreparedFamily, number: int) -> Assembly:
     """A held-out car as the model finds it in its samples, in metres. Both models give it one frame."""
     found = reconstruct(load_model(model), family.load(number), FOUND_IN)
     return replace(to_assembly(found, up="z").transformed(Similarity(LENGTH / 1.8)), unit="m")
+
+
+def picture(one_part: str, family: PreparedFamily, number: int, work: Path, path: Path) -> None:
+    """A car before and after by both models, in a colour that says how far the surface has moved."""
+    name, images, captions = family.shapes[number].name, [], []
+    for model, what in (("cars", "its body alone"), (one_part, "a model without parts")):
+        start = car(model, family, number)
+        end = pw.load_assembly(work / f"{name}-{Path(model).stem}" / "assembly.json")
+        for one, when in ((start, "before"), (end, "after")):
+            surface = surface_of(one, 96)
+            off = np.abs(start.distance(np.asarray(surface.triangles_center))) / LENGTH / FAR
+            share = np.round(12 * np.clip(off, 0, 1))[:, None] / 12
+            colours = np.round(STILL + share * (MOVED - STILL)).astype(np.uint8)
+            images.append(render_mesh(surface, Camera(up="z"), (460, 320), colours))
+            captions.append(f"{what}, {when}")
+    write_png(path, sheet(images, captions, columns=2))
 
 
 def drag(result: Optimised) -> tuple[float, float]:
