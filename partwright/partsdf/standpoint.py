@@ -13,6 +13,7 @@ from partwright.render.raycast import Scene
 _CELLS = 64  # along the longer side of a silhouette
 _FIELDS = (12.0, 25.0, 45.0)  # degrees
 _STEPS = (16.0, 8.0, 4.0)  # degrees, of azimuth and elevation
+_FAR = 20.0  # degrees from where it was seen, of either
 _WAYS = ((-1, 0), (1, 0), (0, -1), (0, 1))
 _SWEEPS = 8  # at most, while they help
 _LOWEST, _HIGHEST = -30.0, 80.0
@@ -30,7 +31,8 @@ class Standpoint:
 def find_standpoint(
     vertices: np.ndarray, faces: np.ndarray, silhouette: np.ndarray, azimuth: float, elevation: float
 ) -> Standpoint:
-    """The best near an azimuth and an elevation, in degrees.
+    """The best near an azimuth and an elevation, in degrees: a silhouette that was badly seen is not to lead
+    far away from these.
 
     vertices (V, 3), faces (F, 3), as the family stands. silhouette (H, W) bool, True somewhere.
     """
@@ -47,8 +49,10 @@ def find_standpoint(
             before = best
             for aside, above in _WAYS:
                 camera = best.camera
-                height = float(np.clip(camera.elevation + step * above, _LOWEST, _HIGHEST))
-                turned = replace(camera, azimuth=camera.azimuth + step * aside, elevation=height)
+                side, height = camera.azimuth + step * aside, camera.elevation + step * above
+                if abs(side - first.azimuth) > _FAR or abs(height - first.elevation) > _FAR:
+                    continue
+                turned = replace(camera, azimuth=side, elevation=height)
                 best = max(best, judged(turned), key=lambda s: s.iou)
             for field in _FIELDS:
                 best = max(best, judged(replace(best.camera, field_of_view=field)), key=lambda s: s.iou)
