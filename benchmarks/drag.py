@@ -48,7 +48,6 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=120)
     parser.add_argument("--held-out", type=int, default=10)
     parser.add_argument("--convergence", action="store_true")
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER")
     parser.add_argument("--work", type=Path, default=Path("build/drag"), metavar="FOLDER")
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
@@ -70,7 +69,6 @@ def main() -> None:
         arguments.family,
         arguments.work,
         arguments.steps,
-        arguments.pictures,
     )
     if arguments.convergence:
         lines += convergence()
