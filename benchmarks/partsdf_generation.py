@@ -1,4 +1,4 @@
-"""New shapes against held-out ones: MMD-CD, COV-CD and 1-NNA, by parts, whether parts touch, how new."""
+"""New shapes against held-out ones: MMD-CD, COV-CD and 1-NNA, whether parts touch, and how new they are."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from partwright.partsdf.novelty import nearest_training_shape
 from partwright.shapes.sampling import sample_triangles
 
 POINTS, PART_POINTS = 2048, 1500
-MATCHED = 512  # of a part's points, where parts are compared
 TOUCH, USUAL = 0.04, 0.95  # unit lengths; the share of training shapes in which two parts touch
 
 
@@ -60,15 +59,14 @@ def generation(arguments: argparse.Namespace) -> None:
     lines = [
         f"# PartSDF: new {family.name} against held-out ones", "",
         f"Trained on {scale_of(model)}. {count} samples of each kind against as many held-out shapes, "
-        f"meshed at {arguments.resolution}^3, {POINTS:,} points each; failures are left out and counted. By "
-        f"part: the mean Chamfer distance of the parts that both have, {MATCHED} points each. "
+        f"meshed at {arguments.resolution}^3, {POINTS:,} points each; failures are left out and counted. "
         f"Touch: the share of shapes whose parts touch (within {TOUCH}) wherever those of {USUAL:.0%} of the "
         "training shapes do and both are there. New: the median of the mean difference of clamped distances "
         "to the nearest training shape, x1e4, and the least.", "",
         command_line(), "",
-        "| | MMD-CD x1e4 | COV-CD % | 1-NNA % | by part: MMD x1e4 | COV % | touch % | new, median | least | "
+        "| | MMD-CD x1e4 | COV-CD % | 1-NNA % | touch % | new, median | least | "
         "failed | s a sample |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     chosen = [training[i] for i in rng.choice(len(training), count, replace=False)]
     lines.append(row("training shapes", chosen, held, [], 0, 0.0))
@@ -92,28 +90,13 @@ def row(
     label: str, clouds: Sequence[Cloud], held: Held, far: list[float], failed: int, seconds: float
 ) -> str:  # fmt: skip
     scores = set_scores([c.points for c in clouds], [c.points for c in held.clouds], held.among)
-    parts = part_distances(clouds, held.clouds)
-    covered = len(np.unique(parts.argmin(axis=1))) / len(held.clouds)
     touch = np.mean([holds_together(cloud, held.usual) for cloud in clouds])
     new = f"{1e4 * np.median(far):.0f} | {1e4 * min(far):.0f}" if far else " | "
     return (
         f"| {label} | {1e4 * scores.mmd:.1f} | {100 * scores.coverage:.1f} | "
-        f"{100 * scores.nearest_accuracy:.1f} | {1e4 * parts.min(axis=0).mean():.1f} | "
-        f"{100 * covered:.1f} | {100 * touch:.0f} | {new} | {failed} | "
+        f"{100 * scores.nearest_accuracy:.1f} | {100 * touch:.0f} | {new} | {failed} | "
         f"{f'{seconds:.1f}' if seconds else ''} |"
     )
-
-
-def part_distances(made: Sequence[Cloud], real: Sequence[Cloud]) -> np.ndarray:
-    """(A, B) mean Chamfer distance of the parts that both have; infinite where there are none."""
-    total, count = np.zeros((len(made), len(real))), np.zeros((len(made), len(real)))
-    for p in range(len(real[0].parts)):
-        rows, columns = ([i for i, c in enumerate(clouds) if len(c.parts[p])] for clouds in (made, real))
-        first = [made[i].parts[p][:MATCHED] for i in rows]
-        second = [real[j].parts[p][:MATCHED] for j in columns]
-        total[np.ix_(rows, columns)] += chamfer_matrix(first, second)
-        count[np.ix_(rows, columns)] += 1
-    return np.where(count > 0, total / np.maximum(count, 1), np.inf)
 
 
 def cloud_of_family(family: PreparedFamily, index: int) -> Cloud:
