@@ -62,7 +62,7 @@ def settings_of(name: str) -> Any:
     few = {"near": 6000, "uniform": 6000}
     if name == "parts":
         return METHODS[name].settings(
-            "draft", model="chairs", iterations=16, points=256, starts=2, resolution=32
+            "draft", model="mixers", iterations=16, points=256, starts=2, resolution=32
         )
     if name == "capri":
         return METHODS[name].settings("draft", surface=6000, tries=2, **few)
@@ -76,12 +76,12 @@ def shape() -> Shape:
 
 @pytest.fixture(scope="module", params=METHODS.own)
 def case(request: pytest.FixtureRequest, shape: Shape) -> Case:
-    return Case(settings_of(request.param), chair() if request.param == "parts" else shape)
+    return Case(settings_of(request.param), mixer() if request.param == "parts" else shape)
 
 
-def chair() -> Shape:
-    """One that the model of chairs was trained on: a few steps are enough for it."""
-    model = load_model("chairs")
+def mixer() -> Shape:
+    """One that the model of mixers was trained on: a few steps are enough for it."""
+    model = load_model("mixers")
     mesh = mesh_shape(NeuralShape.trained(model, "0"), 48, parts=False).whole
     return load_shape(mesh, unit="mm", up="z")
 
