@@ -19,6 +19,7 @@ negative weight); each is divided by what it is at the start. Given several time
   keep_out@x0,y0,z0,x1,y1,z1                              volume within boxes
   wall_thickness                                          of the thinnest twentieth of the surface
   distance@FILE                                           to the surface of a file
+  drag, drag@FILE, drag@AXIS                              the next two by one name; alone, along the length
   surrogate_drag@FILE                                     by a network (parts train-surrogate)
   newtonian_drag@AXIS                                     of flow along an axis: no CFD, see docs/optimise.md
   FILE.py:FUNCTION                                        your own

@@ -23,7 +23,7 @@ from partwright.goals.problem import Options, Point, Problem
 from partwright.goals.report import report
 from partwright.goals.search import Ending, Found, Step, search
 from partwright.goals.steady import moved
-from partwright.goals.wanted import Bound, Wanted
+from partwright.goals.wanted import Bound, Wanted, by_tier
 from partwright.methods import Cancellation, interruptible
 from partwright.shapes import METRES
 
@@ -159,6 +159,8 @@ def optimise(
     given = [objective] if isinstance(objective, str | Wanted) else list(objective)
     wanted = [Wanted.of(one) if isinstance(one, str) else one for one in given]
     limits = [Bound.of(one) if isinstance(one, str) else one for one in bounds]
+    wanted = [replace(one, name=by_tier(one.name, assembly)) for one in wanted]
+    limits = [replace(one, name=by_tier(one.name, assembly)) for one in limits]
     cancel = cancel or Cancellation()
     begun = time.perf_counter()
     problem = Problem(assembly, wanted, limits, freeze, options or Options())

@@ -82,6 +82,21 @@ class Bound:
         return "." in self.name and _FILE.fullmatch(self.name) is None and "@" not in self.name
 
 
+def by_tier(name: str, assembly: Assembly) -> str:
+    """The objective that `drag` stands for: drag@FILE is what a network says, drag@AXIS Newtonian flow along
+    an axis, and drag alone the latter along the longest horizontal side. Other names are what they are."""
+    plain, _, argument = name.partition("@")
+    if plain != "drag":
+        return name
+    if Path(argument).suffix:
+        return f"surrogate_drag@{argument}"
+    if not argument:
+        sides = np.ptp(assembly.bounds(), axis=0)
+        sides["xyz".index(assembly.up or "z")] = 0.0
+        argument = "xyz"[int(sides.argmax())]
+    return f"newtonian_drag@{argument}"
+
+
 def asks_for_labels(name: str) -> bool:
     """Whether an objective of that name does; a user's function may."""
     return _FILE.fullmatch(name) is not None or OBJECTIVES[name.partition("@")[0]].labelled
@@ -99,11 +114,6 @@ def measure_of(name: str, start: Start) -> tuple[Measure, int]:
     if own is not None:
         return _function(Path(own["file"]), own["function"]), 0
     plain, _, argument = name.partition("@")
-    if plain == "drag":
-        raise SettingError(
-            "objective 'drag': expected surrogate_drag@FILE, by a network (parts train-surrogate), or "
-            "newtonian_drag@AXIS, by angles alone; --simulate says at the end what OpenFOAM finds"
-        )
     objective: Objective = OBJECTIVES[plain]
     return objective.prepare(argument, start), objective.power
 
