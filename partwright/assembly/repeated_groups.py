@@ -77,7 +77,14 @@ def _check(count: int) -> None:
 
 
 def copies_of(group: Assembly, moves: Sequence[Similarity]) -> tuple[Assembly, ...]:
-    """The group moved by each of the moves; leaves of the first copy are called NAME_02, and so on."""
+    """The group moved by each of the moves; leaves of the first copy are called NAME_02, and so on.
+
+    Raises:
+        ParameterError: a move scales.
+    """
+    scales = [move.scale for move in moves if abs(move.scale - 1) > 1e-9]
+    if scales:
+        raise ParameterError(f"a move scales by {scales[0]:g}; copies of a group are as large as it is")
     return tuple(GroupCopy(settled(group, move)).of(group, i) for i, move in enumerate(moves, start=2))
 
 
@@ -120,8 +127,8 @@ def _image(group: Assembly, others: Sequence[Node]) -> Assembly | None:
 
 def children_once(node: Assembly) -> list[tuple[Node, tuple[Motion, ...]]]:
     """The children of a node without those that are copies or mirror images of others, each with the motions
-    to these."""
-    found = {repeat.first: repeat for repeat in repeats(node)}
+    to these. Those of an intersection are all told: what is there several times reads as united."""
+    found = {repeat.first: repeat for repeat in repeats(node)} if node.operation != "intersection" else {}
     others = {i for repeat in found.values() for i in repeat.others}
     return [
         (child, found[i].motions if i in found else ())

@@ -14,7 +14,7 @@ import numpy as np
 
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.group_copies import GroupCopy
-from partwright.superfrusta.feature_steps import Feature, image_of
+from partwright.superfrusta.feature_steps import Feature, image_of, pose
 from partwright.superfrusta.flat_tree import joined_by_cuts, nested
 
 _MOST = 150  # copies that are looked at
@@ -44,7 +44,7 @@ def grouped(features: Sequence[Feature]) -> Assembly:
     for i, feature in enumerate(features):
         own = [leaf for leaf in leaves if leaf.feature == i]
         left = [leaf.part for leaf in own if id(leaf) not in taken]
-        whole = list(feature.parts) if len(left) == len(own) else _with_copies(left)
+        whole = list(feature.parts) if len(left) == len(own) else [p for _, p in _with_copies(left)]
         parts += whole
         added += [feature.added] * len(whole)
     nodes: list[Node] = []
@@ -67,8 +67,7 @@ class _Group:
     def nodes(self, features: Sequence[Feature]) -> list[Node]:
         first = self.bodies[0]
         parts = _with_copies([leaf.part for leaf in first], [leaf.feature for leaf in first])
-        added = [features[i].added for i in dict.fromkeys(leaf.feature for leaf in first)]
-        body = nested(parts, added, plain=True)
+        body = nested([part for _, part in parts], [features[i].added for i, _ in parts], plain=True)
         return [body, *(copy.of(body, k) for k, copy in enumerate(self.copies, start=2))]
 
 
@@ -115,8 +114,8 @@ def _moves(first: Sequence[_Leaf], images: Sequence[Part], other: Sequence[_Leaf
     for leaf, image in zip(first, images, strict=True):
         for target in other:
             if target.feature == leaf.feature and target.part.field == image.field:
-                back = _pose(image).inverse()
-                yield from (_pose(target.part) @ turn @ back for turn in _HALF_TURNS)
+                back = pose(image).inverse()
+                yield from (pose(target.part) @ turn @ back for turn in _HALF_TURNS)
 
 
 def _same(one: Part, other: Part) -> bool:
@@ -129,18 +128,14 @@ def _same(one: Part, other: Part) -> bool:
     return bool(np.abs(one.distance(points) - other.distance(points)).max() < _SAME)
 
 
-def _with_copies(parts: Sequence[Part], labels: Sequence[int] | None = None) -> list[Part]:
-    """Parts of one label and field as one with instances."""
+def _with_copies(parts: Sequence[Part], labels: Sequence[int] | None = None) -> list[tuple[int, Part]]:
+    """Parts of one label and field as one with instances, each with its label."""
     result: dict[tuple[int, object], Part] = {}
     for label, part in zip(labels or [0] * len(parts), parts, strict=True):
         first = result.get((label, part.field))
         if first is None:
             result[label, part.field] = part
         else:
-            move = _pose(part) @ _pose(first).inverse()
+            move = pose(part) @ pose(first).inverse()
             result[label, part.field] = replace(first, instances=(*first.instances, move))
-    return list(result.values())
-
-
-def _pose(part: Part) -> Similarity:
-    return Similarity(1.0, part.rotation, part.translation)
+    return [(label, part) for (label, _), part in result.items()]

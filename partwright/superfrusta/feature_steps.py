@@ -96,10 +96,11 @@ def as_move(part: Part, plane: Similarity) -> Similarity | None:
         turn = Similarity(rotation=(0.0, 1.0, 0.0, 0.0))  # upside down it is its own mirror image
     elif image.field != part.field:
         return None
-    return _pose(image) @ turn @ _pose(alone).inverse()
+    return pose(image) @ turn @ pose(alone).inverse()
 
 
-def _pose(part: Part) -> Similarity:
+def pose(part: Part) -> Similarity:
+    """Of a part without its copies."""
     return Similarity(1.0, part.rotation, part.translation)
 
 

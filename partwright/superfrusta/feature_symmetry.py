@@ -49,12 +49,8 @@ def reflected(move: Similarity, points: Floats) -> Floats:
     return move(points * [-1.0, 1.0, 1.0])
 
 
-def turn(axis: Floats, angle: float, point: Floats) -> Similarity:
-    """By an angle about the unit axis (3,) through a point (3,)."""
-    x, y, z = (math.sin(angle / 2) * axis).tolist()
-    rotation = (math.cos(angle / 2), x, y, z)
-    dx, dy, dz = (point - Similarity(rotation=rotation)(point)).tolist()
-    return Similarity(1.0, rotation, (dx, dy, dz))
+def _turn(axis: Floats, order: int, times: int, centre: Floats) -> Similarity:
+    return Similarity.turn(axis.tolist(), 2 * math.pi * times / order, centre.tolist())
 
 
 def symmetries(
@@ -87,11 +83,11 @@ def symmetries(
 
 
 def _turns(axis: Floats, centre: Floats, points: Floats, measure: Measure) -> list[Similarity]:
-    errors = {n: _error(turn(axis, 2 * math.pi / n, centre)(points), measure) for n in _ORDERS}
+    errors = {n: _error(_turn(axis, n, 1, centre)(points), measure) for n in _ORDERS}
     limit = min(_ERROR, _RIVAL * min(errors.values()) + _NOISE)
     orders = [n for n, own in errors.items() if own < limit]
     largest = [n for n in orders if not any(other % n == 0 for other in orders if other > n)]
-    return [turn(axis, 2 * math.pi * k / n, centre) for n in largest for k in range(1, n)]
+    return [_turn(axis, n, k, centre) for n in largest for k in range(1, n)]
 
 
 def _error(image: Floats, measure: Measure) -> float:

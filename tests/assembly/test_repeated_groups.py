@@ -184,7 +184,20 @@ def test_build123d_has_each_once(tmp_path: Path) -> None:
     assert runpy.run_path(str(path))["assembly"].volume == pytest.approx(volume, rel=1e-9)
 
 
+def test_groups_that_are_intersected_are_not_drawn_in_a_loop(tmp_path: Path) -> None:
+    pytest.importorskip("build123d")
+    group = Assembly((Part(Box((4, 4, 4))), Part(Box((8, 1, 1)))))
+    both = Assembly((group, *copies_of(group, [Similarity(translation=(1, 0, 0))])), "intersection")
+    export(both, tmp_path / "a.build123d.py")
+    made = runpy.run_path(str(tmp_path / "a.build123d.py"))["assembly"]
+    assert made.volume == pytest.approx(3 * 16 + 2 * 2)
+    export(both, tmp_path / "a.scad")
+    assert "for (" not in (tmp_path / "a.scad").read_text()
+
+
 def test_bad_patterns_are_named() -> None:
+    with pytest.raises(ParameterError, match="scales by 2"):
+        copies_of(Assembly((Part(Box((1, 1, 1))),)), [Similarity(2.0)])
     with pytest.raises(ParameterError, match="count"):
         line(1, (1, 0, 0))
     with pytest.raises(ParameterError, match=r"count: .* got 2\.5"):

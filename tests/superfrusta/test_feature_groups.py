@@ -104,6 +104,27 @@ def test_copies_of_features_become_copies_of_groups_in_whatever_order() -> None:
     assert ((made.distance(points) < 0) == (flat.distance(points) < 0)).all()
 
 
+def test_a_group_of_a_feature_with_its_image_keeps_its_cut() -> None:
+    away = (Similarity(translation=(0, 3, 0)),)
+    plate = Part(Box((2, 1, 0.2)), (0, -1.5, 0), instances=away)
+    fin = Extrusion(Profile([(0, 0), (0.4, 0), (0, 0.4)]), 0.4)
+    wedge = Part(fin, (0.3, -1.5, 0.2), instances=away)
+    cut = Part(Cylinder(0.06, 2.2), (0, -1.4, 0.1), (np.sqrt(0.5), 0, np.sqrt(0.5), 0), instances=away)
+    made = grouped(
+        [
+            Feature(True, plate, NONE, 0),
+            Feature(True, wedge, NONE, 0, Similarity()),
+            Feature(False, cut, NONE, 0),
+        ]
+    )
+    assert len(repeats(made)) == 1
+    flat = Assembly((Assembly((plate, wedge, image_of(wedge, Similarity()))), cut), "difference")
+    points = np.random.default_rng(0).uniform((-1, -2.2, -0.3), (1, 2.2, 0.6), (20000, 3))
+    wrong = (made.distance(points) < 0) != (flat.distance(points) < 0)
+    assert wrong.sum() == 0
+    assert (cut.distance(points) < 0).sum() > 50
+
+
 def test_a_hole_that_goes_on_into_what_is_no_copy_is_no_group() -> None:
     foot = Part(Cylinder(0.2, 0.4), (0.6, 0, -0.2), instances=ring(3))
     hole = Part(Cylinder(0.04, 0.8), (0.6, 0, -0.2), instances=ring(3))
