@@ -4,8 +4,24 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from partwright.cli.outputs import add_output_folder
+
+
+class _Name(argparse.Action):
+    """The last name is the shape's, and one before it the model's, which --model gives otherwise."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: Any = None
+    ) -> None:
+        model = namespace.name if option is None else values
+        if model is not None:
+            if namespace.model is not None:
+                parser.error("name the model once: before the shape, or as --model")
+            namespace.model = model
+        if option is None:
+            namespace.name, namespace.shape = values, Path(values)
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -15,39 +31,39 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description="Finds latents and poses of a model's parts that make up a plain shape, without labels. "
         "Writes assembly.json, parts.glb, surface.ply, report.json and preview.png. The shape may be turned "
         "about its up axis, and lie on any side if that is unknown. A shape that is none of the model's "
-        "family is told so. In a picture the parts are seen by the model's image encoder, as its family "
-        "stands, and what was seen is held against the silhouette.",
+        "family is told so. In a picture the parts are those that the model's image encoder sees, as its "
+        "family stands; nothing is optimised. Where they do not cover the silhouette, a warning says that it "
+        "may be none of the family: a hint, as many such pictures pass.",
     )
-    # Suppressed: an absent MODEL is not to undo --model.
-    command.add_argument(
-        "model",
-        metavar="MODEL",
-        nargs="?",
-        default=argparse.SUPPRESS,
-        help="a model that ships, or a file (.safetensors); here, or as --model",
-    )
-    command.add_argument("shape", metavar="SHAPE", type=Path, help="mesh, points, grid, STEP file or picture")
     option = command.add_argument
-    option("--model", dest="model", metavar="MODEL", help=argparse.SUPPRESS)
+    option(
+        "name",
+        metavar="[MODEL] SHAPE",
+        action=_Name,
+        help="a model that ships, or a file (.safetensors), here or as --model; then a mesh, points, a grid, "
+        "a STEP file or a picture",
+    )
+    # With nargs="?" it would be taken for absent where an option comes between both names.
+    option("shape", action=_Name, help=argparse.SUPPRESS).required = False
+    option("--model", metavar="MODEL", action=_Name, help="the model, where it is not named before SHAPE")
     add_output_folder(command)
     option(
         "--iterations",
         metavar="N",
         type=int,
-        default=400,
-        help="steps; 0: the start as it is (default: %(default)s)",
+        help="steps; 0: the start as it is (default: 400)",
     )
-    option("--points", metavar="N", type=int, default=2048, help="samples a step (default: %(default)s)")
+    option("--points", metavar="N", type=int, help="samples a step (default: 2048)")
     option(
         "--start",
         choices=("auto", "encoder", "nearest", "mean"),
-        default="auto",
         help="from what the model's encoder sees, from the training shape that fits best, or from the mean "
         "of all; auto: the best of the encoder's, if there is one, and of training shapes' (default: auto)",
     )
     option(
         "--as-it-stands",
         action="store_true",
+        default=None,
         help="try no turns: the shape stands as those that the model was trained on",
     )
     option(
@@ -58,5 +74,5 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
     option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
-    option("--seed", metavar="S", type=int, default=0, help="of the samples (default: %(default)s)")
+    option("--seed", metavar="S", type=int, help="of the samples (default: 0)")
     command.set_defaults(run="parts_reconstruct")

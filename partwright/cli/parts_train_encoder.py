@@ -14,8 +14,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="train a network that sees a model's parts in points, or in a picture",
         description="Learns to tell latents and poses of all parts at once from points of the surface, few "
         "or many, blurred or with a side missing; or from one picture, of renders that are made for it, from "
-        "all around, in all colours and lights. `parts reconstruct` then begins with what it sees. Ctrl-C "
-        "ends with what it has learned.",
+        "all around, in all colours and lights. `parts reconstruct` then begins with what it sees in points; "
+        "what it sees in a picture is the result. Ctrl-C ends with what it has learned.",
     )
     add_training(command, "encoder", 5000, "24 clouds or 32 pictures")
     command.add_argument(

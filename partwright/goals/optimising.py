@@ -16,7 +16,7 @@ from partwright.atomic_io import replacing_files
 from partwright.errors import SimulationError
 from partwright.goals.curves import curves
 from partwright.goals.flow import Air, Skin, simulate
-from partwright.goals.flow.programs import keep_log
+from partwright.goals.flow.programs import drop_log, keep_log
 from partwright.goals.flow.wheels import surface_speeds
 from partwright.goals.pictures import before_and_after, trajectory
 from partwright.goals.problem import Options, Point, Problem
@@ -55,6 +55,7 @@ class Optimised:
         ends = {"before": self.found.points[0], "after": self._best}
         found: dict[str, Any] = {"program": "OpenFOAM, simpleFoam, Spalart-Allmaras", "air": air.to_dict()}
         skins = []
+        drop_log(log)
         with tempfile.TemporaryDirectory(prefix="partwright-") as folder:
             for name, point in ends.items():
                 speeds = None

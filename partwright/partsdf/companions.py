@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,6 +17,7 @@ from torch import Tensor
 from partwright.atomic_io import write_bytes
 from partwright.errors import ModelError, NewerVersionError, SettingError, UnreadableFileError
 from partwright.input_files import check_file
+from partwright.methods import check_count
 from partwright.partsdf.model import SUFFIX, Model, about_file, file_of
 
 VERSION = 1
@@ -71,10 +73,14 @@ def load_companion(
                 f"{path}: was trained for another model than {model.name}; train it again with "
                 f"`{_TRAINED_BY[kind]}`, or remove it"
             )
+        if not all(value.isfinite().all() for value in tensors.values()):
+            raise ValueError("weights are not all finite")
         return made(about["settings"], {name: value.float() for name, value in tensors.items()})
     except OSError as error:
         raise UnreadableFileError(f"cannot read {path}: {error.strerror or error}") from error
-    except (SafetensorError, KeyError, ValueError, TypeError, RuntimeError, SettingError) as error:
+    except (
+        SafetensorError, KeyError, ValueError, TypeError, RuntimeError, AssertionError, SettingError,
+    ) as error:  # fmt: skip
         raise ModelError(f"{path}: damaged, or no {kind} ({error!s:.200})") from error
 
 
@@ -85,6 +91,14 @@ def check_tensors(expected: dict[str, Tensor], found: dict[str, Tensor]) -> None
     for name, value in expected.items():
         if value.shape != found[name].shape:
             raise ValueError(f"{name} is of shape {tuple(found[name].shape)}, not {tuple(value.shape)}")
+
+
+def check_tokens(settings: Any) -> None:
+    """Raise SettingError unless settings are counts, and the width is shared evenly by the heads."""
+    for name, value in asdict(settings).items():
+        check_count(name, value, low=0 if name == "beside" else 1)
+    if settings.width % settings.heads:
+        raise SettingError(f"width is {settings.width}; expected a multiple of the {settings.heads} heads")
 
 
 def place_for(model: Model, kind: str, wanted: Path | None) -> Path:

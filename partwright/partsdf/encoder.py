@@ -16,7 +16,7 @@ from torch import Tensor, nn
 
 from partwright.errors import EmptyShapeError, ParameterError
 from partwright.partsdf.clouds import unit_cloud
-from partwright.partsdf.companions import beside, check_tensors, load_companion, save_companion
+from partwright.partsdf.companions import beside, check_tensors, check_tokens, load_companion, save_companion
 from partwright.partsdf.decoder import positional_encoding
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
@@ -39,6 +39,9 @@ class EncoderSettings:
     rounds: int = 1
     blocks: int = 3
     beside: int = 12
+
+    def __post_init__(self) -> None:
+        check_tokens(self)
 
 
 class PartQueries(nn.Module):

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from partwright.errors import ModelError, SettingError
-from partwright.partsdf.companions import beside, check_tensors, load_companion, save_companion
+from partwright.partsdf.companions import beside, check_tensors, check_tokens, load_companion, save_companion
 from partwright.partsdf.diffusion import denoised
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
@@ -33,6 +33,9 @@ class GeneratorSettings:
     width: int = 128
     heads: int = 4
     blocks: int = 4
+
+    def __post_init__(self) -> None:
+        check_tokens(self)
 
 
 class Layouts(nn.Module):

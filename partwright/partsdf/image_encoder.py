@@ -13,6 +13,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from partwright.methods import check_count
 from partwright.partsdf.companions import beside, check_tensors, load_companion, save_companion
 from partwright.partsdf.encoder import EncoderSettings, PartQueries, shapes_of
 from partwright.partsdf.lighting import MIDDLE, SPREAD
@@ -35,6 +36,10 @@ class ImageSettings:
 
     channels: tuple[int, int, int] = (32, 64, 128)
     queries: EncoderSettings = _QUERIES
+
+    def __post_init__(self) -> None:
+        for count in self.channels:
+            check_count("channels", count, low=1)
 
 
 class _Block(nn.Module):

@@ -11,7 +11,7 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d, binary_cross_entropy_with_logits, smooth_l1_loss
 
 from partwright.datasets.prepared import PreparedFamily
-from partwright.methods import Cancellation
+from partwright.methods import Cancellation, check_count
 from partwright.partsdf.companion_training import check_trainable, descend, follow
 from partwright.partsdf.encoder_training import losses
 from partwright.partsdf.image_encoder import ImageEncoder, ImageNetwork, ImageSettings
@@ -61,9 +61,10 @@ def train_image_encoder(
 
     Raises:
         FamilyError: it is another family, or was prepared without surfaces.
-        SettingError: fewer than one step, or a model of one part, which has no poses.
+        SettingError: fewer than one step or view, or a model of one part, which has no poses.
     """
     check_trainable(model, steps, "an encoder predicts")
+    check_count("views", views, low=1)
     meshes = PartMeshes.of(family, model)
     settings = settings or ImageSettings()
     torch.manual_seed(seed)

@@ -6,6 +6,7 @@ silhouette first, then closely at that part of the picture.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,7 +52,8 @@ def read_photo(path: str | Path) -> Photo:
     """A picture file, upright as its camera says, no larger than is of use.
 
     Raises:
-        UnreadableFileError: it is no picture, damaged, too large to be opened or too small to be seen.
+        UnreadableFileError: it is no picture, damaged, too large to be opened or too small to be seen, or has
+            levels that are not finite.
         EmptyShapeError: it is transparent all over.
     """
     from PIL import Image, ImageOps
@@ -64,7 +66,10 @@ def read_photo(path: str | Path) -> Photo:
                 f"{path}: is {opened.width} by {opened.height} pixels; {_LEAST} or more are needed each way"
             )
         opened.draft("RGB", (_LARGEST, _LARGEST))  # a JPEG may be read at a part of its size
-        picture = ImageOps.exif_transpose(_eight_bits(opened)).convert("RGBA")
+        picture = _eight_bits(opened, path)
+        with suppress(Exception):  # what a camera wrote down may be damaged: then the picture as it stands
+            picture = ImageOps.exif_transpose(picture)
+        picture = picture.convert("RGBA")
     picture.thumbnail((_LARGEST, _LARGEST), Image.Resampling.BOX)
     rgba = np.asarray(picture, np.float32) / 255
     pixels, opaque = rgba[..., :3], rgba[..., 3:]
@@ -95,10 +100,8 @@ def look_at(encoder: ImageEncoder, photo: Photo) -> Looked:
         (sight,) = encoder.see(_tensor(closely)[None])
         seen = _largest(sight.silhouette.numpy() > 0.5)
         if photo.shape is not None:
-            given = _cut_out(
-                np.repeat(photo.shape[..., None], 3, axis=2).astype(np.float32), box, outside=0.0
-            )
-            return Looked(closely, sight, _halved(given[..., 0]) >= 0.5)
+            given = np.repeat(photo.shape[..., None], 3, axis=2).astype(np.float32)
+            return Looked(closely, sight, _mostly(_halved(_cut_out(given, box, outside=0.0)[..., 0])))
         rows, columns = (np.flatnonzero(seen.any(axis=a)) for a in (1, 0))
         if max(len(rows), len(columns)) < _SMALLEST:
             raise EmptyShapeError("no shape is seen in the picture; cut it out, or make what is around plain")
@@ -109,13 +112,15 @@ def look_at(encoder: ImageEncoder, photo: Photo) -> Looked:
     return Looked(closely, sight, seen)
 
 
-def _eight_bits(picture):  # type: ignore[no-untyped-def]  # Pillow's images, which are heavy to import
+def _eight_bits(picture, path: Path):  # type: ignore[no-untyped-def]  # Pillow is heavy to import
     """A picture of 16 bits a pixel, or of floats, in 8: Pillow would cut off what is brighter."""
     if not picture.mode.startswith(("I", "F")):
         return picture
     from PIL import Image
 
     values = np.asarray(picture, np.float64)
+    if not np.isfinite(values).all():
+        raise UnreadableFileError(f"{path}: has NaN or infinite levels; all must be finite")
     low, high = values.min(), values.max()
     return Image.fromarray(np.uint8(255 * (values - low) / max(high - low, 1e-9)))
 
@@ -131,15 +136,11 @@ def _cut_out(pixels: np.ndarray, box: np.ndarray, outside: float | None = None) 
     from PIL import Image
 
     top, left, bottom, right = np.rint(box).astype(int)
-    bottom, right = max(bottom, top + 1), max(right, left + 1)
-    height, width = pixels.shape[:2]
-    around = [(max(0, -top), max(0, bottom - height)), (max(0, -left), max(0, right - width)), (0, 0)]
-    inner = pixels[max(0, top) : min(height, bottom), max(0, left) : min(width, right)]
-    whole = (
-        np.pad(inner, around, mode="edge")
-        if outside is None
-        else np.pad(inner, around, constant_values=outside)
-    )
+    rows, columns = np.arange(top, max(bottom, top + 1)), np.arange(left, max(right, left + 1))
+    near = [np.clip(a, 0, n - 1) for a, n in zip((rows, columns), pixels.shape, strict=False)]
+    whole = pixels[near[0][:, None], near[1]]
+    if outside is not None:
+        whole[near[0] != rows] = whole[:, near[1] != columns] = outside
     levels = Image.fromarray(np.rint(255 * whole).astype(np.uint8))
     return np.asarray(levels.resize((SIDE, SIDE), Image.Resampling.BOX), np.float32) / 255
 
@@ -150,6 +151,13 @@ def _tensor(picture: np.ndarray) -> Tensor:
 
 def _halved(mask: np.ndarray) -> np.ndarray:
     return np.asarray(mask.reshape(SIDE // 2, 2, SIDE // 2, 2).mean(axis=(1, 3)))
+
+
+def _mostly(covered: np.ndarray) -> np.ndarray:
+    """Where cells are covered by half; of what is thinner than cells all over, half as much as most."""
+    if not covered.any():
+        raise EmptyShapeError("what is opaque in the picture is too small to be seen")
+    return np.asarray(covered >= min(0.5, covered.max() / 2))
 
 
 def _largest(mask: np.ndarray) -> np.ndarray:

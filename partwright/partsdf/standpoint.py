@@ -49,7 +49,8 @@ def find_standpoint(
             before = best
             for aside, above in _WAYS:
                 camera = best.camera
-                side, height = camera.azimuth + step * aside, camera.elevation + step * above
+                side = camera.azimuth + step * aside
+                height = float(np.clip(camera.elevation + step * above, _LOWEST, _HIGHEST))
                 if abs(side - first.azimuth) > _FAR or abs(height - first.elevation) > _FAR:
                     continue
                 turned = replace(camera, azimuth=side, elevation=height)

@@ -199,7 +199,9 @@ def test_what_ran_out_of_time_or_disk_is_tried_again(
     assert "is full" in filled.reason
     assert filled.path.with_suffix(".failed.log").read_text() == "no room\n"  # the case itself is gone
     write(stand_in / "simpleFoam", SOLVED)
-    assert simulate_all([("a", CUBE)], tmp_path, Air())[0].drag_area == 1.0
+    solved = simulate_all([("a", CUBE)], tmp_path, Air())[0]
+    assert solved.drag_area == 1.0
+    assert list(tmp_path.glob("*.failed.*")) == []
 
 
 def test_a_case_that_cannot_be_written_is_told(stand_in: Path, tmp_path: Path) -> None:
@@ -215,16 +217,16 @@ def test_a_simulation_that_fails_leaves_what_was_optimised_and_its_log(
     assembly = Assembly((Part(Box((1.0, 1.0, 1.0)), name="box"),))
     assembly.save(tmp_path / "box.json")
     out = tmp_path / "out"
-    code = main(
-        ["optimise", str(tmp_path / "box.json"), "-o", str(out), "--objective", "volume", "--steps", "1",
-         "--resolution", "8", "--simulate", "x"]
-    )  # fmt: skip
-    assert code == 2
+    command = ["optimise", str(tmp_path / "box.json"), "-o", str(out), "--objective", "volume"]
+    command += ["--steps", "1", "--resolution", "8"]
+    assert main([*command, "--simulate", "x"]) == 2
     said = capsys.readouterr()
     assert "volume" in said.out
     assert f"see {out / 'simulation.log'}; {out} holds what was optimised" in said.err
     assert (out / "simulation.log").read_text() == "all about it\n"
     assert load_assembly(out / "assembly.json") != assembly
+    assert main(command) == 0
+    assert not (out / "simulation.log").exists()  # it is none of this result
 
 
 def test_ctrl_c_in_a_simulation_leaves_what_was_optimised(

@@ -213,6 +213,8 @@ def test_its_file_is_for_one_model_and_one_kind(
         load_image_encoder(replace(saved, hash="0" * 64), path)
     with pytest.raises(SettingError, match="steps is 0"):
         train_image_encoder(saved, lamps, steps=0)
+    with pytest.raises(SettingError, match="views: expected a whole number of at least 1, got 0"):
+        train_image_encoder(saved, lamps, steps=1, views=0)
 
 
 def test_commands(

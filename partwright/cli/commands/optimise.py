@@ -12,7 +12,7 @@ from partwright.cli.terminal import counted, note, say, warn
 from partwright.errors import ObjectiveError, SimulationError
 from partwright.goals import Optimised, Options, Step, optimise
 from partwright.goals.flow.air import Air
-from partwright.goals.flow.programs import check_installed
+from partwright.goals.flow.programs import check_installed, drop_log
 from partwright.goals.flow.surrogate import Surrogate
 from partwright.goals.flow.wheels import turning_parts
 from partwright.goals.objectives.surrogate import outside
@@ -57,6 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     failed: SimulationError | None = None
     stopped = False
+    drop_log(arguments.output / LOG)
     if arguments.simulate is not None and result.ending not in ("failed", "interrupted"):
         result.save(arguments.output)  # of minutes: kept, whatever becomes of the simulation
         note("simulating before and after")

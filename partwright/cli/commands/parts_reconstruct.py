@@ -16,16 +16,8 @@ from partwright.partsdf.model import load_model
 from partwright.partsdf.settings import Settings
 from partwright.shapes import PICTURE_SUFFIXES, load_shape
 
-# What is for shapes alone, and how it is when it is not given.
-_OF_SHAPES = {
-    "iterations": 400,
-    "points": 2048,
-    "start": "auto",
-    "as_it_stands": False,
-    "unit": None,
-    "up": None,
-    "seed": 0,
-}
+_SEARCH = ("iterations", "points", "start")
+_OF_SHAPES = (*_SEARCH, "as_it_stands", "unit", "up", "seed")  # not of pictures
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -36,24 +28,21 @@ def run(arguments: argparse.Namespace) -> int:
     settings = Settings(
         arguments.model,
         arguments.resolution,
-        iterations=arguments.iterations,
-        points=arguments.points,
-        start=arguments.start,
         turn=not arguments.as_it_stands,
+        **{name: getattr(arguments, name) for name in _given(arguments, _SEARCH)},
     )
     cancel = Cancellation()
     with Display() as display:
         shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
         with stopping(cancel.request):
-            result = fit(shape, settings, seed=arguments.seed, progress=display.show, cancel=cancel)
+            result = fit(shape, settings, seed=arguments.seed or 0, progress=display.show, cancel=cancel)
         display.stage("writing")
         result.save(arguments.output)
     return finish_fit(result, arguments.output)
 
 
 def _of_picture(arguments: argparse.Namespace) -> int:
-    given = [name for name, plain in _OF_SHAPES.items() if getattr(arguments, name) != plain]
-    if given:
+    if given := _given(arguments, _OF_SHAPES):
         option = given[0].replace("_", "-")
         raise SettingError(f"--{option} is for meshes and points; of a picture there is --resolution alone")
     with Work("looking") as work:
@@ -68,3 +57,7 @@ def _of_picture(arguments: argparse.Namespace) -> int:
     )
     warn(found.warnings)
     return 0
+
+
+def _given(arguments: argparse.Namespace, names: tuple[str, ...]) -> list[str]:
+    return [name for name in names if getattr(arguments, name) is not None]

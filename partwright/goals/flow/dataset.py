@@ -21,7 +21,7 @@ import trimesh
 from partwright.atomic_io import replacing
 from partwright.errors import SettingError, SimulationError, SimulationLimitError, UnreadableFileError
 from partwright.goals.flow.air import Air
-from partwright.goals.flow.programs import keep_log
+from partwright.goals.flow.programs import drop_log, keep_log
 from partwright.goals.flow.simulation import PRESSURE, simulate
 from partwright.goals.flow.skin import Skin
 
@@ -112,6 +112,7 @@ def key(body: trimesh.Trimesh, air: Air) -> str:
 
 
 def _simulated(name: str, body: trimesh.Trimesh, path: Path, air: Air) -> float:
+    drop_log(path.with_suffix(".failed.log"))
     with tempfile.TemporaryDirectory(prefix="partwright-") as folder:
         try:
             found = simulate(body, Path(folder, "case"), air)

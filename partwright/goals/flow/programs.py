@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from partwright.errors import MissingDependencyError, SimulationError, SimulationLimitError
+from partwright.atomic_io import replacing
+from partwright.errors import MissingDependencyError, OutputError, SimulationError, SimulationLimitError
 
 MESHER, SNAPPER = ("blockMesh",), ("snappyHexMesh", "-overwrite")
 SOLVER = ("simpleFoam",)
@@ -64,9 +65,18 @@ def keep_log(error: SimulationError, place: Path | None) -> SimulationError:
     """The error of a case that is deleted: its log is copied to `place`, or is lost."""
     log = None
     if error.log is not None and place is not None:
-        with suppress(OSError):
-            log = Path(shutil.copyfile(error.log, place))
+        with suppress(OSError, OutputError):
+            with replacing(place) as staging:
+                shutil.copyfile(error.log, staging)
+            log = place
     return type(error)(error.message, log)
+
+
+def drop_log(place: Path | None) -> None:
+    """Before another attempt: what an earlier one left at `place` is no log of it."""
+    if place is not None:
+        with suppress(OSError):
+            place.unlink(missing_ok=True)
 
 
 def _complaint(log: str) -> str:
