@@ -27,7 +27,7 @@ def segments(part: Part, allowed: float) -> list[Part]:
     outermost = radius + max(1.0, f.taper) * f.size[0] / 2 + f.dilation
     step = math.acos(max(1 - min(allowed, f.thinnest / 2) / outermost, 0.0))
     count = min(max(math.ceil(angle / step), 2), MOST_SEGMENTS)
-    pose = Similarity(1.0, part.rotation, part.translation)
+    pose = part.pose
     result = []
     for i in range(count):
         turn = angle * ((2 * i + 1) / count - 1)
@@ -48,7 +48,7 @@ def walls(part: Part) -> list[Part]:
     wall = (1 - own.onion) * min(x, y) / 2
     if wall <= 0:
         return []
-    pose = Similarity(1.0, part.rotation, part.translation)
+    pose = part.pose
     placed = [
         (Box((x, wall, z)), (0.0, (y - wall) / 2, 0.0)),
         (Box((x, wall, z)), (0.0, (wall - y) / 2, 0.0)),

@@ -78,7 +78,7 @@ def nearest_solid(part: Part, kinds: Sequence[type[Field]] = SOLIDS) -> Approxim
         raise NoSurfaceError(f"part {part.name!r} is too thin to be measured, so no solid is near it")
     best, error, deviation = found
     solid = best.field.scaled(longest)
-    pose = Similarity(1.0, part.rotation, part.translation)
+    pose = part.pose
     placed = dataclasses.replace(
         part,
         field=solid,

@@ -138,18 +138,21 @@ def _same(one: Node, other: Node, near: float) -> bool:
     if one.is_part and other.is_part:
         return (
             one.field == other.field
-            and _same_place(one, other, near)
+            and same_place(one, other, _SAME, near)
             and len(one.instances) == len(other.instances)
-            and all(_same_place(m, n, near) for m, n in zip(one.instances, other.instances, strict=True))
+            and all(
+                same_place(m, n, _SAME, near) for m, n in zip(one.instances, other.instances, strict=True)
+            )
         )
     if one.is_part or other.is_part or (one.unit, one.up) != (other.unit, other.up):
         return False
     return all(_same(a, b, near) for a, b in zip(one.children, other.children, strict=True))
 
 
-def _same_place(one: Part | Similarity, other: Part | Similarity, near: float) -> bool:
-    turned = np.abs(rotation_matrix(one.rotation) - rotation_matrix(other.rotation)).max()
-    return bool(turned < _SAME and np.abs(np.subtract(one.translation, other.translation)).max() <= near)
+def same_place(one: Part | Similarity, other: Part | Similarity, turned: float, near: float) -> bool:
+    """Whether rigid poses are the same: entries of rotations within `turned`, places within `near`."""
+    off = np.abs(rotation_matrix(one.rotation) - rotation_matrix(other.rotation)).max()
+    return bool(off < turned and np.abs(np.subtract(one.translation, other.translation)).max() <= near)
 
 
 def _move(one: Part, other: Part) -> Similarity:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any, TypeGuard
 
-from partwright.assembly.similarity import Similarity
 from partwright.fields.joint import JointField, Member
 
 if TYPE_CHECKING:
@@ -41,14 +40,10 @@ def is_joint(node: Node) -> TypeGuard[JointPart]:
 
 
 def _among(part: JointPart, parts: list[JointPart], shared: dict[Any, Any]) -> Part:
-    back = _pose(part).inverse()
-    seen = [(other.field, back @ _pose(other)) for other in parts]
+    back = part.pose.inverse()
+    seen = [(other.field, back @ other.pose) for other in parts]
     members = [Member(field, pose.translation, pose.rotation) for field, pose in seen]
     return dataclasses.replace(part, field=part.field.among(members, shared))
-
-
-def _pose(part: Part) -> Similarity:
-    return Similarity(1.0, part.rotation, part.translation)
 
 
 if TYPE_CHECKING:

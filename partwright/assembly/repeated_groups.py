@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.assembly.group_copies import GroupCopy, may_be_copies, settled
+from partwright.assembly.group_copies import GroupCopy, may_be_copies, same_place, settled
 from partwright.assembly.mirroring import mirrored
 from partwright.assembly.motion import Motion
-from partwright.assembly.similarity import Similarity, rotation_matrix
+from partwright.assembly.similarity import Similarity
 from partwright.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -152,12 +152,12 @@ def move_between(one: Node, other: Node) -> Similarity | None:
             return None
         leaves.append(pair)
     a, b = leaves[0]
-    move = _pose(b) @ _pose(a).inverse()
+    move = b.pose @ a.pose.inverse()
     size = 1.0 + float(np.abs([part.translation for pair in leaves for part in pair]).max())
     for a, b in leaves:
         moved = a.transformed(move)
-        if not _same_place(_pose(moved), _pose(b), size) or not all(
-            _same_place(m, n, size) for m, n in zip(moved.instances, b.instances, strict=True)
+        if not same_place(moved, b, _SAME, _SAME * size) or not all(
+            same_place(m, n, _SAME, _SAME * size) for m, n in zip(moved.instances, b.instances, strict=True)
         ):
             return None
     return move
@@ -177,16 +177,6 @@ def _pairs(one: Node, other: Node) -> Iterator[tuple[Part, Part] | None]:
 
 def _form(node: Assembly) -> tuple[str, float, int]:
     return node.operation, node.blend, len(node.children)
-
-
-def _pose(part: Part) -> Similarity:
-    return Similarity(1.0, part.rotation, part.translation)
-
-
-def _same_place(one: Similarity, other: Similarity, size: float) -> bool:
-    turned = np.abs(rotation_matrix(one.rotation) - rotation_matrix(other.rotation)).max()
-    moved = np.abs(np.subtract(one.translation, other.translation)).max()
-    return bool(turned < _SAME and moved < _SAME * size)
 
 
 def alike_leaves(node: Node) -> dict[str, tuple[tuple[str, Motion], ...]]:

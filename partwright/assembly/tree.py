@@ -146,6 +146,11 @@ class Part(_Common):
         """The part itself."""
         return (self,)
 
+    @property
+    def pose(self) -> Similarity:
+        """Of the part without its instances."""
+        return Similarity(1.0, self.rotation, self.translation)
+
     @cached_property
     def copies(self) -> tuple[Part, ...]:
         """The part itself and a moved copy an instance, all of the same name, none of them repeated."""

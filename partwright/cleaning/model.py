@@ -225,8 +225,8 @@ def check_cleanable(part: Part) -> None:
 def joined(copies: Sequence[Part]) -> Part:
     """Copies of one field as one part with instances."""
     base, *others = copies
-    home = Similarity(1.0, base.rotation, base.translation).inverse()
-    moves = [Similarity(1.0, other.rotation, other.translation) @ home for other in others]
+    home = base.pose.inverse()
+    moves = [other.pose @ home for other in others]
     return dataclasses.replace(base, instances=tuple(moves))
 
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from partwright.approximation.collision import Geometry
 from partwright.approximation.light_hull import light_hull
-from partwright.assembly import Similarity
 from partwright.errors import NoSurfaceError
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.manifolds import surface_of
@@ -31,7 +30,7 @@ def collider_mesh(geometry: Geometry) -> trimesh.Trimesh:
         assert geometry.mesh is not None
         return _hull(np.asarray(geometry.mesh.vertices))
     mesh = _solid(geometry.part.field)
-    pose = Similarity(1.0, geometry.part.rotation, geometry.part.translation)
+    pose = geometry.part.pose
     mesh.vertices = pose(np.asarray(mesh.vertices))
     return mesh
 

@@ -174,7 +174,7 @@ class _Scene:
         for cutter in node.children[1:] if subtracts else ():
             back = subtracted_names(cutter)
             for part in (cutter,) if isinstance(cutter, Part) else cutter.parts:
-                placed = Similarity(1.0, part.rotation, part.translation).matrix()
+                placed = part.pose.matrix()
                 about = _extras(part) | ({} if part.name in back else _SUBTRACTED)
                 self.scene.graph.update(frame_to=part.name, frame_from=name, matrix=placed, metadata=about)
         return name
@@ -204,7 +204,7 @@ class _Scene:
             self._add_copy(child, name, leaves)
 
     def _add_part(self, part: Part, parent: str, pose: np.ndarray, extras: dict[str, Any]) -> str:
-        own = Similarity(1.0, part.rotation, part.translation)
+        own = part.pose
         about = _extras(part) | extras
         try:
             mesh = mesh_part(Part(part.field), self.resolution)
@@ -250,7 +250,7 @@ class _Scene:
             known = re.fullmatch("#[0-9a-fA-F]{6}", own)
             colour = np.array(list(bytes.fromhex(own[1:]))) if known else self.colours[part.name]
             return coloured(mesh, colour)
-        pose = Similarity(1.0, part.rotation, part.translation)
+        pose = part.pose
         if placed:
             mesh = mesh.copy()
             mesh.vertices = pose.inverse()(np.asarray(mesh.vertices))

@@ -37,7 +37,7 @@ def patches(assembly: Assembly, resolution: int) -> Iterator[tuple[Part, int, Si
     owner = np.abs(assembly.part_distances(middles)).argmin(axis=0)
     for i, part in enumerate(assembly.parts):
         mine = np.flatnonzero(owner == i)
-        poses = [Similarity(1.0, copy.rotation, copy.translation) for copy in part.copies]
+        poses = [copy.pose for copy in part.copies]
         nearest = _nearest(part, poses, middles[mine])
         for k, pose in enumerate(poses):
             own = faces[mine[nearest == k]]

@@ -20,7 +20,7 @@ from partwright.approximation.change import Change
 from partwright.approximation.closed_quadrics import Ball
 from partwright.approximation.nearest import Approximation
 from partwright.approximation.solid_tree import solid_tree
-from partwright.assembly import Assembly, Node, Part, Similarity
+from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.euler_angles import fixed_axes_angles
 from partwright.assembly.repeated_groups import parts_once
 from partwright.atomic_io import write_bytes
@@ -174,7 +174,7 @@ def _loop(part: SourcePart, names: dict[str, str]) -> Iterator[str]:
 
 def _polyhedron(quadric: Quadric, part: Part, ball: Ball, facets: int) -> str:
     """The quadric of a part in its own frame, closed off outside the ball."""
-    centre = Similarity(1.0, part.rotation, part.translation).inverse()(ball.centre)
+    centre = part.pose.inverse()(ball.centre)
     chord = ball.radius * (1 - math.cos(math.pi / facets))
     box = centre + ball.radius * np.array([[-1.0], [1.0]])
     return _faces(quadric_solid(quadric, box, chord))

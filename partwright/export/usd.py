@@ -150,7 +150,7 @@ class _Writer:
 
     def _add_part(self, prim: Any, part: Part, parent: str, subtracted: bool) -> None:
         about = _about(part, subtracted)
-        pose = Similarity(1.0, part.rotation, part.translation)
+        pose = part.pose
         try:
             mesh = mesh_part(Part(part.field), self.resolution)
         except NoSurfaceError:

@@ -9,7 +9,7 @@ import torch
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from partwright.assembly import Assembly, Similarity
+from partwright.assembly import Assembly
 from partwright.errors import NoSurfaceError
 from partwright.fields.joint import JointField
 from partwright.goals.composite import Composite
@@ -96,7 +96,7 @@ def part_surface(assembly: Assembly, index: int) -> np.ndarray:
     try:
         part = assembly.parts[index]
         if isinstance(part.field, JointField):  # a coarse mesh that all parts of its shape share
-            return Similarity(1.0, part.rotation, part.translation)(part.field.preview().vertices)
+            return part.pose(part.field.preview().vertices)
         return np.asarray(mesh_part(part, _CELLS).vertices)
     except NoSurfaceError:
         return np.zeros((0, 3))

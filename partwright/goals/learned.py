@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from partwright.assembly.similarity import Similarity, rotation_matrix
+from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Field
 from partwright.fields.joint import JointField
 from partwright.goals.entry import FORM, LATENT, Entry
@@ -56,7 +56,7 @@ def decoded(
     first = leaves[0][0]
     shape, unit = first.field.shape, first.field.unit
     model = shape.model
-    frame = Similarity(1.0, first.rotation, first.translation) @ first.field.unit_frame
+    frame = first.pose @ first.field.unit_frame
     turn = torch.tensor(rotation_matrix(frame.rotation), dtype=points.dtype)
     seen = ((points - points.new_tensor(frame.translation)) @ turn / unit).float()
     latents, poses = list(shape.latents), [list(each) for each in shape.poses]

@@ -129,7 +129,7 @@ def _allowed(form: Form, old: np.ndarray, new: np.ndarray) -> Field:
 
 def _same_frame(field: JointField, part: Part, pose: Similarity) -> JointField:
     """A learned part tells where the frame of its shape lies: as seen from where it is now."""
-    old = Similarity(1.0, part.rotation, part.translation)
+    old = part.pose
     frame = Similarity(1.0, field.frame_rotation, field.frame_translation)  # type: ignore[attr-defined]
     seen = pose.inverse() @ old @ frame
     return cast(

@@ -74,7 +74,7 @@ def _learned(assembly: Assembly | Part, cell: float) -> trimesh.Trimesh | None:
     first = parts[0]
     mesh = first.field.whole(cell) if len(first.field.members) == len(parts) else None
     if mesh is not None:
-        mesh.vertices = Similarity(1.0, first.rotation, first.translation)(mesh.vertices)
+        mesh.vertices = first.pose(mesh.vertices)
     return mesh
 
 
@@ -120,7 +120,7 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
         return _repeated(_exact(replace(part, instances=()), resolution), part.instances)
     mesh = part.field.surface(resolution)
     if mesh is not None:
-        mesh.vertices = Similarity(1.0, part.rotation, part.translation)(mesh.vertices)
+        mesh.vertices = part.pose(mesh.vertices)
         return _repeated(mesh, part.instances)
     field = part.field.superfrustum() or part.field
     lower, upper = field.bounds()
@@ -138,7 +138,7 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
         return local(points - centre.astype(np.float32))
 
     mesh = mesh_field(distance, -extent / 2, extent / 2, counts, lipschitz=local.lipschitz, sharp=sharp)
-    pose = Similarity(1.0, part.rotation, part.translation) @ frame.inverse()
+    pose = part.pose @ frame.inverse()
     mesh.vertices = pose(mesh.vertices)
     return _repeated(mesh, part.instances)
 

@@ -69,5 +69,5 @@ def from_assembly(assembly: Assembly) -> tuple[NeuralShape, UnitFrame, Quaternio
     if not all(isinstance(f, NeuralField) for f in fields) or len(first.members) != len(fields):
         raise SettingError("the assembly mixes neural parts with others; edit its neural parts by themselves")
     part = assembly.parts[0]
-    origin = Similarity(1.0, part.rotation, part.translation) @ first.unit_frame
+    origin = part.pose @ first.unit_frame
     return first.shape, UnitFrame(origin.translation, 1.0 / first.unit), origin.rotation

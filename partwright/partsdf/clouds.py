@@ -144,8 +144,14 @@ def draw(
 
 def unit_cloud(points: Tensor) -> Tensor:
     """Clouds (B, N, 3) centred by their bounding boxes, the longest side as in the unit frame."""
+    centre, larger = _frame(points)
+    return (points - centre) * larger
+
+
+def _frame(points: Tensor) -> tuple[Tensor, Tensor]:
+    """Of clouds (B, N, 3): the middles of their boxes (B, 1, 3), and factors (B, 1, 1) to the unit frame."""
     low, high = points.amin(dim=1, keepdim=True), points.amax(dim=1, keepdim=True)
-    return (points - (low + high) / 2) * (LONGEST_SIDE / (high - low).amax(dim=2, keepdim=True))
+    return (low + high) / 2, LONGEST_SIDE / (high - low).amax(dim=2, keepdim=True)
 
 
 def _tilted(points: Tensor, poses: PoseTensors, generator: torch.Generator) -> tuple[Tensor, PoseTensors]:
@@ -171,7 +177,6 @@ def _cut(points: Tensor, count: int, generator: torch.Generator) -> Tensor:
 
 
 def _framed(points: Tensor, latents: Tensor, poses: PoseTensors) -> tuple[Tensor, Tensor, PoseTensors]:
-    low, high = points.amin(dim=1, keepdim=True), points.amax(dim=1, keepdim=True)
-    centre, larger = (low + high) / 2, LONGEST_SIDE / (high - low).amax(dim=2, keepdim=True)
+    centre, larger = _frame(points)
     placed = PoseTensors((poses.translation - centre) * larger, poses.rotation, poses.scale * larger)
     return (points - centre) * larger, latents, placed

@@ -12,7 +12,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
-from torch import Tensor
+import torch
+from torch import Tensor, nn
 
 from partwright.atomic_io import write_bytes
 from partwright.errors import ModelError, NewerVersionError, SettingError, UnreadableFileError
@@ -28,6 +29,7 @@ _TRAINED_BY = {
 }
 
 T = TypeVar("T")
+M = TypeVar("M", bound=nn.Module)
 
 
 def beside(model: Model, kind: str) -> Path | None:
@@ -45,6 +47,14 @@ def save_companion(
     about = {"format": f"partwright-{kind}", "version": VERSION, "model": model.hash, "settings": settings}
     half = {k: v.detach().cpu().half().contiguous() for k, v in tensors.items()}
     write_bytes(path, save(half, {"partwright": json.dumps(about)}))
+
+
+def companion_file(model: Model, kind: str, path: str | Path | None) -> Path | None:
+    """The file that is given, or the one beside the model's; None where none is given and none is there."""
+    if path is not None:
+        return Path(path)
+    own = beside(model, kind)
+    return own if own is not None and own.exists() else None
 
 
 def load_companion(
@@ -82,6 +92,16 @@ def load_companion(
         SafetensorError, KeyError, ValueError, TypeError, RuntimeError, AssertionError, SettingError,
     ) as error:  # fmt: skip
         raise ModelError(f"{path}: damaged, or no {kind} ({error!s:.200})") from error
+
+
+def with_weights(make: Callable[[], M], tensors: dict[str, Tensor]) -> M:
+    """The network that is made, for use, with weights that were read; raises ValueError where they are not
+    its own, before it takes any memory."""
+    with torch.device("meta"):  # shapes without memory
+        check_tensors(make().state_dict(), tensors)
+    network = make()
+    network.load_state_dict(tensors)
+    return network.requires_grad_(False).eval()
 
 
 def check_tensors(expected: dict[str, Tensor], found: dict[str, Tensor]) -> None:

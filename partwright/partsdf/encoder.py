@@ -16,7 +16,13 @@ from torch import Tensor, nn
 
 from partwright.errors import EmptyShapeError, ParameterError
 from partwright.partsdf.clouds import unit_cloud
-from partwright.partsdf.companions import beside, check_tensors, check_tokens, load_companion, save_companion
+from partwright.partsdf.companions import (
+    check_tokens,
+    companion_file,
+    load_companion,
+    save_companion,
+    with_weights,
+)
 from partwright.partsdf.decoder import positional_encoding
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
@@ -159,18 +165,14 @@ def load_encoder(model: Model, path: str | Path | None = None) -> Encoder | None
     Raises:
         UnreadableFileError, ModelError, NewerVersionError: as `load_companion`.
     """
-    source = Path(path) if path is not None else beside(model, KIND)
-    if source is None or (path is None and not source.exists()):
+    source = companion_file(model, KIND, path)
+    if source is None:
         return None
 
     def made(settings: dict[str, Any], tensors: dict[str, Tensor]) -> Encoder:
         known = EncoderSettings(**settings)
         vectors = PartVectors.of(model)
-        parts = len(model.parts)
-        with torch.device("meta"):  # shapes without memory
-            check_tensors(EncoderNetwork(parts, vectors.width, known).state_dict(), tensors)
-        network = EncoderNetwork(parts, vectors.width, known)
-        network.load_state_dict(tensors)
-        return Encoder(model, known, network.requires_grad_(False).eval(), vectors)
+        network = with_weights(lambda: EncoderNetwork(len(model.parts), vectors.width, known), tensors)
+        return Encoder(model, known, network, vectors)
 
     return load_companion(source, KIND, model, made)

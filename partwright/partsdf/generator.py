@@ -15,7 +15,13 @@ import torch
 from torch import Tensor, nn
 
 from partwright.errors import ModelError, SettingError
-from partwright.partsdf.companions import beside, check_tensors, check_tokens, load_companion, save_companion
+from partwright.partsdf.companions import (
+    check_tokens,
+    companion_file,
+    load_companion,
+    save_companion,
+    with_weights,
+)
 from partwright.partsdf.diffusion import denoised
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
@@ -215,22 +221,14 @@ def load_generator(model: Model, path: str | Path | None = None) -> Generator:
     Raises:
         ModelError: there is none; else as `load_companion`.
     """
-    source = Path(path) if path is not None else beside(model, KIND)
-    if source is None or (path is None and not source.exists()):
+    source = companion_file(model, KIND, path)
+    if source is None:
         raise ModelError(f"{model.name} has no generator; make one with `parts train-generator`")
 
     def made(settings: dict[str, Any], tensors: dict[str, Tensor]) -> Generator:
         known, vectors = GeneratorSettings(**settings), PartVectors.of(model)
-        with torch.device("meta"):  # shapes without memory
-            empty = networks(model, vectors, known)
-        expected = {f"{n}.{k}": v for n, one in empty.items() for k, v in one.state_dict().items()}
-        check_tensors(expected, tensors)
-        real = networks(model, vectors, known)
-        for name, one in real.items():
-            prefix = f"{name}."
-            one.load_state_dict({k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)})
-            one.requires_grad_(False).eval()
-        return Generator(model, known, **real, vectors=vectors)  # type: ignore[arg-type]
+        real = with_weights(lambda: nn.ModuleDict(networks(model, vectors, known)), tensors)
+        return Generator(model, known, **dict(real.items()), vectors=vectors)  # type: ignore[arg-type]
 
     return load_companion(source, KIND, model, made)
 

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 
 from partwright.methods import check_count
-from partwright.partsdf.companions import beside, check_tensors, load_companion, save_companion
+from partwright.partsdf.companions import companion_file, load_companion, save_companion, with_weights
 from partwright.partsdf.encoder import EncoderSettings, PartQueries, shapes_of
 from partwright.partsdf.lighting import MIDDLE, SPREAD
 from partwright.partsdf.model import Model
@@ -140,18 +140,14 @@ def load_image_encoder(model: Model, path: str | Path | None = None) -> ImageEnc
     Raises:
         UnreadableFileError, ModelError, NewerVersionError: as `load_companion`.
     """
-    source = Path(path) if path is not None else beside(model, KIND)
-    if source is None or (path is None and not source.exists()):
+    source = companion_file(model, KIND, path)
+    if source is None:
         return None
 
     def made(settings: dict[str, Any], tensors: dict[str, Tensor]) -> ImageEncoder:
         known = ImageSettings(tuple(settings["channels"]), EncoderSettings(**settings["queries"]))
         vectors = PartVectors.of(model)
-        parts = len(model.parts)
-        with torch.device("meta"):  # shapes without memory
-            check_tensors(ImageNetwork(parts, vectors.width, known).state_dict(), tensors)
-        network = ImageNetwork(parts, vectors.width, known)
-        network.load_state_dict(tensors)
-        return ImageEncoder(model, known, network.requires_grad_(False).eval(), vectors)
+        network = with_weights(lambda: ImageNetwork(len(model.parts), vectors.width, known), tensors)
+        return ImageEncoder(model, known, network, vectors)
 
     return load_companion(source, KIND, model, made)

@@ -81,4 +81,5 @@ def boxed(silhouette: np.ndarray) -> np.ndarray:
         ((down >= 0) & (down < silhouette.shape[0]))[:, None]
         & ((across >= 0) & (across < silhouette.shape[1]))[None]
     )  # fmt: skip
-    return silhouette[np.clip(down, 0, None) % silhouette.shape[0]][:, across % silhouette.shape[1]] & inside
+    near = [np.clip(a, 0, n - 1) for a, n in zip((down, across), silhouette.shape, strict=True)]
+    return silhouette[near[0][:, None], near[1]] & inside

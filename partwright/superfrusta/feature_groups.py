@@ -14,7 +14,7 @@ import numpy as np
 
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.group_copies import GroupCopy
-from partwright.superfrusta.feature_steps import Feature, image_of, pose
+from partwright.superfrusta.feature_steps import Feature, image_of
 from partwright.superfrusta.flat_tree import joined_by_cuts, nested
 
 _MOST = 150  # copies that are looked at
@@ -114,8 +114,8 @@ def _moves(first: Sequence[_Leaf], images: Sequence[Part], other: Sequence[_Leaf
     for leaf, image in zip(first, images, strict=True):
         for target in other:
             if target.feature == leaf.feature and target.part.field == image.field:
-                back = pose(image).inverse()
-                yield from (pose(target.part) @ turn @ back for turn in _HALF_TURNS)
+                back = image.pose.inverse()
+                yield from (target.part.pose @ turn @ back for turn in _HALF_TURNS)
 
 
 def _same(one: Part, other: Part) -> bool:
@@ -136,6 +136,6 @@ def _with_copies(parts: Sequence[Part], labels: Sequence[int] | None = None) -> 
         if first is None:
             result[label, part.field] = part
         else:
-            move = pose(part) @ pose(first).inverse()
+            move = part.pose @ first.pose.inverse()
             result[label, part.field] = replace(first, instances=(*first.instances, move))
     return [(label, part) for (label, _), part in result.items()]

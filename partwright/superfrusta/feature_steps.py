@@ -8,7 +8,8 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
-from partwright.assembly import Assembly, Part, Similarity, mirrored
+from partwright.assembly import Part, Similarity
+from partwright.assembly.motion import Motion
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Extrusion
 
@@ -80,7 +81,7 @@ class FeatureTree:
 
 def image_of(part: Part, move: Similarity) -> Part:
     """The part and its copies mirrored in the plane x = 0, then moved."""
-    return mirrored(Assembly((part,)), "x", suffix="").parts[0].transformed(move)
+    return Motion(move, True).of(part)
 
 
 def as_move(part: Part, plane: Similarity) -> Similarity | None:
@@ -96,12 +97,7 @@ def as_move(part: Part, plane: Similarity) -> Similarity | None:
         turn = Similarity(rotation=(0.0, 1.0, 0.0, 0.0))  # upside down it is its own mirror image
     elif image.field != part.field:
         return None
-    return pose(image) @ turn @ pose(alone).inverse()
-
-
-def pose(part: Part) -> Similarity:
-    """Of a part without its copies."""
-    return Similarity(1.0, part.rotation, part.translation)
+    return image.pose @ turn @ alone.pose.inverse()
 
 
 def covers(part: Part, points: NDArray[np.float32]) -> NDArray[np.bool_]:

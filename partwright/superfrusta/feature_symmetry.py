@@ -14,6 +14,7 @@ from manifold3d import Manifold
 from numpy.typing import NDArray
 
 from partwright.assembly import Similarity
+from partwright.assembly.motion import Motion
 
 Floats = NDArray[np.float64]
 Measure = Callable[[NDArray[np.float32]], NDArray[np.float32]]
@@ -46,7 +47,7 @@ def reflection(normal: Floats, point: Floats) -> Similarity:
 
 def reflected(move: Similarity, points: Floats) -> Floats:
     """Points (N, 3) mirrored in the plane x = 0, then moved."""
-    return move(points * [-1.0, 1.0, 1.0])
+    return Motion(move, True)(points)
 
 
 def _turn(axis: Floats, order: int, times: int, centre: Floats) -> Similarity:

@@ -149,7 +149,7 @@ class ResidualFit:
         """
         assert self.best is not None
         settings = self.settings
-        usual = score(self.samples, self.best) - Settings().alpha * len(self.best)
+        usual = self.best_objective + (settings.price - Settings().alpha) * len(self.best)
         if usual > _GOOD or not self.may_carve:
             return True
         self.settings = replace(settings, subtract=True, regions=max(1, settings.regions - 2))

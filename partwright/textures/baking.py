@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly import Assembly, Part
 from partwright.errors import NoSurfaceError
 from partwright.methods import check_count
 from partwright.shapes.sampling import sample_triangles
@@ -133,7 +133,7 @@ class _Sums:
 
 def _local(part: Part, points: Floats) -> Floats:
     """Points (N, 3) in the frame of the part, or of its copy that is nearest to each."""
-    own = [Similarity(1.0, copy.rotation, copy.translation).inverse()(points) for copy in part.copies]
+    own = [copy.pose.inverse()(points) for copy in part.copies]
     if len(own) == 1:
         return np.asarray(own[0])
     off = [np.abs(part.field(np.ascontiguousarray(one, np.float32))) for one in own]

@@ -128,7 +128,7 @@ def _moved(part: Part, step: Floats) -> Part:
     angle = float(np.linalg.norm(step[ROTATION_STEP]))
     half = np.sinc(angle / (2 * math.pi)) / 2
     turn = Similarity(1.0, (math.cos(angle / 2), *(half * step[ROTATION_STEP]).tolist()))
-    pose = Similarity(1.0, part.rotation, part.translation) @ turn
+    pose = part.pose @ turn
     place = np.array(part.translation) + step[TRANSLATION_STEP]
     return replace(
         part,
