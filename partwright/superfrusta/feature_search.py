@@ -8,6 +8,7 @@ most beyond its price joins, with as many copies as stand for other pieces, unti
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -41,7 +42,7 @@ _MOST = 24
 _FOR_MENDING = 10
 _MOST_LOOKED = 150  # pieces whose candidates are made: a part of hundreds is no part that was drawn
 _PERFECT = 0.985  # R from which on no other base is tried
-_TIE = 3e-4  # of the objective: of those that are as good, the plainest is taken
+_TIE = 3e-4, 30_000  # of the objective, with so many samples: of those that are as good, the plainest is taken
 _LOOKED, _OF_A_KIND = 40, 2  # candidates, by what they gain alone
 _RIVALS, _SHARE = 8, 0.25  # candidates that are tried with their copies, and their gain over the best's alone
 _BATCH = 64
@@ -65,6 +66,7 @@ class FeatureSearch:
     ) -> None:
         self.samples, self.alpha, self.checkpoint, self.told = samples, alpha, checkpoint, told
         self.most = min(most or _MOST, _MOST)
+        self.tie = _TIE[0] * math.sqrt(_TIE[1] / max(1, samples.near))
         self.limit = most or _MOST + _FOR_MENDING
         vertices, faces = shape.unit_mesh
         self.body = Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
@@ -136,7 +138,7 @@ class FeatureSearch:
             for gain, chosen, added in _various(rivals)
             if gain > max(0.0, _SHARE * rivals[0][0])
         ]
-        least = max((step.objective for step in steps), default=0.0) - _TIE
+        least = max((step.objective for step in steps), default=0.0) - self.tie
         good = [step for step in steps if step.objective >= least]
         plain = min(
             good, key=lambda step: (step.chosen.sides, isinstance(step.part.field, Swept)), default=None

@@ -152,6 +152,24 @@ def test_a_knob_is_turned() -> None:
     assert knob.translation[:2] == pytest.approx((0.1, 0.2), abs=1e-3)
 
 
+def on_the_axis(body: Manifold) -> set[float]:
+    """How much of the axis each candidate that is turned about z covers."""
+    found = [c.part for c in candidates(body, [np.eye(3)], holes=True)]
+    heights = np.column_stack([np.zeros((400, 2)), np.linspace(-1, 1, 400)])
+    turned = [part for part in found if isinstance(part.field, Cylinder | Revolution)]
+    return {round(float((part.distance(heights + (1e-4, 0, 0)) < 0).mean()), 1) for part in turned}
+
+
+def test_a_hole_across_a_shaft_leaves_no_dent_and_a_cavity_stays() -> None:
+    shaft = Manifold.cylinder(1.6, 0.3, circular_segments=48, center=True)
+    hole = Manifold.cylinder(2.0, 0.16, circular_segments=32, center=True).rotate((90, 0, 8))
+    cavity = Manifold.sphere(0.16, 48)
+    whole, dented = 0.8, 0.6
+    assert whole in on_the_axis(shaft - hole)
+    assert dented not in on_the_axis(shaft - hole)
+    assert on_the_axis(shaft - cavity) == {whole, dented}
+
+
 def test_round_holes_come_apart_by_size() -> None:
     holes = [
         circle(0.1, (-0.5, 0)),

@@ -26,6 +26,7 @@ _SAME = 0.03  # of the area
 _LEAST = 4e-4  # unit areas
 _MOST_PARTIAL = 4
 _CORE = 2e-3  # unit lengths: so near to the axis is at it
+_CROSSED = 1.3  # times the area that a cavity has along all planes, which a hole across has along some
 _SNAP = 0.012
 _DOMED = 3e-3  # unit lengths that an arc may move to become part of a sphere
 _OFFSET = 0.0137  # radians: no plane along faces
@@ -79,16 +80,27 @@ def turned(view: View, centre: np.ndarray) -> Iterator[Candidate]:
         yield from _partly(axis)
         return
     middle = sorted(halves, key=lambda half: half.area())[len(halves) // 2]
-    distinct: list[CrossSection] = []
-    for half in (middle, whole, shared):
-        alike = any((half - d).area() + (d - half).area() < _SAME * half.area() for d in distinct)
-        if half.area() > _LEAST and not alike:
-            distinct.append(half)
     solid = _solid_at_the_axis(whole)
-    for half in [*distinct, *([solid] if solid is not None else [])]:
+    found = [middle, whole, shared, *([solid] if solid is not None else [])]
+    if solid is not None and _is_crossed(solid, whole, shared):
+        found = [_solid_at_the_axis(middle) or middle, solid, shared]
+    distinct: list[CrossSection] = []
+    for half in found:
+        alike = any((half - d).area() + (d - half).area() < _SAME * half.area() for d in distinct)
+        if half is solid or (half.area() > _LEAST and not alike):
+            distinct.append(half)
+    for half in distinct:
         for region in half.decompose():
             if region.area() > 0.05 * half.area():
                 yield from _revolved(axis, region, 0.0, 2 * math.pi)
+
+
+def _is_crossed(solid: CrossSection, whole: CrossSection, shared: CrossSection) -> bool:
+    """Whether what is missing at the axis is a hole across it, which is wider along some planes through the
+    axis than along others, and not a cavity that is turned about it, too."""
+    hollow = solid - whole
+    wider = [piece for piece in (solid - shared).decompose() if not (piece ^ hollow).is_empty()]
+    return bool(sum(piece.area() for piece in wider) > _CROSSED * hollow.area())
 
 
 def _solid_at_the_axis(half: CrossSection) -> CrossSection | None:
