@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from partwright.approximation.sketches.bodies import bodies
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.candidates import candidates
-from partwright.approximation.sketches.directions import frames
+from partwright.approximation.sketches.directions import frames, long_axis
 from partwright.fields import Swept
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
@@ -42,7 +42,7 @@ _MOST = 24
 _FOR_MENDING = 10
 _MOST_LOOKED = 150  # pieces whose candidates are made: a part of hundreds is no part that was drawn
 _PERFECT = 0.985  # R from which on no other base is tried
-_TIE = 3e-4, 30_000  # of the objective, with so many samples: of those that are as good, the plainest is taken
+_TIE = 3e-4, 30_000  # of the objective, with so many samples: of what is as good, the plainest is taken
 _LOOKED, _OF_A_KIND = 40, 2  # candidates, by what they gain alone
 _RIVALS, _SHARE = 8, 0.25  # candidates that are tried with their copies, and their gain over the best's alone
 _BATCH = 64
@@ -89,7 +89,7 @@ class FeatureSearch:
             return None
         empty = FeatureTree(covered=np.zeros(len(self.inside), bool), missed=self.body)
         gains = self._gains(empty, own, True)
-        order = np.argsort(-gains)[:_BASES]
+        order = _bases(own, gains)
         best: FeatureTree | None = None
         others = [candidate for candidate in own if not candidate.cuts]
         for index in order:
@@ -179,11 +179,17 @@ class FeatureSearch:
         return self._of_piece[key]
 
     def _own_frames(self, piece: Manifold) -> list[NDArray[np.float64]]:
-        """The piece's own directions that are none of the whole's: of a small hole askew."""
+        """The piece's own directions that are none of the whole's: of a hole askew, of a slanted tooth."""
         mesh = piece.to_mesh64()
-        own = frames(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
-        known = np.array([frame[:, 2] for frame in self.frames])
-        return [frame for frame in own[:_OWN] if np.abs(known @ frame[:, 2]).max() < _ASKEW]
+        surface = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64)
+        along = long_axis(*surface)
+        own = frames(*surface)[:_OWN] + ([along] if along is not None else [])
+        kept: list[NDArray[np.float64]] = []
+        for frame in own:
+            known = np.array([other[:, 2] for other in (*self.frames, *kept)])
+            if np.abs(known @ frame[:, 2]).max() < _ASKEW:
+                kept.append(frame)
+        return kept
 
     def mask(self, candidate: Candidate) -> NDArray[np.float32]:
         """(N,) 1 at the samples within."""
@@ -223,6 +229,18 @@ class FeatureSearch:
         both = self.weights[covered & self.inside].sum(axis=0)
         either = self.weights[covered | self.inside].sum(axis=0)
         return float((both / np.maximum(either, 1e-9)).mean())
+
+
+def _bases(own: Sequence[Candidate], gains: NDArray[np.float64]) -> list[int]:
+    """The most promising, few of a kind: a gear may be an outline, or a disc with gaps between teeth."""
+    kept: list[int] = []
+    kinds: dict[str, int] = {}
+    for index in np.argsort(-gains).tolist():
+        kind = own[index].part.field.kind
+        kinds[kind] = kinds.get(kind, 0) + 1
+        if kinds[kind] <= _OF_A_KIND and len(kept) < _BASES:
+            kept.append(index)
+    return kept
 
 
 def _various(rivals: Sequence[tuple[float, Candidate, bool]]) -> list[tuple[float, Candidate, bool]]:

@@ -12,6 +12,7 @@ from partwright.assembly import Part, Similarity
 from partwright.assembly.motion import Motion
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Extrusion
+from partwright.meshing.csg import solid_of
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,15 @@ class FeatureTree:
             for part in feature.parts:
                 own = part.distance(points)
                 result = np.minimum(result, own) if feature.added else np.maximum(result, -own)
+        return result
+
+    def body(self, chord: float) -> Manifold:
+        """The fold itself, its chords off by a length at most."""
+        result = Manifold()
+        for feature in self.features:
+            for part in feature.parts:
+                whole = solid_of(part, chord)
+                result = result + whole if feature.added else result - whole
         return result
 
     def first(self, count: int) -> FeatureTree:

@@ -19,7 +19,8 @@ from partwright.assembly.motion import Motion
 Floats = NDArray[np.float64]
 Measure = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
-_ORDERS = range(12, 1, -1)
+_ORDERS = range(36, 1, -1)
+_ROUND = 12  # the largest order that is looked at where all are symmetries
 _ERROR = 1e-2  # unit lengths: mean distance from the surface to its image; each copy is looked at anyway
 _RIVAL, _NOISE = 2.0, 2e-4  # of the least error of an axis, and unit lengths, that another order may have
 _POINTS = 300
@@ -87,6 +88,8 @@ def _turns(axis: Floats, centre: Floats, points: Floats, measure: Measure) -> li
     errors = {n: _error(_turn(axis, n, 1, centre)(points), measure) for n in _ORDERS}
     limit = min(_ERROR, _RIVAL * min(errors.values()) + _NOISE)
     orders = [n for n, own in errors.items() if own < limit]
+    if len(orders) == len(_ORDERS):
+        orders = [n for n in orders if n <= _ROUND]
     largest = [n for n in orders if not any(other % n == 0 for other in orders if other > n)]
     return [_turn(axis, n, k, centre) for n in largest for k in range(1, n)]
 

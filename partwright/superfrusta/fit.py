@@ -19,6 +19,8 @@ from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.starting import starting_rows
 from partwright.superfrusta.symmetric_fit import RepeatedPart
 
+_DEARER = 2.0  # times the price of a feature, that a part of the search has beside it
+
 
 def fit(request: FitRequest[Settings]) -> Fitted:
     """Fits an assembly of SuperFrusta to a shape.
@@ -62,9 +64,7 @@ def fit(request: FitRequest[Settings]) -> Fitted:
             "can see. Check its thickness, or use --quality high"
         )
     leaves = search.leaves or [RepeatedPart(row) for row in search.best]
-    if features is not None and features.objective - features.off >= search.objective(
-        search.best, len(leaves)
-    ):
+    if features is not None and _preferred(features, search, len(leaves)):
         return Fitted(assembly(shape, features), outcome, search.seconds, search.history)
     whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
     whole = _with_locked(whole, request)
@@ -74,6 +74,14 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         one = assembled(step.rows, smaller=smaller)
         curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
     return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)))
+
+
+def _preferred(features: FeatureTree, search: ResidualFit, parts: int) -> bool:
+    """Whether features are the result, and not that many parts of the search, of which none says how it would
+    be drawn: there a part costs more than a feature does."""
+    assert search.best is not None
+    dear = (_DEARER - 1) * search.settings.alpha * parts
+    return features.objective - features.off >= search.objective(search.best, parts) - dear
 
 
 def _with_locked(whole: Assembly, request: FitRequest[Settings]) -> Assembly:

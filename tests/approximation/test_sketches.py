@@ -9,18 +9,21 @@ import pytest
 from manifold3d import CrossSection, Manifold
 
 from partwright.approximation.sketches.candidates import candidates
-from partwright.approximation.sketches.directions import frames
+from partwright.approximation.sketches.directions import frames, long_axis
 from partwright.approximation.sketches.ends import BEYOND, with_open_ends
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.approximation.sketches.open_sides import with_open_sides
 from partwright.approximation.sketches.outlines import fitted_loop
 from partwright.approximation.sketches.sections import profile_of
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.fields import Box, Cylinder, Extrusion, Revolution, Tube
+from partwright.fields import Box, Cylinder, Extrusion, Revolution, Sphere, Tube
 from partwright.fields.profile import Profile, circle, circle_of
 from partwright.meshing.named_solids import named_solid
 
 TOLERANCE = 4e-4
+
+
+HALF_TURN = Similarity(rotation=(0.0, 0.0, 0.0, 1.0))
 
 
 def chords(profile: Profile, count: int) -> np.ndarray:
@@ -155,9 +158,9 @@ def test_a_knob_is_turned() -> None:
 def on_the_axis(body: Manifold) -> set[float]:
     """How much of the axis each candidate that is turned about z covers."""
     found = [c.part for c in candidates(body, [np.eye(3)], holes=True)]
-    heights = np.column_stack([np.zeros((400, 2)), np.linspace(-1, 1, 400)])
+    heights = np.column_stack([np.full(400, 1e-4), np.zeros(400), np.linspace(-1, 1, 400)])
     turned = [part for part in found if isinstance(part.field, Cylinder | Revolution)]
-    return {round(float((part.distance(heights + (1e-4, 0, 0)) < 0).mean()), 1) for part in turned}
+    return {round(float((part.distance(heights) < 0).mean()), 1) for part in turned}
 
 
 def test_a_hole_across_a_shaft_leaves_no_dent_and_a_cavity_stays() -> None:
@@ -168,6 +171,38 @@ def test_a_hole_across_a_shaft_leaves_no_dent_and_a_cavity_stays() -> None:
     assert whole in on_the_axis(shaft - hole)
     assert dented not in on_the_axis(shaft - hole)
     assert on_the_axis(shaft - cavity) == {whole, dented}
+
+
+def test_a_thread_is_turned_at_its_mean_diameter() -> None:
+    """A disc with an eccentric hub, twisted many times, is as a thread: any half section is between two."""
+    rounds, steps, out = 6, 240, 0.03
+    circle_ = CrossSection.circle(0.4, 48).translate((out, 0.0))
+    thread = Manifold.extrude(circle_, 1.2, steps, 360.0 * rounds).translate((0, 0, -0.6))
+    found = [c.part.field for c in candidates(thread, [np.eye(3)], holes=True)]
+    radii = [max(x for x, _, _ in f.profile.outline) for f in found if isinstance(f, Revolution)]
+    radii += [f.radius for f in found if isinstance(f, Cylinder)]
+    assert min(abs(radius - 0.4) for radius in radii) < 0.005
+
+
+def test_a_twisted_gear_is_also_a_disc() -> None:
+    outline = [
+        ((0.55 if k % 4 < 2 else 0.7) * math.cos(a), (0.55 if k % 4 < 2 else 0.7) * math.sin(a))
+        for k, a in enumerate(np.arange(68) * (2 * math.pi / 68))
+    ]
+    gear = Manifold.extrude(CrossSection([outline]), 0.4, 20, 12.0)  # twisted: no section goes on
+    found = [c.part for c in candidates(gear, [np.eye(3)], holes=True)]
+    widths = [part.bounds()[1][0] for part in found if isinstance(part.field, Cylinder | Revolution)]
+    assert max(widths) == pytest.approx(0.7, abs=0.01)
+
+
+def test_a_long_piece_has_its_own_direction() -> None:
+    bar = Manifold.cube((0.1, 0.12, 1.0), True).rotate((20, 0, 0))
+    mesh = bar.to_mesh64()
+    frame = long_axis(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
+    assert frame is not None
+    assert abs(frame[:, 2] @ [0, -math.sin(math.radians(20)), math.cos(math.radians(20))]) > 0.9999
+    cube = Manifold.cube((1.0, 1.0, 1.2), True).to_mesh64()
+    assert long_axis(np.asarray(cube.vert_properties)[:, :3], np.asarray(cube.tri_verts, np.int64)) is None
 
 
 def test_round_holes_come_apart_by_size() -> None:
@@ -256,6 +291,38 @@ def test_open_sides_of_a_cut_move_out() -> None:
     assert isinstance(longer.field, Extrusion)
     assert longer.field.profile.area == pytest.approx(slot.field.profile.area + 0.4 * BEYOND)
     assert with_open_sides(Part(Box((0.2, 0.4, 0.2))), plate.distance) == Part(Box((0.2, 0.4, 0.2)))
+
+
+def test_an_arc_of_a_cut_moves_out_where_it_lies_in_the_air() -> None:
+    disc = Part(Cylinder(0.5, 0.2))
+    reach = math.sqrt(0.25 - 0.16)
+    bulge = math.tan(math.atan2(reach, 0.4) / 2)
+    flat = Part(Extrusion(Profile([(0.4, -reach, bulge), (0.4, reach)]), 0.3), instances=(HALF_TURN,))
+    cut = with_open_sides(flat, Assembly((disc, flat), "difference").distance)
+    assert len(cut.copies) == 2
+    low, high = cut.copies[0].bounds()
+    assert low[0] == pytest.approx(0.4, abs=1e-9)  # the flat stays where it was
+    assert high[0] == pytest.approx(0.5 + BEYOND, abs=1e-9)
+    walled = Assembly((disc, Part(Box((0.02, 1.0, 0.2)), (0.51, 0.0, 0.0))))
+    assert with_open_sides(flat, walled.distance) == flat
+
+
+def test_round_sides_of_a_turned_cut_move_out_where_they_lie_in_the_air() -> None:
+    ball = Part(Sphere(0.5))
+    rim = math.sqrt(0.25 - 0.04)  # where the ball is as high as the cut begins
+    bulge = math.tan(math.atan2(rim, 0.2) / 4)
+    cap = Part(Revolution(Profile([(0.0, 0.2), (rim, 0.2, bulge), (0.0, 0.5)])))
+    points = np.random.default_rng(0).uniform(-0.6, 0.6, (20000, 3))
+    cut = with_open_sides(cap, ball.distance)
+    assert isinstance(cut.field, Revolution)
+    assert cut.field.bounds()[1][2] == pytest.approx(0.5 + BEYOND, abs=1e-6)  # nothing is left of the cap
+    assert cut.field.bounds()[0][2] == pytest.approx(0.2, abs=1e-6)  # the floor stays where it was
+    within = ball.distance(points) < 0
+    left = within & (cut.distance(points) >= 0)
+    assert (left == (within & (points[:, 2] < 0.2))).all()
+    table = Part(Box((2.0, 2.0, 0.1)), (0.0, 0.0, 0.56))
+    joined = Assembly((ball, table))
+    assert with_open_sides(cap, joined.distance) == cap  # something is behind that side
 
 
 def test_a_bore_through_two_walls_is_one_and_bolt_holes_are_copies() -> None:

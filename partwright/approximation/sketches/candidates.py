@@ -28,6 +28,7 @@ _LEAST_SHARE = 0.01  # of the largest region's area
 _AXES = 2
 _LEAST_AXIS = 0.2  # of the area of all walls, that those about an axis have
 _NEAR_AXIS = 4e-3
+_BALANCED = 0.98  # of the largest second moment of a section's area, that the least has
 _MOST_SLABS = 10
 _ALL_RIM = 0.95  # of a slab's height
 
@@ -207,4 +208,26 @@ def _axes(view: View) -> list[np.ndarray]:
         found.append((total, sum((w * c for w, c in near), np.zeros(2)) / total))
     least = _LEAST_AXIS * (straight + sum(weight for weight, _ in votes))
     best = sorted(found, key=lambda f: -f[0])[:_AXES]
-    return [centre for weight, centre in best if weight > least]
+    axes = [centre for weight, centre in best if weight > least]
+    sections = [view.regions((low + high) / 2)[:1] for low, high in view.slabs]
+    largest = max((r for found in sections for r in found), key=lambda r: r.area, default=None)
+    about = _balance(largest) if largest is not None else None
+    if about is not None and all(math.dist(about, centre) > _NEAR_AXIS for centre in axes):
+        axes.append(about)
+    return axes
+
+
+def _balance(region: Region) -> np.ndarray | None:
+    """The centre (2,) of a section that is as long in any direction: of a gear. None of others."""
+    loops = [np.asarray(p, dtype=np.float64) for p in region.section.to_polygons()]
+    a = np.concatenate(loops)
+    b = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    area = float(cross.sum()) / 2
+    centre = ((a + b) * cross[:, None]).sum(axis=0) / (6 * area)
+    a, b = a - centre, b - centre
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    both = np.einsum("ni,nj->nij", a, a) + np.einsum("ni,nj->nij", b, b)
+    both = both + (np.einsum("ni,nj->nij", a, b) + np.einsum("ni,nj->nij", b, a)) / 2
+    short, long = np.linalg.eigvalsh((both * cross[:, None, None]).sum(axis=0) / 12)
+    return np.asarray(centre) if short > _BALANCED * long else None

@@ -12,6 +12,7 @@ _MOST = 4
 _CELL = 0.02
 _SQUARE = 1e-3  # cosine of directions that are square
 _BESIDE, _SAME_AS = math.cos(math.radians(8)), math.cos(math.radians(0.1))
+_ELONGATED = 2.0  # times as long as it is wide
 _SMOOTH = (math.radians(1.0), math.radians(40))  # turns from face to face on a round wall
 
 
@@ -32,6 +33,18 @@ def frames(vertices: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
     found = _clusters(votes, weights, _LEAST * float(area.sum()))[:_MOST]
     found = _with_square(found) or list(np.eye(3))
     return [_frame(direction, found) for direction in found]
+
+
+def long_axis(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray | None:
+    """The frame (3, 3), as of `frames`, along which a surface is much longer than across; None of others."""
+    corners = vertices[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    middle = corners.mean(axis=1)
+    off = middle - np.average(middle, axis=0, weights=area)
+    spread, axes = np.linalg.eigh(np.einsum("n,ni,nj->ij", area, off, off))
+    if spread[2] < _ELONGATED**2 * spread[1]:
+        return None
+    return _frame(_snapped(axes[:, 2]), [axes[:, 1]])
 
 
 def _round_axes(faces: np.ndarray, normal: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

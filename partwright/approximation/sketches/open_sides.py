@@ -7,25 +7,32 @@ from collections.abc import Callable
 
 import numpy as np
 
-from partwright.approximation.sketches.ends import BEYOND, STEPS
+from partwright.approximation.sketches.ends import BEYOND
+from partwright.approximation.sketches.open_turns import (
+    beside,
+    in_the_air,
+    with_grown_sides,
+    with_open_turns,
+)
 from partwright.assembly import Part
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import ParameterError
-from partwright.fields import Box, Extrusion
-from partwright.fields.profile import Corner, Profile
+from partwright.fields import Box, Extrusion, Field, Revolution
+from partwright.fields.profile import Corner, Profile, Side
 
-_ALONG, _UP = 9, 5  # points along a side, and levels, that are looked at
-_INSET = 0.04  # of a side's length, at its ends
+_UP = 5  # levels that are looked at
 _SLANT = 0.4  # sine of the least angle between a side and one that it is moved along
 
 
 def with_open_sides(part: Part, distance: Callable[[np.ndarray], np.ndarray]) -> Part:
-    """The cut with straight sides of its outline moved out where there is nothing behind them, for any copy.
+    """The cut with sides of its outline moved out where there is nothing behind them, for any copy.
 
-    distance: (N,) of the shape at points (N, 3), unit lengths like the part, negative inside. A box or an
-    extrusion without taper; others stay as they are.
+    distance: (N,) of the shape at points (N, 3), unit lengths like the part, negative inside. A box, an
+    extrusion without taper, or a revolution; others stay as they are.
     """
     field = part.field
+    if isinstance(field, Revolution):
+        return with_open_turns(part, field, distance)
     if isinstance(field, Box):
         x, y, height = field.size
         profile = Profile.rectangle(x, y)
@@ -33,43 +40,52 @@ def with_open_sides(part: Part, distance: Callable[[np.ndarray], np.ndarray]) ->
         profile, height = field.profile, field.height
     else:
         return part
-    corners = [np.array(corner) for corner in profile.outline]
-    open_ = [
-        not corner[2] and _is_open(part, profile, i, height, distance) for i, corner in enumerate(corners)
-    ]
+    levels = np.linspace(-0.48, 0.48, _UP) * height
+
+    def is_open(side: Side) -> bool:
+        flat = beside(side)
+        local = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in levels])
+        return in_the_air(local, part, distance)
+
+    sides = profile.sides[0]
+    open_ = [is_open(side) for side in sides]
     if not any(open_):
         return part
+    if isinstance(field, Extrusion) and any(o and side.bulge for o, side in zip(open_, sides, strict=True)):
+        which = {side for o, side in zip(open_, sides, strict=True) if o}
+        grown = with_grown_sides(part, field, which.__contains__, distance)
+        if grown is not part:
+            return centred(grown)
+        open_ = [o and not side.bulge for o, side in zip(open_, sides, strict=True)]
+        if not any(open_):
+            return part
+    corners = [np.array(corner) for corner in profile.outline]
     try:
         moved = Profile(_moved(corners, open_), profile.holes)
     except ParameterError:
         return part
-    lower, upper = moved.bounds()
-    middle = (lower + upper) / 2
-    frame = rotation_matrix(part.rotation)
-    x, y, z = (np.array(part.translation) + frame[:, :2] @ middle).tolist()
     if isinstance(field, Box):
+        lower, upper = moved.bounds()
         width, depth = (upper - lower).tolist()
-        return dataclasses.replace(part, field=Box((width, depth, height)), translation=(x, y, z))
+        return _shifted(part, Box((width, depth, height)), (lower + upper) / 2)
     try:
-        centred = dataclasses.replace(field, profile=moved.moved(-middle))
+        return centred(dataclasses.replace(part, field=dataclasses.replace(field, profile=moved)))
     except ParameterError:  # its rims have no room there
         return part
-    return dataclasses.replace(part, field=centred, translation=(x, y, z))
 
 
-def _is_open(
-    part: Part, profile: Profile, side: int, height: float, distance: Callable[[np.ndarray], np.ndarray]
-) -> bool:
-    start, end = (np.array(profile.outline[k % len(profile.outline)][:2]) for k in (side, side + 1))
-    share = np.linspace(_INSET, 1 - _INSET, _ALONG)
-    levels = np.linspace(-0.48, 0.48, _UP) * height
-    outwards = _outwards(start, end)
-    flat = np.concatenate([start + share[:, None] * (end - start) + step * outwards for step in STEPS])
-    local = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in levels])
-    return all(
-        bool((distance(local @ rotation_matrix(copy.rotation).T + copy.translation) > 0).all())
-        for copy in part.copies
-    )
+def centred(part: Part) -> Part:
+    """The same extrusion with its profile about the part's place."""
+    assert isinstance(part.field, Extrusion)
+    lower, upper = part.field.profile.bounds()
+    middle = (lower + upper) / 2
+    profile = part.field.profile.moved(-middle)
+    return _shifted(part, dataclasses.replace(part.field, profile=profile), middle)
+
+
+def _shifted(part: Part, field: Field, by: np.ndarray) -> Part:
+    x, y, z = (np.array(part.translation) + rotation_matrix(part.rotation)[:, :2] @ by).tolist()
+    return dataclasses.replace(part, field=field, translation=(x, y, z))
 
 
 def _outwards(start: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -27,6 +27,8 @@ _LEAST = 4e-4  # unit areas
 _MOST_PARTIAL = 4
 _CORE = 2e-3  # unit lengths: so near to the axis is at it
 _CROSSED = 1.3  # times the area that a cavity has along all planes, which a hole across has along some
+_EVEN = 0.98  # of what any half section has, that all of them have
+_WAVES = 4e-3  # unit lengths: waves of a mean half section, of which there are nine
 _SNAP = 0.012
 _DOMED = 3e-3  # unit lengths that an arc may move to become part of a sphere
 _OFFSET = 0.0137  # radians: no plane along faces
@@ -81,9 +83,13 @@ def turned(view: View, centre: np.ndarray) -> Iterator[Candidate]:
         return
     middle = sorted(halves, key=lambda half: half.area())[len(halves) // 2]
     solid = _solid_at_the_axis(whole)
-    found = [middle, whole, shared, *([solid] if solid is not None else [])]
+    found = [middle, whole, shared]
+    if shared.area() < _EVEN * whole.area():
+        found.insert(0, _mean(axis))
     if solid is not None and _is_crossed(solid, whole, shared):
-        found = [_solid_at_the_axis(middle) or middle, solid, shared]
+        found = [_solid_at_the_axis(half) or half for half in found]
+    if solid is not None:
+        found.append(solid)
     distinct: list[CrossSection] = []
     for half in found:
         alike = any((half - d).area() + (d - half).area() < _SAME * half.area() for d in distinct)
@@ -93,6 +99,19 @@ def turned(view: View, centre: np.ndarray) -> Iterator[Candidate]:
         for region in half.decompose():
             if region.area() > 0.05 * half.area():
                 yield from _revolved(axis, region, 0.0, 2 * math.pi)
+
+
+def _mean(axis: Axis) -> CrossSection:
+    """What most half sections have: of a thread, up to its mean diameter."""
+    step = 2 * math.pi / 9
+    halves = [axis.halves(k * step + _OFFSET)[0] for k in range(9)]
+    thirds = [_most(*halves[k::3]) for k in range(3)]
+    return _most(*thirds).simplify(_WAVES)
+
+
+def _most(a: CrossSection, b: CrossSection, c: CrossSection) -> CrossSection:
+    """What two of three have."""
+    return (a ^ b) + (c ^ (a + b))
 
 
 def _is_crossed(solid: CrossSection, whole: CrossSection, shared: CrossSection) -> bool:
