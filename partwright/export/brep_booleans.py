@@ -23,18 +23,17 @@ _LOST = 1e-4  # of the larger volume: what an operation may lose by rounding
 _FUZZY = (0.0, 1e-4, 1e-3, 3e-3)  # tolerances of operations, of the cube root of the largest volume
 _RIGHT = 1e-3  # share of the volume: as close as meshes are that it is compared with
 _ACCEPTED = 5e-3  # the closest of all results may be this far off
-_ORDERS = 4  # of operands, beside the given one and its reverse
 _MOVES = (2e-4, 1e-3)  # of the cube root of the largest volume: what operands move by at last
 _DIRECTIONS = 2
 
 
 def operated(
-    operation: str, solids: Sequence[TopoDS_Shape], right: float | None, label: str
+    operation: str, solids: Sequence[TopoDS_Shape], right: float | None, label: str, move: bool = False
 ) -> tuple[TopoDS_Shape, float]:
     """The union, difference or intersection of the solids, and how far some of them were moved for it: as a
     length, 0 but where nothing else goes.
 
-    right: its volume, where it is known.
+    right: its volume, where it is known. move: whether they may move, where that is known.
 
     Raises:
         NoSurfaceError: no way gives a valid solid of that volume.
@@ -45,7 +44,7 @@ def operated(
     if found is not None:
         return found, 0.0
     scale = max(volume_and_area(solid)[0] for solid in solids) ** (1 / 3)
-    for distance in (share * scale for share in _MOVES) if right is not None else ():
+    for distance in (share * scale for share in _MOVES) if move and right is not None else ():
         found = _closest(_moved_results(operation, solids, distance), right)
         if found is not None:
             return found, distance
@@ -104,18 +103,6 @@ def _results(operation: str, solids: Sequence[TopoDS_Shape]) -> Iterator[TopoDS_
             return
     for fuzzy in fuzzies:
         yield from filter(possible, [_one_by_one(operation, solids, fuzzy)])
-    for order in _orders(operation, len(solids)):
-        yield from filter(possible, [_one_by_one(operation, [solids[i] for i in order], 0.0)])
-
-
-def _orders(operation: str, count: int) -> Iterator[list[int]]:
-    """Other orders of the solids; the first of a difference stays."""
-    first = int(operation == "difference")
-    if count - first < 2:
-        return
-    yield [*range(first), *range(count - 1, first - 1, -1)]
-    for seed in range(_ORDERS):
-        yield [*range(first), *(first + np.random.default_rng(seed).permutation(count - first)).tolist()]
 
 
 def _one_by_one(operation: str, solids: Sequence[TopoDS_Shape], fuzzy: float) -> TopoDS_Shape | None:

@@ -19,8 +19,10 @@ CHORD = 1 / 400  # of the longest side: how far facets may lie from the surface
 SHORTEST = 1e-4  # of the longest side: shorter edges are collapsed, which OpenCASCADE would stumble over
 
 
-def faceted(node: Node) -> TopoDS_Shape:
+def faceted(node: Node, fine: bool = False) -> TopoDS_Shape:
     """The exact mesh of a node of quadrics and named solids, its triangles sewn into a solid.
+
+    fine: facets as near to the surface, by the node's shortest side.
 
     Raises:
         NoSurfaceError: nothing is left of the node, or its triangles do not close.
@@ -36,8 +38,10 @@ def faceted(node: Node) -> TopoDS_Shape:
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopoDS import TopoDS
 
-    longest = float(np.ptp(np.array(node.bounds()), axis=0).max())
-    places, triangles = surface_of(solid_of(node, CHORD * longest).simplify(SHORTEST * longest))
+    sides = np.ptp(np.array(node.bounds()), axis=0)
+    longest = float(sides.max())
+    chord = CHORD * float(sides.min() if fine else longest)
+    places, triangles = surface_of(solid_of(node, chord).simplify(SHORTEST * longest))
     sewing = BRepBuilderAPI_Sewing(SHORTEST / 10 * longest)
     for triangle in triangles:
         outline = BRepBuilderAPI_MakePolygon(*(gp_Pnt(*places[i].tolist()) for i in triangle), True)

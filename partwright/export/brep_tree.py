@@ -42,8 +42,9 @@ def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
     """The node's solids, of `built` fields, joined by the boolean operations of its tree.
 
     ball: holds all of the node; quadrics that do not end are closed off outside of it.
-    made: learns of what OpenCASCADE gets wrong. What it cannot unite stays a solid of its own, as long as
-    that hardly overlaps the rest; where an operation fails, flat facets of its exact mesh stand for it.
+    made: learns of what OpenCASCADE gets wrong. Flat facets stand for what it cannot join; what it cannot
+    unite even so stays a solid of its own, as long as that hardly overlaps the rest, and where an operation
+    fails for good, facets of its exact mesh stand for all of it.
 
     Raises:
         NoSurfaceError: the operations leave nothing, or OpenCASCADE cannot do them, nor has the node an exact
@@ -76,38 +77,99 @@ def _combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
     ]
     right = _exact_volume(node)
     try:
-        solid, distance = operated(node.operation, solids, right, _label(node))
-        result = _unified(node, solid)
-        if distance:
-            made.moved.append(([part.name for part in node.parts], distance))
-        return result
+        solid, _ = operated(node.operation, solids, right, _label(node))
+        return _unified(node, solid)
     except NoSurfaceError:
-        if not united:
-            raise
-    return _joined(node, solids, right, made)
+        return _unified(node, _stepwise(node, solids, right, made))
 
 
-def _joined(
+def _stepwise(
     node: Assembly, solids: Sequence[TopoDS_Shape], right: float | None, made: Compromises
 ) -> TopoDS_Shape:
-    """A union of all that can be united; the rest stays beside it, as long as that hardly overlaps."""
-    result, left, joined = solids[0], [], [node.children[0]]
-    for child, solid in zip(node.children[1:], solids[1:], strict=True):
-        so_far = _exact_volume(Assembly((*joined, child))) if right is not None else None
-        try:
-            result, distance = operated("union", (result, solid), so_far, _label(child))
-        except NoSurfaceError:
-            left.append(solid)
-            made.apart.append(child.name or _label(child))
-            continue
+    """One operand after another, each checked by itself, so that what one fails at costs no other.
+
+    Those that fail are tried again when all others are there, then moved a little, then as flat facets; what
+    no union takes then stands beside it, without what that holds already.
+
+    Raises:
+        NoSurfaceError: a difference or an intersection fails for one, or too much of a union would overlap.
+    """
+    result, joined = solids[0], [node.children[0]]
+    waiting = list(zip(node.children[1:], solids[1:], strict=True))
+    for way in (_as_it_is, _as_it_is, _moved_a_little, _as_facets):
+        failed = []
+        for child, solid in waiting:
+            so_far = Assembly((*joined, child), node.operation)
+            volume = _exact_volume(so_far) if right is not None else None
+            try:
+                result = way(so_far, (result, solid), volume, made)
+                joined.append(child)
+            except NoSurfaceError:
+                failed.append((child, solid))
+        if not failed:
+            return result
+        waiting = failed
+    if node.operation != "union":
+        raise NoSurfaceError(
+            f"OpenCASCADE fails at the {node.operation} of {_label(node)}; move its parts a little"
+        )
+    whole = [result]
+    for child, solid in waiting:
+        whole.append(_rest(child, solid, joined, result, right is not None, made))
         joined.append(child)
-        if distance:
-            made.moved.append(([part.name for part in child.parts], distance))
-    whole = [_unified(node, result), *left]
     volume = sum(volume_and_area(one)[0] for one in whole)
     if right is not None and not (1 - _SAME_MESH) * right < volume < (1 + _OVERLAP) * right:
         raise NoSurfaceError(f"OpenCASCADE fails at the union of {_label(node)}; move its parts a little")
     return _side_by_side(whole)
+
+
+def _rest(
+    child: Node,
+    solid: TopoDS_Shape,
+    joined: Sequence[Node],
+    result: TopoDS_Shape,
+    known: bool,
+    made: Compromises,
+) -> TopoDS_Shape:
+    """What of a child of a union the others do not hold, to stand beside them; or all of it."""
+    made.apart.append(child.name or _label(child))
+    rest = Assembly((child, *joined), "difference")
+    if not known:
+        return solid
+    with suppress(NoSurfaceError):
+        return operated("difference", (solid, result), _exact_volume(rest), _label(child))[0]
+    with suppress(NoSurfaceError):
+        whole = faceted(rest, fine=True)
+        made.faceted += [part.name for part in child.parts]
+        return whole
+    return solid
+
+
+def _as_it_is(
+    node: Assembly, pair: tuple[TopoDS_Shape, TopoDS_Shape], volume: float | None, _: Compromises
+) -> TopoDS_Shape:
+    """What is there and the last child of a node, joined by its operation."""
+    return operated(node.operation, pair, volume, _label(node.children[-1]))[0]
+
+
+def _moved_a_little(
+    node: Assembly, pair: tuple[TopoDS_Shape, TopoDS_Shape], volume: float | None, made: Compromises
+) -> TopoDS_Shape:
+    child = node.children[-1]
+    result, distance = operated(node.operation, pair, volume, _label(child), move=True)
+    made.moved.append(([part.name for part in child.parts], distance))
+    return result
+
+
+def _as_facets(
+    node: Assembly, pair: tuple[TopoDS_Shape, TopoDS_Shape], volume: float | None, made: Compromises
+) -> TopoDS_Shape:
+    child = node.children[-1]
+    if not has_exact_mesh(child) or not np.isfinite(child.bounds()).all():
+        raise NoSurfaceError(f"{_label(child)} has no exact mesh")
+    result, _ = operated(node.operation, (pair[0], faceted(child, fine=True)), volume, _label(child))
+    made.faceted += [part.name for part in child.parts]
+    return result
 
 
 def _exact_volume(node: Assembly) -> float | None:

@@ -47,6 +47,7 @@ _LOOKED, _OF_A_KIND = 40, 2  # candidates, by what they gain alone
 _RIVALS, _SHARE = 8, 0.25  # candidates that are tried with their copies, and their gain over the best's alone
 _BATCH = 64
 _OWN, _ASKEW = 2, 0.9995  # directions of a piece, and the cosine to others that a new one has at most
+_ALIKE = 0.6  # IoU of a piece and what is drawn along it where no face says so
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
@@ -175,21 +176,28 @@ class FeatureSearch:
         if key not in self._of_piece:
             if len(self._of_piece) >= _MOST_LOOKED:
                 return []
-            self._of_piece[key] = candidates(piece, [*self.frames, *self._own_frames(piece)], holes=True)
+            own, along = self._own_frames(piece)
+            slanted = candidates(piece, along, holes=True)
+            self._of_piece[key] = [
+                *candidates(piece, [*self.frames, *own], holes=True),
+                *(candidate for candidate in slanted if _stands_for(candidate, piece)),
+            ]
         return self._of_piece[key]
 
-    def _own_frames(self, piece: Manifold) -> list[NDArray[np.float64]]:
-        """The piece's own directions that are none of the whole's: of a hole askew, of a slanted tooth."""
+    def _own_frames(self, piece: Manifold) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+        """The piece's own directions that are none of the whole's, of a hole askew, and that in which it is
+        long, of a slanted tooth."""
         mesh = piece.to_mesh64()
         surface = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64)
+        known = [frame[:, 2] for frame in self.frames]
+
+        def news(found: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+            return [f for f in found if np.abs(np.array(known) @ f[:, 2]).max() < _ASKEW]
+
+        own = news(frames(*surface)[:_OWN])
+        known += [frame[:, 2] for frame in own]
         along = long_axis(*surface)
-        own = frames(*surface)[:_OWN] + ([along] if along is not None else [])
-        kept: list[NDArray[np.float64]] = []
-        for frame in own:
-            known = np.array([other[:, 2] for other in (*self.frames, *kept)])
-            if np.abs(known @ frame[:, 2]).max() < _ASKEW:
-                kept.append(frame)
-        return kept
+        return own, news([along] if along is not None else [])
 
     def mask(self, candidate: Candidate) -> NDArray[np.float32]:
         """(N,) 1 at the samples within."""
@@ -231,16 +239,19 @@ class FeatureSearch:
         return float((both / np.maximum(either, 1e-9)).mean())
 
 
+def _stands_for(candidate: Candidate, piece: Manifold) -> bool:
+    """Whether a candidate along no direction of a face is about the same body as the piece."""
+    body = candidate.make(0.0)
+    both = float((body ^ piece).volume())
+    return both > _ALIKE * (float(body.volume()) + float(piece.volume()) - both)
+
+
 def _bases(own: Sequence[Candidate], gains: NDArray[np.float64]) -> list[int]:
-    """The most promising, few of a kind: a gear may be an outline, or a disc with gaps between teeth."""
-    kept: list[int] = []
-    kinds: dict[str, int] = {}
-    for index in np.argsort(-gains).tolist():
-        kind = own[index].part.field.kind
-        kinds[kind] = kinds.get(kind, 0) + 1
-        if kinds[kind] <= _OF_A_KIND and len(kept) < _BASES:
-            kept.append(index)
-    return kept
+    """The most promising, and the best of another kind: a gear may be an outline, or a disc with gaps."""
+    order = np.argsort(-gains).tolist()
+    kinds = {own[index].part.field.kind for index in order[:_BASES]}
+    other = next((index for index in order if own[index].part.field.kind not in kinds), None)
+    return order[:_BASES] if other is None else [*order[: _BASES - 1], other]
 
 
 def _various(rivals: Sequence[tuple[float, Candidate, bool]]) -> list[tuple[float, Candidate, bool]]:

@@ -20,6 +20,7 @@ from partwright.methods import Checkpoint, FitRequest, Progress
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_groups import grouped
 from partwright.superfrusta.feature_pockets import with_pockets
+from partwright.superfrusta.feature_pruning import pruned
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, image_of
 from partwright.superfrusta.samples import FitSamples
@@ -63,6 +64,8 @@ def feature_tree(
     search = FeatureSearch(request.shape, samples, settings.alpha, checkpoint, settings.max_parts, told)
     try:
         tree = search.run()
+        if tree is not None and settings.min_iou is None:
+            tree = pruned(search, tree)
         if tree is not None:
             seen.append(tree)
             report(tree, _SHARE)

@@ -21,7 +21,7 @@ from partwright.errors import (
     SettingError,
     UnreadableFileError,
 )
-from partwright.export import brep_booleans, export
+from partwright.export import brep_booleans, brep_tree, export
 from partwright.fields import Box, Cylinder, Extrusion, Field, Revolution, Sphere, SuperFrustum, Tube
 from partwright.fields.profile import Profile
 from partwright.meshing import mesh_csg, mesh_part
@@ -194,8 +194,39 @@ def test_what_cannot_be_joined_moves_a_hair(tmp_path: Path, monkeypatch: pytest.
     assert volume / 1e3 == pytest.approx(8 + math.pi / 2, rel=1e-3)
     assert set(kinds) == {"Plane", "Cylinder"}
     (change,) = json.loads((tmp_path / "a.step.report.json").read_text())["approximated"]
-    assert change["parts"] == ["box", "pin"]
+    assert change["parts"] == ["pin"]
     assert change["max_deviation"] == pytest.approx(2e-4 * 2, rel=1e-6)
+
+
+@pytest.mark.parametrize("operation", ["union", "difference"])
+def test_what_fails_for_one_part_costs_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, operation: Any
+) -> None:
+    """As where OpenCASCADE unites or cuts all but the pin, which it takes as facets in a cut at most."""
+    operated = brep_tree.operated
+
+    def without_pins(kind: str, solids: Any, right: Any, label: str, move: bool = False) -> Any:
+        whole_pin = label == "'pin'" and kind == operation and (operation == "union" or not faceted)
+        if len(solids) > 2 or whole_pin:
+            raise NoSurfaceError("fails")
+        return operated(kind, solids, right, label, move)
+
+    faceted: list[Any] = []
+    facets = brep_tree.faceted
+    monkeypatch.setattr(brep_tree, "faceted", lambda node, fine: faceted.append(node) or facets(node, fine))
+    monkeypatch.setattr(brep_tree, "operated", without_pins)
+    parts = (
+        Part(Box((2, 2, 2)), name="box"),
+        Part(Cylinder(0.5, 4), name="pin"),
+        Part(Box((1, 1, 1)), (1, 0, 0), name="side"),
+    )
+    tree = Assembly(parts, operation, unit="cm")
+    export(tree, tmp_path / "a.step")
+    volume, kinds = read_back(tmp_path / "a.step")
+    assert volume / 1e3 == pytest.approx(mesh_csg(tree).volume, rel=4e-3)  # facets
+    (change,) = json.loads((tmp_path / "a.step.report.json").read_text())["approximated"]
+    assert change["parts"] == ["pin"]
+    assert set(kinds) == ({"Plane", "Cylinder"} if operation == "union" else {"Plane"})
 
 
 def test_an_outline_that_touches_itself_is_moved_a_hair_apart(tmp_path: Path) -> None:

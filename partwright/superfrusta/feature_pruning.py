@@ -1,0 +1,73 @@
+"""Features that no longer pay, when all are there: later ones may have made earlier ones vain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.superfrusta.feature_mending import FAR
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
+
+if TYPE_CHECKING:
+    from partwright.superfrusta.feature_search import FeatureSearch
+
+_CHORD = 1e-3  # unit lengths: how far chords of the fold may be off
+_FURTHER = 1e-3  # unit lengths, by which a place that is far off may be further off
+
+
+def pruned(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
+    """The tree without features that explain less than their price, the vainest first.
+
+    None goes without which a place is more than `FAR` off that was not before. What is missed and what is
+    too much are those of the tree as given.
+    """
+    if len(tree.features) < 2:
+        return tree
+    masks = [_mask(feature, search.points) for feature in tree.features]
+    kept = list(range(len(tree.features)))
+    off = max(FAR, farthest_corner(search, tree)) + _FURTHER
+    needed: set[int] = set()
+    score = search.score_of(_fold(tree, masks, kept))
+    while True:
+        tried = [i for i in kept[1:] if i not in needed and tree.features[i].sides]
+        scores = {i: search.score_of(_fold(tree, masks, [k for k in kept if k != i])) for i in tried}
+        gains = {i: scores[i] - score + search.price(tree.features[i].sides) for i in tried}
+        vain = max(gains, key=gains.__getitem__, default=None)
+        if vain is None or gains[vain] <= 0:
+            break
+        left = [k for k in kept if k != vain]
+        if farthest_corner(search, _only(tree, left)) > off:
+            needed.add(vain)
+            continue
+        kept, score = left, scores[vain]
+    if len(kept) == len(tree.features):
+        return tree
+    return replace(search.scored(_only(tree, kept)), off=tree.off, objectives=tree.objectives)
+
+
+def farthest_corner(search: FeatureSearch, tree: FeatureTree) -> float:
+    """How far a corner of the fold lies outside of the shape, or one of what it lacks outside of the fold."""
+    fold = tree.body(_CHORD)
+    lacking = search.body - fold
+    outside, missed = (np.asarray(body.to_mesh().vert_properties)[:, :3] for body in (fold, lacking))
+    sticking = search.samples.measure(outside.astype(np.float32)).max(initial=0.0)
+    return float(max(sticking, tree.distance(missed.astype(np.float32)).max(initial=0.0)))
+
+
+def _only(tree: FeatureTree, kept: list[int]) -> FeatureTree:
+    return replace(tree, features=[tree.features[k] for k in kept])
+
+
+def _mask(feature: Feature, points: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """(N,) whether points (N, 3) lie within a feature, its copies and its image."""
+    return np.any([covers(part, points) for part in feature.parts], axis=0)
+
+
+def _fold(tree: FeatureTree, masks: list[NDArray[np.bool_]], kept: list[int]) -> NDArray[np.bool_]:
+    covered = np.zeros(len(masks[0]), bool)
+    for k in kept:
+        covered = covered | masks[k] if tree.features[k].added else covered & ~masks[k]
+    return covered
