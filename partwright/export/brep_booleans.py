@@ -28,23 +28,29 @@ _DIRECTIONS = 2
 
 
 def operated(
-    operation: str, solids: Sequence[TopoDS_Shape], right: float | None, label: str, move: bool = False
+    operation: str,
+    solids: Sequence[TopoDS_Shape],
+    right: float | None,
+    label: str,
+    move: bool = False,
+    rough: bool = False,
 ) -> tuple[TopoDS_Shape, float]:
     """The union, difference or intersection of the solids, and how far some of them were moved for it: as a
     length, 0 but where nothing else goes.
 
-    right: its volume, where it is known. move: whether they may move, where that is known.
+    right: its volume, where it is known. move: whether they may move, where that is known. rough: with wider
+    tolerances and further moves from the first on, where the least ones left slivers.
 
     Raises:
         NoSurfaceError: no way gives a valid solid of that volume.
     """
     if len(solids) == 1:
         return solids[0], 0.0
-    found = _closest(_results(operation, solids), right)
+    found = _closest(_results(operation, solids, _FUZZY[rough:]), right)
     if found is not None:
         return found, 0.0
     scale = max(volume_and_area(solid)[0] for solid in solids) ** (1 / 3)
-    for distance in (share * scale for share in _MOVES) if move and right is not None else ():
+    for distance in (share * scale for share in _MOVES[rough:]) if move and right is not None else ():
         found = _closest(_moved_results(operation, solids, distance), right)
         if found is not None:
             return found, distance
@@ -83,10 +89,12 @@ def _moved_results(operation: str, solids: Sequence[TopoDS_Shape], distance: flo
             yield result
 
 
-def _results(operation: str, solids: Sequence[TopoDS_Shape]) -> Iterator[TopoDS_Shape]:
+def _results(
+    operation: str, solids: Sequence[TopoDS_Shape], tolerances: Sequence[float]
+) -> Iterator[TopoDS_Shape]:
     """Valid results of volumes that they can have."""
     volumes = [volume_and_area(solid)[0] for solid in solids]
-    fuzzies = [tolerance * max(volumes) ** (1 / 3) for tolerance in _FUZZY]
+    fuzzies = [tolerance * max(volumes) ** (1 / 3) for tolerance in tolerances]
     low, high = {
         "union": (max(volumes), sum(volumes)),
         "difference": (volumes[0] - sum(volumes[1:]), volumes[0]),

@@ -31,8 +31,9 @@ _SAME_MESH = 5e-3  # share of the volume by which what stands for an exact mesh 
 @dataclass
 class Compromises:
     """Names of what OpenCASCADE could not do: `apart`, united with the rest; `faceted`, built at all;
-    `moved`, joined where it was, and how far it moved."""
+    `moved`, joined where it was, and how far it moved. rough: whether tolerances are wide at once."""
 
+    rough: bool = False
     apart: list[str] = field(default_factory=list)
     faceted: list[str] = field(default_factory=list)
     moved: list[tuple[list[str], float]] = field(default_factory=list)
@@ -50,7 +51,7 @@ def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
         NoSurfaceError: the operations leave nothing, or OpenCASCADE cannot do them, nor has the node an exact
             mesh.
     """
-    within = Compromises()
+    within = Compromises(made.rough)
     try:
         solid = _combined(node, ball, within)
     except NoSurfaceError as error:
@@ -60,7 +61,7 @@ def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
             solid = faceted(node)
         except NoSurfaceError:
             raise error from None
-        within = Compromises(faceted=[part.name for part in node.parts])
+        within = Compromises(made.rough, faceted=[part.name for part in node.parts])
     made.apart += within.apart
     made.faceted += within.faceted
     made.moved += within.moved
@@ -77,7 +78,7 @@ def _combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
     ]
     right = _exact_volume(node)
     try:
-        solid, _ = operated(node.operation, solids, right, _label(node))
+        solid, _ = operated(node.operation, solids, right, _label(node), rough=made.rough)
         return _unified(node, solid)
     except NoSurfaceError:
         return _unified(node, _stepwise(node, solids, right, made))
@@ -146,17 +147,17 @@ def _rest(
 
 
 def _as_it_is(
-    node: Assembly, pair: tuple[TopoDS_Shape, TopoDS_Shape], volume: float | None, _: Compromises
+    node: Assembly, pair: tuple[TopoDS_Shape, TopoDS_Shape], volume: float | None, made: Compromises
 ) -> TopoDS_Shape:
     """What is there and the last child of a node, joined by its operation."""
-    return operated(node.operation, pair, volume, _label(node.children[-1]))[0]
+    return operated(node.operation, pair, volume, _label(node.children[-1]), rough=made.rough)[0]
 
 
 def _moved_a_little(
     node: Assembly, pair: tuple[TopoDS_Shape, TopoDS_Shape], volume: float | None, made: Compromises
 ) -> TopoDS_Shape:
     child = node.children[-1]
-    result, distance = operated(node.operation, pair, volume, _label(child), move=True)
+    result, distance = operated(node.operation, pair, volume, _label(child), True, made.rough)
     made.moved.append(([part.name for part in child.parts], distance))
     return result
 
@@ -189,6 +190,7 @@ def _unified(node: Assembly, solid: TopoDS_Shape) -> TopoDS_Shape:
     Raises:
         NoSurfaceError: nothing is left.
     """
+    from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
@@ -197,7 +199,8 @@ def _unified(node: Assembly, solid: TopoDS_Shape) -> TopoDS_Shape:
         unify = ShapeUpgrade_UnifySameDomain(solid, True, True, False)
         with suppress(*opencascade_errors()):  # then the faces stay several
             unify.Build()
-            solid = unify.Shape()
+            if BRepCheck_Analyzer(unify.Shape()).IsValid() or not BRepCheck_Analyzer(solid).IsValid():
+                solid = unify.Shape()
     if not TopExp_Explorer(solid, TopAbs_ShapeEnum.TopAbs_SOLID).More():
         raise NoSurfaceError(f"nothing to export: the {node.operation} of {_label(node)} is empty")
     return solid

@@ -58,12 +58,22 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
         names = [assembly.name or Path(path).stem]
     ball, made = Ball.around(scaled), Compromises()
     solids = [combined(child, ball, made) for child in children]
-    document = _document(list(zip(names, solids, strict=True)))
     with replacing(path) as temporary:
-        _write(document, temporary, unit or "mm", Path(path))
+        _write(_document(list(zip(names, solids, strict=True))), temporary, unit or "mm", Path(path))
+        if not _reads_valid(temporary):  # slivers that the file's digits lose
+            again = Compromises(rough=True)
+            solids = [combined(child, ball, again) for child in children]
+            spare = temporary.with_name(f"{temporary.name}.again")
+            try:
+                _write(_document(list(zip(names, solids, strict=True))), spare, unit or "mm", Path(path))
+                if _reads_valid(spare):
+                    made = again
+                    spare.replace(temporary)
+            finally:
+                spare.unlink(missing_ok=True)
     notes = [] if unit else ["the length unit is unknown: the file says millimetres"]
     if made.apart:
-        overlap = "it overlaps the rest: the union failed"
+        overlap = "it stands beside the rest: the union failed"
         changes.append(Change(tuple(made.apart), "a solid of its own", note=overlap))
     for moved, distance in made.moved:
         note = "they nearly touch: some are moved by this much to be joined"
@@ -72,6 +82,18 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
         wrong = "OpenCASCADE gets their boolean operations wrong"
         changes.append(Change(tuple(made.faceted), "flat facets", note=wrong))
     write_report(assembly, path, changes, notes)
+
+
+def _reads_valid(path: Path) -> bool:
+    """Whether OpenCASCADE finds what it reads from a STEP file valid."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.STEPControl import STEPControl_Reader
+
+    reader = STEPControl_Reader()
+    reader.ReadFile(str(path))
+    reader.TransferRoots()
+    shape = reader.OneShape()
+    return not shape.IsNull() and bool(BRepCheck_Analyzer(shape).IsValid())
 
 
 def _with_note(change: Change, assembly: Assembly, made: Assembly) -> Change:

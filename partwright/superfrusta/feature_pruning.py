@@ -15,20 +15,21 @@ if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
 
 _CHORD = 1e-3  # unit lengths: how far chords of the fold may be off
+_NEARLY = 0.75  # of `FAR`: beyond edges, the distance of a fold is less than the way to it
 _FURTHER = 1e-3  # unit lengths, by which a place that is far off may be further off
 
 
 def pruned(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
     """The tree without features that explain less than their price, the vainest first.
 
-    None goes without which a place is more than `FAR` off that was not before. What is missed and what is
+    None goes without which a place is far off that was not before. What is missed and what is
     too much are those of the tree as given.
     """
     if len(tree.features) < 2:
         return tree
     masks = [_mask(feature, search.points) for feature in tree.features]
     kept = list(range(len(tree.features)))
-    off = max(FAR, farthest_corner(search, tree)) + _FURTHER
+    off = max(_NEARLY * FAR, farthest_corner(search, tree)) + _FURTHER
     needed: set[int] = set()
     score = search.score_of(_fold(tree, masks, kept))
     while True:

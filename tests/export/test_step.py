@@ -21,7 +21,7 @@ from partwright.errors import (
     SettingError,
     UnreadableFileError,
 )
-from partwright.export import brep_booleans, brep_tree, export
+from partwright.export import brep_booleans, brep_tree, export, step
 from partwright.fields import Box, Cylinder, Extrusion, Field, Revolution, Sphere, SuperFrustum, Tube
 from partwright.fields.profile import Profile
 from partwright.meshing import mesh_csg, mesh_part
@@ -205,11 +205,11 @@ def test_what_fails_for_one_part_costs_no_other(
     """As where OpenCASCADE unites or cuts all but the pin, which it takes as facets in a cut at most."""
     operated = brep_tree.operated
 
-    def without_pins(kind: str, solids: Any, right: Any, label: str, move: bool = False) -> Any:
+    def without_pins(kind: str, solids: Any, right: Any, label: str, *ways: Any, **rough: Any) -> Any:
         whole_pin = label == "'pin'" and kind == operation and (operation == "union" or not faceted)
         if len(solids) > 2 or whole_pin:
             raise NoSurfaceError("fails")
-        return operated(kind, solids, right, label, move)
+        return operated(kind, solids, right, label, *ways, **rough)
 
     faceted: list[Any] = []
     facets = brep_tree.faceted
@@ -227,6 +227,27 @@ def test_what_fails_for_one_part_costs_no_other(
     (change,) = json.loads((tmp_path / "a.step.report.json").read_text())["approximated"]
     assert change["parts"] == ["pin"]
     assert set(kinds) == ({"Plane", "Cylinder"} if operation == "union" else {"Plane"})
+
+
+def test_a_file_that_reads_badly_is_made_again_with_wide_tolerances(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where what was valid in memory is not after the digits of the file."""
+    readings, tolerances = [], []
+    results = brep_booleans._results
+
+    def seen(kind: str, solids: Any, given: Any) -> Any:
+        tolerances.append(given[0])
+        return results(kind, solids, given)
+
+    monkeypatch.setattr(step, "_reads_valid", lambda path: readings.append(path) or len(readings) > 1)
+    monkeypatch.setattr(brep_booleans, "_results", seen)
+    tree = Assembly((Part(Box((2, 2, 2))), Part(Cylinder(0.5, 4))), unit="mm")
+    export(tree, tmp_path / "a.step")
+    assert len(readings) == 2
+    assert tolerances[0] == 0 < tolerances[-1]
+    assert read_back(tmp_path / "a.step")[0] == pytest.approx(8 + math.pi / 2, rel=1e-3)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.step"]
 
 
 def test_an_outline_that_touches_itself_is_moved_a_hair_apart(tmp_path: Path) -> None:

@@ -84,18 +84,17 @@ def turned(view: View, centre: np.ndarray) -> Iterator[Candidate]:
     middle = sorted(halves, key=lambda half: half.area())[len(halves) // 2]
     solid = _solid_at_the_axis(whole)
     found = [middle, whole, shared]
-    if shared.area() < _EVEN * whole.area():
-        found.insert(0, _mean(axis))
+    further = [_mean(axis)] if shared.area() < _EVEN * whole.area() else []
     if solid is not None and _is_crossed(solid, whole, shared):
-        found = [_solid_at_the_axis(half) or half for half in found]
+        found, further = ([_solid_at_the_axis(half) or half for half in some] for some in (found, further))
     if solid is not None:
-        found.append(solid)
+        further.append(solid)
     distinct: list[CrossSection] = []
     for half in found:
         alike = any((half - d).area() + (d - half).area() < _SAME * half.area() for d in distinct)
-        if half is solid or (half.area() > _LEAST and not alike):
+        if half.area() > _LEAST and not alike:
             distinct.append(half)
-    for half in distinct:
+    for half in (*distinct, *further):
         for region in half.decompose():
             if region.area() > 0.05 * half.area():
                 yield from _revolved(axis, region, 0.0, 2 * math.pi)
