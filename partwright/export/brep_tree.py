@@ -89,15 +89,16 @@ def _stepwise(
 ) -> TopoDS_Shape:
     """One operand after another, each checked by itself, so that what one fails at costs no other.
 
-    Those that fail are tried again when all others are there, then moved a little, then as flat facets; what
-    no union takes then stands beside it, without what that holds already.
+    Those that fail are moved a little when all others are there. What a union does not take then stands
+    beside it, without what that holds already; a difference takes it as flat facets.
 
     Raises:
         NoSurfaceError: a difference or an intersection fails for one, or too much of a union would overlap.
     """
     result, joined = solids[0], [node.children[0]]
     waiting = list(zip(node.children[1:], solids[1:], strict=True))
-    for way in (_as_it_is, _as_it_is, _moved_a_little, _as_facets):
+    ways = [_as_it_is, _moved_a_little, *([_as_facets] if node.operation != "union" else [])]
+    for way in ways:
         failed = []
         for child, solid in waiting:
             so_far = Assembly((*joined, child), node.operation)

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
 # OpenCASCADE works in millimetres with an absolute tolerance, so all lengths are brought to them.
+_MOST_AGAIN = 30  # parts: more would take minutes
 _WORKING = METRES["mm"]
 _UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "km": "KM", "in": "INCH", "ft": "FT"}
 
@@ -60,7 +61,7 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     solids = [combined(child, ball, made) for child in children]
     with replacing(path) as temporary:
         _write(_document(list(zip(names, solids, strict=True))), temporary, unit or "mm", Path(path))
-        if not _reads_valid(temporary):  # slivers that the file's digits lose
+        if len(scaled) <= _MOST_AGAIN and not _reads_valid(temporary):  # slivers that the file's digits lose
             again = Compromises(rough=True)
             solids = [combined(child, ball, again) for child in children]
             spare = temporary.with_name(f"{temporary.name}.again")

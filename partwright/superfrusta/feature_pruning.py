@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -22,14 +23,13 @@ _FURTHER = 1e-3  # unit lengths, by which a place that is far off may be further
 def pruned(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
     """The tree without features that explain less than their price, the vainest first.
 
-    None goes without which a place is far off that was not before. What is missed and what is
+    None goes without which its own place is far off that was not before. What is missed and what is
     too much are those of the tree as given.
     """
     if len(tree.features) < 2:
         return tree
     masks = [_mask(feature, search.points) for feature in tree.features]
     kept = list(range(len(tree.features)))
-    off = max(_NEARLY * FAR, farthest_corner(search, tree)) + _FURTHER
     needed: set[int] = set()
     score = search.score_of(_fold(tree, masks, kept))
     while True:
@@ -40,7 +40,9 @@ def pruned(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
         if vain is None or gains[vain] <= 0:
             break
         left = [k for k in kept if k != vain]
-        if farthest_corner(search, _only(tree, left)) > off:
+        boxes = [copy.bounds() for part in tree.features[vain].parts for copy in part.copies]
+        before, after = (farthest_corner(search, _only(tree, some), boxes) for some in (kept, left))
+        if after > max(_NEARLY * FAR, before + _FURTHER):
             needed.add(vain)
             continue
         kept, score = left, scores[vain]
@@ -49,13 +51,27 @@ def pruned(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
     return replace(search.scored(_only(tree, kept)), off=tree.off, objectives=tree.objectives)
 
 
-def farthest_corner(search: FeatureSearch, tree: FeatureTree) -> float:
-    """How far a corner of the fold lies outside of the shape, or one of what it lacks outside of the fold."""
+def farthest_corner(
+    search: FeatureSearch, tree: FeatureTree, boxes: Sequence[NDArray[np.float64]] | None = None
+) -> float:
+    """How far a corner of the fold lies outside of the shape, or one of what it lacks outside of the fold; of
+    those in one of the boxes (2, 3) each, if there are any."""
     fold = tree.body(_CHORD)
     lacking = search.body - fold
-    outside, missed = (np.asarray(body.to_mesh().vert_properties)[:, :3] for body in (fold, lacking))
+    outside, missed = (
+        _in_boxes(np.asarray(body.to_mesh().vert_properties)[:, :3], boxes) for body in (fold, lacking)
+    )
     sticking = search.samples.measure(outside.astype(np.float32)).max(initial=0.0)
     return float(max(sticking, tree.distance(missed.astype(np.float32)).max(initial=0.0)))
+
+
+def _in_boxes(
+    points: NDArray[np.float32], boxes: Sequence[NDArray[np.float64]] | None
+) -> NDArray[np.float32]:
+    if boxes is None:
+        return points
+    within = [((points > low - _FURTHER) & (points < high + _FURTHER)).all(axis=1) for low, high in boxes]
+    return points[np.any(within, axis=0)]
 
 
 def _only(tree: FeatureTree, kept: list[int]) -> FeatureTree:
