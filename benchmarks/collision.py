@@ -45,7 +45,7 @@ HERE = Path(__file__).parent
 TARGET = HERE / "results" / "collision.md"
 OWN_SHAPES = HERE.parent / "examples" / "shapes"
 COPIES, STEPS, POINTS = 5, 1000, 200_000
-BEFORE_BALANCING, LEAST_EXTRA = 0.8, 0.01  # of CoACD's volume error: what hulls may add to end at half of it
+BEFORE_BALANCING, LEAST_EXTRA = 0.8, 0.001  # of CoACD's volume error: what hulls may add to end at half of it
 PRIMITIVES, COLLIDE, HALF, COACD, BOXES = KINDS = (
     "primitives",
     "collide",
@@ -277,7 +277,7 @@ def document(rows: list[Row], command: str) -> str:
         "Seconds: CPU seconds to make the body from the mesh; for primitives that is a fit. collide: the",
         "shapes of `partwright collide`; half of CoACD's error: with `--max-parts` its count of hulls, and",
         f"`--extra` {BEFORE_BALANCING:.0%} of its missing and extra volume, no less than",
-        f"{LEAST_EXTRA:.0%}: faces that are then moved inwards bring it to about half.",
+        f"{LEAST_EXTRA:.1%}: faces that are then moved inwards bring it to about half.",
         "Solidity: the shape's volume over its hull's.",
         "",
         "| shape | solidity | body | pieces | missing % | extra % | step us | contacts | seconds |",

@@ -1,97 +1,190 @@
-"""A convex solid as near to one that is not quite convex as it can be: its hull, with faces moved inwards.
+"""Convex solids as near to one that is not quite convex as they can be: hulls, with planes moved inwards.
 
-A hull bridges what is concave, as the chord of a ring's segment its hole. Moved inwards by the right amount
-such a face adds half as much and lacks about as much: the sum of both is what counts.
+A hull bridges what is concave, as the chord of a ring's segment its hole. Cut off to the right depth such a
+face adds half as much and lacks about as much: the sum of both is what counts. What another hull has anyway
+is neither added nor lost.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.convex_cover import faces_of
 from partwright.approximation.convex_piece import Piece
+from partwright.approximation.cutting_planes import Plane
+from partwright.approximation.half_space import Surface
+from partwright.approximation.hull_faces import faces_of
+from partwright.approximation.light_hull import plain_hull
 from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
+    from scipy.spatial import KDTree
 
-_FACES = 12  # of a hull, the largest, that are tried
-_SHALLOWEST = 2.0**-7  # of the deepest depth
-_REFINED = 4  # depths tried between the best of those that double and its neighbours
-_KEPT = 0.5  # of the piece's own volume, at least
-_WORTH = 5e-4  # of the piece's volume: what moves less stays
+_FACES = 12  # of a hull, those that bridge most, that are tried
+_DENTS = 6  # concave places, the largest, across whose openings a plane is tried
+_CUTS = 16  # of a hull, at most
+_DEPTHS = 2.0 ** np.arange(-7, 1)  # of the deepest, that are tried
+_REFINED = 9  # depths tried between the neighbours of the best one
+_KEPT = 0.5  # of what only one hull has of the solid, at least
+_WORTH = 5e-4  # of that: what gains less stays
+_TILTS = (0.2, 0.1, 0.05, 0.025)  # radians, by which the best plane is turned
+_TURNS = np.arange(6) * (np.pi / 3)
+_SAME = 1e-4  # of normals, and of offsets over the size, of the same plane
+_PROBES = 1000  # corners that tell how deep a hull bridges
 
 
-def balanced_hull(piece: Piece, deepest: float) -> Manifold:
-    """The hull of a piece with those faces moved inwards, by a length of `deepest` at most, where that adds
-    less than it takes."""
-    solid, hull = piece.solid, piece.hull
-    own = solid.volume()
-    if piece.extra <= _WORTH * own:
+def balanced_hulls(pieces: Sequence[Piece], solid: Manifold, deepest: float) -> list[Manifold]:
+    """The hulls of a solid's pieces, cut by planes where that adds less than it loses; to a depth of
+    `deepest`, a length, or as deep as the hull bridges."""
+    hulls = [piece.hull for piece in pieces]
+    near = [
+        [k for k, other in enumerate(pieces) if k != i and _touch(other, one)] for i, one in enumerate(pieces)
+    ]
+    for i in sorted(range(len(pieces)), key=lambda i: -pieces[i].extra):
+        piece = pieces[i]
+        if piece.extra > _WORTH * piece.solid.volume():
+            plain = plain_hull(hulls[i])
+            alone = _without(plain, [hulls[k] for k in near[i]])
+            balanced = _balanced(plain, alone, alone - solid, deepest)
+            hulls[i] = hulls[i] if balanced is plain else balanced
+    return hulls
+
+
+def _without(solid: Manifold, others: Sequence[Manifold]) -> Manifold:
+    from manifold3d import Manifold, OpType
+
+    return Manifold.batch_boolean([solid, *others], OpType.Subtract)
+
+
+def _balanced(hull: Manifold, alone: Manifold, extra: Manifold, deepest: float) -> Manifold:
+    """alone: what no other hull has; extra: what of that is not the solid's."""
+    own = alone.volume() - extra.volume()
+    least, spare = _WORTH * own, (1 - _KEPT) * own
+    if extra.volume() <= least:
         return hull
-    extra = hull - solid
-    for normal, offset in zip(*_large_faces(hull), strict=True):
-        if extra.volume() <= _WORTH * own:
+    directions = _directions(hull, extra)
+    corners = surface_of(hull)[0]
+    deepest = max(deepest, _depth(hull, extra))
+    gains = np.full(len(directions), np.inf)
+    for _ in range(_CUTS):
+        bodies = _Bodies(Surface.of(alone), Surface.of(extra), spare, corners, deepest)
+        fresh = np.zeros(len(directions), bool)
+        while not fresh[best := int(gains.argmax())] and gains[best] > least:
+            gains[best] = bodies.best(directions[best], least)[0]
+            fresh[best] = True
+        if gains[best] <= least:
             break
-        face = _Face(tuple((-normal).tolist()), float(offset), solid, extra, _KEPT * own)
-        depth, gain = _deepest(face.gain, deepest)
-        if gain > _WORTH * own:
-            hull, solid, extra = (face.trimmed(one, depth) for one in (hull, solid, extra))
+        normal, offset = bodies.tilted(directions[best])
+        inward = tuple((-normal).tolist())
+        hull, alone, extra = (one.trim_by_plane(inward, -offset) for one in (hull, alone, extra))
+        spare = alone.volume() - extra.volume() - _KEPT * own
     return hull
 
 
 @dataclass(frozen=True)
-class _Face:
-    """One that may move inwards. extra: what the hull adds to the solid; kept: volume that has to stay."""
+class _Bodies:
+    """What a cut takes volume from, and how much of the solid's own it may take. corners (V, 3): of the hull
+    before any cut; deepest: how far below them a plane may lie."""
 
-    inward: tuple[float, ...]
-    offset: float
-    solid: Manifold
-    extra: Manifold
-    kept: float
+    alone: Surface
+    extra: Surface
+    spare: float
+    corners: np.ndarray
+    deepest: float
 
-    def trimmed(self, solid: Manifold, depth: float) -> Manifold:
-        return solid.trim_by_plane(self.inward, depth - self.offset)
+    def tilted(self, normal: np.ndarray) -> Plane:
+        """The plane near to one of this normal (3,) that gains most, by steps that halve."""
+        gain, offset = self.best(normal, 0.0)
+        for step in _TILTS:
+            across = np.linalg.svd(normal[None])[2][1:]
+            turned = [normal + step * (np.cos(t) * across[0] + np.sin(t) * across[1]) for t in _TURNS]
+            tried = [one / np.linalg.norm(one) for one in turned]
+            found = [self.best(one, gain) for one in tried]
+            at = int(np.argmax([one[0] for one in found]))
+            if found[at][0] > gain:
+                normal, (gain, offset) = tried[at], found[at]
+        return normal, offset
 
-    def gain(self, depth: float) -> float:
-        """Volume that is no longer added, less what is lost."""
-        left = self.trimmed(self.solid, depth).volume()
-        gone = self.extra.volume() - self.trimmed(self.extra, depth).volume()
-        return float(gone - (self.solid.volume() - left)) if left >= self.kept else -np.inf
+    def best(self, normal: np.ndarray, least: float) -> tuple[float, float]:
+        """What a cut gains at most, volume that is no longer added less what is lost, and the offset at which
+        it does; looked for where it may be more than `least`."""
+        top = float((self.corners @ normal).max())
+        most = float(self.extra.beyond(normal, np.array([top - self.deepest]))[0])
+        if most <= least:
+            return min(most, least), top
+        depths = self.deepest * _DEPTHS
+        gains = self.gains(normal, top - depths)
+        at = int(gains.argmax())
+        around = np.concatenate([[0.0], depths, depths[-1:]])[at : at + 3]
+        finer = np.linspace(around[0], around[-1], _REFINED)
+        depths, gains = np.append(depths, finer), np.append(gains, self.gains(normal, top - finer))
+        at = int(gains.argmax())
+        return float(gains[at]), top - float(depths[at])
+
+    def gains(self, normal: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+        added = self.extra.beyond(normal, offsets)
+        lost = self.alone.beyond(normal, offsets) - added
+        return np.where(lost <= self.spare, added - lost, -np.inf)
 
 
-def _deepest(gain: Callable[[float], float], deepest: float) -> tuple[float, float]:
-    """The depth that gains most, and what it gains; gains rise up to it and fall beyond, but for steps."""
-    tried = {0.0: 0.0}
-    depth = deepest * _SHALLOWEST
-    while depth <= deepest:
-        tried[depth] = gain(depth)
-        if tried[depth] < min(max(tried.values()), 0.0) or np.isneginf(tried[depth]):
-            break
-        depth *= 2
-    for _ in range(_REFINED):
-        known = sorted(tried)
-        at = known.index(max(tried, key=lambda one: tried[one]))
-        sides = [(known[i], known[i + 1]) for i in (at - 1, at) if 0 <= i < len(known) - 1]
-        low, high = max(sides, key=lambda side: side[1] - side[0])
-        tried[(low + high) / 2] = gain((low + high) / 2)
-    chosen = max(tried, key=lambda one: tried[one])
-    return chosen, tried[chosen]
+def _directions(hull: Manifold, extra: Manifold) -> np.ndarray:
+    """(D, 3) unit normals: of the hull's faces that bridge most, and the mean ones across the openings of the
+    largest dents."""
+    planes = _Planes.of(hull)
+    found = [planes.bridging(extra)]
+    dents = sorted(extra.decompose(), key=lambda dent: -dent.volume())[:_DENTS]
+    found += [planes.bridging(dent).sum(axis=0, keepdims=True) for dent in dents]
+    rows = np.concatenate([found[0][np.argsort(-np.linalg.norm(found[0], axis=1))[:_FACES]], *found[1:]])
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows = rows[length[:, 0] > 0] / length[length[:, 0] > 0]
+    return rows[np.sort(np.unique(np.round(rows, 4), axis=0, return_index=True)[1])]
 
 
-def _large_faces(hull: Manifold) -> tuple[np.ndarray, np.ndarray]:
-    """Normals (F, 3) and offsets (F,) of the largest faces, the largest first."""
-    corners, faces = surface_of(hull)
-    a, b, c = corners[faces.T]
-    cross = np.cross(b - a, c - a)
+@dataclass(frozen=True)
+class _Planes:
+    """Of a hull's faces: normals (F, 3), offsets (F,), and a tree of both, offsets over the size."""
+
+    normals: np.ndarray
+    middle: np.ndarray
+    size: float
+    tree: KDTree
+
+    @classmethod
+    def of(cls, hull: Manifold) -> _Planes:
+        from scipy.spatial import KDTree
+
+        normals, offsets = faces_of(hull)
+        corners = surface_of(hull)[0]
+        middle, size = corners.mean(axis=0), float(np.ptp(corners, axis=0).max())
+        rows = np.column_stack([normals, (offsets - normals @ middle) / size])
+        return cls(normals, middle, size, KDTree(rows))
+
+    def bridging(self, extra: Manifold) -> np.ndarray:
+        """(F, 3) for each face its normal times the area of it that has something extra below it."""
+        vertices, faces = surface_of(extra)
+        a, b, c = (vertices[faces.T] - self.middle) / self.size
+        cross = np.cross(b - a, c - a)
+        length = np.linalg.norm(cross, axis=1)
+        normal = np.divide(cross, length[:, None], out=np.zeros_like(cross), where=length[:, None] > 0)
+        rows = np.column_stack([normal, np.einsum("ij,ij->i", normal, a)])
+        away, face = self.tree.query(rows, distance_upper_bound=_SAME)
+        on = np.isfinite(away)
+        area = np.bincount(face[on], length[on], minlength=len(self.normals))
+        return self.normals * area[:, None]
+
+
+def _depth(hull: Manifold, extra: Manifold) -> float:
+    """How far below the hull's surface what it adds reaches."""
     normals, offsets = faces_of(hull)
-    length = np.linalg.norm(cross, axis=1)
-    real = length > 0
-    owner = (cross[real] / length[real, None] @ normals.T).argmax(axis=1)
-    area = np.bincount(owner, length[real], minlength=len(normals))
-    largest = np.argsort(-area, kind="stable")[:_FACES]
-    return normals[largest], offsets[largest]
+    corners = surface_of(extra)[0]
+    corners = corners[:: max(1, len(corners) // _PROBES)]
+    return float((offsets - corners @ normals.T).min(axis=1).max(initial=0.0))
+
+
+def _touch(a: Piece, b: Piece) -> bool:
+    first, second = (np.reshape(one.hull.bounding_box(), (2, 3)) for one in (a, b))
+    return bool(((first[0] <= second[1]) & (second[0] <= first[1])).all())

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.balanced_hull import balanced_hull
+from partwright.approximation.balanced_hull import balanced_hulls
 from partwright.approximation.change import Change
 from partwright.approximation.convex import segments, walls
-from partwright.approximation.convex_cover import convex_cover
+from partwright.approximation.convex_cover import convex_cover, simplified
 from partwright.approximation.convex_fit import CONVEX_KINDS, convex_fits
 from partwright.approximation.convex_piece import Limits
 from partwright.approximation.light_hull import light_hull
@@ -157,8 +157,8 @@ def _covered(node: Node, kinds: Sequence[type[Field]], allowed: float) -> list[P
     unit = node_solid(node, _CHORD * min(allowed, thinnest)).translate(tuple(-middle)).scale((1 / side,) * 3)
     frame = Similarity(side, translation=tuple(middle.tolist()))
     forms: list[Part | trimesh.Trimesh] = []
-    for one in convex_cover(unit, Limits(allowed / side, _EXTRA)):
-        hull = balanced_hull(one, allowed / side)
+    unit = simplified(unit, allowed / side)
+    for hull in balanced_hulls(convex_cover(unit, Limits(allowed / side, _EXTRA)), unit, allowed / side):
         fits = convex_fits(hull, [kind for kind in kinds if kind in CONVEX_KINDS], "nearest")
         if fits and fits[0].volume_error_ratio <= _AS_GOOD and fits[0].deviation * side <= allowed:
             forms.append(fits[0].part.transformed(frame))

@@ -21,7 +21,10 @@ from partwright.approximation.cutting_planes import (
     across_axes,
     beside_concave_edges,
     candidates,
+    moved,
 )
+from partwright.approximation.hull_faces import faces_of
+from partwright.approximation.light_hull import plain_hull
 from partwright.approximation.piece_joining import exchanged, joined
 from partwright.meshing.manifolds import surface_of
 from partwright.shapes import MeshDistance
@@ -30,11 +33,12 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 _EXACT = 5  # candidates whose pieces are really made
+_MOVED = 2  # of these, the best, that are moved and turned to where less is left
 _LOOKED_AT, _MADE = 6, 3  # planes of faces that are tried and really cut along, where one cut gains nothing
 _TRIES, _CHANGED = 4, 0.005  # of simplifying, and the share of the volume that it may change
 _GAIN = 0.03  # of what a hull adds: a cut that takes less off it looks one cut ahead
 _SLIVER = 1e-5  # of the whole volume: pieces below it are left out
-_COARSE = 0.05  # of the tolerance: how far the search's own copy of the solid may lie from it
+_COARSE = 0.05  # of the tolerance: how far the copy that is searched may lie from the solid
 
 
 def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
@@ -43,33 +47,56 @@ def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
     solid: closed, of any number of bodies. Slivers are left out, but none that reaches farther than the
     allowed deviation from all the rest: a speck may be all that there is at its place.
     """
-    coarse = _simplified(solid, _COARSE * limits.deviation)
-    pieces = _cut_up(coarse, limits)
+    pieces = _cut_up(solid, limits)
     pieces += _far_off(solid, pieces, limits.deviation)
-    pieces = joined(pieces, coarse.volume(), limits)
-    least = _SLIVER * coarse.volume()
+    pieces = joined(pieces, solid.volume(), limits)
+    least = _SLIVER * solid.volume()
     return exchanged(pieces, limits, lambda piece: _best_cut(piece, least))
+
+
+def simplified(solid: Manifold, deviation: float) -> Manifold:
+    """With fewer triangles, for a search that allows this deviation (a length), as far as that leaves its
+    volume alone: walls may be thinner than what is allowed."""
+    own, by = solid.volume(), _COARSE * deviation
+    for _ in range(_TRIES):
+        simple = solid.simplify(by)
+        if abs(simple.volume() - own) <= _CHANGED * own:
+            return simple
+        by /= 4
+    return solid
 
 
 def _far_off(solid: Manifold, pieces: list[Piece], deviation: float) -> list[Piece]:
     """What no hull has and is farther than a length from all of them."""
     from manifold3d import Manifold, OpType
 
+    if not _sticks_out(solid, pieces, deviation / 2):
+        return []
     hulls = Manifold.batch_boolean([piece.hull for piece in pieces], OpType.Add)
     left = [part for part in (solid - hulls).decompose() if part.volume() > 0]
     if hulls.is_empty():
         return [Piece(part) for part in left]
-    mesh = hulls.to_mesh64()
-    vertices = np.asarray(mesh.vert_properties)[:, :3]
-    faces = np.asarray(mesh.tri_verts, dtype=np.int64)
+    vertices, faces = surface_of(hulls)
     middle, scale = vertices.mean(axis=0), 1.0 / float(np.ptp(vertices, axis=0).max())
     there = MeshDistance((vertices - middle) * scale, faces, faces, True)
 
     def reach(part: Manifold) -> float:
-        points = np.asarray(part.to_mesh64().vert_properties)[:, :3]
+        points = surface_of(part)[0]
         return float(there.unsigned((points - middle) * scale).max()) / scale
 
     return [Piece(part) for part in left if reach(part) > deviation]
+
+
+def _sticks_out(solid: Manifold, pieces: list[Piece], by: float) -> bool:
+    """Whether a corner is farther out than a length of one face of each hull."""
+    corners = surface_of(solid)[0]
+    for piece in sorted(pieces, key=lambda piece: -piece.hull.volume()):
+        normals, offsets = faces_of(plain_hull(piece.hull))
+        lower, upper = np.reshape(piece.hull.bounding_box(), (2, 3))
+        near = ((corners >= lower - by) & (corners <= upper + by)).all(axis=1)
+        near[near] = (corners[near] @ normals.T - offsets).max(axis=1) <= by
+        corners = corners[~near]
+    return len(corners) > 0
 
 
 def halved(piece: Piece) -> list[list[Piece]]:
@@ -77,34 +104,6 @@ def halved(piece: Piece) -> list[list[Piece]]:
     least = _SLIVER * piece.solid.volume()
     cut = [_cut(piece, normal, offset, least) for normal, offset in across_axes(piece.corners)[:3]]
     return [parts for parts in cut if len(parts) > 1]
-
-
-def faces_of(hull: Manifold) -> tuple[np.ndarray, np.ndarray]:
-    """Outward unit normals (F, 3) and offsets (F,) of a convex solid's faces, each plane once.
-
-    Each plane is moved out to the farthest corner, so that slivers, whose normals are rounding, cut nothing
-    off.
-    """
-    corners, faces = surface_of(hull)
-    a, b, c = corners[faces.T]
-    normals = np.cross(b - a, c - a)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = normals[length[:, 0] > 0] / length[length[:, 0] > 0]
-    _, first = np.unique(np.round(normals, 9), axis=0, return_index=True)
-    normals = normals[np.sort(first)]
-    return normals, (corners @ normals.T).max(axis=0)
-
-
-def _simplified(solid: Manifold, by: float) -> Manifold:
-    """With fewer triangles, as far as that leaves its volume alone: walls may be thinner than what is
-    allowed."""
-    own = solid.volume()
-    for _ in range(_TRIES):
-        simple = solid.simplify(by)
-        if abs(simple.volume() - own) <= _CHANGED * own:
-            return simple
-        by /= 4
-    return solid
 
 
 def _cut_up(solid: Manifold, limits: Limits) -> list[Piece]:
@@ -154,9 +153,10 @@ def _best_cut(piece: Piece, least: float) -> list[Piece]:
     if not len(left):
         return [piece]
     order = np.argsort(np.round(left / whole, 6), kind="stable")[:_EXACT]  # the earlier ones are plainer
+    chosen = [planes[index] for index in order]
+    chosen += [better for plane in chosen[:_MOVED] if (better := moved(corners, plane)) is not plane]
     best, parts = _GAIN * piece.extra, [piece]
-    for index in order:
-        normal, offset = planes[index]
+    for normal, offset in chosen:
         made = _cut(piece, normal, offset, least)
         gain = (whole - sum(one.hull.volume() for one in made)) / max(len(made) - 1, 1)
         if len(made) > 1 and gain > best + 1e-6 * whole:

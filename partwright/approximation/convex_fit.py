@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from partwright.approximation.convex_cover import faces_of
 from partwright.approximation.ellipsoid import Ellipsoid
+from partwright.approximation.hull_faces import faces_of
 from partwright.assembly import Part, Similarity
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.manifolds import surface_of

@@ -18,6 +18,9 @@ _MOST = 24  # planes along concave edges
 _CONCAVE = 0.08  # radians by which an edge is concave at least
 _HALVING = 0.9  # of a plane that halves an angle, beside one that continues a face: pieces stay square
 _SAME = (0.05, 0.01)  # normals, and offsets over the size, that count as the same plane
+_TURNS = (0.2, 0.1, 0.05, 0.025, 0.0125)  # radians, by which a plane is turned
+_SHIFT = 0.3  # of the size for a radian, by which it is moved
+_LESS = 1e-4  # of the hulls: what moves for less stays
 
 Plane = tuple[np.ndarray, float]
 
@@ -92,6 +95,27 @@ def candidates(corners: Corners) -> list[Plane]:
     """Normal (3,) and offset of each plane that may cut well, the plainest first."""
     square = _across(corners, np.eye(3)) if np.abs(corners.axes).max(axis=1).min() < 0.999 else []
     return [*_along_concave_edges(corners, halving=True), *square, *_across(corners, corners.axes)]
+
+
+def moved(corners: Corners, plane: Plane) -> Plane:
+    """The plane, turned and moved by steps that halve to where the hulls of both sides are smallest; itself
+    where it is best."""
+    normal, offset = plane
+    middle = corners.vertices.mean(axis=0)
+    least = corners.hulls(normal, offset)
+    for turn in _TURNS:
+        across = np.linalg.svd(normal[None])[2][1:]
+        place = offset - normal @ middle
+        tried = [(normal, offset + way * _SHIFT * turn * corners.size) for way in (1, -1)]
+        for way in (*across, *-across):
+            turned = (normal + turn * way) / np.hypot(1, turn)
+            tried.append((turned, float(turned @ middle + place)))
+        left = [corners.hulls(*one) for one in tried]
+        at = int(np.argmin(left))
+        if left[at] < (1 - _LESS) * least:
+            (normal, offset), least = tried[at], left[at]
+            plane = normal, offset
+    return plane
 
 
 def across_axes(corners: Corners) -> list[Plane]:

@@ -6,15 +6,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.convex_cover import faces_of
+from partwright.approximation.hull_faces import faces_of
 from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-_MOST = 128  # corners
-_LOST = 0.01  # of the volume: what is thin keeps more corners
-_FEW = 8  # corners that are taken at once
+_MOST = 256  # corners
+_LOST = 3e-3  # of the volume: what is thin or round keeps more corners
+_PLAIN = 5e-4  # of the volume, that a plain hull may lose
+_EDGES = 0.01  # of the size: edges that are tried to be done without
+_FEW, _SHARE = 8, 8  # corners that are taken at once: so many, or one for this many that are
+
+
+def plain_hull(hull: Manifold) -> Manifold:
+    """Without the corners that hardly count: at once, where `light_hull` chooses."""
+    from manifold3d import Manifold
+
+    by = _EDGES * float(np.ptp(np.reshape(hull.bounding_box(), (2, 3)), axis=0).max())
+    while hull.num_vert() > _FEW:
+        plain = Manifold.hull_points(surface_of(hull.simplify(by))[0])
+        if plain.volume() >= (1 - _PLAIN) * hull.volume():
+            return plain
+        by /= 2
+    return hull
 
 
 def light_hull(hull: Manifold, by: float, most: int = _MOST) -> tuple[Manifold, float]:
@@ -42,4 +57,5 @@ def light_hull(hull: Manifold, by: float, most: int = _MOST) -> tuple[Manifold, 
         height = corners @ normals.T - offsets
         farthest = np.unique(height.argmax(axis=0)[height.max(axis=0) > min(by, worst) / 2])
         ranked = farthest[np.argsort(-beyond[farthest])]
-        chosen.update(ranked[: min(_FEW, most - len(chosen))].tolist())
+        more = max(_FEW, len(chosen) // _SHARE)
+        chosen.update(ranked[: min(more, most - len(chosen))].tolist())

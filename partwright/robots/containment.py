@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.convex_cover import faces_of
 from partwright.approximation.ellipsoid import Ellipsoid
+from partwright.approximation.hull_faces import faces_of
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.robots.model import Shape

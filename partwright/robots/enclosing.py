@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.convex_cover import faces_of
+from partwright.approximation.hull_faces import faces_of
 from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:

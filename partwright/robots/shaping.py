@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.balanced_hull import balanced_hull
+from partwright.approximation.balanced_hull import balanced_hulls
 from partwright.approximation.convex_cover import (
     convex_cover,
-    faces_of,
     halved,
+    simplified,
 )
 from partwright.approximation.convex_fit import ConvexFit, Mode, convex_fits
 from partwright.approximation.convex_piece import Limits, Piece
-from partwright.approximation.light_hull import light_hull
+from partwright.approximation.hull_faces import faces_of
+from partwright.approximation.light_hull import light_hull, plain_hull
 from partwright.meshing.manifolds import as_mesh
 from partwright.robots.containment import larger, shape_solid
 from partwright.robots.enclosing import containing, outer_hull
@@ -30,8 +31,11 @@ if TYPE_CHECKING:
     from partwright.assembly import Part
     from partwright.fields import Field
 
-NATIVE_FOR = 0.03  # of its volume: by how much a native solid may be worse than the hull that it saves
+NATIVE_FOR = 0.03  # of its volume, or `extra`: by how much a native solid may be worse than the hull it saves
 _LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners, or add for fewer faces
+_FLAWS = 1e-3  # of its volume: what a hull may add to a convex link
+_ROUNDING = 1e-9  # of its volume: what a hull adds to a link without a dent
+_CORNERS = 1024  # of a convex link's exact hull
 _FACES = 64  # of an enclosing hull
 _ROOM = 1e-6  # of the size: by how much an enclosing shape is larger than it need be, for rounding
 _POINTS = 50_000  # of the triangles, for the hulls of wrapped pieces
@@ -58,21 +62,43 @@ class Wishes:
 
 def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
     """The shapes, named NAME_1, NAME_2 ..., or NAME for one."""
-    solid = target.wrap if wishes.mode == "around" else target.solid
+    if wishes.mode != "around" and (convex := _convex(target.solid, wishes)) is not None:
+        return [dataclasses.replace(convex, name=name)]
+    solid = simplified(target.wrap if wishes.mode == "around" else target.solid, wishes.tolerance)
     pieces = convex_cover(solid, Limits(wishes.tolerance, wishes.extra, wishes.most))
     if not wishes.hulls:
         pieces = _fit_for_natives(pieces, wishes)
     if wishes.mode == "around":
         hulls = _enclosing(pieces, target, wishes)
     elif wishes.mode == "nearest":
-        hulls = [balanced_hull(piece, wishes.tolerance) for piece in pieces]
+        hulls = balanced_hulls(pieces, solid, wishes.tolerance)
     else:
         hulls = [inscribed(piece.hull, target.solid) for piece in pieces]
-    chosen = [_chosen(piece, hull, target, wishes) for piece, hull in zip(pieces, hulls, strict=True)]
+    chosen = [_chosen(hull, target, wishes) for hull in hulls]
     if wishes.mode == "within":
         chosen = [one for shape in chosen if (one := _within(shape, target)) is not None]
     names = [name] if len(chosen) == 1 else [f"{name}_{i}" for i in range(1, len(chosen) + 1)]
     return [Shape(each, shape.part, shape.mesh) for each, shape in zip(names, chosen, strict=True)]
+
+
+def _convex(solid: Manifold, wishes: Wishes) -> Shape | None:
+    """A convex solid as a native one that is near, or its own hull, exact; None where it is not convex."""
+    whole = Piece(solid)
+    if not wishes.hulls or whole.extra > _FLAWS * solid.volume() or whole.hull.num_vert() > _CORNERS:
+        return None
+    dented = whole.extra > _ROUNDING * solid.volume()
+    if dented and whole.deviation(wishes.tolerance) > wishes.tolerance:
+        return None
+    near = _near(plain_hull(whole.hull), wishes)
+    return Shape("", near.part) if near is not None else Shape("", mesh=as_mesh(whole.hull))
+
+
+def _near(hull: Manifold, wishes: Wishes) -> ConvexFit | None:
+    """The native solid that is near enough and hardly worse than the hull."""
+    fits = convex_fits(hull, wishes.kinds, wishes.mode) if wishes.kinds else []
+    worse = min(NATIVE_FOR, wishes.extra)
+    near = (fit for fit in fits if fit.deviation <= wishes.tolerance and fit.volume_error_ratio <= worse)
+    return next(near, None)
 
 
 def _enclosing(pieces: list[Piece], target: Target, wishes: Wishes) -> list[Manifold]:
@@ -88,19 +114,14 @@ def _enclosing(pieces: list[Piece], target: Target, wishes: Wishes) -> list[Mani
     ]
 
 
-def _chosen(piece: Piece, hull: Manifold, target: Target, wishes: Wishes) -> Shape:
+def _chosen(hull: Manifold, target: Target, wishes: Wishes) -> Shape:
     """By volume: a native solid where it is near enough and hardly worse than the hull."""
-    own = piece.solid.volume()
-    added = max(hull.volume() - own, 0.0) / own
-    fits = convex_fits(hull, wishes.kinds, wishes.mode) if wishes.kinds else []
     if not wishes.hulls:
-        return _native(fits[0].part, target, wishes)
-    near = [fit for fit in fits if fit.deviation <= wishes.tolerance and fit.volume_error_ratio <= NATIVE_FOR]
-    if near and near[0].volume_error_ratio + added <= added + NATIVE_FOR:
-        return _native(near[0].part, target, wishes)
+        return _native(convex_fits(hull, wishes.kinds, wishes.mode)[0].part, target, wishes)
     if wishes.mode != "around":
         hull = light_hull(hull, _LIGHT * wishes.tolerance)[0]
-    return Shape("", mesh=as_mesh(hull))
+    near = _near(hull, wishes)
+    return _native(near.part, target, wishes) if near is not None else Shape("", mesh=as_mesh(hull))
 
 
 def _native(part: Part, target: Target, wishes: Wishes) -> Shape:

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from manifold3d import Manifold, OpType
 
-from partwright.approximation.convex_cover import faces_of
+from partwright.approximation.hull_faces import faces_of
 from partwright.robots import CollideOptions, collide
 from partwright.robots.enclosing import containing, outer_hull
 from tests.robots.robots import urdf
