@@ -105,19 +105,33 @@ class Mending:
         return len(trial) <= len(given) and volume_iou(self.samples, trial) >= least
 
     def joined(self, best: Trial) -> Trial:
-        """With pairs of parts as one where that pays: what mending added may make others vain."""
-        for _ in range(_JOINED if self.settings.merging else 0):
-            found = mergers(self.samples, best.rows, self.settings, self.locked)[:_JOINED]
-            jobs = [partial(self.merged, best.rows, one) for one in found if one.gain > -_HOPELESS]
-            tried = [trial for trials in self.at_once(jobs) for trial in trials]
-            better = max(tried, key=lambda trial: trial.value, default=best)
-            if better.value <= best.value:
+        """With pairs of parts as one where that pays: what mending added may make others vain.
+
+        What would replace a pair is fitted once, for pairs whose members are both still there.
+        """
+        samples, settings = self.samples, self.settings
+        left = mergers(samples, best.rows, settings, self.locked) if settings.merging else []
+        part_of = np.arange(len(best.rows))  # which of the parts as they were each row is; -1: a joined one
+        while left := [one for one in left if one.gain > -_HOPELESS and np.isin(one.pair, part_of).all()]:
+            first = left[:_JOINED]
+            tried = self.at_once([partial(self.merged, best.rows, one, part_of) for one in first])
+            gaining = [
+                (trial, one)
+                for trials, one in zip(tried, first, strict=True)
+                for trial in trials
+                if trial.value > best.value
+            ]
+            if not gaining:
                 break
-            best = better
+            best, joined = max(gaining, key=lambda pair: pair[0].value)
+            part_of[part_of == joined.pair[0]] = -1
+            part_of = part_of[part_of != joined.pair[1]]
+            left = [one for _, one in gaining] + left[_JOINED:]
         return best
 
-    def merged(self, rows: Rows, merger: Merger) -> list[Trial]:
-        fewer = carried_out(self.samples, rows, *merger.pair, merger.part, self.settings, self.locked)
+    def merged(self, rows: Rows, merger: Merger, part_of: NDArray[np.int64]) -> list[Trial]:
+        first, second = (int(np.flatnonzero(part_of == part)[0]) for part in merger.pair)
+        fewer = carried_out(self.samples, rows, first, second, merger.part, self.settings, self.locked)
         return [self.trial(fewer)] if self.allowed(fewer, rows) else []
 
     def slimmed(self, best: Trial) -> Trial:

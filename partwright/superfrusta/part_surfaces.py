@@ -17,13 +17,13 @@ Floats = NDArray[np.float64]
 _ALONG = np.linspace(0, 1, 13)  # of an edge of the profile
 _ACROSS = np.array([0.0, 0.35, 0.7, 0.95])  # of a face at either end, from its rim to its middle
 # A quarter of the section's outline: shares of the straight side, of the arc, and of the other side.
-_SIDE, _ARC = np.array([0.0, 0.5, 1.0]), np.array([30.0, 60.0])
+_SIDE, _ARC = np.array([0.2, 0.6, 1.0]), np.array([15.0, 30.0, 45.0, 60.0, 75.0])
 _STRAIGHT = 1e-6  # bulges below are none
 _LEAST = 1e-12
 
 
 def surface_points(rows: Rows) -> Floats:
-    """Points (M, K, 3) of each part's own surface, a thousand each; a solid part has some on its axis too."""
+    """Points (M, K, 3) of each part's own surface, some thousand each; a solid part has some on its axis too."""
     params = rows.astype(np.float64)
     q, z = _profile(params)
     x, y = _outline(params, q)

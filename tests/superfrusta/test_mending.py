@@ -65,6 +65,15 @@ def test_points_of_a_part_lie_on_its_surface(shape: dict[str, float]) -> None:
     assert (around.min(axis=0) < inside.min(axis=0) + 0.03).all()
 
 
+def test_a_disc_is_looked_at_all_around() -> None:
+    """Its rim may stick out of the gap between two teeth alone."""
+    disc = row((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (1.6, 1.6, 0.004), roundness=1.0)
+    x, y, _ = surface_points(disc[None])[0].T
+    rim = np.hypot(x, y) > 0.79
+    angles = np.sort(np.degrees(np.arctan2(y[rim], x[rim])))
+    assert np.diff(np.append(angles, angles[0] + 360)).max() < 15.5
+
+
 def test_points_of_many_parts_are_those_of_each() -> None:
     rows = random_rows(5, seed=3)
     alone = np.concatenate([surface_points(one[None]) for one in rows])
