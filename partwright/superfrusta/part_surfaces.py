@@ -23,7 +23,7 @@ _LEAST = 1e-12
 
 
 def surface_points(rows: Rows) -> Floats:
-    """Points (M, K, 3) of each part's own surface, some thousand each; a solid part has some on its axis too."""
+    """Points (M, K, 3) of each part's own surface, over a thousand each, of a solid part some on its axis."""
     params = rows.astype(np.float64)
     q, z = _profile(params)
     x, y = _outline(params, q)
