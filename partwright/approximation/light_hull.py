@@ -49,12 +49,12 @@ def light_hull(hull: Manifold, by: float, most: int = _MOST) -> tuple[Manifold, 
         if light.is_empty() or light.volume() <= 0:
             return hull, 0.0
         normals, offsets = faces_of(light)
-        beyond = (corners @ normals.T - offsets).max(axis=1)
+        height = corners @ normals.T - offsets
+        beyond = height.max(axis=1)
         worst = float(beyond.max())
         full = light.volume() >= (1 - _LOST) * hull.volume()
         if (worst <= by and full) or len(chosen) >= min(most, len(corners)):
             return light, max(worst, 0.0)
-        height = corners @ normals.T - offsets
         farthest = np.unique(height.argmax(axis=0)[height.max(axis=0) > min(by, worst) / 2])
         ranked = farthest[np.argsort(-beyond[farthest])]
         more = max(_FEW, len(chosen) // _SHARE)

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from OCP.TDocStd import TDocStd_Document
     from OCP.TopoDS import TopoDS_Shape
 
-# OpenCASCADE works in millimetres with an absolute tolerance, so all lengths are brought to them.
 _MOST_AGAIN = 30  # parts: more would take minutes
+# OpenCASCADE works in millimetres with an absolute tolerance, so all lengths are brought to them.
 _WORKING = METRES["mm"]
 _UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "km": "KM", "in": "INCH", "ft": "FT"}
 
@@ -58,15 +58,18 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     if children == (scaled,):
         names = [assembly.name or Path(path).stem]
     ball, made = Ball.around(scaled), Compromises()
+
+    def save(solids: list[TopoDS_Shape], file: Path) -> None:
+        _write(_document(list(zip(names, solids, strict=True))), file, unit or "mm", Path(path))
+
     solids = [combined(child, ball, made) for child in children]
     with replacing(path) as temporary:
-        _write(_document(list(zip(names, solids, strict=True))), temporary, unit or "mm", Path(path))
+        save(solids, temporary)
         if len(scaled) <= _MOST_AGAIN and not _reads_valid(temporary):  # slivers that the file's digits lose
             again = Compromises(rough=True)
-            solids = [combined(child, ball, again) for child in children]
             spare = temporary.with_name(f"{temporary.name}.again")
             try:
-                _write(_document(list(zip(names, solids, strict=True))), spare, unit or "mm", Path(path))
+                save([combined(child, ball, again) for child in children], spare)
                 if _reads_valid(spare):
                     made = again
                     spare.replace(temporary)

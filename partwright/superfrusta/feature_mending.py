@@ -12,6 +12,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from partwright.approximation.sketches.bodies import bodies
+from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 FAR = 0.054
 """Unit lengths: 3 % of the longest side, by which nothing may be off."""
 _MENDS = 8
-_CHORD = 1e-3  # unit lengths: how far chords of the fold may be off
 _LEAST = 1e-7  # of the volume
 _LOSS = 3e-4  # of R, that mending one place may cost
 
@@ -61,7 +61,7 @@ def farthest(search: FeatureSearch, tree: FeatureTree) -> float:
 
     Skins that a cut leaves of what it goes around are no pieces, and may be far off all the same.
     """
-    corners = np.asarray(tree.body(_CHORD).to_mesh().vert_properties)[:, :3].astype(np.float32)
+    corners = surface_of(tree.body())[0].astype(np.float32)
     skins = float(search.samples.measure(corners).max()) if len(corners) else 0.0
     reaches = [reach for reach, _, _ in far_pieces(search, tree)]
     return max([*reaches, *([skins] if skins > FAR else [])], default=0.0)

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.meshing.manifolds import surface_of
 from partwright.superfrusta.feature_mending import FAR
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
 
-_CHORD = 1e-3  # unit lengths: how far chords of the fold may be off
 _NEARLY = 0.75  # of `FAR`: beyond edges, the distance of a fold is less than the way to it
 _FURTHER = 1e-3  # unit lengths, by which a place that is far off may be further off
 
@@ -56,13 +56,12 @@ def farthest_corner(
 ) -> float:
     """How far a corner of the fold lies outside of the shape, or one of what it lacks outside of the fold; of
     those in one of the boxes (2, 3) each, if there are any."""
-    fold = tree.body(_CHORD)
-    lacking = search.body - fold
+    fold = tree.body()
     outside, missed = (
-        _in_boxes(np.asarray(body.to_mesh().vert_properties)[:, :3], boxes) for body in (fold, lacking)
+        _in_boxes(surface_of(body)[0].astype(np.float32), boxes) for body in (fold, search.body - fold)
     )
-    sticking = search.samples.measure(outside.astype(np.float32)).max(initial=0.0)
-    return float(max(sticking, tree.distance(missed.astype(np.float32)).max(initial=0.0)))
+    sticking = search.samples.measure(outside).max(initial=0.0)
+    return float(max(sticking, tree.distance(missed).max(initial=0.0)))
 
 
 def _in_boxes(

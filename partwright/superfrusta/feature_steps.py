@@ -14,6 +14,8 @@ from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Extrusion
 from partwright.meshing.csg import solid_of
 
+_CHORD = 1e-3  # unit lengths: how far chords of a fold may be off
+
 
 @dataclass(frozen=True)
 class Feature:
@@ -71,12 +73,12 @@ class FeatureTree:
                 result = np.minimum(result, own) if feature.added else np.maximum(result, -own)
         return result
 
-    def body(self, chord: float) -> Manifold:
-        """The fold itself, its chords off by a length at most."""
+    def body(self) -> Manifold:
+        """The fold itself, with chords."""
         result = Manifold()
         for feature in self.features:
             for part in feature.parts:
-                whole = solid_of(part, chord)
+                whole = solid_of(part, _CHORD)
                 result = result + whole if feature.added else result - whole
         return result
 
