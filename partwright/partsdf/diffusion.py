@@ -1,6 +1,10 @@
-"""Noise to vectors: the cosine schedule (Nichol & Dhariwal 2021) and DDIM's sampler (Song et al. 2021).
+"""Noise to vectors: the cosine schedule (Nichol & Dhariwal 2021) and DPM-Solver++(2M) (Lu et al. 2022).
 
-Twenty lines of our own: `diffusers`, which has them too, comes with a client for its hub and eight packages,
+A sampler of first order (DDIM) narrows what it makes, whatever the network: with the best possible denoiser,
+64 equal steps leave 96 % of a normal distribution's variance, and 79 % where its spread is a tenth of the
+noise's.
+
+Thirty lines of our own: `diffusers`, which has them, too, comes with a client for its hub and eight packages,
 which who only wants a chair would have to install.
 """
 
@@ -8,11 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import torch
 from torch import Tensor
 
 STEPS = 64  # of sampling
+_LATE = 2.0  # power of the times: steps are shorter towards the clean end, where narrow spreads are decided
 _OFFSET = 0.008
 
 Denoiser = Callable[[Tensor, Tensor], Tensor]
@@ -46,14 +52,21 @@ def denoised(
     is on the way, so that the rest is made to suit them. Given `like`, they begin at the time `since` as that
     with its share of noise, and so come out near it (SDEdit, Meng et al. 2022)."""
     at = noise if like is None else noised(like, noise, torch.full((len(noise),), since))[0]
-    times = torch.linspace(since, 0.0, max(1, round(steps * since)) + 1)
-    for now, then in zip(times[:-1].tolist(), times[1:].tolist(), strict=True):
-        time = torch.full((len(noise),), now)
+    count = max(1, round(steps * since))
+    times = since * torch.linspace(1.0, 0.0, count + 1, dtype=torch.float64) ** _LATE
+    before = at
+    stride = 0.0  # of the step before, in logarithms of the signal's share over the noise's
+    for now, then in pairwise(times):
+        time = torch.full((len(noise),), float(now))
         if known is not None and kept is not None:
             at = torch.where(kept, noised(known, noise, time)[0], at)
-        velocity = denoiser(at, time)
-        signal, spread = (one.view(-1, *[1] * (noise.ndim - 1)) for one in levels(time))
-        clean, rest = signal * at - spread * velocity, spread * at + signal * velocity
-        signal, spread = levels(torch.tensor(then))
-        at = clean if then == 0 else signal * clean + spread * rest
+        (signal, spread), (signal_then, spread_then) = (map(float, levels(one)) for one in (now, then))
+        clean = signal * at - spread * denoiser(at, time)
+        if then == 0:
+            at = clean
+            break
+        step = math.log(signal_then / spread_then) - math.log(signal / spread)
+        ahead = clean + (clean - before) * (step / (2 * stride)) if stride else clean
+        at = spread_then / spread * at - signal_then * math.expm1(-step) * ahead
+        before, stride = clean, step
     return at if known is None or kept is None else torch.where(kept, known, at)
