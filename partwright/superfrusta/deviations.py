@@ -93,38 +93,55 @@ def _of_parts(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tupl
 
 
 def _of_shape(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
-    """Points on the shape's surface that no part covers."""
-    gap = samples.distance_of(rows, samples.surface)
-    points, gap = samples.surface[gap > _CLOSE], gap[gap > _CLOSE]
+    """Points on the shape's surface that no part covers, and those deep under parts: walls of what is filled,
+    which may be too narrow for its voxels to tell how deep it is."""
+    field = samples.distance_of(rows, samples.surface)
+    open_, filled = np.flatnonzero(field > _CLOSE), np.flatnonzero(field < -_CLOSE)
+    gap = walked(samples, rows, samples.surface[open_], field[open_])
+    index = np.concatenate([open_, filled])
+    points, off = samples.surface[index], np.concatenate([gap, -field[filled]])
     part = added[samples.parts_of(rows[added], points).argmin(axis=0)]
-    return points, np.zeros_like(gap), walked(samples, rows, points, gap), part
+    # What is filled lies outside of the shape, if only just.
+    distance = np.repeat(np.array([0, _ON], np.float32), [len(open_), len(filled)])
+    return points, distance, off, part
 
 
 def walked(samples: FitSamples, rows: Rows, points: Floats, gap: Floats) -> Floats:
     """How far points (n, 3) are from the surface of the assembly, whose field there is `gap` (n,).
 
     Beside thin, bent and blended parts the field is less than the distance: what is missing of a tip counted
-    half. So points walk to the surface along the field's gradient, and the way that they are off is measured.
+    half. So points walk to the surface, and the way that they are off is measured.
     """
-    place, field = points, gap
+    place, arrived = _arrived(samples, rows, points, gap)
+    return np.where(arrived, np.maximum(gap, np.linalg.norm(place - points, axis=1)), gap)
+
+
+def _arrived(samples: FitSamples, rows: Rows, points: Floats, field: Floats) -> tuple[Floats, Any]:
+    """Where points (n, 3) come to that walk to the assembly's surface, and which of them are on it then."""
+    place = points
     for _ in range(_STEPS):
         around = samples.distance_of(rows, (place + _AROUND).reshape(-1, 3)).reshape(len(_AROUND), -1)
         slope = ((around[:3] - around[3:]) / (2 * _BESIDE)).T
         steepness = np.maximum((slope**2).sum(axis=1), _FLAT)
         place = place - (field / steepness)[:, None] * slope
         field = samples.distance_of(rows, place)
-    arrived = np.abs(field) < _CLOSE
-    return np.where(arrived, np.maximum(gap, np.linalg.norm(place - points, axis=1)), gap)
+    return place, np.abs(field) < _CLOSE
 
 
 def _of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
     """Places inside the shape that no part fills, and outside that one does.
 
-    Where blends wall a void no part's surface is near it, and a hole may lie between the points of a face.
+    Where blends wall a void no part's surface is near it, and a hole may lie between the points of a face. A
+    sheet passes between voxels: those beside it walk onto it.
     """
     points, distance = samples.lattice
     field = samples.distance_of(rows, points)
+    beside = np.flatnonzero((field > 0) & (field < samples.grid.spacing) & (distance - field > _CLOSE))
+    onto, arrived = _arrived(samples, rows, points[beside], field[beside])
     wrong = np.where(distance < 0, field, -field) > _BESIDE / 2
-    points, distance = points[wrong], distance[wrong]
-    part = added[samples.parts_of(rows[added], points).argmin(axis=0)]
-    return points, distance, np.abs(distance), part
+    onto = onto[arrived]
+    deepest = samples.parts_of(rows[added], points[wrong]).argmin(axis=0)
+    nearest = np.abs(samples.parts_of(rows[added], onto)).argmin(axis=0)
+    points = np.concatenate([points[wrong], onto])
+    distance = np.concatenate([distance[wrong], np.maximum(samples.near_distance(onto), 0)])
+    return points, distance, np.abs(distance), added[np.concatenate([deepest, nearest])]

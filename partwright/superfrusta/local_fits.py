@@ -22,7 +22,6 @@ from partwright.errors import SettingError
 from partwright.fields.columns import ROTATION, UNSIGNED, Column
 from partwright.methods import Checkpoint, Progress, Run
 from partwright.shapes import Shape
-from partwright.shapes.grid import DistanceGrid, grid_indices
 from partwright.superfrusta.flat_tree import flattened
 from partwright.superfrusta.growing import Region, fit_regions
 from partwright.superfrusta.merging import owners
@@ -32,9 +31,6 @@ from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.solid_kinds import is_solid, solid
 
-_CELLS = 40  # of the local grid, along the longest side
-_ROOM = 0.15  # of that side: how much further than the place the grid goes
-_LOCAL_SAMPLES = 6000
 _FEWEST = 24  # voxels that a part can be fitted to
 _SMALLEST_SHARE = 0.08  # of the voxels, for a piece to be worth a part
 _FILLED = 0.25  # of what is missing in a box, for a part to be what was meant
@@ -182,22 +178,7 @@ class LocalFit:
     def _samples(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> FitSamples:
         """The fit's own samples, and more of them and another grid between two corners of the unit frame."""
         whole = FitSamples.of(self.shape, self.settings, self.run, Checkpoint(self.run.cancel))
-        room = _ROOM * float((high - low).max())
-        low, high = low - room, high + room
-        spacing = float((high - low).max()) / _CELLS
-        counts = np.maximum(np.ceil((high - low) / spacing).astype(int), 4)
-        origin = (low + high - spacing * (counts - 1)) / 2
-        places = (origin + spacing * grid_indices(counts)).astype(np.float32)
-        grid = DistanceGrid(origin, spacing, whole.measure(places).reshape(counts))
-        drawn = np.random.default_rng(self.run.seed).uniform(low, high, (_LOCAL_SAMPLES, 3))
-        local = drawn.astype(np.float32)
-        return replace(
-            whole,
-            points=np.concatenate([whole.points, local]),
-            distance=np.concatenate([whole.distance, whole.measure(local)]),
-            weight=np.concatenate([whole.weight, np.ones(len(local), np.float32)]),
-            grid=grid,
-        )
+        return whole.about(low, high)
 
     def _refined(self, samples: FitSamples, rows: Rows, moving: Sequence[int]) -> Rows:
         free = np.isin(np.arange(len(rows)), moving)

@@ -15,6 +15,8 @@ from os import cpu_count
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from partwright.fields.columns import ROTATION, Column
 from partwright.fields.kernel import Target
@@ -35,10 +37,14 @@ _REGROWN = 3  # at most
 _TWICE = 0.02  # unit lengths off at which a sample weighs twice
 _HEAVIEST = 25.0  # times that a sample may weigh
 _SAME_PLACE = 0.02  # unit lengths
+_WORTH_A_TRY = 1e-3  # of the objective
+_AGAIN = 0.01  # of the objective: after so much progress what was given up is tried again
 _STAGES: Stages = ((40.0, 4), (100.0, 5))
 _HOPELESS = 0.02  # of the objective: what is so much worse after a refit goes no further
 _REFITTED = 2  # of the ways to change a part
 _LEAST_HALVED = 100  # voxels
+_LINKED = 0.06  # unit lengths between points that are off in one place
+_HOLES = 2  # that are looked for there
 _JOINED = 4  # pairs at most, and of the most promising that are tried for each
 
 
@@ -66,19 +72,19 @@ class Mending:
     def __call__(self, rows: Rows) -> Rows:
         """Rows (M, 17) after at most `settings.mends` tries, without parts that no longer pay."""
         best = self.trial(rows)
-        given_up: list[NDArray[np.float32]] = []
+        given_up: list[tuple[NDArray[np.float32], float]] = []
         part: int | None = None
         for _ in range(self.settings.mends + 1):
             trials = [self.firmed(best, _all(best.rows))] if part is None else self.ways(best, part)
             allowed = (trial for trial in trials if self.allowed(trial.rows, rows))
             found = max(allowed, key=lambda trial: trial.value, default=best)
+            if part is not None and found.value < best.value + _WORTH_A_TRY:
+                given_up.append((best.off.points[best.off.worst(part)], best.value))
             if found.value > best.value:
                 best = found
                 if self.told is not None:
                     self.told(best.rows)
-            elif part is not None:
-                given_up.append(best.off.points[best.off.worst(part)])
-            part = _next(best.off, given_up)
+            part = next_to_mend(best, given_up)
             if part is None:
                 break
         slim = self.slimmed(self.joined(best))
@@ -210,7 +216,7 @@ class Mending:
         def with_new(new: Rows) -> tuple[Rows, Mask]:
             return np.concatenate([rows, new]), np.append(moving, _all(new))
 
-        if len(others):
+        if (others[:, Column.SIGN] > 0).any():
             yield others, still
         mine = owners(samples, rows) == part
         if mine.any():
@@ -221,14 +227,24 @@ class Mending:
                 begun = np.insert(still, [self.locked] * len(grown.first), True)
                 yield grown.joined(others, self.locked), np.append(begun, _all(grown.last))
         if self.settings.carving and off.distance[worst] > 0:
-            carved = carve(samples, rows, self.settings, self.settings.regions)
-            if len(carved):
-                yield with_new(carved.last)
+            for one in self.holes(rows, off, worst):
+                yield with_new(one[None])
         missed = self.missed(rows, off.points[worst]) if off.distance[worst] <= 0 else None
         if missed is not None:
             yield with_new(self.fitted(missed, rows, rows[part]))
         if np.count_nonzero(mine) > _LEAST_HALVED:
             yield instead(*(self.fitted(half, others, rows[part], cut) for half in _halves(samples, mine)))
+
+    def holes(self, rows: Rows, off: Deviations, worst: int) -> Rows:
+        """Parts (M, 17) to subtract about a point that is covered, by samples of that place alone: a hole may
+        be as narrow as a voxel."""
+        outside = np.flatnonzero(off.distance > 0)
+        tree = cKDTree(off.points[outside])
+        linked = tree.sparse_distance_matrix(tree, _LINKED, output_type="coo_matrix")
+        _, piece = connected_components(linked)
+        points = off.points[outside[piece == piece[np.searchsorted(outside, worst)]]]
+        low, high = points.min(axis=0) - off.off[worst], points.max(axis=0) + off.off[worst]
+        return carve(self.samples.about(low, high), rows, self.settings, _HOLES).last
 
     def fitted(self, voxels: Mask, others: Rows, like: NDArray[np.float32], under: bool = False) -> Rows:
         """The best part (1, 17) for the voxels, beside the others and before those that are subtracted if it
@@ -250,14 +266,18 @@ class Mending:
         return np.asarray((labels == labels[open_][away.argmin()]).ravel())
 
 
-def _next(off: Deviations, given_up: list[NDArray[np.float32]]) -> int | None:
-    """The part that is furthest off, but for places that were given up; None where all are near."""
-    by_part = off.by_part
+def next_to_mend(best: Trial, given_up: list[tuple[NDArray[np.float32], float]]) -> int | None:
+    """The part that is furthest off, but for places that were given up; None where all are near.
+
+    What is worse elsewhere hides what mending a place is worth: given up once, it is tried again later.
+    """
+    by_part = best.off.by_part
+    hopeless = [place for place, value in given_up if best.value < value + _AGAIN]
     for part in np.argsort(-by_part, kind="stable"):
         if by_part[part] < _ENOUGH:
             return None
-        place = off.points[off.worst(part)]
-        if all(np.linalg.norm(place - other) > _SAME_PLACE for other in given_up):
+        place = best.off.points[best.off.worst(part)]
+        if all(np.linalg.norm(place - other) > _SAME_PLACE for other in hopeless):
             return int(part)
     return None
 

@@ -14,7 +14,7 @@ from partwright.fields.columns import WIDTH
 from partwright.fields.kernel import Target
 from partwright.methods import Checkpoint, Run
 from partwright.shapes import Shape
-from partwright.shapes.grid import DistanceGrid
+from partwright.shapes.grid import DistanceGrid, grid_indices
 from partwright.shapes.sampling import morton_order
 from partwright.superfrusta.backend import Kernel, backend
 from partwright.superfrusta.settings import Settings
@@ -27,6 +27,9 @@ _MOST_PADDING_WEIGHT = 3.0  # of one point, where the weight of a sample in the 
 _PROBES = 48  # along a side of that cube
 _SURFACE = 8000  # points of the shape's surface
 _STRAY = 0.05  # unit lengths: what an assembly covers further than this from the shape is astray
+_LOCAL_CELLS = 40  # of a local grid, along the longest side
+_LOCAL_ROOM = 0.15  # of that side: how much further than the place the grid goes
+_LOCAL_SAMPLES = 6000
 _FAR = 0.1  # unit lengths from the shape
 _NOT_FAR = 0.3
 _FAR_COUNT = 400  # about so many samples stand for all that are far
@@ -102,6 +105,25 @@ class FitSamples:
             distance=np.concatenate([self.distance, distance.astype(np.float32)]),
             weight=np.concatenate([self.weight, np.full(len(hit), self._probe_weight, np.float32)]),
             probes=np.delete(self.probes, hit, axis=0),
+        )
+
+    def about(self, low: NDArray[np.floating], high: NDArray[np.floating]) -> FitSamples:
+        """These and more, with another grid, a little beyond the box between two corners (3,)."""
+        room = _LOCAL_ROOM * float((high - low).max())
+        low, high = low - room, high + room
+        spacing = float((high - low).max()) / _LOCAL_CELLS
+        counts = np.maximum(np.ceil((high - low) / spacing).astype(int), 4)
+        origin = (low + high - spacing * (counts - 1)) / 2
+        places = (origin + spacing * grid_indices(counts)).astype(np.float32)
+        grid = DistanceGrid(origin, spacing, self.measure(places).reshape(counts))
+        drawn = np.random.default_rng(self.seed).uniform(low, high, (_LOCAL_SAMPLES, 3))
+        local = drawn.astype(np.float32)
+        return replace(
+            self,
+            points=np.concatenate([self.points, local]),
+            distance=np.concatenate([self.distance, self.measure(local)]),
+            weight=np.concatenate([self.weight, np.ones(len(local), np.float32)]),
+            grid=grid,
         )
 
     def stray_weight(self, rows: Rows) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from partwright.fields.columns import WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
 from partwright.superfrusta.deviations import deviations, walked
-from partwright.superfrusta.mending import Mending
+from partwright.superfrusta.mending import Mending, next_to_mend
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.samples import FitSamples
@@ -203,3 +203,43 @@ def test_mending_carves_holes_unless_forbidden(subtract: bool | None) -> None:
         assert deviations(found, mended).norm < 0.03
     else:
         assert len(cuts) == 0
+
+
+def test_a_hole_that_is_narrower_than_voxels_tell_is_seen_and_carved() -> None:
+    """No voxel lies deep in it; the shape's surface lies deep under the part."""
+    plate, radius = ((1.8, 1.2, 0.3), (0.0, 0.0, 0.0)), 0.04
+    drill = trimesh.creation.cylinder(radius, 1.0, sections=48).apply_translation((0.3, 0.2, 0))
+    drilled = trimesh.boolean.difference([box(*plate), drill], engine="manifold")
+    found = FitSamples.of(load_shape(drilled), SETTINGS)
+    assert 2 * radius < 3 * found.grid.spacing
+    solid = np.array([box_row(*plate)])
+    off = deviations(found, solid)
+    assert off.norm == pytest.approx(0.15, abs=0.02)  # half of the plate's thickness
+    assert np.linalg.norm(off.points[off.worst(0), :2] - (0.3, 0.2)) < radius + 0.01
+    mended = Mending(found, SETTINGS)(solid)
+    (cut,) = mended[mended[:, Column.SIGN] < 0]
+    assert cut[[Column.TX, Column.TY]] == pytest.approx([0.3, 0.2], abs=0.01)
+    assert deviations(found, mended).norm < 0.03
+
+
+def test_what_was_given_up_is_tried_again_after_progress(samples: FitSamples, exact: np.ndarray) -> None:
+    tab = box_row((0.3, 0.3, 0.01), (-0.3, 0.55, 0.1))
+    best = Mending(samples, SETTINGS).trial(np.vstack([exact, tab]))
+    place = best.off.points[best.off.worst(2)]
+    assert next_to_mend(best, []) == 2
+    assert next_to_mend(best, [(place, best.value)]) is None
+    assert next_to_mend(best, [(place, best.value - 0.02)]) == 2
+
+
+def test_a_sheet_over_a_hole_is_off_although_it_passes_between_voxels() -> None:
+    plate, radius = ((1.8, 1.2, 0.3), (0.0, 0.0, 0.0)), 0.1
+    drill = trimesh.creation.cylinder(radius, 1.0, sections=48).apply_translation((-0.36, 0.1, 0))
+    found = FitSamples.of(load_shape(trimesh.boolean.difference([box(*plate), drill])), SETTINGS)
+    cut = row((-0.36, 0.1, 0.0), (1, 0, 0, 0), (2 * radius, 2 * radius, 1.0), roundness=1.0)
+    cut[Column.SIGN] = -1
+    sheet = box_row((1.7, 1.1, 0.002), (0.0, 0.0, 0.013))
+    rows = np.array([box_row(*plate), cut, sheet])
+    assert deviations(found, rows[:2]).norm < 0.02
+    off = deviations(found, rows)
+    assert off.by_part == pytest.approx([0.0, 0.0, radius], abs=0.02)
+    assert off.points[off.worst(2)] == pytest.approx([-0.36, 0.1, 0.013], abs=0.03)
