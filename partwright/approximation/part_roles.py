@@ -14,6 +14,8 @@ from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Frustum, Profile, Revolution, Sphere
 
+FREEFORM = "freeform"
+"""What names of parts begin with that are no feature, and keep them."""
 _FLAT = 0.3  # a plate's thickness over its next longer side, at most
 _LONG = 3.0  # a bar's length over its next shorter side, at least
 _BORE = 0.5  # of the narrowest side of what it is in: a hole that is wider is its bore
@@ -101,7 +103,7 @@ def _name(node: Node, cut_from: Node | None, roles: dict[str, str]) -> None:
 
 
 def _is_solid(part: Part) -> bool:
-    return part.field.quadric() is None
+    return part.field.quadric() is None and not part.name.startswith(FREEFORM)
 
 
 def _added(field: Field) -> str:

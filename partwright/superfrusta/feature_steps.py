@@ -22,7 +22,7 @@ class Feature:
     """One step of the tree. covers: (N,) the samples within any copy.
 
     image: where the part and all its copies are there as a mirror image, too: what comes after the mirror in
-    the plane x = 0.
+    the plane x = 0. freeform: whether it is no feature that was drawn, but the shape's own form.
     """
 
     added: bool
@@ -30,6 +30,7 @@ class Feature:
     covers: NDArray[np.bool_]
     sides: int
     image: Similarity | None = None
+    freeform: bool = False
 
     @property
     def parts(self) -> tuple[Part, ...]:

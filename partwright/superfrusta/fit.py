@@ -9,9 +9,17 @@ import numpy as np
 
 from partwright.assembly import Assembly
 from partwright.errors import CancelledError, EmptyShapeError
-from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, timed
+from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outcome, timed
+from partwright.shapes import Shape
 from partwright.superfrusta.feature_steps import FeatureTree
-from partwright.superfrusta.featured import SURE, assembly, feature_tree, wants_features
+from partwright.superfrusta.featured import (
+    SURE,
+    assembly,
+    feature_tree,
+    freeform_warnings,
+    mended_assembly,
+    wants_features,
+)
 from partwright.superfrusta.outcome import assembly_of
 from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import FitSamples
@@ -43,9 +51,7 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         with timed(seconds, "features"):
             features, interrupted = feature_tree(request, samples, checkpoint)
         if features is not None and (interrupted or features.score >= SURE or settings.min_iou is not None):
-            return Fitted(
-                assembly(shape, features), "interrupted" if interrupted else "converged", seconds, []
-            )
+            return _of_features(shape, features, "interrupted" if interrupted else "converged", seconds, [])
     assembled = partial(assembly_of, shape, settings=settings, fixed=fixed)
     search = ResidualFit(samples, settings, run.told, len(fixed), assembled, checkpoint, seconds=seconds)
     try:
@@ -65,15 +71,32 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         )
     leaves = search.leaves or [RepeatedPart(row) for row in search.best]
     if features is not None and _preferred(features, search, len(leaves)):
-        return Fitted(assembly(shape, features), outcome, search.seconds, search.history)
+        return _of_features(shape, features, outcome, search.seconds, search.history)
     whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
+    if features is not None and outcome != "interrupted":
+        with timed(seconds, "freeform"):
+            whole, off = mended_assembly(request, samples, whole)
+        if off > features.off:  # nothing may be far off that need not be
+            return _of_features(shape, features, outcome, search.seconds, search.history)
     whole = _with_locked(whole, request)
     curve: list[CurvePoint] = []
     for step in search.curve:
         smaller = curve[-1].assembly if curve else None
         one = assembled(step.rows, smaller=smaller)
         curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
-    return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)))
+    told = freeform_warnings(shape, whole)
+    return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)), warnings=told)
+
+
+def _of_features(
+    shape: Shape,
+    features: FeatureTree,
+    outcome: Outcome,
+    seconds: dict[str, float],
+    history: list[dict[str, float | str]],
+) -> Fitted:
+    whole = assembly(shape, features)
+    return Fitted(whole, outcome, seconds, history, warnings=freeform_warnings(shape, whole))
 
 
 def _preferred(features: FeatureTree, search: ResidualFit, parts: int) -> bool:

@@ -1,0 +1,201 @@
+"""What no feature explains, kept as freeform: where a tree is far off, it takes the shape's own form.
+
+Around such a place the shape, or the space beside it, is cut along one of the directions of the whole into a
+few extrusions that follow it: worse to read than a feature, but no further off than is allowed. They are
+called `freeform_1` and so on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from manifold3d import Manifold
+from numpy.typing import NDArray
+
+from partwright.approximation.sketches.terraces import terraces
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.meshing.csg import solid_of
+from partwright.superfrusta.far_places import (
+    NEARLY,
+    Place,
+    Solid,
+    count,
+    far_places,
+    loose_places,
+    reach,
+)
+from partwright.superfrusta.feature_mending import FAR
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, as_move, covers
+from partwright.superfrusta.feature_symmetry import reflected
+
+if TYPE_CHECKING:
+    from partwright.superfrusta.feature_search import FeatureSearch
+
+_MOST = 4  # extrusions of one place
+_PLACES = 12
+_DEARER = 2.0  # times the price of a feature, that one costs: it says nothing of how it would be drawn
+_TOLERANCES = (0.9, 0.5)  # of `FAR`
+_AROUND = 0.02  # unit lengths, by which what is drawn is larger than the place
+_LOOKED = 0.1  # unit lengths around a place that is looked at again
+_BETTER = 0.9  # of what a place was off, that it may be when mended
+_LOSS = 3e-3  # of R, that mending one place may cost
+_CHORD = 1e-3  # unit lengths
+
+
+@dataclass(frozen=True)
+class _Mended:
+    """A tree with a place mended, as a solid, by parts. off: what that place still is."""
+
+    tree: FeatureTree
+    solid: Solid
+    parts: list[Part]
+    off: float
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """Less is better: few parts where the place is near enough, else the nearest."""
+        if self.off < NEARLY * FAR:
+            return len(self.parts), -self.tree.score
+        return _MOST + 1, self.off
+
+
+def with_freeform(
+    search: FeatureSearch,
+    tree: FeatureTree,
+    made: Callable[[FeatureTree], Assembly],
+    most: int | None = None,
+) -> FeatureTree:
+    """The tree, and what brings its surface to within `FAR` of the shape's, the farthest place first; and
+    what joins pieces that hardly float, where the shape has fewer bodies.
+
+    made: what becomes of a tree, in the unit frame, which is what is measured: ends of cuts are open there,
+    and cuts belong to what they meet. most: features of the result. What is missed and too much are left as
+    they were.
+    """
+    shape = Solid(search.body, search.samples.measure)
+    covered = tree.at(search.points)
+    tree = replace(tree, covered=covered, score=search.score_of(covered))
+    given_up: list[Place] = []
+    for _ in range(_PLACES):
+        other = _solid(made(tree))
+        places = [
+            place
+            for place in (*far_places(shape, other), *loose_places(shape, other))
+            if not _among(place, given_up)
+        ]
+        left = _MOST if most is None else min(_MOST, most - len(tree.features))
+        if not places or left < 1:
+            break
+        start = _Mended(tree, other, [], places[0].off)
+        best = min(_tries(search, shape, start, places[0], left), key=lambda one: one.rank, default=None)
+        if best is None:
+            given_up.append(places[0])
+        else:
+            tree = _with_copies(search, shape, start, best, places).tree
+    return replace(tree, off=max((p.off for p in far_places(shape, _solid(made(tree)))), default=0.0))
+
+
+def _solid(whole: Assembly) -> Solid:
+    return Solid(solid_of(whole, _CHORD), whole.distance)
+
+
+def _tries(search: FeatureSearch, shape: Solid, start: _Mended, place: Place, most: int) -> Iterator[_Mended]:
+    """Ways to mend a place, each better than it is; finer ones where no coarse one brings it near enough."""
+    enough = False
+    for tolerance in _TOLERANCES:
+        for frame in search.frames if not enough else ():
+            parts = terraces(_around(place, shape.body, frame), frame, tolerance * FAR, most)
+            mended = _joined(search, shape, start, parts, place) if parts else None
+            if mended is not None:
+                yield mended
+                enough = enough or mended.off < NEARLY * FAR
+
+
+def _around(place: Place, body: Manifold, frame: NDArray[np.float64]) -> Manifold:
+    """What there is of a body around a place, or what there is beside it where it has too much."""
+    seen = place.points @ frame
+    low, high = seen.min(axis=0) - _AROUND, seen.max(axis=0) + _AROUND
+    box = Manifold.cube((high - low).tolist()).translate(low.tolist())
+    box = box.transform(np.column_stack([frame, np.zeros(3)]))
+    return body ^ box if place.lacks else box - body
+
+
+def _joined(
+    search: FeatureSearch, shape: Solid, start: _Mended, parts: list[Part], place: Place
+) -> _Mended | None:
+    """With parts added, or cut, where that makes a place better and leaves the body whole."""
+    tree, body = start.tree, start.solid.body
+    features = [Feature(place.lacks, part, covers(part, search.points), 0, freeform=True) for part in parts]
+    covered = tree.covered
+    for feature in features:
+        covered = covered | feature.covers if place.lacks else covered & ~feature.covers
+    score = search.score_of(covered)
+    if score < tree.score - _LOSS:
+        return None
+    price = tree.price + _DEARER * search.alpha * len(parts)
+    tree = replace(tree, features=[*tree.features, *features], covered=covered, score=score, price=price)
+    for part in parts:
+        whole = solid_of(part, _CHORD)
+        body = body + whole if place.lacks else body - whole
+
+    def distance(points: NDArray[np.float32]) -> NDArray[np.float32]:
+        result = start.solid.distance(points)
+        for part in parts:
+            own = part.distance(points)
+            result = np.minimum(result, own) if place.lacks else np.maximum(result, -own)
+        return result
+
+    solid = Solid(body, distance)
+    off = reach(shape, solid, place.box + np.array([[-_LOOKED], [_LOOKED]]))
+    bodies, before = count(body), count(start.solid.body)
+    better = off < NEARLY * FAR and bodies < before if place.gap else off < _BETTER * place.off
+    return _Mended(tree, solid, parts, off) if better and bodies <= before else None
+
+
+def _with_copies(
+    search: FeatureSearch, shape: Solid, start: _Mended, first: _Mended, places: Sequence[Place]
+) -> _Mended:
+    """With copies where symmetries of the whole take the first of the places to another."""
+    others = [place for place in places[1:] if place.lacks is places[0].lacks]
+    kept: list[list[Similarity]] = []
+    best = first
+    for moves, middle in _symmetric(search, first.parts, places[0].box.mean(axis=0)):
+        other = next((place for place in others if _within(middle, place)), None)
+        if other is None:
+            continue
+        images = [part.transformed(move) for part, move in zip(first.parts, moves, strict=True)]
+        more = _joined(search, shape, best, images, other)
+        if more is not None and more.off < NEARLY * FAR:
+            others.remove(other)
+            kept.append(moves)
+            best = more
+    features = [
+        replace(feature, part=replace(feature.part, instances=tuple(moves)))
+        for feature, *moves in zip(first.tree.features[len(start.tree.features) :], *kept, strict=True)
+    ]
+    tree = replace(best.tree, features=[*start.tree.features, *features], price=first.tree.price)
+    return replace(best, tree=tree)
+
+
+def _symmetric(
+    search: FeatureSearch, parts: Sequence[Part], point: NDArray[np.float64]
+) -> Iterator[tuple[list[Similarity], NDArray[np.float64]]]:
+    """For each symmetry of the whole the moves that make it of parts, and of a point (3,)."""
+    for turn in search.turns:
+        yield [turn] * len(parts), turn(point)
+    for plane in search.mirrors:
+        moves = [move for part in parts if (move := as_move(part, plane)) is not None]
+        if len(moves) == len(parts):
+            yield moves, reflected(plane, point[None])[0]
+
+
+def _within(point: NDArray[np.float64], place: Place) -> bool:
+    low, high = place.box
+    return bool(((point > low - _AROUND) & (point < high + _AROUND)).all())
+
+
+def _among(place: Place, others: Sequence[Place]) -> bool:
+    return any(other.lacks is place.lacks and _within(place.box.mean(axis=0), other) for other in others)

@@ -1,0 +1,116 @@
+"""Where no feature explains a shape, its own form stands in steps, and nothing is far off."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from manifold3d import Manifold
+
+import partwright as pw
+from partwright.approximation.sketches.terraces import terraces
+from partwright.assembly import Assembly, Part
+from partwright.fields import Box, Sphere
+from partwright.meshing import mesh_assembly
+from partwright.meshing.csg import solid_of
+from partwright.superfrusta.far_places import Solid, count, far_places
+from partwright.superfrusta.feature_freeform import with_freeform
+from partwright.superfrusta.feature_mending import FAR
+from partwright.superfrusta.feature_search import FeatureSearch
+from partwright.superfrusta.feature_steps import Feature, FeatureTree
+from partwright.superfrusta.featured import _as_made
+from partwright.superfrusta.samples import FitSamples
+from partwright.superfrusta.solids import Settings
+
+# In the unit frame: centred, the longest side 1.8.
+PLATE = Part(Box((1.8, 1.0, 0.2)))
+LEFT, RIGHT = (Part(Sphere(0.2), (x, 0.1, 0.0)) for x in (-0.5, 0.5))
+UP = np.eye(3)
+
+
+@cache
+def search_of(whole: Assembly) -> FeatureSearch:
+    settings = Settings.for_quality("draft")
+    shape = pw.load_shape(mesh_assembly(whole))
+    return FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+
+
+def mended(whole: Assembly, *parts: Part, most: int | None = None) -> tuple[FeatureTree, float, int]:
+    """The tree of such parts, mended; how far it is off then, unit lengths; and its bodies."""
+    search = search_of(whole)
+    shape = pw.load_shape(mesh_assembly(whole))
+    first = [Feature(True, part, np.zeros(0, bool), 4) for part in parts]
+    made = partial(_as_made, shape)
+    tree = with_freeform(search, search.scored(FeatureTree(first)), made, most)
+    result = made(tree)
+    other = Solid(solid_of(result, 1e-3), result.distance)
+    places = far_places(Solid(search.body, search.samples.measure), other)
+    return tree, max((place.off for place in places), default=0.0), count(other.body)
+
+
+def test_a_ball_is_a_few_steps_and_a_block_is_one() -> None:
+    ball = Manifold.sphere(0.3, 64)
+    parts = terraces(ball, UP, 0.05, 8)
+    assert parts is not None
+    assert 3 <= len(parts) <= 8
+    whole = solid_of(Assembly(tuple(parts)), 1e-4)
+    assert whole.volume() == pytest.approx(ball.volume(), rel=0.1)
+    points = Solid(whole, Sphere(0.3)).points()
+    assert np.abs(np.linalg.norm(points, axis=1) - 0.3).max() < 2 * 0.05
+    assert terraces(ball, UP, 0.05, 2) is None
+    assert terraces(Manifold(), UP, 0.05, 2) is None
+    (block,) = terraces(Manifold.cube((1.0, 0.5, 0.3), True), UP, 0.05, 1) or ()
+    assert block.field == Box((1.0, 0.5, 0.3))
+
+
+def test_two_bumps_are_one_freeform_and_its_copy() -> None:
+    tree, off, bodies = mended(Assembly((PLATE, LEFT, RIGHT)), PLATE)
+    fresh = tree.features[1:]
+    assert fresh
+    assert all(feature.freeform and feature.added for feature in fresh)
+    assert any(len(feature.part.copies) > 1 for feature in fresh)
+    assert off == tree.off == 0
+    assert bodies == 1
+
+
+def test_a_dent_is_cut() -> None:
+    dent = Part(Sphere(0.15), (0.0, 0.0, 0.1))
+    tree, off, _ = mended(Assembly((PLATE, dent), "difference"), PLATE)
+    assert off == 0
+    assert not any(feature.added for feature in tree.features[1:])
+
+
+def test_what_is_right_is_left_alone_and_the_budget_is_kept() -> None:
+    tree, _, _ = mended(Assembly((PLATE, LEFT, RIGHT)), PLATE, LEFT, RIGHT)
+    assert len(tree.features) == 3
+    tree, off, _ = mended(Assembly((PLATE, LEFT, RIGHT)), PLATE, most=1)
+    assert len(tree.features) == 1
+    assert tree.off == pytest.approx(off)
+    assert off > FAR
+
+
+def test_pieces_that_hardly_float_are_joined() -> None:
+    halves = [Part(Box((0.8995, 1.0, 0.2)), (x, 0.0, 0.0)) for x in (-0.45025, 0.45025)]
+    tree, _, bodies = mended(Assembly((PLATE,)), *halves)
+    assert bodies == 1
+    assert len(tree.features) == 3
+
+
+def test_a_fit_names_what_is_freeform(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(3, 1.0)
+    ball.apply_scale((12.0, 7.0, 9.0))
+    ball.apply_transform(trimesh.transformations.rotation_matrix(0.5, (1, 2, 3), (0, 0, 0)))
+    ball.apply_translation((15.0, 3.0, 8.0))
+    block = trimesh.creation.box((80.0, 50.0, 20.0))
+    both = trimesh.boolean.union([block, ball], engine="manifold")
+    result = pw.fit(pw.load_shape(both, unit="mm"), "solids", quality="draft")
+    assert result.report["scores"]["max_deviation_share"] < 0.03
+    assert "freeform_1" in [part.name for part in result.assembly.parts]
+    assert any("freeform_1 (back upper right)" in line for line in result.report["warnings"])
+    result.assembly.save(tmp_path / "part.json")
+    assert pw.load_assembly(tmp_path / "part.json") == result.assembly
+    pw.export(result.assembly, tmp_path / "part.scad")
+    assert "freeform_1_height" in (tmp_path / "part.scad").read_text("utf-8")
