@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from partwright.shapes import Shape
 from partwright.shapes.sampling import sample_triangles
+from partwright.shapes.topology import area_vectors
 
 _MIN_SMOOTH_COSINE = np.cos(np.radians(32.0))  # facets that meet at less belong to one curved surface
 
@@ -36,7 +37,7 @@ def sample_surface(shape: Shape, count: int, seed: int) -> OrientedPoints:
     vertices, faces = shape.frame.to_unit(shape.vertices), shape.faces
     points, face = sample_triangles(vertices, faces, count, seed)
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = area_vectors(corners)
     smooth = _corner_normals(faces, cross, _angles(corners), len(vertices))
     weights = _barycentric(corners[face], points)
     normals = (weights[:, :, None] * smooth[face]).sum(axis=1)

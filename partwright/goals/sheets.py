@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from partwright.shapes.topology import area_vectors
+
 _SMOOTH = 0.97  # cosine between a vertex normal and the face normals around it
 _INWARDS = 0.25  # of the way to a face's centre: where a sheet is looked at
 _RANK = 0.03  # of the largest eigenvalue: normals that spread less than this are those of one bent surface
@@ -48,7 +50,7 @@ class Sheets:
 def sheets(vertices: np.ndarray, faces: np.ndarray) -> Sheets:
     """Of a mesh of vertices (V, 3) and faces (F, 3): smooth vertices themselves, sharp ones face by face."""
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = area_vectors(corners)
     area = np.linalg.norm(cross, axis=1) / 2
     unit = cross / np.maximum(2 * area, np.finfo(float).tiny)[:, None]
     mean = np.zeros_like(vertices)

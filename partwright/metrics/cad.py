@@ -15,6 +15,7 @@ from partwright.metrics.edge_chamfer import edge_chamfer
 from partwright.metrics.light_field import light_field_distance
 from partwright.metrics.normal_consistency import normal_consistency
 from partwright.shapes.sampling import sample_triangles
+from partwright.shapes.topology import area_vectors
 
 if TYPE_CHECKING:
     import trimesh
@@ -87,6 +88,5 @@ def _sample(mesh: trimesh.Trimesh, count: int, seed: int) -> tuple[np.ndarray, n
     """Points (N, 3) of the surface and its unit normals (N, 3) there."""
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     points, face = sample_triangles(vertices, faces, count, seed)
-    a, b, c = (vertices[faces[face, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
+    normal = area_vectors(vertices[faces[face]])
     return points, normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

@@ -23,6 +23,7 @@ from partwright.robots.wrapping import wrapped
 from partwright.shapes import MeshDistance
 from partwright.shapes import Shape as InputShape
 from partwright.shapes.reading import read_source, source_of
+from partwright.shapes.sampling import sample_triangles
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,14 +62,7 @@ class Target:
 
     def samples(self, count: int, seed: int) -> np.ndarray:
         """(N, 3) points spread evenly over the triangles, and all corners."""
-        random = np.random.default_rng(seed)
-        a, b, c = self.vertices[self.faces.T]
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        chosen = random.choice(len(area), count, p=area / area.sum())
-        u, v = random.random((2, count, 1))
-        over = u + v > 1
-        u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
-        points = a[chosen] + u * (b - a)[chosen] + v * (c - a)[chosen]
+        points, _ = sample_triangles(self.vertices, self.faces, count, seed)
         return np.concatenate([points, self.vertices[np.unique(self.faces)]])
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.shapes.topology import EdgeTable
+from partwright.shapes.topology import EdgeTable, area_vectors
 
 _CELL = 0.04  # unit frame: the neighbourhood is about two cells wide
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -67,7 +67,7 @@ def _bent_edges(
     edge, beside = EdgeTable(faces).pairs
     left, right = beside.T
     corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     along = vertices[edge[:, 1]] - vertices[edge[:, 0]]
     length = np.linalg.norm(along, axis=1)

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from partwright.shapes.topology import area_vectors
 from partwright.shapes.winding import closing_fans, winding_grid
 
 _CHUNK = 262_144  # closest-point queries at once: a query's record takes about 100 bytes
@@ -215,7 +216,7 @@ class MeshDistance:
         closed = winding_grid(vertices, np.concatenate([self._winding_faces, fans]), origin, spacing, shape)
         inside = closed > 0
         corners = vertices[fans]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal = area_vectors(corners)
         reach = np.sqrt(np.linalg.norm(normal, axis=1).sum() / (4 * np.pi))
         first = np.clip((corners.min(axis=(0, 1)) - reach - origin) / spacing, 0, shape).astype(int)
         stop = np.clip((corners.max(axis=(0, 1)) + reach - origin) / spacing + 1, 0, shape).astype(int)
@@ -284,7 +285,7 @@ def _side_of_triangle(
 def closest_on_triangles(corners: NDArray[np.float64], points: NDArray[Any]) -> NDArray[np.float64]:
     """Point (N, 3) of each triangle (N, 3, 3) that is closest to the point (N, 3) of the same row."""
     side, within = _side_of_triangle(corners, points)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     square = np.maximum((normal * normal).sum(axis=1), np.finfo(np.float64).tiny)
     best = points - (side / square)[:, None] * normal
     least = np.where(within, 0.0, np.inf)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.shapes.cleaning import counted
-from partwright.shapes.topology import EdgeTable, doubled_areas, signed_volumes
+from partwright.shapes.topology import EdgeTable, area_vectors, doubled_areas, signed_volumes
 
 _PROBES = 32  # vertices of a body that are looked at to see whether another body contains it
 _MAJORITY = 0.75  # share of a patch's triangles that must agree before its facing in the file is believed
@@ -59,10 +59,7 @@ def _make_consistent(vertices: NDArray[np.float64], edges: EdgeTable, notes: lis
 
 
 def _facing(vertices: NDArray[np.float64], a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.float64]:
-    def normals(f: NDArray[np.int64]) -> NDArray[np.float64]:
-        return np.cross(vertices[f[:, 1]] - vertices[f[:, 0]], vertices[f[:, 2]] - vertices[f[:, 0]])
-
-    return (normals(a) * normals(b)).sum(axis=1)
+    return np.asarray((area_vectors(vertices[a]) * area_vectors(vertices[b])).sum(axis=1))
 
 
 def _areas(

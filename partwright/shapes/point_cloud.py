@@ -19,7 +19,7 @@ from partwright.shapes.frame import LONGEST_SIDE, UnitFrame
 from partwright.shapes.indicator import Indicator
 from partwright.shapes.normals import normal_lines, orient_normals
 from partwright.shapes.source import Piece, Source
-from partwright.shapes.topology import EdgeTable, signed_volumes
+from partwright.shapes.topology import EdgeTable, area_vectors, signed_volumes
 
 _FEWEST = 100
 _DENSE = 100_000  # points from which close ones are merged
@@ -162,7 +162,7 @@ def _borne_out(elements: _Elements, vertices: NDArray[np.float64], faces: NDArra
     from scipy.spatial import cKDTree
 
     corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     apart, nearest = cKDTree(elements.points).query(corners.mean(axis=1), workers=-1)
     agrees = (normal * elements.normals[nearest]).sum(axis=1) > 0
     area = np.linalg.norm(normal, axis=1)

@@ -18,7 +18,7 @@ from partwright.shapes.distance import MeshDistance
 from partwright.shapes.holes import Openings, fill_holes, with_what_stays_open
 from partwright.shapes.orientation import orient
 from partwright.shapes.sampling import sample_triangles
-from partwright.shapes.topology import EdgeTable, components, doubled_areas, signed_volumes
+from partwright.shapes.topology import EdgeTable, area_vectors, components, doubled_areas, signed_volumes
 from partwright.shapes.winding import winding_grid
 
 _FLAT = 1e-6  # thickness under which the vertices count as one plane
@@ -177,7 +177,7 @@ def _surface_of_sheets(
 def _facing(source: MeshDistance, corners: NDArray[np.float64]) -> NDArray[np.int64]:
     """+1 where a triangle (F, 3, 3) parts inside from outside and faces out, -1 where it faces in, 0 where it
     parts nothing: looked at in its middle and near its corners."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     facing = np.zeros(len(corners), dtype=np.int64)
     for weight in ((1 / 3, 1 / 3, 1 / 3), (0.9, 0.05, 0.05), (0.05, 0.9, 0.05), (0.05, 0.05, 0.9)):

@@ -30,7 +30,7 @@ from partwright.shapes.sampling import (
     uniform_box,
 )
 from partwright.shapes.source import Piece, Source
-from partwright.shapes.topology import compacted, signed_volumes
+from partwright.shapes.topology import area_vectors, compacted, signed_volumes
 from partwright.shapes.units import canonical_unit, canonical_up
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ class Shape:
     def area(self) -> float:
         """Area of the outer surface in own units squared."""
         corners = self.vertices[self.faces]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal = area_vectors(corners)
         return float(np.linalg.norm(normal, axis=1).sum() / 2)
 
     @property
@@ -226,7 +226,7 @@ class Shape:
         vertices, faces = self._surface.vertices, self._surface.faces
         points, face = sample_triangles(vertices, faces, count, seed)
         corners = vertices[faces[face]]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal = area_vectors(corners)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
 
         def curvature() -> NDArray[np.float32]:

@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+def area_vectors(corners: NDArray[Any]) -> NDArray[Any]:
+    """Normals (F, 3) of triangles (F, 3, 3), each as long as twice its area."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def doubled_areas(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[Any]:
     """Twice the area (F,) of each triangle, in squared units of the vertices (V, 3): enough for weights."""
-    corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(np.linalg.norm(normals, axis=1))
+    return np.asarray(np.linalg.norm(area_vectors(vertices[faces]), axis=1))
 
 
 @dataclass(frozen=True)
@@ -145,7 +148,7 @@ def signed_volumes(
     Measured from the set's own area centroid, so that it also tells the facing of a set with openings.
     """
     corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     area = np.linalg.norm(normal, axis=1)
     centroid = corners.mean(axis=1)
     count = int(label.max(initial=-1)) + 1

@@ -8,6 +8,7 @@ import numpy as np
 from manifold3d import Manifold, Mesh64
 
 from partwright.meshing.small_components import components
+from partwright.shapes.topology import area_vectors
 
 
 def bodies(solid: Manifold, least: float, thin: float) -> Iterator[tuple[float, Manifold]]:
@@ -21,7 +22,7 @@ def bodies(solid: Manifold, least: float, thin: float) -> Iterator[tuple[float, 
     count, piece = components(faces, len(vertices))
     own = piece[faces[:, 0]]
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = area_vectors(corners)
     volume = np.bincount(own, (corners[:, 0] * cross).sum(axis=1) / 6, minlength=count)
     area = np.bincount(own, np.linalg.norm(cross, axis=1) / 2, minlength=count)
     for k in np.flatnonzero((volume > least) & (2 * volume > thin * area)):

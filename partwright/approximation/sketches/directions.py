@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from partwright.shapes.topology import area_vectors
+
 _SAME = math.cos(math.radians(1.5))
 _LEAST = 0.01  # of the area, that faces across a direction, or round ones along it, have
 _MOST = 4
@@ -22,7 +24,7 @@ def frames(vertices: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
     vertices (V, 3), faces (F, 3) of a closed mesh.
     """
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = area_vectors(corners)
     area = np.linalg.norm(cross, axis=1) / 2
     kept = area > 1e-12
     normal = np.zeros_like(cross)
@@ -38,7 +40,7 @@ def frames(vertices: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
 def long_axis(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray | None:
     """The frame (3, 3), as of `frames`, along which a surface is much longer than across; None of others."""
     corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = np.linalg.norm(area_vectors(corners), axis=1)
     middle = corners.mean(axis=1)
     off = middle - np.average(middle, axis=0, weights=area)
     spread, axes = np.linalg.eigh(np.einsum("n,ni,nj->ij", area, off, off))

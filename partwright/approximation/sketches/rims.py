@@ -12,6 +12,7 @@ from manifold3d import CrossSection, JoinType, Manifold
 from partwright.fields.profile import Profile
 from partwright.fields.profile_distance import profile_distance
 from partwright.fields.rims import Rim
+from partwright.shapes.topology import area_vectors
 
 SHARP = Rim(0.0, 0.0)
 _LEANS = (0.02, 0.9998)  # of a face's normal across the ends
@@ -36,7 +37,7 @@ class Leaning(NamedTuple):
     @classmethod
     def of(cls, vertices: np.ndarray, faces: np.ndarray) -> Leaning:
         corners = vertices[faces]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal = area_vectors(corners)
         area = np.linalg.norm(normal, axis=1) / 2
         upwards = normal[:, 2] / np.maximum(2 * area, 1e-300)
         leans = (np.abs(upwards) > _LEANS[0]) & (np.abs(upwards) < _LEANS[1])

@@ -16,6 +16,7 @@ from partwright.approximation.sketches.rims import Leaning
 from partwright.approximation.sketches.slits import TOUCHING, touches_itself, without_slits
 from partwright.errors import ParameterError
 from partwright.fields.profile import Loop, Profile
+from partwright.shapes.topology import area_vectors
 
 FINE, COARSE = 4e-4, 4e-3  # unit lengths: how far outlines may lie from sections
 _MANY = 24  # sides, from which on fewer are looked for at the coarse tolerance
@@ -76,7 +77,7 @@ class View:
         those at which upright walls begin and end."""
         vertices, faces = self.mesh
         corners = vertices[faces]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal = area_vectors(corners)
         area = np.linalg.norm(normal, axis=1) / 2
         flat = np.abs(normal[:, 2]) > 2 * area * _FLAT
         height, weight = corners[flat, :, 2].mean(axis=1), area[flat]

@@ -8,6 +8,7 @@ import trimesh
 from partwright.errors import SettingError
 from partwright.goals.objective import Measure, Objective, Start
 from partwright.meshing.thin_parts import as_manifold
+from partwright.shapes.topology import area_vectors
 
 
 def _boxes(argument: str) -> np.ndarray:
@@ -33,7 +34,7 @@ def _keep_out(argument: str, start: Start) -> Measure:
     def measure(vertices: np.ndarray, faces: np.ndarray, labels: np.ndarray) -> tuple[float, np.ndarray]:
         solid = as_manifold(trimesh.Trimesh(vertices, faces, process=False))
         corners = vertices[faces]
-        third = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6
+        third = area_vectors(corners) / 6
         area = np.zeros_like(vertices)
         for k in range(3):
             np.add.at(area, faces[:, k], third)

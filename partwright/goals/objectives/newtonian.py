@@ -14,6 +14,7 @@ import torch
 from partwright.goals.objective import Measure, Objective, Start, by_torch
 from partwright.goals.objectives.axes import axis
 from partwright.render.raycast import Scene
+from partwright.shapes.topology import area_vectors
 
 _OFF = 1e-4  # of the longest side: where rays against the flow begin
 
@@ -21,7 +22,7 @@ _OFF = 1e-4  # of the longest side: where rays against the flow begin
 def pressure(vertices: np.ndarray, faces: np.ndarray, flow: np.ndarray) -> np.ndarray:
     """(F,) pressure coefficient of each face, 0 to 2. flow: (3,) unit vector along which the air moves."""
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = area_vectors(corners)
     length = np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), np.finfo(float).tiny)
     facing = -(cross / length) @ flow
     scene = Scene(vertices, faces)
