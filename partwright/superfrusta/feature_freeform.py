@@ -1,8 +1,8 @@
 """What no feature explains, kept as freeform: where a tree is far off, it takes the shape's own form.
 
-Around such a place the shape, or the space beside it, is cut along one of the directions of the whole into a
-few extrusions that follow it: worse to read than a feature, but no further off than is allowed. They are
-called `freeform_1` and so on.
+Around such a place the shape, or the space beside it, is cut along one of the directions of the whole. Where
+it is one extrusion there, that is one more feature. Else a few extrusions follow it: worse to read than a
+feature, but no further off than is allowed. They are called `freeform_1` and so on.
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ _MOST = 4  # extrusions of one place
 _PLACES = 12
 _DEARER = 2.0  # times the price of a feature, that one costs: it says nothing of how it would be drawn
 _TOLERANCES = (0.9, 0.5)  # of `FAR`
+_EXACT = 0.1  # of `FAR`: what is as near to the shape is a feature
 _AROUND = 0.02  # unit lengths, by which what is drawn is larger than the place
+_BESIDE = 0.07  # the same of a feature that is cut, whose walls are nearer than what is far off
 _LOOKED = 0.1  # unit lengths around a place that is looked at again
 _BETTER = 0.9  # of what a place was off, that it may be when mended
 _LOSS = 3e-3  # of R, that mending one place may cost
@@ -103,39 +105,52 @@ def _solid(whole: Assembly) -> Solid:
 
 
 def _tries(search: FeatureSearch, shape: Solid, start: _Mended, place: Place, most: int) -> Iterator[_Mended]:
-    """Ways to mend a place, each better than it is; finer ones where no coarse one brings it near enough."""
+    """Ways to mend a place, each better than it is: by one feature that is as exact as others are, else by
+    what follows the shape, finer where no coarse one brings it near enough."""
     enough = False
-    for tolerance in _TOLERANCES:
+    for tolerance, feature in ((_EXACT, True), *((one, False) for one in _TOLERANCES)):
         for frame in search.frames if not enough else ():
-            parts = terraces(_around(place, shape.body, frame), frame, tolerance * FAR, most)
-            mended = _joined(search, shape, start, parts, place) if parts else None
-            if mended is not None:
+            beside = _BESIDE if feature and not place.lacks else _AROUND
+            along = tolerance * FAR / 2 if feature else _AROUND
+            local = _around(place, shape.body, frame, beside, along)
+            parts = terraces(local, frame, tolerance * FAR, 1 if feature else most, place.points)
+            mended = _joined(search, shape, start, parts, place, not feature) if parts else None
+            if mended is not None and not (feature and mended.off >= NEARLY * FAR):
                 yield mended
                 enough = enough or mended.off < NEARLY * FAR
 
 
-def _around(place: Place, body: Manifold, frame: NDArray[np.float64]) -> Manifold:
+def _around(
+    place: Place, body: Manifold, frame: NDArray[np.float64], beside: float, along: float
+) -> Manifold:
     """What there is of a body around a place, or what there is beside it where it has too much."""
-    seen = place.points @ frame
-    low, high = seen.min(axis=0) - _AROUND, seen.max(axis=0) + _AROUND
+    seen, room = place.points @ frame, np.array([beside, beside, along])
+    low, high = seen.min(axis=0) - room, seen.max(axis=0) + room
     box = Manifold.cube((high - low).tolist()).translate(low.tolist())
     box = box.transform(np.column_stack([frame, np.zeros(3)]))
     return body ^ box if place.lacks else box - body
 
 
 def _joined(
-    search: FeatureSearch, shape: Solid, start: _Mended, parts: list[Part], place: Place
+    search: FeatureSearch,
+    shape: Solid,
+    start: _Mended,
+    parts: list[Part],
+    place: Place,
+    freeform: bool,
 ) -> _Mended | None:
     """With parts added, or cut, where that makes a place better and leaves the body whole."""
     tree, body = start.tree, start.solid.body
-    features = [Feature(place.lacks, part, covers(part, search.points), 0, freeform=True) for part in parts]
+    features = [
+        Feature(place.lacks, part, covers(part, search.points), 0, freeform=freeform) for part in parts
+    ]
     covered = tree.covered
     for feature in features:
         covered = covered | feature.covers if place.lacks else covered & ~feature.covers
     score = search.score_of(covered)
     if score < tree.score - _LOSS:
         return None
-    price = tree.price + _DEARER * search.alpha * len(parts)
+    price = tree.price + (_DEARER if freeform else 1.0) * search.alpha * len(parts)
     tree = replace(tree, features=[*tree.features, *features], covered=covered, score=score, price=price)
     for part in parts:
         whole = solid_of(part, _CHORD)
@@ -167,7 +182,7 @@ def _with_copies(
         if other is None:
             continue
         images = [part.transformed(move) for part, move in zip(first.parts, moves, strict=True)]
-        more = _joined(search, shape, best, images, other)
+        more = _joined(search, shape, best, images, other, first.tree.features[-1].freeform)
         if more is not None and more.off < NEARLY * FAR:
             others.remove(other)
             kept.append(moves)

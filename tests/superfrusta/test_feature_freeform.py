@@ -13,7 +13,7 @@ from manifold3d import Manifold
 import partwright as pw
 from partwright.approximation.sketches.terraces import terraces
 from partwright.assembly import Assembly, Part
-from partwright.fields import Box, Sphere
+from partwright.fields import Box, Cylinder, Sphere
 from partwright.meshing import mesh_assembly
 from partwright.meshing.csg import solid_of
 from partwright.superfrusta.far_places import Solid, count, far_places
@@ -29,6 +29,7 @@ from partwright.superfrusta.solids import Settings
 PLATE = Part(Box((1.8, 1.0, 0.2)))
 LEFT, RIGHT = (Part(Sphere(0.2), (x, 0.1, 0.0)) for x in (-0.5, 0.5))
 UP = np.eye(3)
+MIDDLE = np.zeros((1, 3))
 
 
 @cache
@@ -53,16 +54,18 @@ def mended(whole: Assembly, *parts: Part, most: int | None = None) -> tuple[Feat
 
 def test_a_ball_is_a_few_steps_and_a_block_is_one() -> None:
     ball = Manifold.sphere(0.3, 64)
-    parts = terraces(ball, UP, 0.05, 8)
+    parts = terraces(ball, UP, 0.05, 8, MIDDLE)
     assert parts is not None
     assert 3 <= len(parts) <= 8
     whole = solid_of(Assembly(tuple(parts)), 1e-4)
-    assert whole.volume() == pytest.approx(ball.volume(), rel=0.1)
+    assert whole.volume() == pytest.approx(ball.volume(), rel=0.15)
     points = Solid(whole, Sphere(0.3)).points()
     assert np.abs(np.linalg.norm(points, axis=1) - 0.3).max() < 2 * 0.05
-    assert terraces(ball, UP, 0.05, 2) is None
-    assert terraces(Manifold(), UP, 0.05, 2) is None
-    (block,) = terraces(Manifold.cube((1.0, 0.5, 0.3), True), UP, 0.05, 1) or ()
+    assert terraces(ball, UP, 0.05, 2, MIDDLE) is None
+    assert terraces(Manifold(), UP, 0.05, 2, MIDDLE) is None
+    two = Manifold.cube((1.0, 0.5, 0.3), True)
+    two += two.translate((2.0, 0.0, 0.0))
+    (block,) = terraces(two, UP, 0.05, 1, MIDDLE) or ()
     assert block.field == Box((1.0, 0.5, 0.3))
 
 
@@ -81,6 +84,15 @@ def test_a_dent_is_cut() -> None:
     tree, off, _ = mended(Assembly((PLATE, dent), "difference"), PLATE)
     assert off == 0
     assert not any(feature.added for feature in tree.features[1:])
+
+
+def test_a_hole_is_a_feature() -> None:
+    hole = Part(Cylinder(0.12, 0.4), (0.4, 0.1, 0.0))
+    tree, off, _ = mended(Assembly((PLATE, hole), "difference"), PLATE)
+    (found,) = tree.features[1:]
+    assert (off, found.added, found.freeform) == (0, False, False)
+    assert isinstance(found.part.field, Cylinder)
+    assert found.part.field.radius == pytest.approx(0.12, rel=1e-2)
 
 
 def test_what_is_right_is_left_alone_and_the_budget_is_kept() -> None:

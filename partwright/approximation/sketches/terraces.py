@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from manifold3d import CrossSection, JoinType, Manifold
+from manifold3d import CrossSection, JoinType, Manifold, OpType
 
 from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.sections import View, profile_of
@@ -18,11 +18,14 @@ _OVERLAP = 0.05  # tolerances, by which one reaches into the next: numbers are r
 _LEAST = 0.25  # tolerances: half the width of what is drawn
 
 
-def terraces(body: Manifold, frame: np.ndarray, tolerance: float, most: int) -> list[Part] | None:
+def terraces(
+    body: Manifold, frame: np.ndarray, tolerance: float, most: int, about: np.ndarray
+) -> list[Part] | None:
     """Extrusions along the frame's third column; None where more than `most` would be needed.
 
     body: closed. frame: (3, 3), a rotation. tolerance: a length, by which the extrusions' union may lie from
-    the body, within a section, and along the frame.
+    the body, within a section, and along the frame. about: (N, 3) points; what none of them is within, seen
+    along the frame, is left out.
     """
     view = View.along(body, frame)
     if view.body.is_empty():
@@ -30,7 +33,8 @@ def terraces(body: Manifold, frame: np.ndarray, tolerance: float, most: int) -> 
     low, high = view.levels[0], view.levels[-1]
     count = int(np.clip(math.ceil((high - low) / tolerance * _STEPS), 2, _MOST_SECTIONS))
     step = (high - low) / count
-    sections = [_section(view, low + (k + 0.5) * step, tolerance) for k in range(count)]
+    seen = about @ frame
+    sections = [_section(view, low + (k + 0.5) * step, tolerance, seen[:, :2]) for k in range(count)]
     allowed = max(1, int(tolerance / step))
     parts: list[Part] = []
     start = 0
@@ -50,18 +54,25 @@ def terraces(body: Manifold, frame: np.ndarray, tolerance: float, most: int) -> 
     return parts or None
 
 
-def _section(view: View, height: float, tolerance: float) -> CrossSection:
-    """Without what is thinner than can be far off."""
+def _section(view: View, height: float, tolerance: float, about: np.ndarray) -> CrossSection:
+    """Regions about points (N, 2), without what is thinner than can be far off."""
     whole = view.body.slice(height)
     thick = whole.offset(-_LEAST * tolerance, JoinType.Miter).offset(_LEAST * tolerance, JoinType.Miter)
-    return (thick ^ whole).simplify(_SIMPLER * tolerance)
+    half = tolerance / 2
+    places = CrossSection.batch_boolean(
+        [CrossSection.square((tolerance, tolerance)).translate((x - half, y - half)) for x, y in about],
+        OpType.Add,
+    )
+    regions = (thick ^ whole).simplify(_SIMPLER * tolerance).decompose()
+    kept = [region for region in regions if not (region ^ places).is_empty()]
+    return CrossSection.compose(kept) if kept else CrossSection()
 
 
 def _stands_for(sections: list[CrossSection], start: int, end: int, allowed: int, tolerance: float) -> bool:
     """Whether the middle one of sections is like those between, but for so many at either end."""
     middle = sections[(start + end) // 2]
     wider = middle.offset(tolerance, JoinType.Miter)
-    for other in sections[start + allowed : end - allowed]:
+    for other in sections[start + allowed : max(start, end - allowed)]:
         if (
             not (other - wider).is_empty()
             or not (middle - other.offset(tolerance, JoinType.Miter)).is_empty()
