@@ -114,7 +114,7 @@ def covered(mesh: trimesh.Trimesh, kind: str, options: CollideOptions) -> Body:
     link = Link("mesh", np.eye(4), None, (use,))
     target = Solids().target(link, link.collisions)
     tolerance = options.length(target.size, target.size)
-    wishes = Wishes(tolerance, GEOMS, True, options.max_parts, options.extra, options.mode)
+    wishes = Wishes(tolerance, GEOMS, True, options.max_parts, options.extra, options.mode, options.worth)
     shapes = shapes_for("mesh", target, wishes)
     seconds = time.process_time() - start
 

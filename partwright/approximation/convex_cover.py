@@ -25,7 +25,7 @@ from partwright.approximation.cutting_planes import (
 )
 from partwright.approximation.hull_faces import faces_of
 from partwright.approximation.light_hull import plain_hull
-from partwright.approximation.piece_joining import exchanged, joined
+from partwright.approximation.piece_joining import exchanged, joined, spent
 from partwright.meshing.manifolds import surface_of
 from partwright.shapes import MeshDistance
 
@@ -51,7 +51,11 @@ def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
     pieces += _far_off(solid, pieces, limits.deviation)
     pieces = joined(pieces, solid.volume(), limits)
     least = _SLIVER * solid.volume()
-    return exchanged(pieces, limits, lambda piece: _best_cut(piece, least))
+
+    def cut(piece: Piece) -> list[Piece]:
+        return _best_cut(piece, least)
+
+    return exchanged(spent(pieces, solid.volume(), limits, cut), limits, cut)
 
 
 def simplified(solid: Manifold, deviation: float) -> Manifold:

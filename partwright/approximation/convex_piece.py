@@ -23,11 +23,14 @@ _FEWEST, _DENSEST = 12.0, 60.0  # points along the longest side of a hull, whate
 @dataclass(frozen=True)
 class Limits:
     """deviation: how far a hull's surface may lie from the solid's, as a length. extra: volume that all hulls
-    may add, over the solid's. most: pieces at most; this one is kept where not all can be."""
+    may add, over the solid's. most: pieces at most; this one is kept where not all can be. worth: of the mean
+    of what hulls add, what one piece more has to save to be made though the limits ask for none; None for
+    none."""
 
     deviation: float
     extra: float = 0.03
     most: int = MOST
+    worth: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,9 +32,11 @@ def plain_hull(hull: Manifold) -> Manifold:
     return hull
 
 
-def light_hull(hull: Manifold, by: float, most: int = _MOST) -> tuple[Manifold, float]:
+def light_hull(hull: Manifold, by: float, most: int = _MOST, lost: float = _LOST) -> tuple[Manifold, float]:
     """The hull of some of its corners, those added first that stick out most; and how far (a length) any of
-    the others sticks out of it: no more than `by`, unless that would take more than `most` corners."""
+    the others sticks out of it: no more than `by`, unless that would take more than `most` corners.
+
+    lost: share of its volume that it may lose."""
     from manifold3d import Manifold
 
     corners = surface_of(hull)[0]
@@ -52,7 +54,7 @@ def light_hull(hull: Manifold, by: float, most: int = _MOST) -> tuple[Manifold, 
         height = corners @ normals.T - offsets
         beyond = height.max(axis=1)
         worst = float(beyond.max())
-        full = light.volume() >= (1 - _LOST) * hull.volume()
+        full = light.volume() >= (1 - lost) * hull.volume()
         if (worst <= by and full) or len(chosen) >= min(most, len(corners)):
             return light, max(worst, 0.0)
         farthest = np.unique(height.argmax(axis=0)[height.max(axis=0) > min(by, worst) / 2])

@@ -17,6 +17,7 @@ from partwright.approximation.convex_piece import Limits, Piece
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
+_LEAST_SAVED = 5e-4  # of the volume: what one piece more has to save where the limits ask for none
 _EXCHANGES = 24  # pieces that are tried to be cut once there are as many as may be
 
 
@@ -54,6 +55,31 @@ def joined(pieces: Sequence[Piece], volume: float, limits: Limits) -> list[Piece
             price(number, other)
         number += 1
     return list(alive.values())
+
+
+def spent(
+    pieces: Sequence[Piece], volume: float, limits: Limits, cut: Callable[[Piece], list[Piece]]
+) -> list[Piece]:
+    """More pieces, as many as may be: those that add most are cut as long as that is worth it."""
+    pieces = list(pieces)
+    if limits.worth is None:
+        return pieces
+    kept: set[Piece] = set()
+    while len(pieces) < limits.most:
+        total = sum(piece.extra for piece in pieces)
+        least = max(limits.worth * total / len(pieces), _LEAST_SAVED * volume)
+        left = [piece for piece in pieces if piece not in kept and piece.extra > least]
+        if not left:
+            break
+        worst = max(left, key=lambda piece: piece.extra)
+        parts = cut(worst)
+        more = len(parts) - 1
+        gain = worst.extra - sum(part.extra for part in parts)
+        if more < 1 or gain < more * least or len(pieces) + more > limits.most:
+            kept.add(worst)
+            continue
+        pieces = [*(piece for piece in pieces if piece is not worst), *parts]
+    return pieces
 
 
 def exchanged(pieces: Sequence[Piece], limits: Limits, cut: Callable[[Piece], list[Piece]]) -> list[Piece]:

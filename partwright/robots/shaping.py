@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 NATIVE_FOR = 0.03  # of its volume, or `extra`: by how much a native solid may be worse than the hull it saves
 _LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners, or add for fewer faces
+_LOST = 1e-3  # of its volume: what a hull of fewer corners may lack
 _FLAWS = 1e-3  # of its volume: what a hull may add to a convex link
 _ROUNDING = 1e-9  # of its volume: what a hull adds to a link without a dent
 _CORNERS = 1024  # of a convex link's exact hull
@@ -49,7 +50,7 @@ class Wishes:
 
     tolerance: largest deviation, as a length. kinds: native solids that may be used. hulls: whether convex
     meshes may. most: shapes a link. extra: volume that hulls may add, over the link's. mode: whether they
-    contain the target, lie within it, or are nearest.
+    contain the target, lie within it, or are nearest. worth: of `Limits`, what more shapes have to save.
     """
 
     tolerance: float
@@ -58,6 +59,7 @@ class Wishes:
     most: int
     extra: float
     mode: Mode
+    worth: float | None = None
 
 
 def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
@@ -65,7 +67,7 @@ def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
     if wishes.mode != "around" and (convex := _convex(target.solid, wishes)) is not None:
         return [dataclasses.replace(convex, name=name)]
     solid = simplified(target.wrap if wishes.mode == "around" else target.solid, wishes.tolerance)
-    pieces = convex_cover(solid, Limits(wishes.tolerance, wishes.extra, wishes.most))
+    pieces = convex_cover(solid, Limits(wishes.tolerance, wishes.extra, wishes.most, wishes.worth))
     if not wishes.hulls:
         pieces = _fit_for_natives(pieces, wishes)
     if wishes.mode == "around":
@@ -119,7 +121,7 @@ def _chosen(hull: Manifold, target: Target, wishes: Wishes) -> Shape:
     if not wishes.hulls:
         return _native(convex_fits(hull, wishes.kinds, wishes.mode)[0].part, target, wishes)
     if wishes.mode != "around":
-        hull = light_hull(hull, _LIGHT * wishes.tolerance)[0]
+        hull = light_hull(hull, _LIGHT * wishes.tolerance, lost=_LOST)[0]
     near = _near(hull, wishes)
     return _native(near.part, target, wishes) if near is not None else Shape("", mesh=as_mesh(hull))
 

@@ -73,6 +73,19 @@ def test_a_ring_is_as_many_pieces_as_its_chords_ask_for(deviation: float) -> Non
     assert all(piece.deviation(deviation) <= deviation for piece in pieces)
 
 
+def test_pieces_are_spent_where_they_save_most() -> None:
+    """A chord over half the angle adds an eighth: two pieces for one save three quarters of what it adds."""
+    outer = Manifold.cylinder(0.5, 1.0, circular_segments=SEGMENTS)
+    ring = outer - Manifold.cylinder(2, 0.6, circular_segments=SEGMENTS, center=True)
+    few, saving, more, plain = (
+        convex_cover(solid, Limits(1.0, extra=0.3, most=16, worth=worth))
+        for solid, worth in ((ring, None), (ring, 2.0), (ring, 0.5), (outer, 0.5))
+    )
+    assert len(few) == len(saving) < len(more) == 16
+    assert sum(piece.extra for piece in more) < 0.1 * sum(piece.extra for piece in few)
+    assert len(plain) == 1
+
+
 def test_limits_are_kept_and_hulls_cover() -> None:
     solid = union([Manifold.sphere(1.0, 48), Manifold.cylinder(3, 0.4, circular_segments=48, center=True)])
     loose, tight = (convex_cover(solid, Limits(0.2, extra)) for extra in (0.2, 0.03))

@@ -49,6 +49,13 @@ def test_shapes_inside_reach_nowhere_beyond_the_mesh(tmp_path: Path, kind: str) 
     assert report.missing < (0.01 if kind in ("box", "hull") else 0.6)
 
 
+def test_a_tolerance_tells_how_many_shapes_there_are() -> None:
+    """Without one, more are spent as long as each saves much."""
+    assert CollideOptions().worth is not None
+    for told in ({"tolerance": "2%"}, {"enclose": True}, {"inside": True}):
+        assert CollideOptions(**told).worth is None
+
+
 def test_a_tighter_tolerance_comes_nearer_with_more_shapes(tmp_path: Path) -> None:
     path = urdf(tmp_path)
     ring = trimesh.creation.annulus(0.4, 0.5, 0.2, sections=64)
