@@ -201,7 +201,8 @@ def _check_names(told: Mapping[str, tuple[str, ...]], names: tuple[str, ...]) ->
 def _check_enough(name: str, sources: Sequence[PartedSource], refused: Sequence[Refused]) -> None:
     if len(sources) < 2:
         why = "".join(f"; {shape.name} was refused: {shape.reason}" for shape in refused)
-        raise FamilyError(f"{name}: {len(sources)} usable shapes; a family needs at least two{why}")
+        usable = "1 usable shape" if len(sources) == 1 else f"{len(sources)} usable shapes"
+        raise FamilyError(f"{name}: {usable}; a family needs at least two{why}")
 
 
 def _start(output: Path) -> None:

@@ -222,7 +222,7 @@ def test_unusable_shapes_are_left_out_by_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("count", "options", "message"),
     [
-        (1, {}, "1 usable shapes; a family needs at least two"),
+        (1, {}, "1 usable shape; a family needs at least two"),
         (2, {"parts": ("foot", "tail")}, "no shape has tail; the shapes' parts are foot, head"),
         (2, {"held_out": ("thing_9",)}, "no usable shape is called thing_9"),
     ],

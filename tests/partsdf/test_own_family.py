@@ -99,7 +99,7 @@ def test_bad_folders_are_told_in_one_line(tmp_path: Path, capsys: pytest.Capture
         return lines[0]
 
     pair = ("foot", "head")
-    assert "1 usable shapes; a family needs at least two" in said({"a": pair})
+    assert "1 usable shape; a family needs at least two" in said({"a": pair})
     assert "no part name is in two shapes: a has a2, a1; b has b2, b1" in said(
         {"a": ("a1", "a2"), "b": ("b1", "b2")}
     )
