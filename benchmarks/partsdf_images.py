@@ -31,6 +31,7 @@ COLOURS = ((196, 200, 208), (150, 90, 50), (60, 90, 150), (70, 70, 75), (190, 60
 PIXELS = 256
 OTHERS = ("cars", "chairs", "mixers")
 OUTLINED = 64  # cells of the meshes that outlines are of
+SIDE = 30  # degrees of azimuth within which a shape is well seen
 
 
 def imaging(arguments: argparse.Namespace) -> None:
@@ -45,11 +46,13 @@ def imaging(arguments: argparse.Namespace) -> None:
         f"all sides, with shadows, {PIXELS} pixels, looked at in 64; meshed at {arguments.resolution}^3. The "
         "nearest training shape is told by the true shape's distances, which no picture gives. Camera: the "
         f"median error of the azimuth; outline: the mean IoU of silhouettes; told: pictures that are said "
-        "to be of no shape of the family, maybe. Seconds of the "
+        f"to be of no shape of the family, maybe, and that share of those seen within {SIDE} degrees of the "
+        "true azimuth. Seconds of the "
         "processor, one thread, to see, without meshing.", "",
         command_line(), "",
-        "| | IoU % | pIoU % | CD x1e4 | parts right % | camera, degrees | outline % | told % | s |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| | IoU % | pIoU % | CD x1e4 | parts right % | camera, degrees | outline % | told % | "
+        "of well seen % | s |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
 
     def add(line: str) -> None:
@@ -65,8 +68,8 @@ def imaging(arguments: argparse.Namespace) -> None:
             f"{100 * m.iou:.1f} | {100 * m.part_iou:.1f} | {1e4 * m.chamfer:.0f} | {100 * np.mean(right):.0f}"
         )
 
-    add(f"| mean shape | {scored([(NeuralShape.mean(model), s) for s in shapes])} | | | | |")
-    add(f"| nearest training shape | {scored([(nearest(model, s), s) for s in shapes])} | | | | |")
+    add(f"| mean shape | {scored([(NeuralShape.mean(model), s) for s in shapes])} | | | | | |")
+    add(f"| nearest training shape | {scored([(nearest(model, s), s) for s in shapes])} | | | | | |")
     for label, cluttered in (("plain background", False), ("spots and stripes behind", True)):
         taken = list(pictures(shapes, arguments.views, cluttered))
         start = time.process_time()
@@ -74,13 +77,19 @@ def imaging(arguments: argparse.Namespace) -> None:
         seconds = (time.process_time() - start) / len(taken)
         off = [away(one, azimuth) for one, (_, azimuth, _) in zip(seen, taken, strict=True)]
         found = [(one and one.sight.shape, s) for one, (s, _, _) in zip(seen, taken, strict=True)]
-        add(f"| seen, {label} | {scored(found)} | {np.median(off):.0f} | {outlines(seen)} | {seconds:.3f} |")
+        ious, told = outlines(seen)
+        well = told[np.array(off) < SIDE]
+        add(
+            f"| seen, {label} | {scored(found)} | {np.median(off):.0f} | {100 * ious.mean():.0f} | "
+            f"{100 * told.mean():.0f} | {100 * well.mean():.0f} | {seconds:.3f} |"
+        )
     for name in OTHERS:
         if name != family.name and (family.folder.parent / name).is_dir():
             other = PreparedFamily(family.folder.parent / name)
             some = [other.load(i) for i in other.split("test")[: arguments.shapes]]
             seen = [seen_in(encoder, photo) for _, _, photo in pictures(some, arguments.views, False)]
-            add(f"| pictures of {name} | | | | | | {outlines(seen)} | |")
+            ious, told = outlines(seen)
+            add(f"| pictures of {name} | | | | | | {100 * ious.mean():.0f} | {100 * told.mean():.0f} | | |")
     write(f"images-{family.name}", lines)
 
 
@@ -105,8 +114,8 @@ def away(seen: Looked | None, azimuth: float) -> float:
     return abs((seen.sight.azimuth - azimuth + 180) % 360 - 180) if seen else 180.0
 
 
-def outlines(seen: list[Looked | None]) -> str:
-    """Their mean IoU, and the share that is told to be of no shape of the family, as two cells."""
+def outlines(seen: list[Looked | None]) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) their IoUs, and whether each is told to be of no shape of the family."""
     ious, told = [], []
     for one in seen:
         if one is None:
@@ -119,7 +128,7 @@ def outlines(seen: list[Looked | None]) -> str:
         )
         ious.append(found.iou)
         told.append(bool(warnings_of("", sight, found)))
-    return f"{100 * np.mean(ious):.0f} | {100 * np.mean(told):.0f}"
+    return np.array(ious), np.array(told)
 
 
 def nearest(model: Model, shape: PreparedShape) -> NeuralShape:

@@ -79,17 +79,26 @@ def train_encoder(
 
 
 def losses(
-    found: Tensor, vectors: PartVectors, latents: Tensor, poses: PoseTensors, present: Tensor
+    found: Tensor,
+    vectors: PartVectors,
+    latents: Tensor,
+    poses: PoseTensors,
+    present: Tensor,
+    metric: Tensor | None = None,
 ) -> Tensor:
     """(3,) of latents, poses and presence, of what a network gave, (B, P, K + 12 + 1).
 
-    latents (B, P, Z), poses (B, P, ...) and present (B, P): of what it saw.
+    latents (B, P, Z), poses (B, P, ...) and present (B, P): of what it saw. metric: (P, K, K) of `felt`, by
+    which latents are off; the latents' own if None.
     """
     seen, posed, logits = found.split((vectors.width, POSE, 1), dim=-1)
     there = present.float()
     count = there.sum().clamp(min=1)
-    off = (seen - vectors.of_latents(latents)) * vectors.spread  # each direction as it tells
-    unexplained = off.square().sum(-1) / vectors.spread.square().sum(-1)
+    off = seen - vectors.of_latents(latents)
+    if metric is None:
+        unexplained = (off * vectors.spread).square().sum(-1) / vectors.spread.square().sum(-1)
+    else:
+        unexplained = torch.einsum("bpk,pkm->bpm", off, metric).square().sum(-1)
     missed = torch.nn.functional.smooth_l1_loss(posed, vectors.of_poses(poses), reduction="none", beta=0.3)
     presence = torch.nn.functional.binary_cross_entropy_with_logits(logits.squeeze(-1), there)
     return torch.stack(

@@ -15,12 +15,13 @@ from partwright.methods import Cancellation, check_count
 from partwright.partsdf.companion_training import check_trainable, descend, follow
 from partwright.partsdf.encoder_training import losses
 from partwright.partsdf.image_encoder import ImageEncoder, ImageNetwork, ImageSettings
+from partwright.partsdf.latent_metric import felt
 from partwright.partsdf.lighting import lit
 from partwright.partsdf.model import Model
 from partwright.partsdf.part_vectors import PartVectors
 from partwright.partsdf.views import PartMeshes, Views, draw_views
 
-VIEWS = 8_000
+VIEWS = 16_000
 _BATCH = 32
 _AVERAGE = 0.995  # what is kept of the averaged weights each step
 _STEEPEST = 1.0  # norm of the gradients
@@ -29,8 +30,8 @@ _TOLD = 20  # steps
 
 @dataclass(frozen=True)
 class ImageStep:
-    """latents: share of their variance that is not predicted yet; poses: mean error, in their spreads;
-    presence and silhouette: cross-entropies; camera: mean error, radians."""
+    """latents: share of what they change in distances that is not predicted yet; poses: mean error, in their
+    spreads; presence and silhouette: cross-entropies; camera: mean error, radians."""
 
     number: int
     of: int
@@ -69,6 +70,7 @@ def train_image_encoder(
     settings = settings or ImageSettings()
     torch.manual_seed(seed)
     vectors = PartVectors.of(model)
+    metric = felt(model, vectors)
     network = ImageNetwork(len(model.parts), vectors.width, settings)
     kept = copy.deepcopy(network).requires_grad_(False)
     generator = torch.Generator().manual_seed(seed)
@@ -78,7 +80,7 @@ def train_image_encoder(
 
     def terms() -> Tensor:
         rows = torch.randint(len(seen.label), (_BATCH,), generator=generator)
-        return picture_losses(network, vectors, model, seen, rows, generator)
+        return picture_losses(network, vectors, metric, model, seen, rows, generator)
 
     def heard(number: int, means: list[float]) -> None:
         if told is not None:
@@ -94,19 +96,23 @@ def train_image_encoder(
 def picture_losses(
     network: ImageNetwork,
     vectors: PartVectors,
+    metric: Tensor,
     model: Model,
     views: Views,
     rows: Tensor,
     generator: torch.Generator,
 ) -> Tensor:
-    """(5,) of latents, poses, presence, silhouette and camera, of pictures made of the views `rows` (B,)."""
+    """(5,) of latents, poses, presence, silhouette and camera, of pictures made of the views `rows` (B,).
+
+    metric: of `felt`.
+    """
     pictures, silhouette = lit(views, rows, generator)
     with torch.autocast("cpu", torch.bfloat16):
         found, logits, camera = network(pictures.contiguous(memory_format=torch.channels_last))
     donors = views.donors[rows]
     latents = model.latents[donors, torch.arange(len(model.parts))]
     poses, present = views.poses.map(lambda t: t[rows]), views.present[rows]
-    about_parts = losses(found.float(), vectors, latents, poses, present)
+    about_parts = losses(found.float(), vectors, latents, poses, present, metric)
     covered = binary_cross_entropy_with_logits(logits.float(), avg_pool2d(silhouette, 2))
     stood = smooth_l1_loss(camera.float(), views.camera[rows], beta=0.1)
     return torch.cat([about_parts, covered[None], stood[None]])

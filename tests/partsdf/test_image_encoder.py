@@ -22,8 +22,10 @@ from partwright.partsdf.encoder import EncoderSettings, load_encoder
 from partwright.partsdf.from_photo import FILES, reconstruct_photo
 from partwright.partsdf.image_encoder import KIND, ImageEncoder, ImageSettings, load_image_encoder
 from partwright.partsdf.image_encoder_training import ImageStep, train_image_encoder
+from partwright.partsdf.latent_metric import felt
 from partwright.partsdf.lighting import lit
 from partwright.partsdf.model import Model, file_of
+from partwright.partsdf.part_vectors import PartVectors
 from partwright.partsdf.photos import look_at, read_photo
 from partwright.partsdf.standpoint import boxed, find_standpoint, outline
 from partwright.partsdf.views import SHADED, SIDE, PartMeshes, draw_views
@@ -110,6 +112,28 @@ def test_light_and_colour_change_and_the_silhouette_does_not(saved: Model, lamps
     assert torch.equal(silhouette, same)
     assert torch.equal(silhouette > 0, views.label % SHADED > 0)
     assert ((one - other).abs().mean(dim=(1, 2, 3)) > 0.03).all()
+
+
+def test_errors_weigh_as_the_decoder_feels_them(model: Model) -> None:
+    """The squares of what a small step along each direction changes in distances near the surface."""
+    vectors = PartVectors.of(model)
+    metric = felt(model, vectors)
+    torch.testing.assert_close(metric.square().sum((1, 2)), torch.ones(len(model.parts)))
+    local = 2.2 * torch.rand(len(model.shapes), len(model.parts), 400, 3) - 1.1
+    step = 0.05
+    with torch.no_grad():
+        before = model.condition(model.latents, model.poses)(local)
+        near = (before.abs() < 0.05) & model.present[..., None]
+        for p in range(len(model.parts)):
+            changes = []
+            for k in range(min(6, vectors.width)):
+                moved = model.latents.clone()
+                moved[:, p] += step * vectors.spread[p, k] * vectors.directions[p, k]
+                after = model.condition(moved, model.poses)(local)
+                changes.append(((after - before)[:, p].square() * near[:, p]).sum())
+            measured = torch.stack(changes)
+            told = metric[p, : len(changes)].square().sum(-1)
+            assert float(torch.corrcoef(torch.stack([measured, told]))[0, 1]) > 0.9
 
 
 def test_it_learns_and_sees_a_held_out_lamp(
