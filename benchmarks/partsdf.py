@@ -5,7 +5,7 @@
     python benchmarks/partsdf.py encode --family FOLDER --model MODEL [--shapes N]
     python benchmarks/partsdf.py images --family FOLDER --model MODEL [--shapes N] [--views N]
     python benchmarks/partsdf.py scans --family FOLDER --model MODEL [--shapes N] [--surface]
-    python benchmarks/partsdf.py generate --family FOLDER --model MODEL [--samples N] [--fresh FOLDER]
+    python benchmarks/partsdf.py generate --family FOLDER --model MODEL [--held N] [--fresh N]
     python benchmarks/partsdf.py ablations --family FOLDER [--epochs N] [--width N] [--shapes N]
     python benchmarks/partsdf.py decoders --family FOLDER [--seconds S]
     python benchmarks/partsdf.py training --models FOLDER
@@ -90,9 +90,9 @@ def main() -> None:
     one = command("generate", generation)
     one.add_argument("--family", required=True)
     one.add_argument("--model", required=True)
-    one.add_argument("--samples", type=int, default=10_000, help="at most so many, and test shapes")
+    one.add_argument("--held", type=int, default=10_000, help="at most so many test shapes")
     one.add_argument("--resolution", type=int, default=96, help="of the meshes")
-    one.add_argument("--fresh", help="a prepared family made with another seed: held-out shapes, too")
+    one.add_argument("--fresh", type=int, default=0, help="more held-out shapes, of another seed")
     one.add_argument("--seed", type=int, default=0)
     one = measuring("robots", robots)
     one.add_argument("--parts", required=True, help="folder of arms, a folder of link meshes each")

@@ -1,4 +1,4 @@
-"""New shapes against held-out ones: MMD-CD, COV-CD and 1-NNA, whether parts touch, and how new they are."""
+"""New shapes against held-out ones: MMD-CD, COV-CD and 1-NNA, by parts, whether parts touch, how new."""
 
 from __future__ import annotations
 
@@ -11,18 +11,22 @@ import numpy as np
 from partsdf_scores import command_line, scale_of, write
 from scipy.spatial import cKDTree
 
+from partwright.datasets.families.recipes import recipe_of
+from partwright.datasets.inputs import MadeShape
+from partwright.datasets.labelling import label_surface
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import NoSurfaceError
-from partwright.metrics.sets import chamfer_matrix, set_scores
+from partwright.metrics.sets import chamfer_matrix, scores_of_distances
 from partwright.partsdf.generator import load_generator
 from partwright.partsdf.generator_training import gaussian_samples
 from partwright.partsdf.meshing import labelled_surface, mesh_shape
 from partwright.partsdf.model import load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
-from partwright.shapes.sampling import sample_triangles
+from partwright.shapes.sampling import morton_order, sample_triangles
 
-POINTS, PART_POINTS = 2048, 1500
+POINTS, PART_POINTS = 512, 1500
+MATCHED = 128  # of a part's points, where parts are compared
 TOUCH, USUAL = 0.04, 0.95  # unit lengths; the share of training shapes in which two parts touch
 
 
@@ -32,6 +36,22 @@ class Cloud:
 
     points: np.ndarray
     parts: list[np.ndarray]
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Of A shapes to B held-out ones: Chamfer distances among them (A, A), and between, whole and by part
+    (A, B)."""
+
+    among: np.ndarray
+    between: np.ndarray
+    by_part: np.ndarray
+
+    @classmethod
+    def of(cls, made: Sequence[Cloud], held: Sequence[Cloud]) -> Distances:
+        wholes = [c.points for c in made]
+        between = chamfer_matrix(wholes, [c.points for c in held])
+        return cls(chamfer_matrix(wholes), between, part_distances(made, held))
 
 
 @dataclass(frozen=True)
@@ -46,62 +66,98 @@ class Held:
 def generation(arguments: argparse.Namespace) -> None:
     """Diffusion, a Gaussian, and training shapes against as many held-out ones."""
     family, model = PreparedFamily(arguments.family), load_model(arguments.model)
-    unknown = [(family, i) for i in family.split("test")]
-    if arguments.fresh:  # made with another seed, so all of them are unknown to the model
-        fresh = PreparedFamily(arguments.fresh)
-        unknown += [(fresh, i) for i in range(len(fresh))]
-    real = [cloud_of_family(source, i) for source, i in unknown[: arguments.samples]]
+    real = [cloud_of_family(family, i) for i in family.split("test")[: arguments.held]]
+    real += [fresh_cloud(family, i) for i in range(arguments.fresh)]
     count = len(real)
-    rng = np.random.default_rng(0)
     numbers = {entry.name: i for i, entry in enumerate(family.shapes)}
     training = [cloud_of_family(family, numbers[name]) for name in model.shapes]
     held = Held(real, chamfer_matrix([c.points for c in real]), touching_pairs(training))
     lines = [
         f"# PartSDF: new {family.name} against held-out ones", "",
         f"Trained on {scale_of(model)}. {count} samples of each kind against as many held-out shapes, "
-        f"meshed at {arguments.resolution}^3, {POINTS:,} points each; failures are left out and counted. "
+        f"{arguments.fresh} of which were made with another seed; meshed at {arguments.resolution}^3, "
+        f"{POINTS:,} points each; failures are left out and counted. By part: the mean Chamfer distance of "
+        f"the parts that both have, {MATCHED} points each. "
         f"Touch: the share of shapes whose parts touch (within {TOUCH}) wherever those of {USUAL:.0%} of the "
         "training shapes do and both are there. New: the median of the mean difference of clamped distances "
-        "to the nearest training shape, x1e4, and the least.", "",
+        "to the nearest training shape, x1e4, and the least. Training shapes are drawn once each, as far as "
+        "they go; nearest: the training shape that is "
+        "nearest to each held-out one, so that one may come several times.", "",
         command_line(), "",
-        "| | MMD-CD x1e4 | COV-CD % | 1-NNA % | touch % | new, median | least | "
+        "| | MMD-CD x1e4 | COV-CD % | 1-NNA % | by part: MMD x1e4 | COV % | touch % | new, median | least | "
         "failed | s a sample |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
-    chosen = [training[i] for i in rng.choice(len(training), count, replace=False)]
-    lines.append(row("training shapes", chosen, held, [], 0, 0.0))
-    generator = load_generator(model)
+
+    def say(line: str) -> None:
+        lines.append(line)
+        print(line, flush=True)
+        write(f"generation-{family.name}", lines)  # the rows so far
+
+    drawn = np.random.default_rng(0).permutation(len(training))[:count]
+    nearest = chamfer_matrix([c.points for c in training], [c.points for c in real]).argmin(axis=0)
+    for label, rows in (("training shapes", drawn), ("nearest training shapes", nearest)):
+        shapes = [training[i] for i in rows]
+        say(row(label, shapes, held, Distances.of(shapes, real), [], 0, 0.0))
     for label, make in (
-        ("diffusion", lambda: generator.generate(count, arguments.seed)),
         ("Gaussian", lambda: gaussian_samples(model, count, arguments.seed)),
+        ("diffusion", lambda: load_generator(model).generate(count, arguments.seed)),
     ):
         start = time.process_time()
-        shapes = make()
-        clouds = [cloud_of(shape, arguments.resolution) for shape in shapes]
-        seconds = (time.process_time() - start) / len(shapes)
-        far = [nearest_training_shape(shape)[1] for shape in shapes]
+        made = make()
+        clouds = [cloud_of(shape, arguments.resolution) for shape in made]
+        seconds = (time.process_time() - start) / len(made)
+        far = [nearest_training_shape(shape)[1] for shape in made]
         there = [cloud for cloud in clouds if cloud]
-        lines.append(row(label, there, held, far, len(shapes) - len(there), seconds))
-        print(lines[-1], flush=True)
-    write(f"generation-{family.name}", lines)
+        failed = len(made) - len(there)
+        say(row(label, there, held, Distances.of(there, real), far, failed, seconds))
 
 
 def row(
-    label: str, clouds: Sequence[Cloud], held: Held, far: list[float], failed: int, seconds: float
+    label: str, clouds: Sequence[Cloud], held: Held, distances: Distances, far: list[float],
+    failed: int, seconds: float,
 ) -> str:  # fmt: skip
-    scores = set_scores([c.points for c in clouds], [c.points for c in held.clouds], held.among)
+    scores = scores_of_distances(distances.among, distances.between, held.among)
+    covered = len(np.unique(distances.by_part.argmin(axis=1))) / len(held.clouds)
     touch = np.mean([holds_together(cloud, held.usual) for cloud in clouds])
     new = f"{1e4 * np.median(far):.0f} | {1e4 * min(far):.0f}" if far else " | "
     return (
         f"| {label} | {1e4 * scores.mmd:.1f} | {100 * scores.coverage:.1f} | "
-        f"{100 * scores.nearest_accuracy:.1f} | {100 * touch:.0f} | {new} | {failed} | "
+        f"{100 * scores.nearest_accuracy:.1f} | {1e4 * distances.by_part.min(axis=0).mean():.1f} | "
+        f"{100 * covered:.1f} | {100 * touch:.0f} | {new} | {failed} | "
         f"{f'{seconds:.1f}' if seconds else ''} |"
     )
+
+
+def part_distances(made: Sequence[Cloud], real: Sequence[Cloud]) -> np.ndarray:
+    """(A, B) mean Chamfer distance of the parts that both have; infinite where there are none."""
+    total, count = np.zeros((len(made), len(real))), np.zeros((len(made), len(real)))
+    for p in range(len(real[0].parts)):
+        rows, columns = ([i for i, c in enumerate(clouds) if len(c.parts[p])] for clouds in (made, real))
+        first, second = ([thinned(a[i].parts[p]) for i in own] for a, own in ((made, rows), (real, columns)))
+        total[np.ix_(rows, columns)] += chamfer_matrix(first, second)
+        count[np.ix_(rows, columns)] += 1
+    return np.where(count > 0, total / np.maximum(count, 1), np.inf)
+
+
+def thinned(points: np.ndarray) -> np.ndarray:
+    """(MATCHED, 3), evenly from points that lie along a curve that fills space."""
+    return points[np.linspace(0, len(points) - 1, MATCHED).round().astype(int)]
 
 
 def cloud_of_family(family: PreparedFamily, index: int) -> Cloud:
     shape = family.load(index)
     return _cloud(shape.vertices, shape.faces, shape.label, len(family.parts))
+
+
+def fresh_cloud(family: PreparedFamily, number: int) -> Cloud:
+    """Of a shape of a made family with another seed, which no model has seen: only its surface is made."""
+    made = MadeShape(family.name, family.seed + 1, number).read()
+    if recipe_of(family.name).parts != family.parts:
+        raise SystemExit(f"{family.folder}: has not the parts of made {family.name}; prepare it again")
+    labelled = label_surface(made, family.parts)
+    vertices = labelled.shape.frame.to_unit(labelled.shape.vertices)
+    return _cloud(vertices, labelled.shape.faces, labelled.label, len(family.parts))
 
 
 def cloud_of(shape: NeuralShape, resolution: int) -> Cloud | None:
@@ -117,8 +173,14 @@ def _cloud(vertices: np.ndarray, faces: np.ndarray, label: np.ndarray, parts: in
     each = []
     for p in range(parts):
         mine = triangles[label == p]
-        each.append(sample_triangles(corners, mine, PART_POINTS, 0)[0] if len(mine) else np.zeros((0, 3)))
-    return Cloud(sample_triangles(corners, triangles, POINTS, 0)[0], each)
+        each.append(_points(corners, mine, PART_POINTS) if len(mine) else np.zeros((0, 3)))
+    return Cloud(_points(corners, triangles, POINTS), each)
+
+
+def _points(corners: np.ndarray, triangles: np.ndarray, count: int) -> np.ndarray:
+    """In the order of a curve that fills space: neighbours are asked for one after another, faster."""
+    points = sample_triangles(corners, triangles, count, 0)[0]
+    return points[morton_order(points)]
 
 
 def touching(cloud: Cloud) -> np.ndarray:

@@ -76,8 +76,7 @@ TABLES = (
           "scans --family families/mixers --model mixers --shapes 3 --iterations 200 --threads 1 --surface",
           3, "families/"),
     Table("partsdf-generation-mixers.md", "partsdf.py", None, 0,
-          "generate --family families/mixers --model mixers --samples 60 --resolution 128 --threads 1", 4,
-          "families/"),
+          "generate --family families/mixers --model mixers --fresh 60 --threads 1", 6, "families/"),
     Table("partsdf-ablations-cars.md", "partsdf.py", None, 0,
           "ablations --family families/cars-small --epochs 84 --width 96 --shapes 4 --iterations 150 "
           "--points 1024 --resolution 128 --threads 1", 900, "families/"),

@@ -38,15 +38,21 @@ def set_scores(made: Clouds, real: Clouds, among_real: NDArray[np.float64] | Non
     """
     if min(len(made), len(real)) < 2:
         raise SettingError(f"{len(made)} made and {len(real)} real shapes: two or more of either are needed")
-    between = chamfer_matrix(made, real)
     among = chamfer_matrix(real) if among_real is None else among_real
-    distances = np.block([[chamfer_matrix(made), between], [between.T, among]])
+    return scores_of_distances(chamfer_matrix(made), chamfer_matrix(made, real), among)
+
+
+def scores_of_distances(
+    among_made: NDArray[np.float64], between: NDArray[np.float64], among_real: NDArray[np.float64]
+) -> SetScores:
+    """Of distances among A made shapes (A, A), between these and B real ones (A, B), among those (B, B)."""
+    distances = np.block([[among_made, between], [between.T, among_real]])
     np.fill_diagonal(distances, np.inf)
-    is_made = np.arange(len(distances)) < len(made)
+    is_made = np.arange(len(distances)) < len(among_made)
     alike = is_made[distances.argmin(axis=1)] == is_made
     return SetScores(
         float(between.min(axis=0).mean()),
-        len(np.unique(between.argmin(axis=1))) / len(real),
+        len(np.unique(between.argmin(axis=1))) / len(among_real),
         float(alike.mean()),
     )
 

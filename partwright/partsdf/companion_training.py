@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -39,7 +40,7 @@ def follow(kept: nn.Module, made: nn.Module, step: int, most: float) -> None:
 
 
 def descend(
-    parameters: Iterable[nn.Parameter],
+    parameters: Iterable[nn.Parameter] | Iterable[dict[str, Any]],
     terms: Callable[[], Tensor],
     *,
     steps: int,
@@ -52,22 +53,25 @@ def descend(
 ) -> None:
     """Lessen the sum of the terms (K,), until the steps are done or it is cancelled.
 
+    parameters: or groups of them, of `params` and `lr`, that one's share of the rate.
     terms: of a batch that is drawn anew. every: steps after which `told` hears. steepest: norm that gradients
     are cut to. after: called after each step, with its number from 0.
     """
-    parameters = list(parameters)
-    optimiser = torch.optim.AdamW(parameters, lr=rate, weight_decay=_DECAY, fused=True)
+    optimiser = torch.optim.AdamW(parameters, lr=1.0, weight_decay=_DECAY, fused=True)
+    shares = [float(group["lr"]) for group in optimiser.param_groups]
     cancel, sums, since = cancel or Cancellation(), torch.zeros(()), 0
     for step in range(steps):
         if cancel.requested:
             return
         late = 0.5 * (1 + math.cos(math.pi * step / steps))
-        optimiser.param_groups[0]["lr"] = rate * late * min(1.0, (step + 1) / _WARMUP)
+        for group, share in zip(optimiser.param_groups, shares, strict=True):
+            group["lr"] = share * rate * late * min(1.0, (step + 1) / _WARMUP)
         found = terms()
         optimiser.zero_grad()
         found.sum().backward()
         if steepest < math.inf:
-            torch.nn.utils.clip_grad_norm_(parameters, steepest)
+            every_one = (p for group in optimiser.param_groups for p in group["params"])
+            torch.nn.utils.clip_grad_norm_(every_one, steepest)
         optimiser.step()
         if after is not None:
             after(step)

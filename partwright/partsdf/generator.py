@@ -30,6 +30,7 @@ from partwright.partsdf.poses import PoseTensors
 
 KIND = "generator"
 _WAVES = 16  # by which a network sees the time
+_FORGOTTEN = 0.3  # dropout of forms: poses tell little of them, and single shapes would be learned by heart
 
 
 @dataclass(frozen=True)
@@ -53,8 +54,8 @@ class Layouts(nn.Module):
         self.enter = nn.Linear(POSE + 1, width)
         self.part = nn.Parameter(0.5 * torch.randn(parts, width))
         self.time = _Time(width)
-        self.blocks = nn.TransformerEncoder(_block(nn.TransformerEncoderLayer, settings), settings.blocks,
-                                            enable_nested_tensor=False)  # fmt: skip
+        block = _block(nn.TransformerEncoderLayer, settings, 0.0)
+        self.blocks = nn.TransformerEncoder(block, settings.blocks, enable_nested_tensor=False)
         self.out = _last(width, POSE + 1)
 
     def forward(self, layout: Tensor, time: Tensor) -> Tensor:
@@ -74,7 +75,8 @@ class Forms(nn.Module):
         self.placed = nn.Linear(POSE + 1, width)
         self.part = nn.Parameter(0.5 * torch.randn(parts, width))
         self.time = _Time(width)
-        self.blocks = nn.TransformerDecoder(_block(nn.TransformerDecoderLayer, settings), settings.blocks)
+        block = _block(nn.TransformerDecoderLayer, settings, _FORGOTTEN)
+        self.blocks = nn.TransformerDecoder(block, settings.blocks)
         self.out = _last(width, latent)
 
     def forward(self, latents: Tensor, time: Tensor, layout: Tensor) -> Tensor:
@@ -95,10 +97,9 @@ class _Time(nn.Module):
         return result
 
 
-def _block(kind: Any, settings: GeneratorSettings) -> Any:
-    return kind(
-        settings.width, settings.heads, 2 * settings.width, dropout=0.1, batch_first=True, norm_first=True
-    )
+def _block(kind: Any, settings: GeneratorSettings, dropout: float) -> Any:
+    width = settings.width
+    return kind(width, settings.heads, 2 * width, dropout=dropout, batch_first=True, norm_first=True)
 
 
 def _last(width: int, outputs: int) -> nn.Module:

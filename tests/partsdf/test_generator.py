@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
 import trimesh
 
 from partwright.errors import ModelError, SettingError
+from partwright.partsdf.companion_training import descend
 from partwright.partsdf.companions import beside
 from partwright.partsdf.diffusion import denoised, levels, noised
 from partwright.partsdf.generator import KIND, Generator, GeneratorSettings, load_generator
@@ -180,3 +182,13 @@ def test_a_gaussian_to_compare_with_and_the_distance_to_what_is_known(generator:
     assert (name, difference) == ("lamp3", pytest.approx(0.0, abs=1e-6))
     _, far = nearest_training_shape(drawn[0])
     assert 1e-4 < far < 0.1
+
+
+def test_groups_learn_at_their_own_rate() -> None:
+    """Adam's first step is the rate, whatever the gradient."""
+    fast, slow = (torch.nn.Parameter(torch.ones(1)) for _ in range(2))
+    groups: list[dict[str, Any]] = [{"params": [fast], "lr": 1.0}, {"params": [slow], "lr": 0.25}]
+    rate, warmed = 0.1, 0.02  # the first of 50 steps over which rates rise
+    descend(groups, lambda: torch.stack([fast[0] ** 2, 7 * slow[0] ** 2]), steps=1, rate=rate)
+    assert 1 - float(fast.detach()) == pytest.approx(rate * warmed, rel=0.02)
+    assert 1 - float(slow.detach()) == pytest.approx(0.25 * rate * warmed, rel=0.02)
