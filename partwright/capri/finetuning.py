@@ -68,7 +68,7 @@ class Finetuning:
         """Of a batch (1, n, 3), (1, n)."""
         net = self.network
         distance = distances(net.coefficients(self.code), points)
-        found = stages.sides(stage, distance, net.selection, net.weights)
+        found = stages.sides(stage, distance, net.selection, net.weights, leaks=True)
         return stages.loss(stage, found, inside, net.selection, net.weights)
 
     def tree(self) -> CsgTree:

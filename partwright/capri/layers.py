@@ -14,6 +14,18 @@ LEAK = 1e-3  # share of the gradient that passes the clamp from outside [0, 1], 
 ALPHA = 0.2  # eq. 5, section 4.1
 
 
+class _Positive(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, x: Tensor) -> Tensor:
+        ctx.save_for_backward(x)
+        return x.relu()
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> Tensor:
+        (x,), (gradient,) = ctx.saved_tensors, gradients
+        return gradient * ((x > 0) + LEAK * ((x <= 0) & (gradient < 0)))
+
+
 class _Clamp(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, x: Tensor) -> Tensor:
@@ -33,9 +45,17 @@ def clamp(x: Tensor) -> Tensor:
     return cast(Tensor, _Clamp.apply(x))
 
 
-def intersection(distance: Tensor, selection: Tensor) -> Tensor:
-    """Eq. 2: C = relu(D) T, (B, n, c), 0 inside; D (B, n, p), T (p, c) or (B, p, c)."""
-    return distance.relu() @ selection
+def positive(x: Tensor) -> Tensor:
+    """The relu of eq. 2, with `LEAK` of a gradient that leads negative values back."""
+    return cast(Tensor, _Positive.apply(x))
+
+
+def intersection(distance: Tensor, selection: Tensor, leaks: bool = False) -> Tensor:
+    """Eq. 2: C = relu(D) T, (B, n, c), 0 inside; D (B, n, p), T (p, c) or (B, p, c).
+
+    leaks: so that a point deep inside a convex where nothing should be teaches its primitives, by `positive`.
+    """
+    return (positive(distance) if leaks else distance.relu()) @ selection
 
 
 def union_exact(convexes: Tensor) -> Tensor:

@@ -32,10 +32,10 @@ def binary(selection: Tensor) -> Tensor:
     return (selection > ETA).to(selection.dtype)
 
 
-def sides(stage: Stage, distance: Tensor, selection: Tensor, weights: Tensor) -> Sides:
-    """Both unions in the form of the stage; D (B, n, p), T (p, c), W (c,)."""
+def sides(stage: Stage, distance: Tensor, selection: Tensor, weights: Tensor, leaks: bool = False) -> Sides:
+    """Both unions in the form of the stage; D (B, n, p), T (p, c), W (c,). leaks: of the intersection."""
     chosen = binary(selection) if stage == "binary_selection" else selection
-    convexes = layers.intersection(distance, chosen)
+    convexes = layers.intersection(distance, chosen, leaks)
     half = convexes.shape[-1] // 2
     left, right = convexes[..., :half], convexes[..., half:]
     if stage == "weighted_union":

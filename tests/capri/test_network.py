@@ -115,6 +115,17 @@ def test_the_clamp_leaks_only_what_leads_back() -> None:
     assert x.grad.tolist() == pytest.approx([0, -1e-3, 1, -1, 1e-3, 0])
 
 
+def test_a_point_deep_inside_a_convex_can_carve_it() -> None:
+    distance = torch.tensor([[[-0.5, -0.5, 0.25]]], requires_grad=True)
+    for sign, wanted in ((-1.0, [-1e-3, -1e-3, -1]), (1.0, [0, 0, 1])):
+        (gradient,) = torch.autograd.grad(
+            sign * layers.intersection(distance, torch.ones(3, 1), leaks=True).sum(), distance
+        )
+        assert gradient.flatten().tolist() == pytest.approx(wanted)
+    (gradient,) = torch.autograd.grad(-layers.intersection(distance, torch.ones(3, 1)).sum(), distance)
+    assert gradient.flatten().tolist() == [0, 0, -1]
+
+
 def test_a_drilled_slab_by_hand() -> None:
     """|x| < 0.4, |y| < 0.4 minus a cylinder of radius 0.2 along z: both unions and both differences agree."""
     table = torch.tensor(
