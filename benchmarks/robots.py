@@ -146,7 +146,7 @@ def document(rows: list[Row]) -> str:
     ]
     for r in rows:
         cells = (
-            f"{100 * r.missing:.1f}",
+            f"{100 * max(r.missing, 0.0):.1f}",  # rounding leaves -0.0
             f"{100 * r.extra:.1f}",
             f"{1000 * r.deviation:.1f}",
             "" if r.contained is None else f"{r.contained} of {r.links}",
