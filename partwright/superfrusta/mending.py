@@ -15,8 +15,6 @@ from os import cpu_count
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from partwright.fields.columns import ROTATION, Column
 from partwright.fields.kernel import Target
@@ -43,7 +41,7 @@ _STAGES: Stages = ((40.0, 4), (100.0, 5))
 _HOPELESS = 0.02  # of the objective: what is so much worse after a refit goes no further
 _REFITTED = 2  # of the ways to change a part
 _LEAST_HALVED = 100  # voxels
-_LINKED = 0.06  # unit lengths between points that are off in one place
+_ABOUT = 0.2  # unit lengths: how far from a point that is off a narrow hole may reach
 _HOLES = 2  # that are looked for there
 _JOINED = 4  # pairs at most, and of the most promising that are tried for each
 
@@ -227,6 +225,9 @@ class Mending:
                 begun = np.insert(still, [self.locked] * len(grown.first), True)
                 yield grown.joined(others, self.locked), np.append(begun, _all(grown.last))
         if self.settings.carving and off.distance[worst] > 0:
+            carved = carve(samples, rows, self.settings, self.settings.regions)
+            if len(carved):
+                yield with_new(carved.last)
             for one in self.holes(rows, off, worst):
                 yield with_new(one[None])
         missed = self.missed(rows, off.points[worst]) if off.distance[worst] <= 0 else None
@@ -238,12 +239,10 @@ class Mending:
     def holes(self, rows: Rows, off: Deviations, worst: int) -> Rows:
         """Parts (M, 17) to subtract about a point that is covered, by samples of that place alone: a hole may
         be as narrow as a voxel."""
-        outside = np.flatnonzero(off.distance > 0)
-        tree = cKDTree(off.points[outside])
-        linked = tree.sparse_distance_matrix(tree, _LINKED, output_type="coo_matrix")
-        _, piece = connected_components(linked)
-        points = off.points[outside[piece == piece[np.searchsorted(outside, worst)]]]
-        low, high = points.min(axis=0) - off.off[worst], points.max(axis=0) + off.off[worst]
+        place = off.points[worst]
+        near = np.linalg.norm(off.points - place, axis=1) < _ABOUT
+        about = off.points[near & (off.distance > 0)]
+        low, high = about.min(axis=0) - off.off[worst], about.max(axis=0) + off.off[worst]
         return carve(self.samples.about(low, high), rows, self.settings, _HOLES).last
 
     def fitted(self, voxels: Mask, others: Rows, like: NDArray[np.float32], under: bool = False) -> Rows:
