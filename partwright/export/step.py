@@ -2,30 +2,37 @@
 
 Straight parts are exact, whatever their taper, hole, rounding and dilation, and so are bent ones without
 taper, and quadrics (saddles and their like are refused). Bent ones with taper are surfaces through sections;
-what cannot be built becomes the nearest solid, and where a boolean operation goes wrong, flat facets of the
-exact mesh stand for its result. Blends become sharp edges. FILE.report.json lists all but the exact.
+what cannot be built becomes the nearest solid, and where a boolean operation goes wrong, or the file does not
+read as a valid solid, flat facets of the exact mesh stand for it. Blends become sharp edges. FILE.report.json
+lists all but the exact.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from partwright import __version__
 from partwright.approximation.change import Change
 from partwright.approximation.closed_quadrics import Ball
 from partwright.approximation.solid_tree import solid_tree
-from partwright.assembly import Assembly
+from partwright.assembly import Assembly, Node
 from partwright.atomic_io import replacing
 from partwright.errors import OutputError
 from partwright.export.brep import built
+from partwright.export.brep_facets import FacetsWarning, faceted
 from partwright.export.brep_rims import SHALLOW
 from partwright.export.brep_tree import Compromises, combined
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.fields import Extrusion, Field
+from partwright.meshing import has_exact_mesh
 from partwright.shapes import METRES, canonical_unit
 
 if TYPE_CHECKING:
@@ -33,6 +40,12 @@ if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
 _MOST_AGAIN = 30  # parts: more would take minutes
+_RESORTED = (
+    "what OpenCASCADE makes of its surfaces does not read as a valid solid, so flat facets stand for all"
+)
+_NOT_VALID = (
+    "the file does not read as a valid solid; move parts a little that nearly touch, or export a mesh"
+)
 # OpenCASCADE works in millimetres with an absolute tolerance, so all lengths are brought to them.
 _WORKING = METRES["mm"]
 _UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "km": "KM", "in": "INCH", "ft": "FT"}
@@ -44,6 +57,9 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     Raises:
         NoSurfaceError: nothing to export, or a part is too thin for a B-rep.
         OutputError: the file cannot be written.
+
+    Warns:
+        FacetsWarning: facets stand for all of a product, or the file does not read as a valid solid.
     """
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     scale = METRES[unit] / _WORKING if unit else 1.0
@@ -57,24 +73,16 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     names = [child.name or f"assembly_{i:02d}" for i, child in enumerate(children, 1)]
     if children == (scaled,):
         names = [assembly.name or Path(path).stem]
-    ball, made = Ball.around(scaled), Compromises()
+    ball = Ball.around(scaled)
 
     def save(solids: list[TopoDS_Shape], file: Path) -> None:
         _write(_document(list(zip(names, solids, strict=True))), file, unit or "mm", Path(path))
 
-    solids = [combined(child, ball, made) for child in children]
     with replacing(path) as temporary:
-        save(solids, temporary)
-        if len(scaled) <= _MOST_AGAIN and not _reads_valid(temporary):  # slivers that the file's digits lose
-            again = Compromises(rough=True)
-            spare = temporary.with_name(f"{temporary.name}.again")
-            try:
-                save([combined(child, ball, again) for child in children], spare)
-                if _reads_valid(spare):
-                    made = again
-                    spare.replace(temporary)
-            finally:
-                spare.unlink(missing_ok=True)
+        made, resorted = _saved(children, ball, temporary, save, len(scaled) <= _MOST_AGAIN)
+    changes += resorted
+    for change in resorted:
+        warnings.warn(f"{', '.join(names)}: {change.note}", FacetsWarning, stacklevel=2)
     notes = [] if unit else ["the length unit is unknown: the file says millimetres"]
     if made.apart:
         overlap = "it stands beside the rest: the union failed"
@@ -86,6 +94,38 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
         wrong = "OpenCASCADE gets their boolean operations wrong"
         changes.append(Change(tuple(made.faceted), "flat facets", note=wrong))
     write_report(assembly, path, changes, notes)
+
+
+def _saved(
+    products: Sequence[Node],
+    ball: Ball,
+    path: Path,
+    save: Callable[[list[TopoDS_Shape], Path], None],
+    again: bool,
+) -> tuple[Compromises, list[Change]]:
+    """Saves the products so that the file reads as valid solids: as they are, with wider tolerances (again:
+    whether to try those), as facets; and what that cost. As they are where nothing helps, which is told."""
+    made = Compromises()
+    save([combined(product, ball, made) for product in products], path)
+    if _reads_valid(path):
+        return made, []
+    spare = path.with_name(f"{path.name}.again")
+    try:
+        if again:  # slivers that the file's digits lose
+            rough = Compromises(rough=True)
+            save([combined(product, ball, rough) for product in products], spare)
+            if _reads_valid(spare):
+                spare.replace(path)
+                return rough, []
+        parts = tuple(part.name for product in products for part in product.parts)
+        if all(has_exact_mesh(product) and np.isfinite(product.bounds()).all() for product in products):
+            save([faceted(product, fine=True) for product in products], spare)
+            if _reads_valid(spare):
+                spare.replace(path)
+                return Compromises(), [Change(parts, "flat facets", note=_RESORTED)]
+        return made, [Change(parts, "a solid that is not valid", note=_NOT_VALID)]
+    finally:
+        spare.unlink(missing_ok=True)
 
 
 def _reads_valid(path: Path) -> bool:

@@ -19,8 +19,8 @@ from partwright.errors import NoSurfaceError, ParameterError
 from partwright.export import brep_booleans, export
 from partwright.fields import Box, Cone, Cylinder, Quadric, Sphere
 from partwright.meshing import mesh_csg
+from tests.export.step_faces import read_back
 from tests.export.test_openscad import rendered
-from tests.export.test_step import read_back
 
 TURN = Similarity(1.0, (0.9, 0.1, -0.3, 0.2), (4.0, -1.0, 2.0))
 # name -> the quadric and the face that STEP gives it
