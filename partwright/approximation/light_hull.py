@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _MOST = 256  # corners
 _LOST = 3e-3  # of the volume: what is thin or round keeps more corners
 _PLAIN = 5e-4  # of the volume, that a plain hull may lose
-_EDGES = 0.01  # of the size: edges that are tried to be done without
+_EDGES, _HALVINGS = 0.01, 10  # of the size: edges that are tried to be done without; then half, and so on
 _FEW, _SHARE = 8, 8  # corners that are taken at once: so many, or one for this many that are
 
 
@@ -23,12 +23,14 @@ def plain_hull(hull: Manifold) -> Manifold:
     """Without the corners that hardly count: at once, where `light_hull` chooses."""
     from manifold3d import Manifold
 
-    by = _EDGES * float(np.ptp(np.reshape(hull.bounding_box(), (2, 3)), axis=0).max())
-    while hull.num_vert() > _FEW:
-        plain = Manifold.hull_points(surface_of(hull.simplify(by))[0])
+    if hull.num_vert() <= _FEW:
+        return hull
+    size = float(np.ptp(np.reshape(hull.bounding_box(), (2, 3)), axis=0).max())
+    # Of a hull as thin as rounding, no copy may have the volume.
+    for halving in range(_HALVINGS):
+        plain = Manifold.hull_points(surface_of(hull.simplify(_EDGES * size / 2**halving))[0])
         if plain.volume() >= (1 - _PLAIN) * hull.volume():
             return plain
-        by /= 2
     return hull
 
 

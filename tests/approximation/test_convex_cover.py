@@ -14,7 +14,7 @@ from partwright.approximation.convex_piece import Limits, Piece
 from partwright.approximation.cutting_planes import Corners, moved
 from partwright.approximation.half_space import Surface
 from partwright.approximation.hull_faces import faces_of
-from partwright.approximation.light_hull import light_hull
+from partwright.approximation.light_hull import light_hull, plain_hull
 
 SEGMENTS = 96
 
@@ -111,6 +111,14 @@ def test_no_more_pieces_than_asked_for() -> None:
     pieces = convex_cover(hollow_box(), Limits(0.05, most=2))
     assert len(pieces) == 2
     assert (hollow_box() - union([piece.hull for piece in pieces])).volume() < 1e-9
+
+
+def test_a_hull_that_no_plainer_one_holds_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As rounding has it of slivers."""
+    ball = Manifold.sphere(1.0, 24)
+    assert plain_hull(ball).volume() == pytest.approx(ball.volume(), rel=1e-3)
+    monkeypatch.setattr("partwright.approximation.light_hull._PLAIN", -1e-3)
+    assert plain_hull(ball) is ball
 
 
 def test_a_light_hull_says_what_it_loses() -> None:
