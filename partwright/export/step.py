@@ -9,6 +9,7 @@ lists all but the exact.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import warnings
@@ -24,7 +25,7 @@ from partwright.approximation.closed_quadrics import Ball
 from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node
 from partwright.atomic_io import replacing
-from partwright.errors import OutputError
+from partwright.errors import NoSurfaceError, OutputError
 from partwright.export.brep import built
 from partwright.export.brep_facets import FacetsWarning, faceted
 from partwright.export.brep_rims import SHALLOW
@@ -119,10 +120,11 @@ def _saved(
                 return rough, []
         parts = tuple(part.name for product in products for part in product.parts)
         if all(has_exact_mesh(product) and np.isfinite(product.bounds()).all() for product in products):
-            save([faceted(product, fine=True) for product in products], spare)
-            if _reads_valid(spare):
-                spare.replace(path)
-                return Compromises(), [Change(parts, "flat facets", note=_RESORTED)]
+            with contextlib.suppress(NoSurfaceError):  # of facets that are too small; told below
+                save([faceted(product, fine=True) for product in products], spare)
+                if _reads_valid(spare):
+                    spare.replace(path)
+                    return Compromises(), [Change(parts, "flat facets", note=_RESORTED)]
         return made, [Change(parts, "a solid that is not valid", note=_NOT_VALID)]
     finally:
         spare.unlink(missing_ok=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from partwright.assembly import Assembly, Part
+from partwright.errors import NoSurfaceError
 from partwright.export import brep_facets, export, step
 from partwright.export.brep import volume_and_area
 from partwright.export.brep_facets import FacetsWarning
@@ -42,10 +43,16 @@ def test_a_file_that_never_reads_well_becomes_facets_and_says_so(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.step", "a.step.report.json"]
 
 
+@pytest.mark.parametrize("made", [True, False])
 def test_what_not_even_facets_mend_is_written_and_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, made: bool
 ) -> None:
+    def too_small(*_: object, **__: object) -> None:
+        raise NoSurfaceError("too small")
+
     _read_badly(monkeypatch, 3)
+    if not made:
+        monkeypatch.setattr(step, "faceted", too_small)
     with pytest.warns(FacetsWarning, match="not read as a valid solid"):
         export(Assembly((Part(Cylinder(1, 2), name="pin"),), unit="mm"), tmp_path / "a.step")
     assert read_back(tmp_path / "a.step")[1] == {"Plane": 2, "Cylinder": 1}
