@@ -18,7 +18,9 @@ from partwright.approximation.cutting_planes import Plane
 from partwright.approximation.half_space import Surface
 from partwright.approximation.hull_faces import faces_of
 from partwright.approximation.light_hull import plain_hull
+from partwright.approximation.piece_joining import boxes_touch
 from partwright.meshing.manifolds import surface_of
+from partwright.shapes.topology import area_vectors
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -42,7 +44,8 @@ def balanced_hulls(pieces: Sequence[Piece], solid: Manifold, deepest: float) -> 
     `deepest`, a length, or as deep as the hull bridges."""
     hulls = [piece.hull for piece in pieces]
     near = [
-        [k for k, other in enumerate(pieces) if k != i and _touch(other, one)] for i, one in enumerate(pieces)
+        [k for k, other in enumerate(pieces) if k != i and boxes_touch(other.hull, one.hull)]
+        for i, one in enumerate(pieces)
     ]
     for i in sorted(range(len(pieces)), key=lambda i: -pieces[i].extra):
         piece = pieces[i]
@@ -166,11 +169,11 @@ class _Planes:
     def bridging(self, extra: Manifold) -> np.ndarray:
         """(F, 3) for each face its normal times the area of it that has something extra below it."""
         vertices, faces = surface_of(extra)
-        a, b, c = (vertices[faces.T] - self.middle) / self.size
-        cross = np.cross(b - a, c - a)
+        corners = (vertices[faces] - self.middle) / self.size
+        cross = area_vectors(corners)
         length = np.linalg.norm(cross, axis=1)
         normal = np.divide(cross, length[:, None], out=np.zeros_like(cross), where=length[:, None] > 0)
-        rows = np.column_stack([normal, np.einsum("ij,ij->i", normal, a)])
+        rows = np.column_stack([normal, np.einsum("ij,ij->i", normal, corners[:, 0])])
         away, face = self.tree.query(rows, distance_upper_bound=_SAME)
         on = np.isfinite(away)
         area = np.bincount(face[on], length[on], minlength=len(self.normals))
@@ -183,8 +186,3 @@ def _depth(hull: Manifold, extra: Manifold) -> float:
     corners = surface_of(extra)[0]
     corners = corners[:: max(1, len(corners) // _PROBES)]
     return float((offsets - corners @ normals.T).min(axis=1).max(initial=0.0))
-
-
-def _touch(a: Piece, b: Piece) -> bool:
-    first, second = (np.reshape(one.hull.bounding_box(), (2, 3)) for one in (a, b))
-    return bool(((first[0] <= second[1]) & (second[0] <= first[1])).all())

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.meshing.manifolds import surface_of
+from partwright.shapes.topology import area_vectors, doubled_areas
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -54,16 +55,15 @@ class Corners:
     @cached_property
     def normals(self) -> np.ndarray:
         """(F, 3) unit normals; zero for triangles without area."""
-        a, b, c = self.vertices[self.faces.T]
-        normal = np.cross(b - a, c - a)
+        normal = area_vectors(self.vertices[self.faces])
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
 
     @cached_property
     def axes(self) -> np.ndarray:
         """(3, 3) principal axes of the surface, in rows, the longest first."""
+        area = doubled_areas(self.vertices, self.faces)
         a, b, c = self.vertices[self.faces.T]
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         middle = (a + b + c) / 3
         centred = middle - np.average(middle, axis=0, weights=area)
         return np.linalg.eigh((centred * area[:, None]).T @ centred)[1].T[::-1]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.meshing.manifolds import surface_of
+from partwright.shapes.topology import area_vectors
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -24,8 +25,7 @@ class Surface:
     @classmethod
     def of(cls, solid: Manifold) -> Surface:
         vertices, faces = surface_of(solid)
-        a, b, c = vertices[faces.T]
-        return cls(vertices, faces, np.cross(b - a, c - a) / 2)
+        return cls(vertices, faces, area_vectors(vertices[faces]) / 2)
 
     def beyond(self, normal: np.ndarray, offsets: np.ndarray) -> np.ndarray:
         """(K,) volume where normal . p > offset, for each of the offsets (K,).

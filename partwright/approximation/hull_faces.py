@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.meshing.manifolds import surface_of
+from partwright.shapes.topology import area_vectors
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -19,8 +20,7 @@ def faces_of(hull: Manifold) -> tuple[np.ndarray, np.ndarray]:
     off.
     """
     corners, faces = surface_of(hull)
-    a, b, c = corners[faces.T]
-    normals = np.cross(b - a, c - a)
+    normals = area_vectors(corners[faces])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals[length[:, 0] > 0] / length[length[:, 0] > 0]
     _, first = np.unique(np.round(normals, 9), axis=0, return_index=True)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 _LEAST_SAVED = 5e-4  # of the volume: what one piece more has to save where the limits ask for none
+_ROOM = 0.05  # of both: how far apart the boxes of two may lie that are joined
 _EXCHANGES = 24  # pieces that are tried to be cut once there are as many as may be
 
 
@@ -118,13 +119,13 @@ def _cost(a: Piece, b: Piece) -> float:
     """Volume that the hull of both adds; infinite for those that lie apart."""
     from manifold3d import Manifold
 
-    if not _near(a.hull, b.hull):
+    if not boxes_touch(a.hull, b.hull, _ROOM):
         return np.inf
     return float(Manifold.batch_hull([a.hull, b.hull]).volume() - a.hull.volume() - b.hull.volume())
 
 
-def _near(a: Manifold, b: Manifold) -> bool:
-    """Whether their boxes touch, with room to spare."""
+def boxes_touch(a: Manifold, b: Manifold, share: float = 0.0) -> bool:
+    """Whether their boxes touch, with room to spare: a share of the longest side of both together."""
     first, second = (np.reshape(one.bounding_box(), (2, 3)) for one in (a, b))
-    room = 0.05 * float(np.ptp(np.concatenate([first, second]), axis=0).max())
+    room = share * float(np.ptp(np.concatenate([first, second]), axis=0).max())
     return bool(((first[0] <= second[1] + room) & (second[0] <= first[1] + room)).all())

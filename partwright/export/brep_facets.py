@@ -15,6 +15,7 @@ from partwright.export.brep_errors import opencascade_errors
 from partwright.export.plane_patches import boundary_loops, patches, twins_of
 from partwright.meshing.csg import solid_of
 from partwright.meshing.manifolds import surface_of
+from partwright.shapes.topology import components, signed_volumes
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Solid, TopoDS_Vertex
@@ -71,14 +72,11 @@ def flat_faced(places: np.ndarray, triangles: np.ndarray, flat: float) -> TopoDS
 
 def _pieces(places: np.ndarray, triangles: np.ndarray) -> list[list[np.ndarray]]:
     """The triangles of each solid: those of its outside, then those of each of its cavities."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
-    graph = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(places), len(places)))
-    of_corner = connected_components(graph, directed=False)[1][triangles[:, 0]]
-    shells = [triangles[of_corner == one] for one in np.unique(of_corner)]
-    volumes = [_volume(places, shell) for shell in shells]
+    of_triangle = components(len(places), *ends.T)[triangles[:, 0]]
+    found, shell_of = np.unique(of_triangle, return_inverse=True)
+    shells = [triangles[shell_of == one] for one in range(len(found))]
+    volumes = signed_volumes(places, triangles, shell_of).tolist()
     boxes = [(places[shell].min(axis=(0, 1)), places[shell].max(axis=(0, 1))) for shell in shells]
     outsides = sorted((i for i, volume in enumerate(volumes) if volume > 0), key=lambda i: volumes[i])
     pieces = {i: [shells[i]] for i in outsides}
@@ -89,11 +87,6 @@ def _pieces(places: np.ndarray, triangles: np.ndarray) -> list[list[np.ndarray]]
         if volume <= 0 and around:
             pieces[around[0]].append(shells[i])
     return list(pieces.values())
-
-
-def _volume(places: np.ndarray, triangles: np.ndarray) -> float:
-    a, b, c = np.moveaxis(places[triangles] - places[triangles[0, 0]], 1, 0)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
 def _solid(places: np.ndarray, shells: list[np.ndarray], flat: float) -> TopoDS_Solid:

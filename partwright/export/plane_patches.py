@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from partwright.shapes.topology import area_vectors
+
 _ALIKE = 0.9  # least cosine of normals in a patch; needles, whose own means nothing, are in it at any
 
 
@@ -28,7 +30,7 @@ def patches(
     of the first: planes do not drift, and needles join what they lie along.
     """
     corners = places[triangles]
-    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    crossed = area_vectors(corners)
     areas = np.linalg.norm(crossed, axis=1)
     normals = crossed / np.maximum(areas, np.finfo(float).tiny)[:, None]
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)

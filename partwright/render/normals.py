@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from partwright.shapes.topology import area_vectors
+
 _CREASE = 0.77  # cosine of the angle between faces (about 40 degrees) beyond which an edge stays sharp
 _CROWDED = 256  # at a corner of more faces than this, flat shading is all there is time for
 
 
 def face_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) normals whose length is twice the face's area."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    return np.cross(b - a, c - a)
+    return area_vectors(vertices[faces])
 
 
 def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
