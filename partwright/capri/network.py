@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from partwright.capri.quadric_rows import CROSS
-from partwright.errors import SettingError, UnreadableFileError
+from partwright.errors import UnreadableFileError
 from partwright.input_files import check_file
 
 VOXELS = 64
@@ -40,6 +40,7 @@ class NetworkSizes:
 
 
 SMALL = NetworkSizes(primitives=256, convexes=32, code=128, hidden=256, channels=4)  # a few megabytes
+SIZES = {"small": SMALL, "paper": NetworkSizes()}
 
 
 class Encoder(nn.Module):
@@ -146,10 +147,3 @@ def load_network(path: Path) -> CapriNet:
             f"{path}: is no CAPRI network ({error}); give the file of a training"
         ) from error
     return network
-
-
-def device_of(name: str) -> torch.device:
-    """Raises SettingError where cuda is asked for and absent."""
-    if name == "cuda" and not torch.cuda.is_available():
-        raise SettingError("device cuda was asked for, but PyTorch finds none; use --device cpu")
-    return torch.device("cuda" if name == "cuda" or (name == "auto" and torch.cuda.is_available()) else "cpu")

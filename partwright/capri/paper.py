@@ -13,9 +13,10 @@ from partwright.capri import stages
 from partwright.capri.csg_tree import CsgTree
 from partwright.capri.finetuning import Finetuning, encoded, seeded, straightened
 from partwright.capri.finetuning_samples import draw_finetuning_samples
-from partwright.capri.network import CapriNet, device_of, load_network, rows_of
+from partwright.capri.network import CapriNet, load_network, rows_of
 from partwright.capri.pruning import pruned
 from partwright.capri.settings import Settings
+from partwright.devices import device_of
 from partwright.methods import Run
 from partwright.shapes import Shape
 

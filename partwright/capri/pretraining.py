@@ -26,6 +26,7 @@ from partwright.capri.pretraining_dataset import (
     load_pretraining_dataset,
     make_pretraining_dataset,
 )
+from partwright.devices import device_of
 from partwright.errors import SettingError, UnreadableFileError
 
 NETWORK, CHECKPOINT, COLLECTION = "network.safetensors", "checkpoint.safetensors", "collection.safetensors"
@@ -85,24 +86,28 @@ def train(
     training: PretrainingSettings | None = None,
     sizes: NetworkSizes = SMALL,
     progress: Callable[[PretrainingReport], None] | None = None,
+    device: str = "auto",
+    workers: int = 1,
 ) -> Outcome:
     """Trains, or goes on where a training in `folder` was stopped; writes network.safetensors.
+
+    device: "auto", "cpu" or "cuda". workers: processes that make the parts.
 
     Ctrl-C writes the network as it is, keeps the last checkpoint, and the outcome is "interrupted".
 
     Raises:
-        SettingError: the folder holds a checkpoint of other settings.
+        SettingError: the folder holds a checkpoint of other settings, or there is no such device.
         UnreadableFileError: a file in the folder is damaged.
     """
-    training = training or PretrainingSettings()
+    training, place = training or PretrainingSettings(), device_of(device)
     check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / COLLECTION
     if not path.exists():
-        made = make_pretraining_dataset(training.parts, training.points, training.seed)
+        made = make_pretraining_dataset(training.parts, training.points, training.seed, workers)
         made.save(path, training.parts, training.seed)
     collection = load_pretraining_dataset(path, training.parts, training.points, training.seed)
-    trainer = Trainer(collection, training, sizes)
+    trainer = Trainer(collection, training, sizes, place)
     checkpoint = folder / CHECKPOINT
     if checkpoint.exists():
         trainer.load(checkpoint)
@@ -120,12 +125,18 @@ class Trainer:
     """The network, its optimiser, and the number of steps done."""
 
     def __init__(
-        self, collection: PretrainingDataset, training: PretrainingSettings, sizes: NetworkSizes
+        self,
+        collection: PretrainingDataset,
+        training: PretrainingSettings,
+        sizes: NetworkSizes,
+        device: torch.device | None = None,
     ) -> None:
-        self.collection, self.training = collection, training
+        self.device = device or torch.device("cpu")
+        self.collection, self.training = collection.to(self.device), training
         torch.manual_seed(training.seed)
         self.network = CapriNet(sizes)
         initialise_boxes(self.network, training.seed)
+        self.network.to(self.device)
         self.optimiser = torch.optim.Adam(self.network.parameters(), training.rate, betas=(0.5, 0.999))
         self.step = 0
 
@@ -185,7 +196,7 @@ class Trainer:
         self.network.load_state_dict(state)
         for name, parameter in self.network.named_parameters():
             if f"exp_avg.{name}" in tensors:
-                moments = {moment: tensors[f"{moment}.{name}"] for moment in _MOMENTS}
+                moments = {moment: tensors[f"{moment}.{name}"].to(self.device) for moment in _MOMENTS}
                 self.optimiser.state[parameter] = {"step": torch.tensor(float(step)), **moments}
         self.step = step
 

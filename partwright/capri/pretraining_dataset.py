@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +20,7 @@ from partwright.errors import UnreadableFileError
 
 _NEAR_SIGMAS = (0.02, 0.06)  # unit lengths: of the points near the surface
 _FORMAT = "partwright-capri-collection-1"
+_AT_ONCE = 16  # parts that a process makes
 
 
 @dataclass(frozen=True)
@@ -24,29 +28,31 @@ class PretrainingDataset:
     """voxels (N, 64^3 / 8) uint8, packed; points (N, n, 3) float16 in the paper's coordinates, the first half
     near the surface, the rest anywhere in the box; inside (N, n) bool."""
 
-    voxels: NDArray[np.uint8]
-    points: NDArray[np.float16]
-    inside: NDArray[np.bool_]
+    voxels: Tensor
+    points: Tensor
+    inside: Tensor
 
     def __len__(self) -> int:
         return len(self.points)
+
+    def to(self, device: torch.device) -> PretrainingDataset:
+        return PretrainingDataset(*(t.to(device) for t in vars(self).values()))
 
     def draw(
         self, size: int, count: int, near: bool, rng: np.random.Generator
     ) -> tuple[Tensor, Tensor, Tensor]:
         """A batch of `size` parts, turned or mirrored by one of the 48 symmetries of the cube: voxels
         (B, 1, 64, 64, 64), `count` points (B, n, 3) and inside (B, n); near: also near the surface."""
-        parts = rng.choice(len(self), size, replace=False)
+        device = self.points.device
+        parts = torch.from_numpy(rng.choice(len(self), size, replace=False)).to(device)
         half = self.points.shape[1] // 2
-        chosen = np.sort(rng.integers(0 if near else half, 2 * half, count))
-        voxels = np.unpackbits(self.voxels[parts], axis=1).reshape(size, VOXELS, VOXELS, VOXELS)
-        points = self.points[parts][:, chosen].astype(np.float32)
-        axes, signs = rng.permutation(3), rng.choice([-1, 1], 3)
-        flipped = tuple(1 + axis for axis in range(3) if signs[axis] < 0)
-        turned = np.flip(voxels.transpose(0, *(1 + axes)), flipped).astype(np.float32)
-        moved = (points[..., axes] * signs).astype(np.float32)
-        inside = self.inside[parts][:, chosen].astype(np.float32)
-        return torch.from_numpy(turned)[:, None], torch.from_numpy(moved), torch.from_numpy(inside)
+        chosen = torch.from_numpy(np.sort(rng.integers(0 if near else half, 2 * half, count))).to(device)
+        axes, signs = rng.permutation(3).tolist(), rng.choice([-1, 1], 3)
+        voxels = _unpacked(self.voxels[parts]).view(size, VOXELS, VOXELS, VOXELS)
+        flipped = [1 + axis for axis in range(3) if signs[axis] < 0]
+        turned = voxels.permute(0, *(1 + axis for axis in axes)).flip(flipped)
+        moved = self.points[parts][:, chosen].float()[..., axes] * torch.from_numpy(signs).float().to(device)
+        return turned[:, None].contiguous().float(), moved, self.inside[parts][:, chosen].float()
 
     def save(self, path: Path, parts: int, seed: int) -> None:
         """As safetensors, beside what it was made by."""
@@ -54,8 +60,8 @@ class PretrainingDataset:
 
         from partwright.atomic_io import write_bytes
 
-        arrays: dict[str, NDArray[Any]] = {"voxels": self.voxels, "points": self.points}
-        arrays["inside"] = np.packbits(self.inside, axis=1)
+        arrays = {"voxels": self.voxels.numpy(), "points": self.points.numpy()}
+        arrays["inside"] = np.packbits(self.inside.numpy(), axis=1)
         about = {"format": _FORMAT, "parts": str(parts), "seed": str(seed)}
         write_bytes(path, save(arrays, {"about": json.dumps(about)}))
 
@@ -78,22 +84,45 @@ def load_pretraining_dataset(path: Path, parts: int, points: int, seed: int) -> 
     if about != expected or arrays["points"].shape[1] != points:
         raise UnreadableFileError(f"{path}: holds other CAD parts ({about}); remove it, or write elsewhere")
     inside = np.unpackbits(arrays["inside"], axis=1, count=points).astype(bool)
-    return PretrainingDataset(arrays["voxels"], arrays["points"], inside)
+    return _dataset(arrays["voxels"], arrays["points"], inside)
 
 
-def make_pretraining_dataset(parts: int, points: int, seed: int) -> PretrainingDataset:
-    """The first `parts` CAD parts of a seed, `points` points each."""
-    from partwright.datasets.cad_parts import cad_parts
+def make_pretraining_dataset(parts: int, points: int, seed: int, workers: int = 1) -> PretrainingDataset:
+    """The first `parts` CAD parts of a seed, `points` points each; the same by however many processes."""
+    few = -(-parts // _AT_ONCE)
+    jobs = [range(i * _AT_ONCE, min((i + 1) * _AT_ONCE, parts)) for i in range(few)]
+    make = partial(_made, points=points, seed=seed)
+    if workers > 1:
+        with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+            made = list(pool.map(make, jobs))
+    else:
+        made = [make(job) for job in jobs]
+    return _dataset(*(np.concatenate(each) for each in zip(*made, strict=True)))
+
+
+def _made(parts: range, points: int, seed: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Voxels, points and inside of the parts of these numbers."""
+    from partwright.datasets.cad_parts import cad_part
     from partwright.shapes import load_shape
 
-    voxels = np.zeros((parts, VOXELS**3 // 8), dtype=np.uint8)
-    places = np.zeros((parts, points, 3), dtype=np.float16)
-    inside = np.zeros((parts, points), dtype=bool)
-    for i, part in enumerate(cad_parts(parts, seed)):
-        shape = load_shape(part.mesh)
+    places = np.zeros((len(parts), points, 3), dtype=np.float16)
+    voxels = np.zeros((len(parts), VOXELS**3 // 8), dtype=np.uint8)
+    inside = np.zeros((len(parts), points), dtype=bool)
+    for i, number in enumerate(parts):
+        shape = load_shape(cad_part(number, seed).mesh)
         near = shape.samples(points // 2, 0, seed, _NEAR_SIGMAS).points
-        anywhere = np.random.default_rng((seed, i)).uniform(-1, 1, (points - len(near), 3))
+        anywhere = np.random.default_rng((seed, number)).uniform(-1, 1, (points - len(near), 3))
         places[i] = UNIT_TO_PAPER * np.concatenate([near, anywhere])
         inside[i] = shape.unit_distance(places[i].astype(np.float32) / UNIT_TO_PAPER) < 0
         voxels[i] = np.packbits(shape.unit_occupancy(VOXELS).ravel())
-    return PretrainingDataset(voxels, places, inside)
+    return voxels, places, inside
+
+
+def _dataset(voxels: NDArray[Any], points: NDArray[Any], inside: NDArray[Any]) -> PretrainingDataset:
+    return PretrainingDataset(*(torch.from_numpy(one) for one in (voxels, points, inside)))
+
+
+def _unpacked(packed: Tensor) -> Tensor:
+    """(B, 8 n) bits of bytes (B, n), the highest first, as `numpy.packbits` puts them."""
+    shift = torch.arange(7, -1, -1, dtype=torch.uint8, device=packed.device)
+    return ((packed[..., None] >> shift) & 1).flatten(1)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 
 from partwright.cli.outputs import add_output, given
+from partwright.methods import DEVICES
 
 
 def add_training(command: argparse.ArgumentParser, kind: str, steps: int, batch: str) -> None:
-    """MODEL, --output, --steps and --seed. batch: what a step learns from."""
+    """MODEL, --output, --steps, --batch, --device and --seed. batch: what a step learns from."""
     command.add_argument("model", metavar="MODEL", help="a model that ships, or a file (.safetensors)")
     add_output(
         command,
@@ -20,4 +21,11 @@ def add_training(command: argparse.ArgumentParser, kind: str, steps: int, batch:
     )
     option = command.add_argument
     option("--steps", metavar="N", type=int, default=steps, help=f"of {batch} each (default: %(default)s)")
+    option("--batch", metavar="N", type=int, help="take so many a step instead")
+    option(
+        "--device",
+        choices=DEVICES,
+        default="auto",
+        help="where to compute; auto takes an NVIDIA accelerator where there is one (default: %(default)s)",
+    )
     option("--seed", metavar="S", type=int, default=0, help="of all that is drawn (default: %(default)s)")

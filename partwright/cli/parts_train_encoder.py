@@ -26,6 +26,16 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="what it sees; that of images is written to MODEL.image-encoder.safetensors (default: points)",
     )
     command.add_argument(
+        "--width", metavar="N", type=int, default=128, help="of the network's tokens (default: %(default)s)"
+    )
+    command.add_argument(
+        "--views",
+        metavar="N",
+        type=int,
+        default=16_000,
+        help="with --from images: views that are ray cast, to be lit anew each step (default: %(default)s)",
+    )
+    command.add_argument(
         "family", metavar="FAMILY", type=Path, help="the prepared family that it was trained on"
     )
     command.set_defaults(run="parts_train_encoder")

@@ -38,6 +38,9 @@ class PartClouds:
     points: Tensor
     area: Tensor
 
+    def to(self, device: torch.device) -> PartClouds:
+        return PartClouds(self.points.to(device), self.area.to(device))
+
     @classmethod
     def of(cls, family: PreparedFamily, model: Model) -> PartClouds:
         """Of the model's training shapes, in their order.

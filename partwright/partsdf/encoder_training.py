@@ -9,7 +9,8 @@ import torch
 from torch import Tensor
 
 from partwright.datasets.prepared import PreparedFamily
-from partwright.methods import Cancellation
+from partwright.devices import device_of
+from partwright.methods import Cancellation, check_count
 from partwright.partsdf.clouds import PartClouds, draw
 from partwright.partsdf.companion_training import check_trainable, descend
 from partwright.partsdf.encoder import Encoder, EncoderNetwork, EncoderSettings
@@ -17,7 +18,7 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.part_vectors import POSE, PartVectors
 from partwright.partsdf.poses import PoseTensors
 
-_BATCH = 24
+BATCH = 24
 _POINTS = (64, 128, 256, 512)  # of a step's clouds
 _STEEPEST = 1.0  # norm of the gradients
 _TOLD = 20  # steps
@@ -40,8 +41,10 @@ def train_encoder(
     family: PreparedFamily,
     *,
     steps: int = 5000,
+    batch: int = BATCH,
     rate: float = 1e-3,
     seed: int = 0,
+    device: str = "auto",
     settings: EncoderSettings | None = None,
     told: Callable[[EncoderStep], None] | None = None,
     cancel: Cancellation | None = None,
@@ -49,23 +52,29 @@ def train_encoder(
     """An encoder for a model, from the prepared family that it was trained on; after a cancellation, as far
     as it has come.
 
+    batch: clouds a step. device: "auto", "cpu" or "cuda".
+
     Raises:
         FamilyError: it is another family, or was prepared without surfaces.
-        SettingError: fewer than one step, or a model of one part, which has no poses.
+        SettingError: fewer than one step or cloud, a model of one part, which has no poses, or no
+            such device.
     """
     check_trainable(model, steps, "an encoder predicts")
-    clouds = PartClouds.of(family, model)
-    settings = settings or EncoderSettings()
-    torch.manual_seed(seed)
+    check_count("batch", batch, low=1)
+    place, settings = device_of(device), settings or EncoderSettings()
     vectors = PartVectors.of(model)
-    network = EncoderNetwork(len(model.parts), vectors.width, settings)
-    generator = torch.Generator().manual_seed(seed)
+    known, own, clouds = vectors.to(place), model.to(place), PartClouds.of(family, model).to(place)
+    torch.manual_seed(seed)
+    generator = torch.Generator(place).manual_seed(seed)
+    with place:
+        network = EncoderNetwork(len(model.parts), vectors.width, settings)
 
     def terms() -> Tensor:
-        shapes = torch.randint(len(model.shapes), (_BATCH,), generator=generator)
-        count = _POINTS[int(torch.randint(len(_POINTS), (), generator=generator))]
-        drawn = draw(clouds, model, shapes, count, generator)
-        return losses(network(drawn.points), vectors, drawn.latents, drawn.poses, drawn.present)
+        with place:  # all that is drawn
+            shapes = torch.randint(len(model.shapes), (batch,), generator=generator)
+            count = _POINTS[int(torch.randint(len(_POINTS), (), generator=generator))]
+            drawn = draw(clouds, own, shapes, count, generator)
+            return losses(network(drawn.points), known, drawn.latents, drawn.poses, drawn.present)
 
     def heard(number: int, means: list[float]) -> None:
         if told is not None:
@@ -75,7 +84,7 @@ def train_encoder(
         network.parameters(), terms, steps=steps, rate=rate, told=heard, every=_TOLD, cancel=cancel,
         steepest=_STEEPEST,
     )  # fmt: skip
-    return Encoder(model, settings, network.requires_grad_(False).eval(), vectors)
+    return Encoder(model, settings, network.cpu().requires_grad_(False).eval(), vectors)
 
 
 def losses(

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from partwright.devices import device_of
 from partwright.errors import SettingError
-from partwright.methods import Cancellation
+from partwright.methods import Cancellation, check_count
 from partwright.partsdf.companion_training import check_posed, check_trainable, descend, follow
 from partwright.partsdf.diffusion import noised
 from partwright.partsdf.generator import Generator, GeneratorSettings, networks, tidy
@@ -18,7 +19,8 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import POSE, PartVectors
 
-_BATCH, _RATE = 64, 1e-3
+BATCH = 64
+_RATE = 1e-3
 _FIRST = "are generated first"
 _AVERAGE = 0.995  # of the weights that are kept, a step
 _TOLD = 50  # steps
@@ -40,7 +42,9 @@ def train_generator(
     model: Model,
     *,
     steps: int = 1600,
+    batch: int = BATCH,
     seed: int = 0,
+    device: str = "auto",
     settings: GeneratorSettings | None = None,
     told: Callable[[GeneratorStep], None] | None = None,
     cancel: Cancellation | None = None,
@@ -48,27 +52,34 @@ def train_generator(
     """A generator for a model, whose file holds all that is learned from; after a cancellation, as far as it
     has come.
 
+    batch: shapes a step. device: "auto", "cpu" or "cuda".
+
     Raises:
-        SettingError: fewer than one step, fewer than two shapes, or a model without poses.
+        SettingError: fewer than one step or shape a step, fewer than two shapes, a model without poses, or no
+            such device.
     """
     check_trainable(model, steps, _FIRST)
+    check_count("batch", batch, low=1)
     _check_shapes(model)
-    settings = settings or GeneratorSettings()
-    torch.manual_seed(seed)
+    place, settings = device_of(device), settings or GeneratorSettings()
     vectors = PartVectors.of(model)
-    made = networks(model, vectors, settings)
+    torch.manual_seed(seed)
+    with place:
+        made = networks(model, vectors, settings)
     kept = {name: copy.deepcopy(one).requires_grad_(False) for name, one in made.items()}
     result = Generator(model, settings, **kept, vectors=vectors)  # type: ignore[arg-type]
     layouts, forms = result.layout_of(model.poses, model.present), vectors.of_latents(model.latents)
     # Each direction as it tells: a spread of a hundredth of the widest one's is no shape.
     told_by = (vectors.spread * vectors.directions.norm(dim=2)).square()  # none of those beyond the latents'
     tells = told_by / told_by.mean(dim=1, keepdim=True).clamp(min=1e-12)
+    layouts, forms, tells = layouts.to(place), forms.to(place), tells.to(place)
     shares = {"layouts": 1.0, "forms": _SLOWER}
-    generator = torch.Generator().manual_seed(seed)
+    generator = torch.Generator(place).manual_seed(seed)
 
     def terms() -> Tensor:
-        rows = torch.randint(len(layouts), (_BATCH,), generator=generator)
-        return _errors(made, layouts[rows], forms[rows], tells, generator)
+        with place:  # all that is drawn
+            rows = torch.randint(len(layouts), (batch,), generator=generator)
+            return _errors(made, layouts[rows], forms[rows], tells, generator)
 
     def averaged(step: int) -> None:
         for name, one in made.items():
@@ -83,7 +94,7 @@ def train_generator(
         steps=steps, rate=_RATE, told=heard, every=_TOLD, cancel=cancel, after=averaged,
     )  # fmt: skip
     for one in kept.values():
-        one.eval()
+        one.cpu().eval()
     return result
 
 

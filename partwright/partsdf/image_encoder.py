@@ -6,13 +6,14 @@ the encoder of points, hear of what it saw. The paper's tells neither silhouette
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import torch
 from torch import Tensor, nn
 
+from partwright.errors import SettingError
 from partwright.methods import check_count
 from partwright.partsdf.companions import companion_file, load_companion, save_companion, with_weights
 from partwright.partsdf.encoder import EncoderSettings, PartQueries, shapes_of
@@ -40,6 +41,14 @@ class ImageSettings:
     def __post_init__(self) -> None:
         for count in self.channels:
             check_count("channels", count, low=1)
+
+    @classmethod
+    def of_width(cls, width: int) -> ImageSettings:
+        """Tokens of this width, and channels in proportion; raises SettingError."""
+        check_count("width", width, low=1)
+        if width % (4 * _GROUPS):
+            raise SettingError(f"width is {width}; expected a multiple of {4 * _GROUPS}")
+        return cls((width // 4, width // 2, width), replace(_QUERIES, width=width))
 
 
 class _Block(nn.Module):

@@ -11,6 +11,7 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d, binary_cross_entropy_with_logits, smooth_l1_loss
 
 from partwright.datasets.prepared import PreparedFamily
+from partwright.devices import device_of
 from partwright.methods import Cancellation, check_count
 from partwright.partsdf.companion_training import check_trainable, descend, follow
 from partwright.partsdf.encoder_training import losses
@@ -22,7 +23,7 @@ from partwright.partsdf.part_vectors import PartVectors
 from partwright.partsdf.views import PartMeshes, Views, draw_views
 
 VIEWS = 16_000
-_BATCH = 32
+BATCH = 32
 _AVERAGE = 0.995  # what is kept of the averaged weights each step
 _STEEPEST = 1.0  # norm of the gradients
 _TOLD = 20  # steps
@@ -48,8 +49,10 @@ def train_image_encoder(
     *,
     steps: int = 5000,
     views: int = VIEWS,
+    batch: int = BATCH,
     rate: float = 1e-3,
     seed: int = 0,
+    device: str = "auto",
     settings: ImageSettings | None = None,
     drawn: Callable[[int, int], None] | None = None,
     told: Callable[[ImageStep], None] | None = None,
@@ -58,29 +61,34 @@ def train_image_encoder(
     """An image encoder for a model, from the prepared family that it was trained on; after a cancellation, as
     far as it has come.
 
-    drawn: told how many of the `views` there are, of which steps then take some each.
+    drawn: told how many of the `views` there are, of which steps then take `batch` each. device: "auto",
+    "cpu" or "cuda".
 
     Raises:
         FamilyError: it is another family, or was prepared without surfaces.
-        SettingError: fewer than one step or view, or a model of one part, which has no poses.
+        SettingError: fewer than one step, view or picture, a model of one part, which has no poses, or no
+            such device.
     """
     check_trainable(model, steps, "an encoder predicts")
     check_count("views", views, low=1)
-    meshes = PartMeshes.of(family, model)
-    settings = settings or ImageSettings()
-    torch.manual_seed(seed)
+    check_count("batch", batch, low=1)
+    place, settings = device_of(device), settings or ImageSettings()
     vectors = PartVectors.of(model)
-    metric = felt(model, vectors)
-    network = ImageNetwork(len(model.parts), vectors.width, settings)
-    kept = copy.deepcopy(network).requires_grad_(False)
-    generator = torch.Generator().manual_seed(seed)
-    views = min(views, steps * _BATCH)  # no more than are looked at
+    views = min(views, steps * batch)  # no more than are looked at
     count = (lambda done: drawn(done, views)) if drawn else None
-    seen = draw_views(meshes, model, views, generator, count, cancel)
+    meshes = PartMeshes.of(family, model)
+    seen = draw_views(meshes, model, views, torch.Generator().manual_seed(seed), count, cancel).to(place)
+    metric, known, own = felt(model, vectors).to(place), vectors.to(place), model.to(place)
+    torch.manual_seed(seed)
+    with place:
+        network = ImageNetwork(len(model.parts), vectors.width, settings)
+    kept = copy.deepcopy(network).requires_grad_(False)
+    generator = torch.Generator(place).manual_seed(seed)
 
     def terms() -> Tensor:
-        rows = torch.randint(len(seen.label), (_BATCH,), generator=generator)
-        return picture_losses(network, vectors, metric, model, seen, rows, generator)
+        with place:  # all that is drawn
+            rows = torch.randint(len(seen.label), (batch,), generator=generator)
+            return picture_losses(network, known, metric, own, seen, rows, generator)
 
     def heard(number: int, means: list[float]) -> None:
         if told is not None:
@@ -90,7 +98,7 @@ def train_image_encoder(
         network.parameters(), terms, steps=steps, rate=rate, told=heard, every=_TOLD, cancel=cancel,
         steepest=_STEEPEST, after=lambda step: follow(kept, network, step, _AVERAGE),
     )  # fmt: skip
-    return ImageEncoder(model, settings, kept.eval(), vectors)
+    return ImageEncoder(model, settings, kept.cpu().eval(), vectors)
 
 
 def picture_losses(
@@ -107,7 +115,7 @@ def picture_losses(
     metric: of `felt`.
     """
     pictures, silhouette = lit(views, rows, generator)
-    with torch.autocast("cpu", torch.bfloat16):
+    with torch.autocast(pictures.device.type, torch.bfloat16):
         found, logits, camera = network(pictures.contiguous(memory_format=torch.channels_last))
     donors = views.donors[rows]
     latents = model.latents[donors, torch.arange(len(model.parts))]

@@ -10,6 +10,7 @@ which is never more than the true one, and more than what losses look at. No par
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,7 +21,7 @@ from partwright.partsdf.checkpointed_linear import working_type
 from partwright.partsdf.config import DecoderSettings
 from partwright.partsdf.decoder import Conditioned, positional_encoding
 from partwright.partsdf.poses import PoseTensors, rotation_matrices
-from partwright.partsdf.segmented_linear import segmented_linear
+from partwright.partsdf.segmented_linear import filled_linear, filled_up, segmented_linear
 
 ROOM = 1.05  # times what the surfaces of training shapes need of a part's cuboid
 REACH = 0.1  # around that room, unit lengths: the paper's clamp
@@ -114,24 +115,42 @@ class _Local:
     octaves: int
     kind: torch.dtype
 
-    def __call__(self, local: Tensor) -> Tensor:
+    def __call__(self, local: Tensor, filled: bool | None = None) -> Tensor:
+        """filled: whether segments are filled up to one length, as on a GPU; by the device if None."""
         beyond = local.abs() - self.room[:, None]
         room = (beyond * self.scale.unsqueeze(-2)).amax(-1)  # the distance from it
         near = (room < REACH).flatten(0, 1)  # (B P, N)
         rows = near.flatten().nonzero().squeeze(1)
-        ends = near.sum(dim=1).cumsum(dim=0).tolist()
         points = local.reshape(-1, 3).index_select(0, rows)
         with torch.autocast(local.device.type, enabled=False):
-            inside = self._network(points, ends, rows // near.shape[1])
+            inside = self._network(points, near.sum(dim=1), rows // near.shape[1], filled)
         flat = room.flatten()
         return flat.index_put((rows,), torch.maximum(inside, flat.index_select(0, rows))).view(room.shape)
 
-    def _network(self, points: Tensor, ends: list[int], owner: Tensor) -> Tensor:
-        """(M,) at local points (M, 3), those of each part of each shape together, up to `ends`."""
+    def _network(self, points: Tensor, counts: Tensor, owner: Tensor, filled: bool | None) -> Tensor:
+        """(M,) at local points (M, 3), `counts` (B P,) of each part of each shape, which stand together."""
         lengths = self.scale.flatten(0, 1).index_select(0, owner)
         y = torch.cat([positional_encoding(points, self.octaves), points * lengths], dim=-1)
-        # In full precision at both ends, as in `decoder`.
-        for n, (weight, shift) in enumerate(self.layers):
-            kind = self.kind if 0 < n < len(self.layers) - 1 else points.dtype
-            y = segmented_linear(y.to(kind), weight.to(kind), shift.to(kind), ends, n < len(self.layers) - 1)
+        filled = y.is_cuda if filled is None else filled
+        y = self._filled(y, counts) if filled else self._one_by_one(y, counts.cumsum(dim=0).tolist())
         return y.squeeze(1) * lengths.amin(dim=1)  # a small part's errors are small
+
+    def _one_by_one(self, y: Tensor, ends: list[int]) -> Tensor:
+        for n, (weight, shift) in enumerate(self._typed(y.dtype)):
+            y = segmented_linear(y.to(weight.dtype), weight, shift, ends, n < len(self.layers) - 1)
+        return y
+
+    def _filled(self, y: Tensor, counts: Tensor) -> Tensor:
+        if not len(y):
+            return y[:, :1]
+        place, most = filled_up(counts)
+        y = y.new_zeros(len(counts) * most, y.shape[1]).index_copy(0, place, y).unflatten(0, (-1, most))
+        for n, (weight, shift) in enumerate(self._typed(y.dtype)):
+            y = filled_linear(y.to(weight.dtype), weight, shift, n < len(self.layers) - 1)
+        return y.flatten(0, 1).index_select(0, place)
+
+    def _typed(self, whole: torch.dtype) -> Iterator[tuple[Tensor, Tensor]]:
+        """The layers, `whole` at both ends, as in `decoder`."""
+        for n, (weight, shift) in enumerate(self.layers):
+            kind = self.kind if 0 < n < len(self.layers) - 1 else whole
+            yield weight.to(kind), shift.to(kind)

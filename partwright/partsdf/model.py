@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import os
@@ -90,6 +91,15 @@ class Model:
         weight = (~self.present).float()[..., None]
         mean = (weight * self.latents).sum(0) / weight.sum(0).clamp(min=1)
         return torch.where(weight.sum(0) > 0, mean, self.mean_latent)
+
+    def to(self, device: torch.device) -> Model:
+        """The same on another device."""
+        poses, average = (p.map(lambda t: t.to(device)) for p in (self.poses, self.average_pose))
+        decoder = copy.deepcopy(self.decoder).to(device)
+        return replace(
+            self, decoder=decoder, latents=self.latents.to(device), present=self.present.to(device),
+            poses=poses, average_pose=average,
+        )  # fmt: skip
 
     def index(self, part: str) -> int:
         """The number of a part; raises SettingError for another name."""

@@ -52,6 +52,9 @@ class PartVectors:
             pose_spread[p] = mine.std(dim=0, correction=0).clamp(min=_LEAST)
         return cls(model.mean_latent, directions, spread, pose_mean, pose_spread)
 
+    def to(self, device: torch.device) -> PartVectors:
+        return PartVectors(*(t.to(device) for t in vars(self).values()))
+
     @property
     def width(self) -> int:
         """K, of a latent's vector; a pose's is `POSE`."""

@@ -79,6 +79,11 @@ class Views:
     poses: PoseTensors
     present: Tensor
 
+    def to(self, device: torch.device) -> Views:
+        poses = self.poses.map(lambda t: t.to(device))
+        rest = {k: v.to(device) for k, v in vars(self).items() if k != "poses"}
+        return Views(**rest, poses=poses)
+
 
 def draw_views(
     meshes: PartMeshes,

@@ -39,7 +39,7 @@ def few() -> PretrainingDataset:
 
 def test_points_have_the_part_s_own_side(few: PretrainingDataset) -> None:
     shape = load_shape(cad_part(1).mesh)
-    distance = shape.unit_distance(few.points[1].astype(np.float32) / UNIT_TO_PAPER)
+    distance = shape.unit_distance(few.points[1].float().numpy() / UNIT_TO_PAPER)
     np.testing.assert_array_equal(few.inside[1], distance < 0)
     assert (np.abs(distance[:256]) < 0.25).all()
     assert np.abs(distance[256:]).max() > 0.4
@@ -61,6 +61,8 @@ def test_a_collection_comes_back_from_its_file(few: PretrainingDataset, tmp_path
     back = load_pretraining_dataset(tmp_path / "c", 4, 512, 0)
     for name in ("voxels", "points", "inside"):
         np.testing.assert_array_equal(getattr(back, name), getattr(few, name))
+    again = make_pretraining_dataset(4, 512, seed=0, workers=2)
+    assert all(torch.equal(getattr(again, name), getattr(few, name)) for name in vars(few))
     with pytest.raises(UnreadableFileError, match="holds other CAD parts"):
         load_pretraining_dataset(tmp_path / "c", 5, 512, 0)
     (tmp_path / "c").write_bytes(b"x" * 100)

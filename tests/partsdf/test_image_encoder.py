@@ -16,7 +16,6 @@ import partwright as pw
 from partwright.cli.main import main
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import EmptyShapeError, ModelError, SettingError, UnreadableFileError
-from partwright.partsdf import image_encoder_training
 from partwright.partsdf.companions import beside
 from partwright.partsdf.encoder import EncoderSettings, load_encoder
 from partwright.partsdf.from_photo import FILES, reconstruct_photo
@@ -45,11 +44,9 @@ def saved(model: Model, tmp_path_factory: pytest.TempPathFactory) -> Model:
 def trained(saved: Model, lamps: PreparedFamily) -> tuple[ImageEncoder, list[ImageStep]]:
     torch.set_num_threads(1)
     steps: list[ImageStep] = []
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(image_encoder_training, "_BATCH", 12)
-        made = train_image_encoder(
-            saved, lamps, steps=130, views=160, rate=4e-3, settings=SMALL, told=steps.append
-        )
+    made = train_image_encoder(
+        saved, lamps, steps=130, views=160, batch=12, rate=4e-3, settings=SMALL, told=steps.append
+    )
     path = beside(saved, KIND)
     assert path is not None
     made.save(path)
@@ -263,9 +260,19 @@ def test_commands(
     assert "--up is for meshes and points" in capsys.readouterr().err
     assert main(["parts", "reconstruct", str(photo)]) == 2
     assert "which model's parts?" in capsys.readouterr().err
-    monkeypatch.setattr(image_encoder_training, "_BATCH", 4)
-    train = ["parts", "train-encoder", file, str(lamps.folder), "--from", "images", "--steps", "2"]
-    assert main([*train, "-o", "seen.safetensors"]) == 0
+    train = [
+        "parts",
+        "train-encoder",
+        file,
+        str(lamps.folder),
+        "--from",
+        "images",
+        "--steps",
+        "2",
+        "--batch",
+        "4",
+    ]
+    assert main([*train, "--batch", "4", "-o", "seen.safetensors"]) == 0
     again = load_image_encoder(trained[0].model, "seen.safetensors")
     assert again is not None
     assert again.settings == ImageSettings()

@@ -92,6 +92,27 @@ def test_each_segment_has_its_own_weights() -> None:
         assert torch.autograd.gradcheck(lambda *t, on=activated: segmented_linear(*t, ends, on), inputs)
 
 
+def test_segments_that_are_filled_up_come_to_the_same() -> None:
+    """What a GPU does, values and gradients; a part that is asked nowhere is a segment of no rows."""
+    made, (z, points, poses) = decoder(), placed()
+    points[1] += 5.0  # far from all parts
+
+    def network(filled: bool) -> list[torch.Tensor]:
+        made.zero_grad()
+        inputs = [t.clone().requires_grad_() for t in (z, points, *poses)]
+        conditioned = made.condition(inputs[0], PoseTensors(*inputs[2:]))
+        local = local_points(inputs[1], PoseTensors(*inputs[2:]))
+        values = conditioned(local, filled)  # type: ignore[call-arg]
+        values.square().sum().backward()
+        return [values, *(t.grad for t in inputs), *(p.grad.clone() for p in made.parameters())]
+
+    for one, other in zip(network(filled=True), network(filled=False), strict=True):
+        torch.testing.assert_close(one, other)
+    far = made.condition(z[:1], poses.map(lambda t: t[:1]))
+    nowhere = torch.full((1, 4, 7, 3), 50.0, dtype=torch.float64)
+    torch.testing.assert_close(far(nowhere, True), far(nowhere, False))  # type: ignore[call-arg]
+
+
 def test_parts_hear_of_one_another_once_a_shape() -> None:
     z, points, poses = placed()
     moved, turned = z.clone(), poses.translation.clone()

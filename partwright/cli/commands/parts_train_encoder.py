@@ -9,9 +9,9 @@ from partwright.cli.progress import Count
 from partwright.datasets.prepared import PreparedFamily
 from partwright.methods import Cancellation
 from partwright.partsdf import encoder, image_encoder
-from partwright.partsdf.encoder import Encoder
+from partwright.partsdf.encoder import Encoder, EncoderSettings
 from partwright.partsdf.encoder_training import EncoderStep, train_encoder
-from partwright.partsdf.image_encoder import ImageEncoder
+from partwright.partsdf.image_encoder import ImageEncoder, ImageSettings
 from partwright.partsdf.image_encoder_training import ImageStep, train_image_encoder
 from partwright.partsdf.model import Model
 
@@ -24,16 +24,20 @@ def run(arguments: argparse.Namespace) -> int:
             last[:] = [step]
             count.show(step.number, step.of, f"latents {step.latents:.3f}  poses {step.poses:.3f}")
 
-        family, steps, seed = PreparedFamily(arguments.family), arguments.steps, arguments.seed
+        family, width = PreparedFamily(arguments.family), arguments.width
+        how = {"steps": arguments.steps, "seed": arguments.seed, "device": arguments.device}
+        how |= {"batch": arguments.batch} if arguments.batch is not None else {}
         if arguments.sees == "points":
-            return train_encoder(model, family, steps=steps, seed=seed, told=told, cancel=cancel)
+            settings = EncoderSettings(width=width)
+            return train_encoder(model, family, settings=settings, told=told, cancel=cancel, **how)
 
         def drawn(done: int, of: int) -> None:
             count.show(done, of, "views drawn")
 
         return train_image_encoder(
-            model, family, steps=steps, seed=seed, drawn=drawn, told=told, cancel=cancel
-        )
+            model, family, settings=ImageSettings.of_width(width), views=arguments.views, drawn=drawn,
+            told=told, cancel=cancel, **how,
+        )  # fmt: skip
 
     def about(_: Model) -> str:
         return f": {1 - last[0].latents:.0%} of what latents vary by are told;" if last else ";"

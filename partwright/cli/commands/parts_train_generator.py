@@ -18,6 +18,8 @@ def run(arguments: argparse.Namespace) -> int:
         def told(step: GeneratorStep) -> None:
             count.show(step.number, step.of, f"poses {step.layouts:.3f}  latents {step.forms:.3f}")
 
-        return train_generator(model, steps=arguments.steps, seed=arguments.seed, told=told, cancel=cancel)
+        how = {"steps": arguments.steps, "seed": arguments.seed, "device": arguments.device}
+        how |= {"batch": arguments.batch} if arguments.batch is not None else {}
+        return train_generator(model, told=told, cancel=cancel, **how)
 
     return train_beside(arguments, KIND, train, lambda model: f", of {counted(len(model.shapes), 'shape')}:")
