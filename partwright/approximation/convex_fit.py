@@ -295,11 +295,11 @@ def _ellipsoid_around(body: _Body, frame: np.ndarray) -> tuple[Field, Similarity
     return Ellipsoid((x, y, z)), _placed(axes, centre)
 
 
-def smallest_ball(points: np.ndarray) -> tuple[np.ndarray, float]:
+def smallest_ball(points: np.ndarray, rounds: int = _ROUNDS) -> tuple[np.ndarray, float]:
     """Centre and radius of the smallest ball around points (N, d), to about a hundredth, by steps towards the
     farthest one (Badoiu and Clarkson, 2003); it contains them all."""
     centre: np.ndarray = points.mean(axis=0)
-    for turn in range(1, _ROUNDS):
+    for turn in range(1, rounds):
         far = points[((points - centre) ** 2).sum(axis=1).argmax()]
         centre = centre + (far - centre) / (turn + 1)
     return centre, float(np.sqrt(((points - centre) ** 2).sum(axis=1).max()))

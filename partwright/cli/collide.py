@@ -70,7 +70,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--spheres",
         metavar="N",
         type=int,
-        help="also N spheres a link, for planners: ROBOT.spheres.yml (cuRobo's) and ROBOT.spheres.json",
+        help="also N spheres at most for each link that collides, for planners: ROBOT.spheres.yml (cuRobo's) "
+        "and ROBOT.spheres.json; in its material, or around or inside it as the shapes are",
     )
     command.set_defaults(run="collide")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +23,8 @@ from partwright.robots.picture import picture
 from partwright.robots.report import LinkReport, report
 from partwright.robots.shaping import Wishes, shapes_for
 from partwright.robots.solids import Solids, Target, largest_deviation
-from partwright.robots.spheres import as_json, curobo, errors_of, spheres_for
+from partwright.robots.spheres import LinkSpheres, as_json, curobo, spheres_for
+from partwright.shapes.cleaning import counted
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -55,7 +56,7 @@ class CollideOptions:
     kinds: tuple[str, ...] = ()
     """Native solids that may be used, and "hull" for convex meshes; all that the format has if empty."""
     spheres: int | None = None
-    """Spheres a link that are found beside the shapes; none if not given."""
+    """Spheres a link at most, that are found beside the shapes for all that collides; none if not given."""
     extra: float = 0.08
     """Volume that convex pieces may add, over the link's, before it is cut further."""
 
@@ -102,16 +103,15 @@ class CollideOptions:
 
 @dataclass(frozen=True)
 class Collided:
-    """The robot as it was and what is to be written of it. shapes, spheres ((N, 4), centre and radius): by
-    link."""
+    """The robot as it was and what is to be written of it. shapes: by link. spheres: of every link that
+    collides, if they were asked for."""
 
     robot: RobotFile
     shapes: dict[str, list[Shape]]
     links: list[LinkReport]
     pairs_before: dict[Pair, float] = field(default_factory=dict)
     pairs_after: dict[Pair, float] = field(default_factory=dict)
-    spheres: dict[str, np.ndarray] = field(default_factory=dict)
-    sphere_errors: dict[str, dict[str, float]] = field(default_factory=dict)
+    spheres: list[LinkSpheres] = field(default_factory=list)
 
 
 def collide(
@@ -120,22 +120,23 @@ def collide(
     packages: Sequence[str | Path] = (),
     told: Told = lambda _: None,
 ) -> Collided:
-    """Shapes for every link of the robot that has collision meshes.
+    """Shapes for every link of the robot that has collision meshes, and spheres, if they are asked for, for
+    every one that collides.
 
     told: gets a line a link.
 
     Raises:
         UnreadableFileError, UnsupportedFormatError, RobotError: of `open_robot`; no link has a collision
-        mesh. PartwrightError: a mesh is damaged or encloses nothing; the message names the link.
+        mesh, or collides. PartwrightError: a mesh is damaged or encloses nothing; the message names the link.
         SettingError: an option does not fit the format.
     """
     options = options or CollideOptions()
     robot = robot if isinstance(robot, RobotFile) else open_robot(robot, packages)
     links = [link for link in robot.links if link.collisions]
-    if not links:
-        raise RobotError(
-            f"{robot.path}: none of its {len(robot.links)} links has a collision mesh to replace"
-        )
+    colliding = [link for link in robot.links if link.collisions or link.natives]
+    if not (colliding if options.spheres is not None else links):
+        meant = "collides" if options.spheres is not None else "has a collision mesh to replace"
+        raise RobotError(f"{robot.path}: none of its {len(robot.links)} links {meant}")
     kinds, hulls = kinds_of(robot, options.kinds)
     solids = Solids()
     before = {link.name: solids.target(link, link.collisions) for link in links}
@@ -145,10 +146,10 @@ def collide(
         else before[link.name]
         for link in links
     }
-    bodies = {link.name: _in_world(link, before[link.name].solid) for link in links}
+    bodies = _bodies(colliding, {name: target.solid for name, target in before.items()})
     pairs_before = overlaps(bodies)
-    corners = np.concatenate([np.reshape(body.bounding_box(), (2, 3)) for body in bodies.values()])
-    whole = float(np.ptp(corners, axis=0).max())
+    corners = [np.reshape(_in_world(link, before[link.name].solid).bounding_box(), (2, 3)) for link in links]
+    whole = float(np.ptp(np.concatenate(corners), axis=0).max()) if links else 0.0
     volumes = {name: body.volume() for name, body in bodies.items()}
     wishes = {
         name: Wishes(
@@ -168,12 +169,12 @@ def collide(
         for link in links:
             if link.name in todo:
                 shapes[link.name] = _shaped(link, wanted[link.name], wishes[link.name])
-                told(f"{link.name}: {len(shapes[link.name])} shapes")
+                told(f"{link.name}: {counted(len(shapes[link.name]), 'shape')}")
         unions = {link.name: _union(shapes[link.name]) for link in links}
-        pairs_after = overlaps({link.name: _in_world(link, unions[link.name]) for link in links})
+        pairs_after = overlaps(_bodies(colliding, unions))
         near = too_near(pairs_before, pairs_after, volumes, _MORE_OVERLAP)
         neighbours = {frozenset((link.name, link.parent)) for link in links}
-        todo = {name for pair in near if frozenset(pair) in neighbours for name in pair}
+        todo = {name for pair in near if frozenset(pair) in neighbours for name in pair if name in shapes}
         if options.enclose:  # nothing is left to be finer by
             todo = {name for name in todo if len(shapes[name]) < options.max_parts}
         if not todo or turn == _FINER:
@@ -194,13 +195,11 @@ def collide(
         )
         for link in links
     ]
-    spheres = {
-        name: spheres_for(target, options.spheres, options.enclose)
-        for name, target in wanted.items()
-        if options.spheres is not None
-    }
-    errors = {name: errors_of(found, wanted[name]) for name, found in spheres.items()}
-    return Collided(robot, shapes, reports, pairs_before, pairs_after, spheres, errors)
+    spheres = []
+    for link in colliding if options.spheres is not None else ():
+        spheres.append(_spheres(link, wanted.get(link.name), solids, options))
+        told(f"{link.name}: {counted(len(spheres[-1].balls), 'sphere')}")
+    return Collided(robot, shapes, reports, pairs_before, pairs_after, spheres)
 
 
 def save(result: Collided, folder: str | Path) -> list[Path]:
@@ -219,12 +218,12 @@ def save(result: Collided, folder: str | Path) -> list[Path]:
             if within not in files.written:
                 shutil.copyfile(source, _parent(staging / within))
         (staging / f"{name}.report.json").write_bytes(
-            report(name, result.links, result.pairs_before, result.pairs_after)
+            report(name, result.links, result.pairs_before, result.pairs_after, result.spheres)
         )
         if result.spheres:
             (staging / f"{name}.spheres.yml").write_bytes(curobo(result.spheres))
-            (staging / f"{name}.spheres.json").write_bytes(as_json(result.spheres, result.sphere_errors))
-        picture(result.robot, result.shapes, staging / f"{name}.png")
+            (staging / f"{name}.spheres.json").write_bytes(as_json(result.spheres))
+        picture(result.robot, result.shapes, result.spheres, staging / f"{name}.png")
         written = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
     return [folder / path for path in written]
 
@@ -262,6 +261,25 @@ def _union(shapes: Sequence[Shape]) -> Manifold:
 
 def _in_world(link: Link, solid: Manifold) -> Manifold:
     return solid.transform(link.pose[:3])
+
+
+def _bodies(links: Sequence[Link], solids: Mapping[str, Manifold]) -> dict[str, Manifold]:
+    """All that collides of each link, at rest: its solid, if it has one here, and its native ones."""
+    from manifold3d import Manifold, OpType
+
+    found = {}
+    for link in links:
+        own = [solids[link.name]] if link.name in solids else []
+        own += [shape_solid(Shape("", part)) for part in link.natives]
+        found[link.name] = _in_world(link, Manifold.batch_boolean(own, OpType.Add))
+    return found
+
+
+def _spheres(link: Link, target: Target | None, solids: Solids, options: CollideOptions) -> LinkSpheres:
+    if target is None and options.enclose and link.visuals:
+        target = solids.target(link, link.visuals, sheets=True)
+    assert options.spheres is not None
+    return spheres_for(link, target, options.spheres, options.mode)
 
 
 def _measured(

@@ -46,7 +46,7 @@ def containing(hulls: Sequence[Manifold], triangles: np.ndarray, fine: float) ->
         for i in np.unique(owner[joins]):
             joining[i].append(left[joins & (owner == i)].reshape(-1, 3))
             changed[i] = True
-        left = _halves(left[~joins], edges[~joins].argmax(axis=1))
+        left = halves(left[~joins], edges[~joins].argmax(axis=1))
     return [
         Manifold.hull_points(np.concatenate(points)) if more else hull
         for hull, points, more in zip(hulls, joining, changed, strict=True)
@@ -97,7 +97,7 @@ def _beyond(planes: _Planes, triangles: np.ndarray) -> np.ndarray:
     return beyond
 
 
-def _halves(triangles: np.ndarray, longest: np.ndarray) -> np.ndarray:
+def halves(triangles: np.ndarray, longest: np.ndarray) -> np.ndarray:
     """(2 T, 3, 3) triangles cut through the middle of the edge that ends at corner `longest` (T,)."""
     rows = np.arange(len(triangles))
     start, stop, apex = (triangles[rows, (longest + k) % 3] for k in (-1, 0, 1))

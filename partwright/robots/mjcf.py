@@ -22,7 +22,16 @@ from partwright.errors import ParameterError, RobotError, UnreadableFileError
 from partwright.export.mjcf import geom_size
 from partwright.export.rigid_body import numbers
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
-from partwright.robots.mjcf_defaults import Compiler, Defaults, kept_path, mesh_matrix, pose_of, values
+from partwright.robots.mjcf_defaults import (
+    Compiler,
+    Defaults,
+    geom_pose,
+    kept_path,
+    mesh_matrix,
+    pose_of,
+    span,
+    values,
+)
 from partwright.robots.model import Files, Link, MeshUse, RobotFile, Shape
 from partwright.robots.xml_files import parsed, serialised
 
@@ -160,7 +169,7 @@ class Mjcf(RobotFile):
         for child in self._children(element):
             if child.tag == "geom":
                 said = self._defaults.attributes(child, inherited)
-                geoms.append(_Geom(child, said, pose @ pose_of(said, self._compiler, where)))
+                geoms.append(_Geom(child, said, pose @ geom_pose(said, self._compiler, where)))
             elif child.tag == "body":
                 bodies.append((child, pose, inherited))
             elif child.tag == "frame":
@@ -286,11 +295,16 @@ def _inline(said: Mapping[str, str], where: str) -> Any:
 
 
 def _native(geom: _Geom, link: str) -> Part | None:
-    """A colliding geom that is a solid; None for a plane, a field of heights and what is said by two ends."""
+    """A colliding geom that is a solid; None for a plane and a field of heights."""
     kind = geom.said.get("type", "sphere")
-    if kind in ("plane", "hfield", "sdf", "mesh") or "fromto" in geom.said or "mesh" in geom.said:
+    if kind in ("plane", "hfield", "sdf", "mesh") or "mesh" in geom.said:
         return None
     size = values(geom.said, "size", (), f"link {link!r}: geom").tolist()
+    if (
+        "fromto" in geom.said and size
+    ):  # its length is said by its ends; of boxes both sides by the first size
+        half = span(geom.said, f"link {link!r}: geom") / 2
+        size = [size[0], half] if kind in ("cylinder", "capsule") else [size[0], size[0], half]
     try:
         match kind, size:
             case "box", [x, y, z]:

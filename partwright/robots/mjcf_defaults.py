@@ -90,6 +90,20 @@ def pose_of(said: Mapping[str, str], compiler: Compiler, where: str) -> np.ndarr
     return frame(_rotation(said, compiler, where), place)
 
 
+def geom_pose(said: Mapping[str, str], compiler: Compiler, where: str) -> np.ndarray:
+    """(4, 4) of a geom: by its two ends, z from one to the other, where it says them."""
+    if "fromto" not in said:
+        return pose_of(said, compiler, where)
+    ends = values(said, "fromto", (0,) * 6, where)[:6].reshape(2, 3)
+    return frame(_along(ends[1] - ends[0], where), ends.mean(axis=0))
+
+
+def span(said: Mapping[str, str], where: str) -> float:
+    """Distance of the two ends of a geom."""
+    ends = values(said, "fromto", (0,) * 6, where)[:6].reshape(2, 3)
+    return float(np.linalg.norm(ends[1] - ends[0]))
+
+
 def _rotation(said: Mapping[str, str], compiler: Compiler, where: str) -> np.ndarray:
     unit = np.pi / 180 if compiler.degrees else 1.0
     if "quat" in said:
@@ -110,13 +124,19 @@ def _rotation(said: Mapping[str, str], compiler: Compiler, where: str) -> np.nda
         y = y / np.linalg.norm(y)
         return np.column_stack([x, y, np.cross(x, y)])
     if "zaxis" in said:
-        z = values(said, "zaxis", (0, 0, 1), where)[:3]
-        z = z / np.linalg.norm(z)
-        axis = np.cross((0, 0, 1), z)
-        if np.linalg.norm(axis) < 1e-12:
-            return np.eye(3) if z[2] > 0 else np.diag([1.0, -1.0, -1.0])
-        return _about(axis, float(np.arctan2(np.linalg.norm(axis), z[2])), where)
+        return _along(values(said, "zaxis", (0, 0, 1), where)[:3], where)
     return np.eye(3)
+
+
+def _along(z: np.ndarray, where: str) -> np.ndarray:
+    """(3, 3) that turns the z axis to a direction, the shortest way."""
+    if not np.linalg.norm(z) > 0:
+        raise RobotError(f"{where}: an axis without length")
+    z = z / np.linalg.norm(z)
+    axis = np.cross((0, 0, 1), z)
+    if np.linalg.norm(axis) < 1e-12:
+        return np.eye(3) if z[2] >= 0 else np.diag([1.0, -1.0, -1.0])
+    return _about(axis, float(np.arctan2(np.linalg.norm(axis), z[2])), where)
 
 
 def _about(axis: np.ndarray, angle: float, where: str) -> np.ndarray:

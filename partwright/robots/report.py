@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from partwright import __version__
+from partwright.robots.spheres import LinkSpheres, sphere_warnings
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,7 @@ def report(
     links: Sequence[LinkReport],
     before: Mapping[tuple[str, str], float],
     after: Mapping[tuple[str, str], float],
+    spheres: Sequence[LinkSpheres] = (),
 ) -> bytes:
     """As JSON. before, after: volume that two links share at rest."""
     pairs = [
@@ -67,8 +69,9 @@ def report(
         "file": name,
         "version": __version__,
         "unit": "m",
-        "warnings": warnings(links),
+        "warnings": [*warnings(links), *sphere_warnings(spheres)],
         "links": [link.to_dict() for link in links],
+        **({"spheres": [each.to_dict() for each in spheres]} if spheres else {}),
         "colliding_pairs_at_rest": {"before": len(before), "after": len(after)},
         "shared_volumes_at_rest": pairs,
     }

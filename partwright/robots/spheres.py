@@ -1,97 +1,183 @@
-"""A link as so many spheres, as motion planners on GPUs collide it.
-
-Points of the solid are shared out among spheres, each of which then becomes the smallest around its points,
-or the one of their volume; both are repeated, as in k-means, from the deepest places on.
-"""
+"""A link as so many spheres, as motion planners on GPUs collide it: its material, filled or contained."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from partwright.approximation.convex_fit import smallest_ball
+from partwright.approximation.ball_filling import Balls, filling_balls
+from partwright.approximation.convex_fit import Mode
+from partwright.errors import RobotError
+from partwright.fields import Box, Sphere
 from partwright.meshing.manifolds import surface_of
+from partwright.robots.containment import larger, shape_solid
+from partwright.robots.covering import balls_solid, covering_balls, outside_of_balls
+from partwright.robots.model import Link, Shape
 from partwright.robots.solids import Target
 from partwright.shapes import MeshDistance
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-_ROUNDS = 12
+    from partwright.assembly import Part
+
 _INSIDE, _SURFACE = 14, 3000  # cells along the solid's box; points of its surface
-_MARGIN = 1e-6
+_FRESH = 100_000  # points of the surface that containment is tried on
+_ROUND = 2e-3  # of its size: by how much a native solid's facets lie within it, at most
+_FEW = 0.5  # of the link's volume: what spheres that stand for it may lack and add
 _ERRORS = ("mean", "best", "worst")
-Spheres = np.ndarray  # (N, 4): centre and radius
 
 
-def spheres_for(target: Target, count: int, around: bool, seed: int = 0) -> Spheres:
-    """(N, 4) centres and radii of at most `count` spheres in the link's frame.
+@dataclass(frozen=True, eq=False)
+class LinkSpheres:
+    """The spheres of one link.
 
-    around: they contain every point of the target's surface that is tried, and its corners; else they are so
-    large that they lack about as much volume as they add.
+    balls: (N, 4) centres and radii in the link's frame. missing, extra: volume that they lack and add, over
+    the link's. far: the mean, smallest and largest distance of its surface from theirs, in metres.
+    sticking_out: how far it is outside of them, by fresh points; None where it may be.
     """
-    surface = target.samples(_SURFACE, seed)
-    inside = _points_inside(target.solid)
-    points = np.concatenate([surface, inside])
-    centres = _spread_out(points, count)
-    for _ in range(_ROUNDS):
-        owner = _nearest(points, centres)
-        found = [smallest_ball(points[owner == i]) for i in np.unique(owner)]
-        moved = np.array([centre for centre, _ in found])
-        if moved.shape == centres.shape and np.allclose(moved, centres, atol=1e-4 * target.size):
-            break
-        centres = moved
-    owner = _nearest(points, centres)
-    radii = np.array([_reach(points[owner == i], centre) for i, centre in enumerate(centres)])
-    spheres = np.column_stack([centres, radii])[radii > 0]
-    if not around:
-        return _balanced(spheres, target.solid)
-    fresh = target.samples(10 * _SURFACE, seed + 1)
-    beyond = np.min(np.linalg.norm(fresh[:, None] - spheres[None, :, :3], axis=2) - spheres[:, 3], axis=1)
-    spheres[:, 3] += max(float(beyond.max()), 0.0) + _MARGIN * target.size
-    return spheres
+
+    link: str
+    balls: Balls
+    missing: float
+    extra: float
+    far: tuple[float, float, float]
+    sticking_out: float | None
+
+    @property
+    def too_few(self) -> bool:
+        """Whether they are too far from the link to stand for it."""
+        return self.missing + self.extra > _FEW
+
+    def to_dict(self) -> dict[str, Any]:
+        own: dict[str, Any] = {
+            "link": self.link,
+            "spheres": len(self.balls),
+            "volume_missing_ratio": _short(self.missing),
+            "volume_extra_ratio": _short(self.extra),
+        }
+        if self.sticking_out is not None:
+            own |= {"contained": self.sticking_out <= 0, "sticking_out": _short(self.sticking_out)}
+        return own
 
 
-def curobo(spheres: Mapping[str, Spheres]) -> bytes:
+def spheres_for(link: Link, target: Target | None, count: int, mode: Mode, seed: int = 0) -> LinkSpheres:
+    """At most `count` spheres for a link: for what its meshes bound, if it has some, and its native solids.
+
+    mode: around contains every triangle; within lies inside; nearest lacks and adds little volume.
+    """
+    fields = [part.field for part in link.natives]
+    if target is None and len(fields) <= count and all(isinstance(field, Sphere) for field in fields):
+        return _themselves(link, mode)
+    whole = _with_natives(link.natives, target)
+    if mode != "around":
+        balls = filling_balls(whole.solid, count, "within" if mode == "within" else "in", seed=seed)
+        return _measured(link.name, balls, whole, None)
+    points = np.concatenate([whole.samples(_SURFACE, seed), _points_inside(whole.wrap)])
+    balls = covering_balls(whole.wrap, points, whole.vertices[whole.faces], count, seed)
+    return _measured(link.name, balls, whole, seed + 1)
+
+
+def curobo(spheres: Sequence[LinkSpheres]) -> bytes:
     """As the YAML of cuRobo's robot configurations."""
     lines = ["collision_spheres:"]
-    for link, found in spheres.items():
-        lines.append(f"  {json.dumps(link)}:")
-        for x, y, z, radius in found.tolist():
-            lines.append(f"    - center: [{x:.6g}, {y:.6g}, {z:.6g}]")
-            lines.append(f"      radius: {radius:.6g}")
+    for each in spheres:
+        lines.append(f"  {json.dumps(each.link)}:")
+        for row in each.balls:
+            x, y, z, radius = map(_decimal, row)
+            lines.append(f"    - center: [{x}, {y}, {z}]")
+            lines.append(f"      radius: {radius}")
     return ("\n".join(lines) + "\n").encode()
 
 
-def errors_of(spheres: Spheres, target: Target) -> dict[str, float]:
-    """Mean, smallest and largest distance of the target's surface from that of the spheres, as lengths."""
-    points = target.samples(_SURFACE, seed=2)
-    distance = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2) - spheres[:, 3]
-    apart = np.abs(distance.min(axis=1))
-    return {
-        name: _short(float(v))
-        for name, v in zip(_ERRORS, (apart.mean(), apart.min(), apart.max()), strict=True)
-    }
-
-
-def as_json(spheres: Mapping[str, Spheres], errors: Mapping[str, Mapping[str, float]]) -> bytes:
+def as_json(spheres: Sequence[LinkSpheres]) -> bytes:
     """For each link its errors, and a list of `origin` and `radius`, as foam's sphere decompositions have
     them."""
     whole = {
-        link: {
-            **errors[link],
-            "spheres": [{"origin": [_short(v) for v in row[:3]], "radius": _short(row[3])} for row in found],
+        each.link: {
+            **{name: _short(value) for name, value in zip(_ERRORS, each.far, strict=True)},
+            "spheres": [
+                {"origin": [_short(v) for v in row[:3]], "radius": _short(row[3])}
+                for row in each.balls.tolist()
+            ],
         }
-        for link, found in spheres.items()
+        for each in spheres
     }
     return (json.dumps(whole, indent=1) + "\n").encode()
 
 
-def _short(value: float) -> float:
-    return float(f"{value:.6g}")
+def sphere_warnings(spheres: Sequence[LinkSpheres]) -> list[str]:
+    """What a user should be told, a sentence a link: where spheres are too few, or its mesh sticks out."""
+    result = []
+    for each in spheres:
+        if each.too_few:
+            lacks = f"lack {_percent(each.missing)} of its volume and add {_percent(each.extra)}"
+            result.append(
+                f"link {each.link!r}: {len(each.balls)} spheres are too few to stand for it: they {lacks}; "
+                "ask for more with --spheres"
+            )
+        if each.sticking_out:
+            result.append(
+                f"link {each.link!r}: its mesh sticks out of the spheres by {1000 * each.sticking_out:.3f} mm"
+            )
+    return result
+
+
+def _themselves(link: Link, mode: Mode) -> LinkSpheres:
+    """Spheres that the link has."""
+    balls = np.array([[*part.translation, part.field.radius] for part in link.natives])  # type: ignore[attr-defined]
+    return LinkSpheres(link.name, balls, 0.0, 0.0, (0.0, 0.0, 0.0), 0.0 if mode == "around" else None)
+
+
+def _with_natives(natives: Sequence[Part], target: Target | None) -> Target:
+    """Meshes, if there are any, and native solids as one."""
+    from manifold3d import Manifold, OpType
+
+    if target is not None and not natives:
+        return target
+    plain = [shape_solid(Shape("", part)) for part in natives]
+    around = [surface_of(shape_solid(Shape("", _rounded(part)))) for part in natives]
+    pieces = [(target.vertices, target.faces)] if target is not None else []
+    vertices, faces, start = [], [], 0
+    for corners, triangles in [*pieces, *around]:
+        vertices.append(corners)
+        faces.append(triangles + start)
+        start += len(corners)
+    solid = Manifold.batch_boolean([*([target.solid] if target is not None else []), *plain], OpType.Add)
+    notes = target.notes if target is not None else ()
+    wrap = Manifold.batch_boolean([target.wrap, *plain], OpType.Add) if target is not None else solid
+    return Target(solid, wrap, np.concatenate(vertices), np.concatenate(faces), notes)
+
+
+def _rounded(part: Part) -> Part:
+    """So much larger that its facets contain the solid itself."""
+    if isinstance(part.field, Box):
+        return part
+    lower, upper = np.reshape(shape_solid(Shape("", part)).bounding_box(), (2, 3))
+    return dataclasses.replace(part, field=larger(part.field, _ROUND * float((upper - lower).max())))
+
+
+def _measured(link: str, balls: Balls, target: Target, seed: int | None) -> LinkSpheres:
+    if not len(balls):
+        raise RobotError(f"link {link!r}: no sphere lies inside of its mesh; it is too thin")
+    union, own = balls_solid(balls), target.solid.volume()
+    apart = np.abs(outside_of_balls(target.samples(_SURFACE, seed=2), balls))
+    sticking = None
+    if seed is not None:
+        sticking = max(float(outside_of_balls(target.samples(_FRESH, seed), balls).max()), 0.0)
+    return LinkSpheres(
+        link,
+        balls,
+        float((target.solid - union).volume() / own),
+        float((union - target.solid).volume() / own),
+        (float(apart.mean()), float(apart.min()), float(apart.max())),
+        sticking,
+    )
 
 
 def _points_inside(solid: Manifold) -> np.ndarray:
@@ -105,36 +191,14 @@ def _points_inside(solid: Manifold) -> np.ndarray:
     return points[signed < 0]
 
 
-def _spread_out(points: np.ndarray, count: int) -> np.ndarray:
-    """Points of which each is the farthest from those before it, the first the nearest to the middle."""
-    first = int(((points - points.mean(axis=0)) ** 2).sum(axis=1).argmin())
-    chosen, distance = [first], np.linalg.norm(points - points[first], axis=1)
-    while len(chosen) < min(count, len(points)):
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return points[chosen]
+def _decimal(value: float) -> str:
+    """Six digits without an exponent: YAML reads 1e-05 as a word."""
+    return np.format_float_positional(float(f"{value:.6g}"), trim="0")
 
 
-def _nearest(points: np.ndarray, centres: np.ndarray) -> np.ndarray:
-    from scipy.spatial import cKDTree
-
-    return np.asarray(cKDTree(centres).query(points)[1])
+def _percent(ratio: float) -> str:
+    return f"{100 * ratio:.0f} %"
 
 
-def _reach(points: np.ndarray, centre: np.ndarray) -> float:
-    return float(np.linalg.norm(points - centre, axis=1).max(initial=0.0))
-
-
-def _balanced(spheres: Spheres, solid: Manifold) -> Spheres:
-    """All radii smaller by one factor, at which the spheres fill as much as the solid does."""
-    from manifold3d import Manifold, OpType
-
-    def filled(factor: float) -> float:
-        balls = [Manifold.sphere(factor * r, 32).translate((x, y, z)) for x, y, z, r in spheres.tolist()]
-        return float(Manifold.batch_boolean(balls, OpType.Add).volume())
-
-    low, high = 0.3, 1.0
-    for _ in range(12):
-        middle = (low + high) / 2
-        low, high = (middle, high) if filled(middle) < solid.volume() else (low, middle)
-    return np.column_stack([spheres[:, :3], high * spheres[:, 3]])
+def _short(value: float) -> float:
+    return float(f"{value:.6g}")

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import RobotError, UnreadableFileError
+from partwright.export.mjcf import geom_size
 from partwright.robots import CollideOptions, collide, open_robot, save
 from tests.robots.robots import mjcf
 
@@ -113,3 +115,21 @@ def test_includes_without_end(tmp_path: Path) -> None:
     path.write_text('<mujoco><include file="a.xml"/></mujoco>')
     with pytest.raises(RobotError, match="included twice"):
         open_robot(path)
+
+
+@pytest.mark.parametrize("kind", ["capsule", "cylinder", "box", "ellipsoid"])
+def test_geoms_between_two_ends_are_where_mujoco_has_them(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "a.xml"
+    path.write_text(
+        f"""<mujoco><worldbody><body name="a" pos="1 0 0" euler="0 30 0">
+        <geom type="{kind}" size="0.1" fromto="0.2 0 0 0.5 -0.4 0.3"/></body></worldbody></mujoco>"""
+    )
+    [link] = [link for link in open_robot(path).links if link.name == "a"]
+    [part] = link.natives
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert np.allclose(link.pose @ [*part.translation, 1], [*data.geom_xpos[0], 1])
+    axis = link.pose[:3, :3] @ rotation_matrix(part.rotation)[:, 2]
+    assert abs(axis @ data.geom_xmat[0].reshape(3, 3)[:, 2]) == pytest.approx(1)
+    assert np.allclose(geom_size(part.field), model.geom_size[0][: len(geom_size(part.field))])

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
-from manifold3d import Manifold, OpType
 
 from partwright.errors import SettingError
-from partwright.robots import CollideOptions, collide, save
+from partwright.robots import CollideOptions, collide
 from partwright.robots.containment import outside_of, shape_solid
 from partwright.robots.solids import Solids
 from tests.robots.robots import mjcf, urdf
@@ -104,42 +102,3 @@ def test_options_that_make_no_sense(given: dict, words: str) -> None:
 def test_kinds_that_a_format_lacks(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match=r"has no 'ellipsoid'; expected some of box, cylinder, sphere"):
         collide(urdf(tmp_path), CollideOptions(kinds=("ellipsoid",)))
-
-
-@pytest.mark.parametrize("enclose", [False, True])
-def test_spheres_fill_or_contain_a_link_and_more_do_it_better(tmp_path: Path, enclose: bool) -> None:
-    path = urdf(tmp_path)
-    sizes = []
-    for count in (1, 8):
-        result = collide(path, CollideOptions(enclose=enclose, spheres=count, kinds=("box",), max_parts=1))
-        rod = result.spheres["arm"]
-        assert len(rod) <= count
-        sizes.append(4 / 3 * np.pi * (rod[:, 3] ** 3).sum())
-        arm = next(link for link in result.robot.links if link.name == "arm")
-        target = Solids().target(arm, arm.collisions)
-        if enclose:
-            points = target.samples(20_000, seed=77)
-            inside = (np.linalg.norm(points[:, None] - rod[None, :, :3], axis=2) <= rod[:, 3]).any(axis=1)
-            assert inside.mean() > 0.999
-        else:
-            balls = [Manifold.sphere(r, 32).translate((x, y, z)) for x, y, z, r in rod.tolist()]
-            union = Manifold.batch_boolean(balls, OpType.Add)
-            assert union.volume() == pytest.approx(target.solid.volume(), rel=0.02)
-    if enclose:
-        assert sizes[1] < 0.7 * sizes[0]
-
-
-def test_spheres_are_written_for_curobo_and_as_json(tmp_path: Path) -> None:
-    result = collide(urdf(tmp_path / "in"), CollideOptions(spheres=3, kinds=("box",), max_parts=1))
-    save(result, tmp_path / "out")
-    text = (tmp_path / "out" / "pair.urdf.spheres.yml").read_text()
-    assert text.startswith('collision_spheres:\n  "base":\n    - center: [')
-    found = json.loads((tmp_path / "out" / "pair.urdf.spheres.json").read_text())
-    assert (
-        len(found["arm"]["spheres"])
-        == len(result.spheres["arm"])
-        == text.count("radius") - len(found["base"]["spheres"])
-    )
-    assert 0 <= found["arm"]["best"] <= found["arm"]["mean"] <= found["arm"]["worst"] < 0.3
-    with pytest.raises(SettingError, match="spheres: expected a number from 1"):
-        CollideOptions(spheres=0)

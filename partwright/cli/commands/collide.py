@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from partwright.cli.terminal import counted, note, say, warn
 from partwright.robots import Collided, CollideOptions, collide, save
 from partwright.robots.report import LinkReport, warnings
+from partwright.robots.spheres import LinkSpheres, sphere_warnings
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -22,22 +23,35 @@ def run(arguments: argparse.Namespace) -> int:
     )
     result = collide(arguments.robot, options, arguments.packages, told=note)
     save(result, arguments.output)
-    for line in _table(result.links):
+    for line in (*_table(result.links), *_sphere_table(result.spheres)):
         say(line)
     say(_summary(result))
     say(f"written to {arguments.output}")
-    warn(warnings(result.links))
+    warn([*warnings(result.links), *sphere_warnings(result.spheres)])
     return 0
 
 
 def _table(links: Sequence[LinkReport]) -> list[str]:
-    wide = max(len(link.link) for link in links)
+    if not links:
+        return []
+    wide = max(len("link"), *(len(link.link) for link in links))
     lines = [f"{'link':{wide}}  shapes                        missing    extra  largest deviation"]
     for link in links:
         kinds = ", ".join(f"{number} {kind}" for kind, number in link.shapes.items())
         errors = f"{100 * link.missing:6.1f} %  {100 * link.extra:6.1f} %"
         far = f"{1000 * link.deviation:.2f} mm" + (" (over)" if link.deviation > link.tolerance else "")
         lines.append(f"{link.link:{wide}}  {kinds:28}  {errors}  {far}")
+    return lines
+
+
+def _sphere_table(links: Sequence[LinkSpheres]) -> list[str]:
+    if not links:
+        return []
+    wide = max(len("link"), *(len(link.link) for link in links))
+    lines = [f"{'link':{wide}}  spheres  missing    extra"]
+    for link in links:
+        errors = f"{100 * link.missing:6.1f} %  {100 * link.extra:6.1f} %"
+        lines.append(f"{link.link:{wide}}  {len(link.balls):7}  {errors}")
     return lines
 
 
@@ -49,4 +63,6 @@ def _summary(result: Collided) -> str:
     if checked:
         held = sum(link.sticking_out == 0 for link in checked)
         line += f"; {held} of {counted(len(checked), 'link')} contained"
+    if result.spheres:
+        line += f"; {counted(sum(len(link.balls) for link in result.spheres), 'sphere')}"
     return line
