@@ -3,11 +3,13 @@ quadrics, which rarely end, come as the convexes that they bound.
 
 The script holds each part's mesh in the part's own frame, so that an object's location and rotation are the
 part's. A second collection holds the surface of the whole: an object that follows the parts through a boolean
-modifier each; where parts blend, a remesh modifier skins it and a smooth modifier rounds its joints.
+modifier each; where parts blend, a remesh modifier skins it and a smooth modifier rounds its joints. Maps of
+parts are pictures within the script, those that are alike one.
 """
 
 from __future__ import annotations
 
+import base64
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -22,6 +24,7 @@ from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment, free_name
+from partwright.export.texturing import own_colour, textured
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit
 
@@ -35,10 +38,13 @@ _PARAMETERS = ("size", "roundness", "dilation", "taper", "bulge", "onion")
 
 @dataclass(frozen=True)
 class _Solid:
-    """One object: what the script knows of it, and its mesh."""
+    """One object: what the script knows of it, its mesh, and of a part with a map the coordinates (F, 3, 2)
+    of its faces' corners and the picture, a PNG."""
 
     entry: dict[str, Any]
     surface: trimesh.Trimesh
+    corners: np.ndarray | None = None
+    png: bytes = b""
 
     @property
     def mesh(self) -> tuple[list[list[float]], list[list[int]]]:
@@ -46,6 +52,12 @@ class _Solid:
         digits = f".{_DIGITS}g"
         vertices = [[float(format(x, digits)) for x in vertex] for vertex in self.surface.vertices.tolist()]
         return vertices, self.surface.faces.tolist()
+
+    @property
+    def coordinates(self) -> list[list[float]]:
+        """u and v of the corners of all faces."""
+        assert self.corners is not None
+        return self.corners.reshape(-1, 2).round(5).tolist()
 
 
 def write(assembly: Assembly, path: str | Path, resolution: int = 24) -> None:
@@ -62,9 +74,11 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 24) -> None:
         raise NoSurfaceError("nothing to export: no part has a surface at this resolution")
     colours = (palette(len(solids)) / 255).round(4).tolist()
     parts = [
-        {"name": name, "colour": colour, **solid.entry}
+        {"name": name, "colour": colour} | solid.entry
         for (name, solid), colour in zip(solids.items(), colours, strict=True)
     ]
+    pictures = list(dict.fromkeys(solid.png for solid in solids.values() if solid.png))
+    mapped = [(name, solid, pictures.index(solid.png)) for name, solid in solids.items() if solid.png]
     lines = [
         f"# {comment(assembly.name) or 'Assembly'}: {len(parts)} parts, for Blender 3.4 or later.",
         "# Run it by: blender -P FILE, or from Blender's text editor.",
@@ -87,6 +101,16 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 24) -> None:
         "MESHES = {",
         *(f"    {_literal(name)}: {_literal(solid.mesh)}," for name, solid in solids.items()),
         "}",
+        "",
+        "# name: (u, v) of the corners of its faces, and a number in PICTURES",
+        "MAPS = {",
+        *(f"    {_literal(name)}: ({_literal(solid.coordinates)}, {i})," for name, solid, i in mapped),
+        "}",
+        "",
+        "# PNG, in base 64",
+        "PICTURES = [",
+        *(f"    {_literal(base64.b64encode(png).decode('ascii'))}," for png in pictures),
+        "]",
         "",
         "main()",
         "",
@@ -126,7 +150,7 @@ def _part(part: Part, resolution: int) -> _Solid:
     f = part.field.superfrustum()
     if f is not None:
         entry |= {name: list(v) if isinstance(v := getattr(f, name), tuple) else v for name in _PARAMETERS}
-    return _Solid(entry, mesh_part(Part(part.field), resolution))
+    return _looking(entry, mesh_part(Part(part.field), resolution), part)
 
 
 def _atomic(node: Node, assembly: Assembly) -> _Solid:
@@ -134,7 +158,23 @@ def _atomic(node: Node, assembly: Assembly) -> _Solid:
     fields = ((part.name, part.field.quadric()) for part in node.parts)
     quadrics = {name: list(own.coefficients) for name, own in fields if own is not None}
     entry = {"location": [0.0] * 3, "rotation": [1.0, 0.0, 0.0, 0.0], "kind": "convex", "blend": 0.0}
-    return _Solid(entry | quadrics, atomic_mesh(node, assembly))
+    return _looking(entry | quadrics, atomic_mesh(node, assembly), node.parts[0], placed=True)
+
+
+def _looking(entry: dict[str, Any], mesh: trimesh.Trimesh, part: Part, placed: bool = False) -> _Solid:
+    """With the part's map, or its own colour, where it has one. The mesh stays closed, as booleans need it:
+    coordinates that differ at a vertex are those of corners."""
+    if (own := own_colour(part)) is not None:
+        entry = entry | {"colour": (own / 255).round(4).tolist()}
+    found = textured(mesh, part, placed)
+    if found is None:
+        return _Solid(entry, mesh)
+    import trimesh as tm
+
+    vertices, number = np.unique(np.asarray(found.mesh.vertices), axis=0, return_inverse=True)
+    faces = np.asarray(found.mesh.faces)
+    whole = tm.Trimesh(vertices, number.reshape(-1)[faces], process=False)
+    return _Solid(entry, whole, found.uv[faces], found.png)
 
 
 def _literal(value: Any) -> str:

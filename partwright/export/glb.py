@@ -41,10 +41,9 @@ from partwright.export.glb_colliders import (
 from partwright.export.glb_joined import add_patches
 from partwright.export.identifiers import free_name
 from partwright.export.shared_groups import Shared, shared
+from partwright.export.texturing import own_colour, textured
 from partwright.meshing import mesh_part
-from partwright.textures import part_map
 from partwright.textures.maps import KEY
-from partwright.textures.unwrapping import unwrapped
 
 if TYPE_CHECKING:
     import trimesh
@@ -244,21 +243,12 @@ class _Scene:
 
     def _looking(self, mesh: trimesh.Trimesh, part: Part, placed: bool = False) -> trimesh.Trimesh:
         """The mesh in the part's map, or in its colour; placed: it is where the part is, not in its frame."""
-        texture = part_map(part)
-        if texture is None:
-            own = str(part.metadata.get("colour", ""))
-            known = re.fullmatch("#[0-9a-fA-F]{6}", own)
-            colour = np.array(list(bytes.fromhex(own[1:]))) if known else self.colours[part.name]
-            return coloured(mesh, colour)
-        pose = part.pose
-        if placed:
-            mesh = mesh.copy()
-            mesh.vertices = pose.inverse()(np.asarray(mesh.vertices))
-        result, uv, image = unwrapped(mesh, part.field, texture)
-        if placed:
-            result.vertices = pose(np.asarray(result.vertices))
-        result.visual = with_image(uv, image)
-        return result
+        found = textured(mesh, part, placed)
+        if found is None:
+            own = own_colour(part)
+            return coloured(mesh, self.colours[part.name] if own is None else own)
+        found.mesh.visual = with_image(found.uv, found.image)
+        return found.mesh
 
     def _name_of_whole(self, node: Node) -> str:
         """A part that was cut keeps its name; of a repeated one, the first copy does."""

@@ -28,6 +28,11 @@ def comment(text: str) -> str:
     return " ".join(plain.replace("\\", "/").split())
 
 
+def file_name(text: str) -> str:
+    """`text` for the name of a file: letters, digits, `_`, `.` and `-`."""
+    return re.sub(r"[^\w.-]", "_", text, flags=re.ASCII)
+
+
 def free_name(wanted: str, taken: set[str]) -> str:
     """The name, or it with the first free number behind it, which is then taken."""
     name = next(n for i in count(1) if (n := wanted if i == 1 else f"{wanted}_{i:02d}") not in taken)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from partwright.assembly.names import unique_names
 from partwright.atomic_io import write_bytes
+from partwright.export.identifiers import file_name
 
 if TYPE_CHECKING:
     import trimesh
@@ -46,7 +46,7 @@ def write_link_meshes(
         meshes += [(link.name, name, mesh) for name, _, mesh in own]
         seen[link.name] = [(name, colour) for name, colour, _ in own]
     keys = [f"{link}_{piece}" if len(made) > 1 else piece for link, piece, _ in meshes]
-    plain = [re.sub(r"[^\w.-]", "_", key, flags=re.ASCII) for key in keys]
+    plain = [file_name(key) for key in keys]
     files: dict[str, dict[str, str]] = {link.name: {} for link, _ in made}
     for (link_name, piece, mesh), name in zip(meshes, unique_names(plain, plain), strict=True):
         files[link_name][piece] = f"{path.stem}_{name}.stl"

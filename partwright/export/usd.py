@@ -3,7 +3,7 @@
 The numbers are the assembly's own; `metersPerUnit` and `upAxis` say what they mean. USD knows Y and Z up
 only: an assembly of another up axis is turned to Z. Of a difference each part is shown as what is left of it;
 subtracted parts are there with the purpose "guide", which renderers leave out. An intersection is one mesh.
-Copies, of a part or of a group, are instances.
+Copies, of a part or of a group, are instances. Maps are pictures beside the file; those that are alike are one.
 """
 
 from __future__ import annotations
@@ -12,8 +12,6 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from partwright import __version__
 from partwright.approximation.atomic_nodes import atomic_mesh, check_ends, is_atomic, is_operation
@@ -25,11 +23,14 @@ from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
 from partwright.export.axes import to_metres_z_up
 from partwright.export.formats import Format, Holds
+from partwright.export.identifiers import file_name, free_name
 from partwright.export.shared_groups import shared
+from partwright.export.texturing import own_colour, textured
 from partwright.export.usd_physics import add_physics, body_of, check_physics
-from partwright.export.usd_prims import define_mesh, define_xform, exported, place, to_linear
+from partwright.export.usd_prims import define_mesh, define_texture, define_xform, exported, place, to_linear
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
+from partwright.textures.maps import KEY
 
 _AXES = {"y": "Y", "z": "Z"}
 _NO_SURFACE = "no surface of its own at this resolution"
@@ -63,7 +64,7 @@ def write(
     UsdGeom.SetStageUpAxis(stage, _AXES.get(up, "Z"))
     UsdGeom.SetStageMetersPerUnit(stage, METRES[canonical_unit(assembly.unit)] if assembly.unit else 1.0)
     stage.SetMetadata("comment", f"Partwright {__version__}")
-    writer = _Writer(stage, assembly, resolution)
+    writer = _Writer(stage, assembly, resolution, Path(path).stem)
     writer.add(assembly, "", subtracted=False)
     if not writer.meshes:
         raise nothing_to_export(assembly)
@@ -75,17 +76,23 @@ def write(
         body = body_of(assembly, density, tolerance)
         add_physics(stage, root, body, free_joint)
         body.write_report(path)
+    for name, data in writer.images.items():
+        write_bytes(Path(path).parent / name, data)
     write_bytes(path, exported(stage, Path(path).suffix.lower()))
 
 
 class _Writer:
     """Adds prims to a stage."""
 
-    def __init__(self, stage: Any, assembly: Assembly, resolution: int) -> None:
-        self.stage, self.assembly, self.resolution = stage, assembly, resolution
+    def __init__(self, stage: Any, assembly: Assembly, resolution: int, stem: str) -> None:
+        self.stage, self.assembly, self.resolution, self.stem = stage, assembly, resolution, stem
+        self.images: dict[str, bytes] = {}  # by the names of their files
         self.meshes = 0  # that are shown
         linear = to_linear(palette(len(assembly)) / 255.0)
         self.colours = dict(zip((p.name for p in assembly.parts), linear, strict=True))
+        for part in assembly.parts:
+            if (own := own_colour(part)) is not None:
+                self.colours[part.name] = to_linear(own / 255.0)
 
     def add(self, node: Node, parent: str, *, subtracted: bool) -> Any:
         """A node below another, as a prim. A difference shows what is left of it; what it subtracts is a
@@ -144,7 +151,7 @@ class _Writer:
         except NoSurfaceError:
             about["note"] = _NO_SURFACE
         else:
-            self._add_mesh(f"{prim.GetPath()}/mesh", mesh, self.colours[parts[0].name], subtracted)
+            self._add_mesh(prim, mesh, parts[0], subtracted, placed=True)
         prim.SetCustomData({"partwright": _plain(about)})
         return prim
 
@@ -159,24 +166,40 @@ class _Writer:
         place(prim, pose)
         if mesh is None:
             return
-        self._add_mesh(f"{prim.GetPath()}/mesh", mesh, self.colours[part.name], subtracted)
+        self._add_mesh(prim, mesh, part, subtracted)
         for i, move in enumerate(part.instances, start=2):
             copy = define_xform(self.stage, parent, f"{part.name}_{i}")
             copy.SetCustomData({"partwright": {"copy_of": part.name}})
             self._refer(copy, prim, move @ pose)
 
-    def _add_mesh(self, path: str, mesh: Any, colour: np.ndarray, subtracted: bool) -> None:
+    def _add_mesh(self, below: Any, mesh: Any, part: Part, subtracted: bool, placed: bool = False) -> None:
+        """In the part's map, or its colour; placed: the mesh is where the part is, not in its frame."""
         from pxr import UsdGeom
 
         self.meshes += not subtracted
-        prim = define_mesh(self.stage, path, mesh, colour)
+        path = f"{below.GetPath()}/mesh"
+        found = None if subtracted else textured(mesh, part, placed)
+        if found is not None:
+            prim = define_mesh(self.stage, path, found.mesh)
+            define_texture(prim, f"{below.GetPath()}/material", found.uv, self._picture(part.name, found.png))
+        else:
+            prim = define_mesh(self.stage, path, mesh, self.colours[part.name])
         if subtracted:
             prim.CreatePurposeAttr(UsdGeom.Tokens.guide)
             prim.CreateVisibilityAttr(UsdGeom.Tokens.invisible)  # some viewers show guides
 
+    def _picture(self, part: str, data: bytes) -> str:
+        """The name of the file that has it; parts whose maps are alike share one."""
+        same = next((name for name, known in self.images.items() if known == data), None)
+        if same is None:
+            same = f"{free_name(file_name(f'{self.stem}_{part}'), {name[:-4] for name in self.images})}.png"
+            self.images[same] = data
+        return same
+
 
 def _about(part: Part, subtracted: bool) -> dict[str, Any]:
-    own = {"field": part.field.to_dict(), "blend": part.blend, "metadata": dict(part.metadata)}
+    metadata = {key: value for key, value in part.metadata.items() if key != KEY}  # a picture beside the file
+    own = {"field": part.field.to_dict(), "blend": part.blend, "metadata": metadata}
     return own | ({"role": "subtracted"} if subtracted else {})
 
 

@@ -42,6 +42,36 @@ def define_mesh(stage: Any, path: Any, mesh: Any, colour: np.ndarray | None = No
     return prim
 
 
+def define_texture(mesh: Any, path: str, uv: np.ndarray, picture: str) -> None:
+    """A mesh's coordinates (V, 2) and a material with a picture beside the file, bound to it."""
+    from pxr import Sdf, UsdGeom, UsdShade, Vt
+
+    kinds, stage = Sdf.ValueTypeNames, mesh.GetPrim().GetStage()
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    coordinates = primvars.CreatePrimvar("st", kinds.TexCoord2fArray, UsdGeom.Tokens.vertex)
+    coordinates.Set(Vt.Vec2fArray.FromNumpy(np.asarray(uv, np.float32)))
+    material = UsdShade.Material.Define(stage, path)
+    reader = UsdShade.Shader.Define(stage, f"{path}/coordinates")
+    reader.CreateIdAttr("UsdPrimvarReader_float2")
+    reader.CreateInput("varname", kinds.String).Set("st")
+    texture = UsdShade.Shader.Define(stage, f"{path}/picture")
+    texture.CreateIdAttr("UsdUVTexture")
+    texture.CreateInput("file", kinds.Asset).Set(Sdf.AssetPath(f"./{picture}"))
+    texture.CreateInput("sourceColorSpace", kinds.Token).Set("sRGB")
+    for axis in ("wrapS", "wrapT"):
+        texture.CreateInput(axis, kinds.Token).Set("clamp")
+    place = reader.CreateOutput("result", kinds.Float2)
+    texture.CreateInput("st", kinds.Float2).ConnectToSource(place)
+    shader = UsdShade.Shader.Define(stage, f"{path}/surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    colour = texture.CreateOutput("rgb", kinds.Float3)
+    shader.CreateInput("diffuseColor", kinds.Color3f).ConnectToSource(colour)
+    shader.CreateInput("roughness", kinds.Float).Set(0.7)
+    surface = shader.CreateOutput("surface", kinds.Token)
+    material.CreateSurfaceOutput().ConnectToSource(surface)
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
 def place(prim: Any, pose: Similarity) -> None:
     """Its translation and rotation."""
     from pxr import Gf, UsdGeom

@@ -52,6 +52,8 @@ def _check(path: Path, name: str, data: bytes) -> None:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(data)) as picture:
                 width, height = picture.size
+                if width * height <= LARGEST:
+                    picture.load()  # a header alone is no picture
     except Image.DecompressionBombError as error:
         raise UnreadableFileError(
             f"{path}: its picture {name} has too many pixels; make it smaller"
