@@ -45,9 +45,17 @@ def parsed(path: Path, tag: str | None) -> Any:
 def serialised(tree: Any) -> bytes:
     from lxml import etree
 
-    encoding = tree.docinfo.encoding or "UTF-8"
-    text = etree.tostring(tree, encoding=encoding, xml_declaration=bool(tree.docinfo.xml_version))
-    return bytes(text.rstrip(b"\n") + b"\n")
+    encoding, root = tree.docinfo.encoding or "UTF-8", tree.getroot()
+
+    def written(element: Any) -> str:
+        return str(etree.tostring(element, encoding="unicode", with_tail=False))
+
+    # What is beside the root is written by itself: the parser drops the line ends there.
+    lines = [f"<?xml version='{tree.docinfo.xml_version}' encoding='{encoding}'?>"]
+    lines += [tree.docinfo.doctype] if tree.docinfo.doctype else []
+    lines += [written(each) for each in reversed(list(root.itersiblings(preceding=True)))]
+    lines += [written(root), *map(written, root.itersiblings())]
+    return ("\n".join(lines) + "\n").encode(encoding, "xmlcharrefreplace")
 
 
 def three(text: str, path: Path, where: str) -> list[float]:

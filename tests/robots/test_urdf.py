@@ -200,3 +200,11 @@ def test_what_is_no_robot(tmp_path: Path) -> None:
     (tmp_path / "a.urdf").write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:a/></robot>')
     with pytest.raises(RobotError, match="xacro"):
         open_robot(tmp_path / "a.urdf")
+
+
+def test_comments_before_the_robot_keep_their_lines(tmp_path: Path) -> None:
+    path = urdf(tmp_path / "in")
+    head = "<!-- one -->\n<!-- one -->\n<!-- two\n     lines -->\n"
+    path.write_text(path.read_text().replace("<!-- kept -->\n", head, 1))
+    save(collide(path, CollideOptions(kinds=("box",), max_parts=1)), tmp_path / "out")
+    assert head + "<robot " in (tmp_path / "out" / "pair.urdf").read_text()
