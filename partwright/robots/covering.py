@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.ball_filling import Balls, filling_balls
+from partwright.approximation.ball_filling import Balls, Place, filling_balls
 from partwright.approximation.convex_fit import smallest_ball
 from partwright.robots.enclosing import halves
 
@@ -25,7 +25,13 @@ if TYPE_CHECKING:
 _Measure = Callable[[np.ndarray, float], np.ndarray]
 _SEGMENTS = 48  # of a sphere, where volumes are measured
 
-_FIRM = (3.0, 10.0, 30.0)  # what balls lack over what they add; the cover of least volume is taken
+# where balls begin, and what they lack over what they add: the cover of least volume is taken
+_BEGINNINGS: tuple[tuple[Place, float], ...] = (
+    ("in", 1.0),
+    ("anywhere", 3.0),
+    ("anywhere", 10.0),
+    ("anywhere", 30.0),
+)
 _SHRUNK = 40  # times that points are shared out by depth
 _STEPS = 50  # towards the farthest point, to find a ball's centre
 _LEAST = 1e-3  # by less of all radii it is not worth to go on
@@ -43,17 +49,18 @@ def covering_balls(
     """
     size = float(np.ptp(points, axis=0).max())
     found = []
-    for firmness in _FIRM:
-        balls = _shrunk(points, filling_balls(solid, count, "anywhere", firmness, seed))
+    for place, firmness in _BEGINNINGS:
+        balls = _shrunk(points, filling_balls(solid, count, place, firmness, seed))
         balls = _grown(balls, triangles, _FINE * size)
         found.append(np.column_stack([balls[:, :3], balls[:, 3] + _ROUNDING * size]))
     return min(found, key=lambda balls: float(balls_solid(balls).volume()))
 
 
 def balls_solid(balls: Balls) -> Manifold:
-    """The balls as one solid, each of facets that have its volume."""
+    """The balls as one solid, each of facets that have its volume; without those that have next to none."""
     from manifold3d import Manifold, OpType
 
+    balls = balls[balls[:, 3] > _LEAST * balls[:, 3].max()]
     same = math.cbrt(4 / 3 * math.pi / Manifold.sphere(1.0, _SEGMENTS).volume())
     placed = [Manifold.sphere(same * r, _SEGMENTS).translate((x, y, z)) for x, y, z, r in balls.tolist()]
     return Manifold.batch_boolean(placed, OpType.Add)

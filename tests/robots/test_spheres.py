@@ -201,3 +201,8 @@ def test_what_is_asked_for_in_one_link_is_said_in_the_singular(tmp_path: Path) -
     path.write_text(NATIVE)
     collide(open_robot(path), CollideOptions(spheres=16), told=said.append)
     assert "ball: 1 sphere" in said
+
+
+def test_a_ball_around_one_point_leaves_the_others_their_volume() -> None:
+    balls = np.array([[0, 0, 0, 1.0], [3, 0, 0, 0.0], [5, 0, 0, 1e-9]])
+    assert balls_solid(balls).volume() == pytest.approx(4 / 3 * np.pi, rel=1e-6)
