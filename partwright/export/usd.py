@@ -3,7 +3,8 @@
 The numbers are the assembly's own; `metersPerUnit` and `upAxis` say what they mean. USD knows Y and Z up
 only: an assembly of another up axis is turned to Z. Of a difference each part is shown as what is left of it;
 subtracted parts are there with the purpose "guide", which renderers leave out. An intersection is one mesh.
-Copies, of a part or of a group, are instances. Maps are pictures beside the file; those that are alike are one.
+Copies, of a part or of a group, are instances. Maps are pictures beside the file; those that are alike are
+one.
 """
 
 from __future__ import annotations

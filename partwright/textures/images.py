@@ -33,8 +33,7 @@ def check_images(path: Path) -> None:
     check_file(path)
     if suffix == ".obj":
         for name, file in _of_obj(path):
-            check_file(file)
-            _check(path, name, file.read_bytes())
+            _check(path, name, _read(path, name, file))
     elif suffix in (".glb", ".gltf"):
         try:
             found = list(_of_gltf(path))
@@ -69,6 +68,14 @@ def _check(path: Path, name: str, data: bytes) -> None:
         )
 
 
+def _read(path: Path, name: str, file: Path) -> bytes:
+    try:
+        check_file(file)
+    except UnreadableFileError as error:
+        raise UnreadableFileError(f"{path}: its picture {name}: {error}") from error
+    return file.read_bytes()
+
+
 def _of_obj(path: Path) -> Iterator[tuple[str, Path]]:
     """Names and places of pictures; a name may have spaces, and options before it."""
     for library in _MTLLIB.findall(path.read_bytes()):
@@ -100,9 +107,7 @@ def _of_gltf(path: Path) -> Iterator[tuple[str, bytes]]:
         elif uri.startswith("data:"):
             yield name, _data(path, uri)
         else:
-            file = path.parent / unquote(uri)
-            check_file(file)
-            yield name, file.read_bytes()
+            yield name, _read(path, name, path.parent / unquote(uri))
 
 
 def _used(tree: dict[str, Any]) -> set[int]:

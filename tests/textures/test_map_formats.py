@@ -157,5 +157,8 @@ def test_a_picture_that_ends_too_early_is_named(tmp_path: Path) -> None:
     assert load_colours(tmp_path / "a.obj")
     whole = (tmp_path / "wood.png").read_bytes()
     (tmp_path / "wood.png").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(UnreadableFileError, match="its picture wood.png cannot be read"):
+    with pytest.raises(UnreadableFileError, match=r"a\.obj: its picture wood\.png cannot be read"):
+        load_colours(tmp_path / "a.obj")
+    (tmp_path / "wood.png").unlink()
+    with pytest.raises(UnreadableFileError, match=r"a\.obj: its picture wood\.png: .*no such file"):
         load_colours(tmp_path / "a.obj")
