@@ -29,6 +29,8 @@ from partwright.fields import (
 )
 
 _LOOPED: tuple[type[Field], ...] = (*SOLIDS, HollowBox, HollowFrustum, SuperFrustum)
+HOLE = "_hole"
+"""After the name of a hollow part: its hole, where that is a part of its own."""
 Keep = Callable[[Part], Approximation | None]
 
 
@@ -107,7 +109,7 @@ def _with_holes(node: Node) -> Node:
         return node
     outer, hole = node.field.pieces()
     whole = dataclasses.replace(node, field=outer, blend=0.0)
-    cut = dataclasses.replace(node, field=hole, blend=0.0, name=f"{node.name}_hole")
+    cut = dataclasses.replace(node, field=hole, blend=0.0, name=f"{node.name}{HOLE}")
     return Assembly((whole, cut), operation="difference", blend=node.blend)
 
 

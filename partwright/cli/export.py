@@ -14,7 +14,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
         "export",
         help="write an assembly in another format",
-        description=f"Writes an assembly in the format of FILE's suffix: {', '.join(FORMATS.own)}.",
+        description=f"Writes an assembly in the format of FILE's suffix: {', '.join(FORMATS.own)}. "
+        "STEP: where OpenCASCADE gets joints of parts wrong they are tried again in other ways, for about a "
+        "minute at most; then flat facets stand for them, and FILE.report.json says so.",
     )
     command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     add_output(command, "FILE", "where to write", reads=lambda a: [a.assembly], writes=_writes)

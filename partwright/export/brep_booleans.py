@@ -3,11 +3,14 @@
 Where surfaces nearly touch, OpenCASCADE may lose a solid, or a cut, and say nothing: what it returns is
 checked for being valid, and its volume is compared with what is known of it. All solids at once go wrong less
 often than one after another, and a tolerance as wide as the faces' distance makes nearly touching faces one.
+All tries beyond the first of an operation are paid from one budget for the whole export, in faces, which
+cost about as much time each, so that the same assembly gives the same bytes on a slow machine.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +28,36 @@ _RIGHT = 1e-3  # share of the volume: as close as meshes are that it is compared
 _ACCEPTED = 5e-3  # the closest of all results may be this far off
 _MOVES = (2e-4, 1e-3)  # of the cube root of the largest volume: what operands move by at last
 _DIRECTIONS = 2
+_BUDGET = 60_000
+
+
+@dataclass
+class Repairs:
+    """What may still be spent on further tries, in faces of their operands; about a thousand to a second."""
+
+    left: int = _BUDGET
+
+    def allow(self, solids: Sequence[TopoDS_Shape]) -> bool:
+        """Whether there is a try more, which then is paid."""
+        self.left -= sum(map(face_count, solids))
+        return self.left > 0
+
+    @property
+    def spent(self) -> bool:
+        """Whether tries were left out."""
+        return self.left <= 0
+
+
+def face_count(solid: TopoDS_Shape) -> int:
+    """Of a solid."""
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+
+    faces, count = TopExp_Explorer(solid, TopAbs_ShapeEnum.TopAbs_FACE), 0
+    while faces.More():
+        count += 1
+        faces.Next()
+    return count
 
 
 def operated(
@@ -32,26 +65,41 @@ def operated(
     solids: Sequence[TopoDS_Shape],
     right: float | None,
     label: str,
-    move: bool = False,
+    repairs: Repairs,
     rough: bool = False,
-) -> tuple[TopoDS_Shape, float]:
-    """The union, difference or intersection of the solids, and how far some of them were moved for it: as a
-    length, 0 but where nothing else goes.
+) -> TopoDS_Shape:
+    """The union, difference or intersection of the solids.
 
-    right: its volume, where it is known. move: whether they may move, where that is known. rough: with wider
-    tolerances and further moves from the first on, where the least ones left slivers.
+    right: its volume, where it is known. repairs: what pays for all tries but the first. rough: with wider
+    tolerances from the first on, where the least ones left slivers.
 
     Raises:
         NoSurfaceError: no way gives a valid solid of that volume.
     """
     if len(solids) == 1:
-        return solids[0], 0.0
-    found = _closest(_results(operation, solids, _FUZZY[rough:]), right)
-    if found is not None:
-        return found, 0.0
+        return solids[0]
+    found = _closest(_results(operation, solids, _FUZZY[rough:], repairs), right)
+    if found is None:
+        raise NoSurfaceError(f"OpenCASCADE gets the {operation} of {label} wrong; move it a little")
+    return found
+
+
+def operated_on_moved(
+    operation: str,
+    solids: Sequence[TopoDS_Shape],
+    right: float,
+    label: str,
+    repairs: Repairs,
+    rough: bool = False,
+) -> tuple[TopoDS_Shape, float]:
+    """As `operated`, with all but the first moved a little, and how far: a length. rough: further at once.
+
+    Raises:
+        NoSurfaceError: no way gives a valid solid of that volume.
+    """
     scale = max(volume_and_area(solid)[0] for solid in solids) ** (1 / 3)
-    for distance in (share * scale for share in _MOVES[rough:]) if move and right is not None else ():
-        found = _closest(_moved_results(operation, solids, distance), right)
+    for distance in (share * scale for share in _MOVES[rough:]):
+        found = _closest(_moved_results(operation, solids, distance, repairs), right)
         if found is not None:
             return found, distance
     raise NoSurfaceError(f"OpenCASCADE gets the {operation} of {label} wrong; move it a little")
@@ -71,12 +119,16 @@ def _closest(results: Iterator[TopoDS_Shape], right: float | None) -> TopoDS_Sha
     return closest
 
 
-def _moved_results(operation: str, solids: Sequence[TopoDS_Shape], distance: float) -> Iterator[TopoDS_Shape]:
+def _moved_results(
+    operation: str, solids: Sequence[TopoDS_Shape], distance: float, repairs: Repairs
+) -> Iterator[TopoDS_Shape]:
     """With all but the first moved so far, each in another direction: faces that nearly touched do not."""
     from OCP.gp import gp_Trsf, gp_Vec
     from OCP.TopLoc import TopLoc_Location
 
     for seed in range(_DIRECTIONS):
+        if not repairs.allow(solids):
+            return
         ways = np.random.default_rng(seed).normal(size=(len(solids), 3))
         ways *= distance / np.linalg.norm(ways, axis=1)[:, None]
         moved = [solids[0]]
@@ -90,27 +142,24 @@ def _moved_results(operation: str, solids: Sequence[TopoDS_Shape], distance: flo
 
 
 def _results(
-    operation: str, solids: Sequence[TopoDS_Shape], tolerances: Sequence[float]
+    operation: str, solids: Sequence[TopoDS_Shape], tolerances: Sequence[float], repairs: Repairs
 ) -> Iterator[TopoDS_Shape]:
     """Valid results of volumes that they can have."""
     volumes = [volume_and_area(solid)[0] for solid in solids]
-    fuzzies = [tolerance * max(volumes) ** (1 / 3) for tolerance in tolerances]
     low, high = {
         "union": (max(volumes), sum(volumes)),
         "difference": (volumes[0] - sum(volumes[1:]), volumes[0]),
         "intersection": (0.0, min(volumes)),
     }[operation]
     slack = _LOST * max(volumes)
-
-    def possible(result: TopoDS_Shape | None) -> bool:
-        return result is not None and low - slack <= volume_and_area(result)[0] <= high + slack
-
-    if operation != "intersection":  # OpenCASCADE's is that with the union of the others
-        yield from filter(possible, (_at_once(operation, solids, fuzzy) for fuzzy in fuzzies))
-        if len(solids) == 2:
+    # OpenCASCADE's intersection is that with the union of the others.
+    way = _one_by_one if operation == "intersection" else _at_once
+    for i, tolerance in enumerate(tolerances):
+        if i and not repairs.allow(solids):
             return
-    for fuzzy in fuzzies:
-        yield from filter(possible, [_one_by_one(operation, solids, fuzzy)])
+        result = way(operation, solids, tolerance * max(volumes) ** (1 / 3))
+        if result is not None and low - slack <= volume_and_area(result)[0] <= high + slack:
+            yield result
 
 
 def _one_by_one(operation: str, solids: Sequence[TopoDS_Shape], fuzzy: float) -> TopoDS_Shape | None:

@@ -14,7 +14,7 @@ from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
 from partwright.export.plane_patches import boundary_loops, patches, twins_of
 from partwright.meshing.csg import solid_of
-from partwright.meshing.manifolds import surface_of
+from partwright.meshing.manifolds import simplified, surface_of
 from partwright.shapes.topology import components, signed_volumes
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def faceted(node: Node, fine: bool = False) -> TopoDS_Shape:
     sides = np.ptp(np.array(node.bounds()), axis=0)
     longest = float(sides.max())
     chord = CHORD * float(sides.min() if fine else longest)
-    places, triangles = surface_of(solid_of(node, chord).simplify(SHORTEST * longest))
+    places, triangles = surface_of(simplified(solid_of(node, chord), SHORTEST * longest))
     if not len(triangles):
         raise NoSurfaceError("nothing is left of a node to be written as facets")
     try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import NoSurfaceError
 from partwright.export.brep import solid_of, volume_and_area
-from partwright.export.brep_booleans import operated
+from partwright.export.brep_booleans import Repairs, operated, operated_on_moved
 from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
@@ -31,9 +31,11 @@ _SAME_MESH = 5e-3  # share of the volume by which what stands for an exact mesh 
 @dataclass
 class Compromises:
     """Names of what OpenCASCADE could not do: `apart`, united with the rest; `faceted`, built at all;
-    `moved`, joined where it was, and how far it moved. rough: whether tolerances are wide at once."""
+    `moved`, joined where it was, and how far it moved. rough: whether tolerances are wide at once.
+    repairs: what pays for further tries, of all that is tried for one export."""
 
     rough: bool = False
+    repairs: Repairs = field(default_factory=Repairs)
     apart: list[str] = field(default_factory=list)
     faceted: list[str] = field(default_factory=list)
     moved: list[tuple[list[str], float]] = field(default_factory=list)
@@ -51,7 +53,7 @@ def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
         NoSurfaceError: the operations leave nothing, or OpenCASCADE cannot do them, nor has the node an exact
             mesh.
     """
-    within = Compromises(made.rough)
+    within = Compromises(made.rough, made.repairs)
     try:
         solid = _combined(node, ball, within)
     except NoSurfaceError as error:
@@ -61,7 +63,7 @@ def combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
             solid = faceted(node)
         except NoSurfaceError:
             raise error from None
-        within = Compromises(made.rough, faceted=[part.name for part in node.parts])
+        within = Compromises(made.rough, made.repairs, faceted=[part.name for part in node.parts])
     made.apart += within.apart
     made.faceted += within.faceted
     made.moved += within.moved
@@ -78,7 +80,7 @@ def _combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
     ]
     right = _exact_volume(node)
     try:
-        solid, _ = operated(node.operation, solids, right, _label(node), rough=made.rough)
+        solid = operated(node.operation, solids, right, _label(node), made.repairs, made.rough)
         return _unified(node, solid)
     except NoSurfaceError:
         return _unified(node, _stepwise(node, solids, right, made))
@@ -95,82 +97,103 @@ def _stepwise(
     Raises:
         NoSurfaceError: a difference or an intersection fails for one, or too much of a union would overlap.
     """
-    result, joined = solids[0], [node.children[0]]
-    waiting = list(zip(node.children[1:], solids[1:], strict=True))
-    ways = [_as_it_is, _moved_a_little, *([_as_facets] if node.operation != "union" else [])]
-    for way in ways:
-        failed = []
-        for child, solid in waiting:
-            so_far = Assembly((*joined, child), node.operation)
-            volume = _exact_volume(so_far) if right is not None else None
-            try:
-                result = way(so_far, (result, solid), volume, made)
-                joined.append(child)
-            except NoSurfaceError:
-                failed.append((child, solid))
-        if not failed:
-            return result
-        waiting = failed
+    steps = _Steps(node, solids, right is not None, made)
+    if len(solids) > 2:  # of two, that is what was tried
+        steps.join(_as_it_is)
+    if right is not None:
+        steps.join(_moved_a_little)
     if node.operation != "union":
+        steps.join(_as_facets)
+        if steps.waiting:
+            raise NoSurfaceError(
+                f"OpenCASCADE fails at the {node.operation} of {_label(node)}; move its parts a little"
+            )
+        whole = [steps.result]
+    else:
+        whole = [steps.result, *map(steps.rest, steps.waiting)]
+    volume = sum(volume_and_area(one)[0] for one in whole)
+    if right is not None and not (1 - _SAME_MESH) * right < volume < (1 + _OVERLAP) * right:
         raise NoSurfaceError(
             f"OpenCASCADE fails at the {node.operation} of {_label(node)}; move its parts a little"
         )
-    whole = [result]
-    for child, solid in waiting:
-        whole.append(_rest(child, solid, joined, result, right is not None, made))
-        joined.append(child)
-    volume = sum(volume_and_area(one)[0] for one in whole)
-    if right is not None and not (1 - _SAME_MESH) * right < volume < (1 + _OVERLAP) * right:
-        raise NoSurfaceError(f"OpenCASCADE fails at the union of {_label(node)}; move its parts a little")
     return _side_by_side(whole)
 
 
-def _rest(
-    child: Node,
-    solid: TopoDS_Shape,
-    joined: Sequence[Node],
-    result: TopoDS_Shape,
-    known: bool,
-    made: Compromises,
-) -> TopoDS_Shape:
-    """What of a child of a union the others do not hold, to stand beside them; or all of it."""
-    made.apart.append(child.name or _label(child))
-    rest = Assembly((child, *joined), "difference")
-    if not known:
+_Way = Callable[["_Steps", Node, "TopoDS_Shape", float | None], "TopoDS_Shape"]
+
+
+class _Steps:
+    """What of a node is joined so far, and what is waiting. known: whether volumes are."""
+
+    def __init__(
+        self, node: Assembly, solids: Sequence[TopoDS_Shape], known: bool, made: Compromises
+    ) -> None:
+        self.operation, self.known, self.made = node.operation, known, made
+        self.result, self.joined = solids[0], [node.children[0]]
+        self.waiting = list(zip(node.children[1:], solids[1:], strict=True))
+        self._expected = _exact_volume(Assembly((node.children[0],))) if known else None
+
+    def join(self, way: _Way) -> None:
+        """All that can be joined in this way; the others go on waiting."""
+        failed = []
+        for child, solid in self.waiting:
+            try:
+                self._joined(way, child, solid)
+            except NoSurfaceError:
+                failed.append((child, solid))
+        self.waiting = failed
+
+    def _joined(self, way: _Way, child: Node, solid: TopoDS_Shape) -> None:
+        expected = volume = None
+        if self._expected is not None:
+            expected = _exact_volume(Assembly((*self.joined, child), self.operation))
+            assert expected is not None
+            # By how much this step changes it; what earlier ones are off is not its fault.
+            volume = expected + volume_and_area(self.result)[0] - self._expected
+        self.result = way(self, child, solid, volume)
+        self._expected = expected
+        self.joined.append(child)
+
+    def rest(self, waiting: tuple[Node, TopoDS_Shape]) -> TopoDS_Shape:
+        """What of a child of a union the others do not hold, to stand beside them; or all of it."""
+        child, solid = waiting
+        self.made.apart.append(child.name or _label(child))
+        rest = Assembly((child, *self.joined), "difference")
+        self.joined.append(child)
+        if not self.known:
+            return solid
+        with suppress(NoSurfaceError):
+            pair = (solid, self.result)
+            return operated("difference", pair, _exact_volume(rest), _label(child), self.made.repairs)
+        with suppress(NoSurfaceError):
+            whole = faceted(rest, fine=True)
+            self.made.faceted += [part.name for part in child.parts]
+            return whole
         return solid
-    with suppress(NoSurfaceError):
-        return operated("difference", (solid, result), _exact_volume(rest), _label(child))[0]
-    with suppress(NoSurfaceError):
-        whole = faceted(rest, fine=True)
-        made.faceted += [part.name for part in child.parts]
-        return whole
-    return solid
 
 
-def _as_it_is(
-    node: Assembly, pair: tuple[TopoDS_Shape, TopoDS_Shape], volume: float | None, made: Compromises
-) -> TopoDS_Shape:
-    """What is there and the last child of a node, joined by its operation."""
-    return operated(node.operation, pair, volume, _label(node.children[-1]), rough=made.rough)[0]
+def _as_it_is(steps: _Steps, child: Node, solid: TopoDS_Shape, volume: float | None) -> TopoDS_Shape:
+    made = steps.made
+    pair = (steps.result, solid)
+    return operated(steps.operation, pair, volume, _label(child), made.repairs, made.rough)
 
 
-def _moved_a_little(
-    node: Assembly, pair: tuple[TopoDS_Shape, TopoDS_Shape], volume: float | None, made: Compromises
-) -> TopoDS_Shape:
-    child = node.children[-1]
-    result, distance = operated(node.operation, pair, volume, _label(child), True, made.rough)
+def _moved_a_little(steps: _Steps, child: Node, solid: TopoDS_Shape, volume: float | None) -> TopoDS_Shape:
+    made = steps.made
+    assert volume is not None
+    result, distance = operated_on_moved(
+        steps.operation, (steps.result, solid), volume, _label(child), made.repairs, made.rough
+    )
     made.moved.append(([part.name for part in child.parts], distance))
     return result
 
 
-def _as_facets(
-    node: Assembly, pair: tuple[TopoDS_Shape, TopoDS_Shape], volume: float | None, made: Compromises
-) -> TopoDS_Shape:
-    child = node.children[-1]
+def _as_facets(steps: _Steps, child: Node, solid: TopoDS_Shape, volume: float | None) -> TopoDS_Shape:
     if not has_exact_mesh(child) or not np.isfinite(child.bounds()).all():
         raise NoSurfaceError(f"{_label(child)} has no exact mesh")
-    result, _ = operated(node.operation, (pair[0], faceted(child, fine=True)), volume, _label(child))
-    made.faceted += [part.name for part in child.parts]
+    pair = (steps.result, faceted(child, fine=True))
+    result = operated(steps.operation, pair, volume, _label(child), steps.made.repairs)
+    steps.made.faceted += [part.name for part in child.parts]
     return result
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from partwright import __version__
+from partwright.approximation.solid_tree import HOLE
 from partwright.atomic_io import report_path, write_bytes
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def write_report(
         "version": __version__,
         "unit": assembly.unit,
         "parts": len(assembly),
+        "approximated_parts": _own_names(assembly, changes),
         "approximated": [change.to_dict() for change in changes],
         "notes": list(notes),
     }
@@ -39,9 +41,20 @@ def write_report(
 
 
 def approximated_parts(path: str | Path) -> list[str]:
-    """Names of the parts that an export to `path` changed, by its report; none where it has no report."""
+    """Names of the assembly's parts that an export to `path` changed, or a copy of them, by its report; none
+    where it has no report."""
     target = report_path(path)
     if not target.exists():
         return []
-    changes = json.loads(target.read_text("utf-8")).get("approximated", [])
-    return list(dict.fromkeys(name for change in changes for name in change["parts"]))
+    names: list[str] = json.loads(target.read_text("utf-8"))["approximated_parts"]
+    return names
+
+
+def _own_names(assembly: Assembly, changes: Sequence[Change]) -> list[str]:
+    """Of the assembly's own parts: a format may hold each copy, and each hole, under a name of its own."""
+    copies = [part.name for part in assembly.expanded().parts]
+    owner = dict(zip(copies, (part.name for part in assembly.parts for _ in part.copies), strict=True))
+    changed = {name for change in changes for name in change.what}
+    changed |= {name.removesuffix(HOLE) for name in changed - owner.keys()}
+    found = {own for name, own in owner.items() if name in changed}
+    return [part.name for part in assembly.parts if part.name in found]

@@ -3,8 +3,8 @@
 Straight parts are exact, whatever their taper, hole, rounding and dilation, and so are bent ones without
 taper, and quadrics (saddles and their like are refused). Bent ones with taper are surfaces through sections;
 what cannot be built becomes the nearest solid, and where a boolean operation goes wrong, or the file does not
-read as a valid solid, flat facets of the exact mesh stand for it. Blends become sharp edges. FILE.report.json
-lists all but the exact.
+read as a valid solid, flat facets of the exact mesh stand for it. Further tries have a budget
+(brep_booleans). Blends become sharp edges. FILE.report.json lists all but the exact.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ _RESORTED = (
 _NOT_VALID = (
     "the file does not read as a valid solid; move parts a little that nearly touch, or export a mesh"
 )
+_SPENT = "boolean operations that went wrong were tried again only until the budget for that was spent"
 # OpenCASCADE works in millimetres with an absolute tolerance, so all lengths are brought to them.
 _WORKING = METRES["mm"]
 _UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "km": "KM", "in": "INCH", "ft": "FT"}
@@ -85,6 +86,8 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
     for change in resorted:
         warnings.warn(f"{', '.join(names)}: {change.note}", FacetsWarning, stacklevel=2)
     notes = [] if unit else ["the length unit is unknown: the file says millimetres"]
+    if made.repairs.spent:
+        notes.append(_SPENT)
     if made.apart:
         overlap = "it stands beside the rest: the union failed"
         changes.append(Change(tuple(made.apart), "a solid of its own", note=overlap))
@@ -112,8 +115,8 @@ def _saved(
         return made, []
     spare = path.with_name(f"{path.name}.again")
     try:
-        if again:  # slivers that the file's digits lose
-            rough = Compromises(rough=True)
+        if again and not made.repairs.spent:  # slivers that the file's digits lose
+            rough = Compromises(rough=True, repairs=made.repairs)
             save([combined(product, ball, rough) for product in products], spare)
             if _reads_valid(spare):
                 spare.replace(path)
@@ -124,7 +127,7 @@ def _saved(
                 save([faceted(product, fine=True) for product in products], spare)
                 if _reads_valid(spare):
                     spare.replace(path)
-                    return Compromises(), [Change(parts, "flat facets", note=_RESORTED)]
+                    return Compromises(repairs=made.repairs), [Change(parts, "flat facets", note=_RESORTED)]
         return made, [Change(parts, "a solid that is not valid", note=_NOT_VALID)]
     finally:
         spare.unlink(missing_ok=True)

@@ -16,7 +16,7 @@ from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Node
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.fields import Field, normal_form
-from partwright.meshing.manifolds import as_mesh
+from partwright.meshing.manifolds import as_mesh, simplified
 from partwright.meshing.named_solids import is_named, named_solid
 from partwright.meshing.quadric_solids import half_space, quadric_solid
 from partwright.meshing.small_components import components
@@ -95,32 +95,38 @@ class _Builder:
 
     def __init__(self, box: np.ndarray, tolerance: float) -> None:
         self.box, self.tolerance = box, tolerance
+        self._nudges: dict[int, int] = {}  # of each node, by its identity: how many are within one another
 
     def solid(self, node: Node) -> Manifold:
         if node.is_part and not node.instances:
             return self.leaf(node)
         if node.operation == "intersection":
-            return self.intersection(node.operands)
-        return self.joined(node.operands, node.operation == "difference", _NUDGE * _STEP ** _height(node))
+            return self.intersection(node, node.operands)
+        return self.joined(node, node.operands, node.operation == "difference")
 
-    def joined(self, children: tuple[Node, ...], subtract: bool, nudge: float) -> Manifold:
+    def joined(self, node: Node, children: tuple[Node, ...], subtract: bool) -> Manifold:
         """The union of solids, or the first minus the others.
 
         Faces that were meant to touch differ by rounding once they are turned, and leave a slit or a skin
         without width between them. It shows: with every solid (but the first of a difference) larger by
-        `nudge`, a share of the box, the result has another topology, and that is the one that was meant.
+        a share of the box, the result has another topology, and that is the one that was meant. The share
+        outdoes those by which solids within these were made larger, and no others: it shows in the volume.
         """
         from manifold3d import Manifold, OpType
 
         operation = OpType.Subtract if subtract else OpType.Add
         solids = [self.solid(child) for child in children]
         plain = Manifold.batch_boolean(solids, operation)
+        within = self._nudges[id(node)] = max(self._nudges.get(id(child), 0) for child in children)
         if len(solids) < 2:
             return plain
-        further = nudge * float(np.ptp(self.box, axis=0).max())
+        further = _NUDGE * _STEP**within * float(np.ptp(self.box, axis=0).max())
         larger = [self.larger(child, one, further) for child, one in zip(children, solids, strict=True)]
         clear = Manifold.batch_boolean([solids[0], *larger[1:]] if subtract else larger, operation)
-        return plain if _topology(plain) == _topology(clear) else clear.simplify(4 * further)
+        if _topology(plain) == _topology(clear):
+            return plain
+        self._nudges[id(node)] = within + 1
+        return simplified(clear, 4 * further)
 
     def larger(self, node: Node, solid: Manifold, nudge: float) -> Manifold:
         """The solid of a node with every side further out by `nudge`: along a leaf's own axes."""
@@ -128,7 +134,7 @@ class _Builder:
             return _larger(solid, nudge)
         return _placed(_larger(named_solid(node.field, self.tolerance), nudge), node)
 
-    def intersection(self, children: tuple[Node, ...]) -> Manifold:
+    def intersection(self, node: Node, children: tuple[Node, ...]) -> Manifold:
         """The box cut by the planes one by one, which is exact and fast, then by the others."""
         from manifold3d import Manifold, OpType
 
@@ -139,6 +145,7 @@ class _Builder:
                 others.append(self.solid(child))
             else:
                 region = half_space(region, *plane)
+        self._nudges[id(node)] = max((self._nudges.get(id(child), 0) for child in children), default=0)
         return Manifold.batch_boolean([region, *others], OpType.Intersect) if others else region
 
     def leaf(self, part: Part) -> Manifold:
@@ -146,12 +153,6 @@ class _Builder:
         if quadric is not None:
             return quadric_solid(quadric, self.box, self.tolerance)
         return _placed(named_solid(part.field, self.tolerance), part)
-
-
-def _height(node: Node) -> int:
-    """Operations below the node's own, on the way to the deepest leaf."""
-    below = () if node.is_part else node.children
-    return max((1 + _height(child) for child in below if not child.is_part), default=0)
 
 
 def _topology(solid: Manifold) -> tuple[int, int]:

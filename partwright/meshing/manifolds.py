@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     import trimesh
     from manifold3d import Manifold
 
+_SHARES = (1.0, 0.25, 0.02)  # of a tolerance, that are tried where more of it takes too much away
+
 
 def closed(vertices: np.ndarray, faces: np.ndarray) -> Manifold:
     """The solid that vertices (V, 3) and faces (F, 3) bound."""
@@ -36,3 +38,17 @@ def as_mesh(solid: Manifold) -> trimesh.Trimesh:
     import trimesh
 
     return trimesh.Trimesh(*surface_of(solid), process=False)
+
+
+def simplified(solid: Manifold, tolerance: float) -> Manifold:
+    """With fewer corners, no place of its surface further off than a length; as it is where that fails.
+
+    manifold3d's own may lose a whole wall where many nearly flat triangles meet: a surface that moves by no
+    more than the tolerance changes the volume by no more than that times its area.
+    """
+    volume, most = solid.volume(), tolerance * solid.surface_area()
+    for share in _SHARES:
+        simple = solid.simplify(share * tolerance)
+        if abs(simple.volume() - volume) <= most:
+            return simple
+    return solid

@@ -21,6 +21,7 @@ from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames, long_axis
 from partwright.fields import Swept
+from partwright.meshing.manifolds import simplified
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_copying import joined_by, with_copies
@@ -167,7 +168,7 @@ class FeatureSearch:
             low, high = np.reshape(piece.bounding_box(), (2, 3))
             within = ((points > low) & (points < high)).all(axis=1)
             if float((weight[within].sum(axis=0) / total).mean()) > _HOPELESS * self.alpha:
-                pieces.append((volume, piece if piece.num_tri() < _FINE else piece.simplify(_SKIN)))
+                pieces.append((volume, piece if piece.num_tri() < _FINE else simplified(piece, _SKIN)))
         return [piece for _, piece in sorted(pieces, key=lambda p: -p[0])[:_PIECES]]
 
     def candidates_of(self, piece: Manifold) -> list[Candidate]:

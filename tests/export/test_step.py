@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import sys
@@ -189,6 +190,14 @@ def test_what_fails_for_one_part_costs_no_other(
     facets = brep_tree.faceted
     monkeypatch.setattr(brep_tree, "faceted", lambda node, fine: faceted.append(node) or facets(node, fine))
     monkeypatch.setattr(brep_tree, "operated", without_pins)
+    moved = brep_tree.operated_on_moved
+
+    def without_moved_pins(kind: str, solids: Any, right: Any, label: str, *ways: Any) -> Any:
+        if label == "'pin'":
+            raise NoSurfaceError("fails")
+        return moved(kind, solids, right, label, *ways)
+
+    monkeypatch.setattr(brep_tree, "operated_on_moved", without_moved_pins)
     parts = (
         Part(Box((2, 2, 2)), name="box"),
         Part(Cylinder(0.5, 4), name="pin"),
@@ -210,9 +219,9 @@ def test_a_file_that_reads_badly_is_made_again_with_wide_tolerances(
     readings, tolerances = [], []
     results = brep_booleans._results
 
-    def seen(kind: str, solids: Any, given: Any) -> Any:
+    def seen(kind: str, solids: Any, given: Any, repairs: Any) -> Any:
         tolerances.append(given[0])
-        return results(kind, solids, given)
+        return results(kind, solids, given, repairs)
 
     monkeypatch.setattr(step, "_reads_valid", lambda path: readings.append(path) or len(readings) > 1)
     monkeypatch.setattr(brep_booleans, "_results", seen)
@@ -222,6 +231,27 @@ def test_a_file_that_reads_badly_is_made_again_with_wide_tolerances(
     assert tolerances[0] == 0 < tolerances[-1]
     assert read_back(tmp_path / "a.step")[0] == pytest.approx(8 + math.pi / 2, rel=1e-3)
     assert [path.name for path in tmp_path.iterdir()] == ["a.step"]
+
+
+def test_tries_have_a_budget_and_the_report_says_that_it_is_spent(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where nothing that OpenCASCADE makes is right: some tries, and facets."""
+    tries: list[int] = []
+    monkeypatch.setattr(brep_booleans, "_at_once", lambda _, solids, fuzzy: tries.append(len(solids)))
+    parts = [Part(Box((2, 2, 2)), (1.5 * k, 0, 0.1 * k), name=f"box_{k}") for k in range(5)]
+    exporting = functools.partial(export, Assembly(tuple(parts), unit="cm"), tmp_path / "a.step")
+    exporting()
+    unbounded = len(tries)
+    assert "budget" not in (report := tmp_path / "a.step.report.json").read_text()
+    tries.clear()
+    with monkeypatch.context() as small:
+        small.setattr(brep_booleans.Repairs.__init__, "__defaults__", (30,))  # each box has six faces
+        exporting()
+    # The first of the whole, and of each box that joins it, and of what is left of each.
+    assert len(tries) == 9 < unbounded
+    assert "until the budget" in json.loads(report.read_text())["notes"][-1]
+    assert read_back(tmp_path / "a.step")[1].keys() == {"Plane"}
 
 
 def test_an_outline_that_touches_itself_is_moved_a_hair_apart(tmp_path: Path) -> None:
