@@ -25,7 +25,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     command.add_argument(
-        "source", metavar="FOLDER_OR_FAMILY", help="a folder of shapes, or mixers, chairs or cars"
+        "source", metavar="FOLDER_OR_FAMILY", help="a folder of shapes, or mixers, chairs, cars or vehicles"
     )
     command.add_argument("-o", "--output", metavar="FOLDER", type=Path, required=True, help="where to write")
     option = command.add_argument

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 import partwright as pw
-from partwright.datasets.families import FAMILIES, FamilyShape, family
+from partwright.datasets.families import FAMILIES, FamilyShape, family, vehicle_fittings
+from partwright.datasets.families.car_shapes import WHEELS
 from partwright.errors import SettingError
 
 COUNT = 8
@@ -51,6 +53,63 @@ def test_mixers_and_cars_are_complete_and_some_chairs_lack_arms_or_back() -> Non
         assert "back" in parts or "arm_left" not in parts
 
 
+def test_vehicles_have_a_body_and_wheels_and_mostly_what_is_set_into_them() -> None:
+    vehicles = family("vehicles", 24, seed=0)
+    for shape in vehicles:
+        assert {"body", *WHEELS} <= set(shape.parts)
+        for pair in ("windows", "mirror"):
+            assert (f"{pair}_left" in shape.parts) == (f"{pair}_right" in shape.parts)
+    for part in vehicle_fittings.PARTS:
+        having = sum(part in shape.parts for shape in vehicles)
+        assert 0.5 * len(vehicles) <= having < len(vehicles), part
+    assert any(set(shape.parts) == {"body", *WHEELS} for shape in vehicles)
+    # from sports cars to box vans: width and height as shares of the length
+    sizes = np.array([shape.whole.extents for shape in vehicles])
+    assert np.ptp(sizes[:, 0] / sizes[:, 1]) > 0.1
+    assert (sizes[:, 2] / sizes[:, 1]).min() < 0.3
+    assert (sizes[:, 2] / sizes[:, 1]).max() > 0.45
+
+
+def test_pairs_are_mirror_images(made: dict[str, list[FamilyShape]]) -> None:
+    """Left is the driver's in vehicles, and the left of who stands before a car."""
+    for shape in [*made["vehicles"], *made["cars"]]:
+        driver = 1 if shape.name.startswith("vehicle") else -1
+        for name, left in shape.parts.items():
+            if "_left" not in name:
+                continue
+            right = shape.parts[name.replace("left", "right")]
+            assert left.bounds[:, 0].mean() * driver > 0
+            np.testing.assert_allclose(left.bounds[:, 0], right.bounds[::-1, 0] * -1, atol=0.05)
+            np.testing.assert_allclose(left.bounds[:, 1:], right.bounds[:, 1:], atol=0.05)
+            assert left.volume == pytest.approx(right.volume, rel=5e-3)
+
+
+def test_panes_are_glass_that_the_whole_shows(made: dict[str, list[FamilyShape]]) -> None:
+    """Seen from ahead or behind, the first thing in the middle of the pane is the glass."""
+    seen = 0
+    for shape in made["vehicles"]:
+        for name in sorted({"windscreen", "window_back"} & set(shape.parts)):
+            glass = shape.parts[name]
+            assert 1.5 < 2 * glass.volume / glass.area < 4.0  # cm thick
+            ahead = -1.0 if name == "windscreen" else 1.0
+            ray = trimesh.ray.ray_triangle.RayMeshIntersector(shape.whole)
+            middle = glass.bounds.mean(axis=0)
+            start = np.array([[0.0, ahead * 1000, middle[2]]])
+            hit = ray.intersects_location(start, [[0, -ahead, 0]], multiple_hits=False)[0]
+            own = trimesh.proximity.ProximityQuery(glass).on_surface(hit)[1]
+            assert own[0] < 1e-3, (shape.name, name)  # the whole shows the glass
+            seen += 1
+    assert seen >= COUNT
+
+
+def test_the_whole_which_is_one_body_shows_every_part(made: dict[str, list[FamilyShape]]) -> None:
+    """So all hang together: what floats would be a splinter, which the whole goes without."""
+    for shape in made["vehicles"]:
+        corners = cKDTree(shape.whole.vertices)
+        for name, part in shape.parts.items():
+            assert corners.query(part.vertices)[0].min() < 1e-3, (shape.name, name)
+
+
 def test_a_mixer_is_hollow_from_end_to_end(made: dict[str, list[FamilyShape]]) -> None:
     for shape in made["mixers"]:
         tube = shape.parts["tube"]
@@ -61,11 +120,10 @@ def test_a_mixer_is_hollow_from_end_to_end(made: dict[str, list[FamilyShape]]) -
 
 def test_wheel_wells_follow_the_wheels(made: dict[str, list[FamilyShape]]) -> None:
     """No wheel comes nearer to the body than the well's gap, axles aside; all stand on the ground."""
-    for shape in made["cars"]:
+    for shape in [*made["cars"], *made["vehicles"]]:
         body = trimesh.proximity.ProximityQuery(shape.parts["body"])
-        for name, wheel in shape.parts.items():
-            if name == "body":
-                continue
+        for name in WHEELS:
+            wheel = shape.parts[name]
             low, high = wheel.bounds
             assert low[2] == pytest.approx(0, abs=1e-3)
             radius = (high[2] - low[2]) / 2
@@ -95,7 +153,7 @@ def test_shapes_vary(made: dict[str, list[FamilyShape]]) -> None:
 
 
 def test_unknown_names_and_empty_families_are_refused() -> None:
-    with pytest.raises(SettingError, match=r"no family is called 'boats'.*mixers, chairs, cars"):
+    with pytest.raises(SettingError, match=r"no family is called 'boats'.*mixers, chairs, cars, vehicles"):
         pw.datasets.family("boats", 3, 0)
     with pytest.raises(SettingError, match="0 shapes"):
         pw.datasets.family("cars", 0, 0)

@@ -239,7 +239,7 @@ def test_impossible_places_and_numbers(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(FamilyError, match="holds no shapes"):
         prepare(tmp_path / "empty", tmp_path / "out")
-    with pytest.raises(FamilyError, match="neither a folder nor one of mixers, chairs, cars"):
+    with pytest.raises(FamilyError, match="neither a folder nor one of mixers, chairs, cars, vehicles"):
         prepare(tmp_path / "nowhere", tmp_path / "out")
     with pytest.raises(SettingError, match="10 samples"):
         prepare("chairs", tmp_path / "out", samples=10)

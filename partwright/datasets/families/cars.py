@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.datasets.making import AROUND, Point, bar, rod
+from partwright.datasets.families import car_shapes
+from partwright.datasets.making import bar
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-WHEELS = ("wheel_front_left", "wheel_front_right", "wheel_back_left", "wheel_back_right")
-PARTS = ("body", *WHEELS)
+PARTS = ("body", *car_shapes.WHEELS)
 
 
 @dataclass(frozen=True)
@@ -51,45 +51,15 @@ def make(rng: np.random.Generator) -> dict[str, Manifold]:
     broad = rng.uniform(18, 26)
     clearance = rng.uniform(0.5, 0.7) * radius
     front, back = -length * rng.uniform(0.29, 0.33), length * rng.uniform(0.26, 0.32)
-    x = width / 2 - broad * rng.uniform(0.5, 0.65)
+    out = width / 2 - broad * rng.uniform(0.5, 0.65)
 
-    wheel = _wheel(rng, radius, broad)
-    axle = rod(broad, radius * 0.28).rotate((0, 90, 0)).translate((-0.95 * broad, 0, 0))
-    gap = rng.uniform(1.08, 1.2)
-    well = rod(200, radius * gap, radius * gap).rotate((0, 90, 0)).translate((-0.75 * broad, 0, 0))
+    wheel = car_shapes.wheel(rng, radius, broad, shoulder=(0.15, 0.3), rim=(0.55, 0.7))
+    places = car_shapes.Places(front, back, out, mirrored="left")
+    wells, wheels = car_shapes.on_axles(wheel, radius, broad, rng.uniform(1.08, 1.2), places)
     body = _body(rng, style, length, width, clearance, floor=2.25 * radius)
-    wells, wheels = [], {}
-    for name, y in zip(WHEELS, (front, front, back, back), strict=True):
-        place = (x, y, radius)
-        turned = [solid.translate(place) for solid in (well, wheel + axle)]
-        if "left" in name:
-            turned = [solid.mirror((1, 0, 0)) for solid in turned]
-        wells.append(turned[0])
-        wheels[name] = turned[1]
     for well in wells:
         body = body - well
     return {"body": body, **wheels}
-
-
-def _wheel(rng: np.random.Generator, radius: float, broad: float) -> Manifold:
-    """Around x, its outer side at x > 0: a tyre with round shoulders, a dish in it, perhaps spokes."""
-    from manifold3d import CrossSection, JoinType, Manifold
-
-    shoulder = broad * rng.uniform(0.15, 0.3)
-    flat = CrossSection.square((radius - shoulder, broad - 2 * shoulder)).translate((0, shoulder - broad / 2))
-    section = flat.offset(shoulder, JoinType.Round, circular_segments=16) ^ CrossSection.square(
-        (radius, broad)
-    ).translate((0, -broad / 2))
-    tyre = Manifold.revolve(section, AROUND)
-    rim, deep = radius * rng.uniform(0.55, 0.7), broad * rng.uniform(0.12, 0.3)
-    dish = rod(broad, rim).translate((0, 0, broad / 2 - deep))
-    hub = rod(broad / 2 - deep * 0.3, rim * 0.28)
-    spokes = int(rng.choice([0, 5, 6, 8]))
-    wheel = tyre - dish + hub
-    for number in range(spokes):
-        spoke = bar(rim * 1.02, rim * 0.24, deep * 0.8).translate((rim * 0.51, 0, broad / 2 - deep * 0.65))
-        wheel = wheel + spoke.rotate((0, 0, 360 * number / spokes))
-    return wheel.rotate((0, 90, 0))
 
 
 def _body(
@@ -104,15 +74,9 @@ def _body(
     edge = rng.uniform(7, 13)
     half = width / 2
     snout, rump = half * rng.uniform(0.72, 0.88), half * rng.uniform(0.82, 0.94)
-    low = clearance + edge
 
     def slab(*points: tuple[float, float, float]) -> Manifold:
-        """Hull of balls whose tops reach (share of the length, half width, height), on both sides."""
-        places: list[Point] = []
-        for share, wide, z in points:
-            y = float(np.clip((share - 0.5) * length, edge - length / 2, length / 2 - edge))
-            places += [(wide - edge, y, max(z - edge, low)), (edge - wide, y, max(z - edge, low))]
-        return _hull(places, edge)
+        return car_shapes.slab(length, edge, clearance, points)
 
     screen, window = (style.screen, half, bonnet), (style.window, half, shoulder)
     flanks = [(0.1, half, 0), (0.9, half, 0)]
@@ -139,10 +103,3 @@ def _body(
         bed = bar(2 * rump - 18, end - start, 2 * (shoulder - floor))
         body = body - bed.translate((0, (start + end) / 2, shoulder))
     return body
-
-
-def _hull(places: list[Point], radius: float) -> Manifold:
-    from manifold3d import Manifold
-
-    ball = Manifold.sphere(radius, AROUND // 2)
-    return Manifold.batch_hull([ball.translate(place) for place in places])
