@@ -180,13 +180,19 @@ def _solved(fit: PrimitiveFit, canonical: Array, residual: Array, weight: Array)
     from scipy.spatial.transform import Rotation
 
     arm = (canonical * fit.scale) @ fit.rotation.T
-    columns = [np.broadcast_to(axis, arm.shape) for axis in np.eye(3)]
-    columns += [np.cross(axis, arm) for axis in np.eye(3)]
-    grow = [canonical[:, i, None] * fit.rotation[:, i] for i in range(3)]
-    columns += grow if fit.kind == CUBOID else [grow[0] + grow[1], grow[2]]
-    jacobian = np.stack(columns, axis=-1).reshape(-1, len(columns))
-    weighted = (jacobian * np.repeat(weight, 3)[:, None]).T
-    normal = weighted @ jacobian
+    columns = 9 if fit.kind == CUBOID else 8
+    jacobian = np.zeros((len(arm), 3, columns))
+    jacobian[:, (0, 1, 2), (0, 1, 2)] = 1.0
+    for axis in range(3):  # the unit vector along it, cross the arm
+        after, last = (axis + 1) % 3, (axis + 2) % 3
+        jacobian[:, after, 3 + axis] = -arm[:, last]
+        jacobian[:, last, 3 + axis] = arm[:, after]
+    own = (6, 7, 8) if fit.kind == CUBOID else (6, 6, 7)  # a cylinder's radius grows along two axes
+    for axis, column in enumerate(own):
+        jacobian[:, :, column] += canonical[:, axis, None] * fit.rotation[:, axis]
+    rows = jacobian.reshape(-1, columns)
+    weighted = (rows * np.repeat(weight, 3)[:, None]).T
+    normal = weighted @ rows
     # A cylinder's turn about its axis moves nothing; a little damping keeps the system solvable.
     normal[np.diag_indices(len(normal))] += 1e-9
     step = np.linalg.solve(normal, weighted @ residual.ravel())
