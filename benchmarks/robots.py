@@ -21,10 +21,16 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from partwright.robots import CollideOptions, collide, open_robot, save
+from partwright.robots.containment import shape_solid
+from partwright.robots.model import Link, Shape
 from partwright.robots.overlaps import overlaps
 from partwright.robots.solids import Solids, largest_deviation, surface_of
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
 
 TARGET = Path(__file__).parent / "results" / "robots.md"
 STEPS = 500
@@ -69,6 +75,14 @@ def simulated(path: Path) -> tuple[float, float]:
     return 1e6 * (time.process_time() - start) / STEPS, contacts / STEPS
 
 
+def with_natives(link: Link, *solids: Manifold) -> Manifold:
+    """Solids of a link and those that it has natively, at rest."""
+    from manifold3d import Manifold, OpType
+
+    own = [shape_solid(Shape("", part)) for part in link.natives]
+    return Manifold.batch_boolean([*solids, *own], OpType.Add).transform(link.pose[:3])
+
+
 def decomposed(name: str, path: Path) -> Row:
     """Each link's collision meshes, closed as `collide` closes them, by CoACD."""
     import coacd
@@ -76,7 +90,7 @@ def decomposed(name: str, path: Path) -> Row:
     from manifold3d import Manifold, OpType
 
     coacd.set_log_level("error")
-    solids, seconds, hulls = Solids(), 0.0, 0
+    solids, seconds, hulls, links = Solids(), 0.0, 0, 0
     own = missing = extra = deviation = 0.0
     bodies: dict[str, tuple[Manifold, Manifold]] = {}
     for link in (link for link in open_robot(path).links if link.collisions):
@@ -85,16 +99,19 @@ def decomposed(name: str, path: Path) -> Row:
         pieces = coacd.run_coacd(coacd.Mesh(*surface_of(solid)))
         seconds += time.process_time() - start
         hulls += len(pieces)
+        links += 1
         convex = [Manifold.hull_points(trimesh.Trimesh(*piece).vertices) for piece in pieces]
         union = Manifold.batch_boolean(convex, OpType.Add)
         own += solid.volume()
         missing += (solid - union).volume()
         extra += (union - solid).volume()
         deviation = max(deviation, largest_deviation(solid, union))
-        bodies[link.name] = solid.transform(link.pose[:3]), union.transform(link.pose[:3])
+        bodies[link.name] = with_natives(link, solid), with_natives(link, union)
+    for link in (link for link in open_robot(path).links if link.natives and link.name not in bodies):
+        bodies[link.name] = with_natives(link), with_natives(link)
     pairs = [len(overlaps({name: both[i] for name, both in bodies.items()})) for i in (0, 1)]
     return Row(
-        name, COACD, len(bodies), 0, hulls, missing / own, extra / own, deviation, None,
+        name, COACD, links, 0, hulls, missing / own, extra / own, deviation, None,
         (pairs[0], pairs[1]), None, None, seconds,
     )  # fmt: skip
 
@@ -137,8 +154,9 @@ def document(rows: list[Row]) -> str:
         f"`python benchmarks/robots.py`; {os.cpu_count()} cores. Missing and extra: volume that the shapes",
         "lack and add, in % of the links' meshes (enclose: of the visual ones). Contained: links of whose",
         "visual mesh no corner and none of 100,000 fresh points is outside. Pairs: links that share volume,",
-        f"with the meshes and with the shapes. Step and contacts: MuJoCo's, means of {STEPS} steps, with the",
-        "shapes and with the hulls of the meshes. Seconds are CPU seconds, CoACD's without reading meshes.",
+        "with the meshes and with the shapes, native solids included. Step and contacts: MuJoCo's, means of",
+        f"{STEPS} steps, with the shapes and with the hulls of the meshes. Seconds are CPU seconds, CoACD's",
+        "without reading meshes.",
         "",
         "| robot | way | links | native | hulls | missing % | extra % | deviation mm | contained | pairs "
         "| step us | contacts | seconds |",
