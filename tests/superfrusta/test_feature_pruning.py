@@ -49,3 +49,17 @@ def test_what_is_vain_goes_and_what_is_far_stays(search: FeatureSearch) -> None:
 def test_a_base_alone_stays(search: FeatureSearch) -> None:
     assert len(pruned(search, tree(search, (PLATE, True))).features) == 1
     assert len(pruned(search, tree(search, (PLATE, True), (HOLE, False))).features) == 2
+
+
+@pytest.mark.parametrize(("share", "stays"), [(1.5, False), (2.5, True)])
+def test_a_feature_has_to_explain_twice_its_price(share: float, stays: bool) -> None:
+    pad = Part(Box((0.6, 0.6, 0.03)), (0.2, 0.0, 0.155))  # too flat to be far off without it
+    settings = Settings.for_quality("draft")
+    shape = pw.load_shape(mesh_assembly(Assembly((PLATE, pad))))
+    samples = FitSamples.of(shape, settings)
+    any_price = FeatureSearch(shape, samples, settings.alpha)
+    whole = tree(any_price, (PLATE, True), (pad, True))
+    gain = whole.score - tree(any_price, (PLATE, True)).score
+    assert gain > 0
+    given = FeatureSearch(shape, samples, gain / share)
+    assert len(pruned(given, tree(given, (PLATE, True), (pad, True))).features) == 1 + stays
