@@ -106,6 +106,7 @@ TABLES = (
           "--shapes {data} --names cad/bdw_weld_neck_flange,cad/ttt_corner_tie,cad/prusa_y_rod_holder,"
           "cad/f360_clamp_block --unit mm --method solids --clean --rows build/collision-cad.jsonl "
           "--target benchmarks/results/collision-cad.md", 10),
+    Table("ring_bound.md", "ring_bound.py", None, 0, "--shape {data}/toys/mug.ply", 1),
     Table("robots.md", "robots.py", "hinge=examples/shapes/hinge.urdf --rows robots.jsonl --ways nearest", 1,
           None, 0, "robots of packages on PyPI, which the script names"),
     Table("optimise.md", "optimise.py", None, 0,
