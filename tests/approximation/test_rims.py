@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from partwright.approximation.sketches.candidates import candidates
-from partwright.approximation.sketches.rims import SHARP, Leaning, measured_rims, rimmed_body
+from partwright.approximation.sketches.rims import SHARP, Leaning, bottom_rim, rimmed_body, top_rim
 from partwright.fields import Box, Extrusion, Profile
 from partwright.fields.profile import circle
 from partwright.fields.rims import Rim
@@ -20,7 +20,8 @@ BRACKET = Profile([(0, 0), (1, 0), (1, 0.4), (0.5, 0.4, -0.4142), (0.4, 0.5), (0
 def measured(field: Extrusion, profile: Profile, tolerance: float) -> tuple[Rim, Rim]:
     mesh = extruded(field, tolerance).to_mesh64()
     faces = Leaning.of(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
-    return measured_rims(faces, profile, -field.height / 2, field.height / 2)
+    half = field.height / 2
+    return bottom_rim(faces, profile, -half), top_rim(faces, profile, half)
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4], ids=["three chords", "six", "many"])

@@ -13,7 +13,7 @@ from manifold3d import CrossSection, Manifold
 from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.candidate import Candidate, posed
 from partwright.approximation.sketches.holes import hole_parts
-from partwright.approximation.sketches.rims import SHARP, limited, measured_rims, rimmed_body
+from partwright.approximation.sketches.rims import SHARP, bottom_rim, limited, rimmed_body, top_rim
 from partwright.approximation.sketches.sections import Region, View, profile_of
 from partwright.approximation.sketches.turned import turned
 from partwright.errors import ParameterError
@@ -131,8 +131,10 @@ def _rounded(
     for section, profile in _outlines(region, holes):
         if profile is None:
             continue
-        for low, high in product(lows, highs):
-            bottom, top = limited(measured_rims(view.leaning, profile, low, high), profile)
+        bottoms = [(low, bottom_rim(view.leaning, profile, low)) for low in lows]
+        tops = [(high, top_rim(view.leaning, profile, high)) for high in highs]
+        for (low, under), (high, over) in product(bottoms, tops):
+            bottom, top = limited((under, over), profile)
             further = (lows[0] - low, high - highs[0])
             if all(rim.depth >= _ALL_RIM * more for rim, more in zip((bottom, top), further, strict=True)):
                 rimmed = _with_rims(section, profile, view.frame, low, high, (bottom, top))

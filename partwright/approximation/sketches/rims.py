@@ -44,12 +44,14 @@ class Leaning(NamedTuple):
         return cls(corners[leans], area[leans], upwards[leans])
 
 
-def measured_rims(faces: Leaning, profile: Profile, low: float, high: float) -> tuple[Rim, Rim]:
-    """Of the bottom and the top of a profile extruded from one height to another; unit lengths."""
-    heights = faces.corners[..., 2]
-    return _rim(faces, heights - low, -faces.upwards, profile), _rim(
-        faces, high - heights, faces.upwards, profile
-    )
+def bottom_rim(faces: Leaning, profile: Profile, low: float) -> Rim:
+    """Of a profile extruded from a height on, however far."""
+    return _rim(faces, faces.corners[..., 2] - low, -faces.upwards, profile)
+
+
+def top_rim(faces: Leaning, profile: Profile, high: float) -> Rim:
+    """Of a profile extruded to a height, from wherever."""
+    return _rim(faces, high - faces.corners[..., 2], faces.upwards, profile)
 
 
 def _rim(faces: Leaning, off: np.ndarray, facing: np.ndarray, profile: Profile) -> Rim:
