@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.fields.columns import Column
 from partwright.superfrusta.objective import removal_scores, score
 from partwright.superfrusta.refining import TOUCH_UP, refine
 from partwright.superfrusta.samples import FitSamples, Rows
@@ -19,7 +20,7 @@ def prune(samples: FitSamples, rows: Rows, alpha: float, locked: int = 0) -> Row
     """Removes parts one by one while the objective R - alpha * parts does not fall (section 3.4, Pruning)."""
     while len(rows) > max(1, locked):
         without, whole = removal_scores(samples, rows)
-        without[:locked] = -np.inf
+        without[~_removable(rows, locked)] = -np.inf
         worst = int(without.argmax())
         if without[worst] + alpha < whole:
             break
@@ -30,7 +31,7 @@ def prune(samples: FitSamples, rows: Rows, alpha: float, locked: int = 0) -> Row
 def drop_least(samples: FitSamples, rows: Rows, locked: int = 0) -> Rows:
     """The assembly without the part that R misses least."""
     without, _ = removal_scores(samples, rows)
-    without[:locked] = -np.inf
+    without[~_removable(rows, locked)] = -np.inf
     return np.delete(rows, int(without.argmax()), axis=0)
 
 
@@ -46,7 +47,7 @@ def cheapest_removal(
     Returns it with its measure, and the R of the assembly as given. `settings.trials` parts are tried.
     """
     without, whole = removal_scores(samples, rows)
-    without[:locked] = -np.inf
+    without[~_removable(rows, locked)] = -np.inf
     best: tuple[Rows, float] | None = None
     for index in np.argsort(-without, kind="stable")[: settings.trials]:
         if not np.isfinite(without[index]):
@@ -62,6 +63,13 @@ def cheapest_removal(
     if best is None:
         return rows, whole, whole
     return best[0], best[1], whole
+
+
+def _removable(rows: Rows, locked: int) -> NDArray[np.bool_]:
+    """Parts (M,) that are not locked, and not the only one from which others are subtracted."""
+    added = rows[:, Column.SIGN] > 0
+    free = np.arange(len(rows)) >= locked
+    return free & ~(added & (np.count_nonzero(added) == 1) & (len(rows) > 1))
 
 
 def neighbours(samples: FitSamples, rows: Rows, index: int) -> NDArray[np.bool_]:

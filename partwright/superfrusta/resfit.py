@@ -17,7 +17,8 @@ from partwright.assembly import Assembly
 from partwright.errors import CancelledError
 from partwright.methods import Outcome, Progress, timed
 from partwright.shapes import Shape
-from partwright.superfrusta.growing import grow
+from partwright.superfrusta.growing import carve, grow
+from partwright.superfrusta.hollows import with_hollows_filled
 from partwright.superfrusta.hull_start import convex_hull_start
 from partwright.superfrusta.mending import Mending
 from partwright.superfrusta.merging import cheapest_merger, merge
@@ -118,10 +119,12 @@ class ResidualFit:
         return converged
 
     def opening(self) -> Rows:
-        """A few rounds from nothing and from a body to carve from; whichever gets further."""
+        """A few rounds from nothing and from bodies to carve from; whichever gets furthest."""
         brief = replace(self.settings, rounds=min(_OPENING, self.settings.rounds))
         tried: list[Rows] = []
-        for start in (NOTHING, convex_hull_start(self.samples, self.settings)):
+        for start in (NOTHING, convex_hull_start(self.samples, self.settings), self.hollowed(brief)):
+            if tried and not len(start):
+                continue
             opening = ResidualFit(
                 self.samples, brief, locked=self.locked, number=self.number, seconds=self.seconds
             )
@@ -136,14 +139,30 @@ class ResidualFit:
                 tried.append(opening.best)
         return max(tried, key=self.objective) if tried else NOTHING
 
+    def hollowed(self, settings: Settings) -> Rows:
+        """The body that fits the shape with its hollows filled, and what is taken out of it; nothing where
+        there are none."""
+        filled = with_hollows_filled(self.samples)
+        if filled is None:
+            return NOTHING
+        plain = replace(settings, subtract=False, rounds=min(_OPENING, settings.rounds))
+        full = ResidualFit(filled, plain, seconds=self.seconds)
+        full.growth(NOTHING)
+        if full.best is None:
+            return NOTHING
+        body = full.thinning(full.best)
+        with self.timed("grow"):
+            cuts = carve(self.samples, body, settings, settings.regions)
+        return cuts.joined(body, 0)
+
     @property
     def may_carve(self) -> bool:
         settings = self.settings
         return settings.subtract is None and settings.carving and settings.rounds >= _ROUNDS_BEHIND
 
     def carved(self) -> bool:
-        """An attempt with parts to subtract, where the shape may have holes or be hollow; says whether the
-        growth of what is kept converged.
+        """An attempt with parts to subtract, where the shape may have holes or be hollow, from the body that
+        is hollowed out if there is one; says whether the growth of what is kept converged.
 
         What it makes of other shapes is worse or takes more parts, and is left as soon as that shows.
         """
@@ -152,12 +171,14 @@ class ResidualFit:
         usual = self.best_objective + (settings.price - Settings().alpha) * len(self.best)
         if usual > _GOOD or not self.may_carve:
             return True
-        self.settings = replace(settings, subtract=True, regions=max(1, settings.regions - 2))
+        carving = replace(settings, subtract=True, regions=max(1, settings.regions - 2))
+        start = self.hollowed(carving)
+        self.settings = carving
         self.number = settings.attempts
         self.rival = self.best_objective + _WORTH_CUTS
         whole, converged = self.best, True
         try:
-            converged = self.attempt(NOTHING)
+            converged = self.attempt(start)
         finally:
             if self.best_objective < self.rival:
                 self.best = None
