@@ -51,7 +51,7 @@ class ResidualFit:
     `locked` never change.
 
     report: told of each step. assembled: makes the assembly of rows. number: of the attempt, from 0.
-    rival: the objective that an attempt to carve must reach to be kept.
+    rival: the objective that an attempt to carve must reach to be kept. furthest: that progress was told.
     """
 
     samples: FitSamples
@@ -64,6 +64,7 @@ class ResidualFit:
     best: Rows | None = None
     best_objective: float = -np.inf
     rival: float | None = None
+    furthest: float = 0.0
     earlier: Rows | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
@@ -161,21 +162,31 @@ class ResidualFit:
         return settings.subtract is None and settings.carving and settings.rounds >= _ROUNDS_BEHIND
 
     def carved(self) -> bool:
-        """An attempt with parts to subtract, where the shape may have holes or be hollow, from the body that
-        is hollowed out if there is one; says whether the growth of what is kept converged.
+        """Attempts with parts to subtract, where the shape may have holes or be hollow: from nothing, and
+        from the body that is hollowed out; says whether the growth of what is kept converged.
 
-        What it makes of other shapes is worse or takes more parts, and is left as soon as that shows.
+        What they make of other shapes is worse or takes more parts, and is left as soon as that shows.
         """
-        assert self.best is not None
-        settings = self.settings
-        usual = self.best_objective + (settings.price - Settings().alpha) * len(self.best)
-        if usual > _GOOD or not self.may_carve:
+        if not self.may_carve:
             return True
+        settings, converged = self.settings, True
         carving = replace(settings, subtract=True, regions=max(1, settings.regions - 2))
-        start = self.hollowed(carving)
-        self.settings = carving
+        for hollow in (False, True):
+            assert self.best is not None
+            usual = self.best_objective + (settings.price - Settings().alpha) * len(self.best)
+            if usual > _GOOD:
+                break
+            start = self.hollowed(carving) if hollow else NOTHING
+            if len(start) or not hollow:
+                converged = self.carved_from(start, carving) and converged
+        return converged
+
+    def carved_from(self, start: Rows, carving: Settings) -> bool:
+        """One such attempt, kept if it is clearly better; says whether the growth of what is kept
+        converged."""
+        settings, self.settings = self.settings, carving
         self.number = settings.attempts
-        self.rival = self.best_objective + _WORTH_CUTS
+        self.rival = self.best_objective + (0.0 if settings.subtract else _WORTH_CUTS)
         whole, converged = self.best, True
         try:
             converged = self.attempt(start)
@@ -366,8 +377,9 @@ class ResidualFit:
         entry: dict[str, float | str] = {"stage": stage, "round": round_, "parts": parts}
         self.history.append(entry | {"score": reached, "iou": iou})
         if self.report is not None:
+            self.furthest = max(self.furthest, fraction)
             best = partial(self.assembled, self.best) if self.assembled and self.best is not None else None
-            self.report(Progress(stage, round_, self.settings.rounds, parts, iou, fraction, best))
+            self.report(Progress(stage, round_, self.settings.rounds, parts, iou, self.furthest, best))
         if self.checkpoint is not None:
             self.checkpoint()
 
