@@ -3,7 +3,8 @@
     python benchmarks/textures.py --shapes FOLDER --output benchmarks/results/textures.md
 
 Each shape is fitted, its colours are baked into maps of 128 texels a side, and both are seen without light,
-by the same rays. PSNR is of all pixels ("picture": outlines count) and of those where both are met
+by the same rays, from other sides than those that maps are optimised for. "Not optimised" are means of what
+is nearest to the surface. PSNR is of all pixels ("picture": outlines count) and of those where both are met
 ("surface": colours alone). Then GLB as it is exported and read again, part by part and as the one surface of
 all parts (--joined). For comparison, the part's mean colour instead of its map. Three shapes have textures of
 their own, three are painted here: bands and blots that are functions of the place.
@@ -22,73 +23,23 @@ import numpy as np
 import trimesh
 
 import partwright as pw
-from partwright.assembly import Assembly, Similarity
+from partwright.assembly import Assembly
 from partwright.export import export
 from partwright.meshing import mesh_assembly
-from partwright.render.camera import Camera, View
+from partwright.render.camera import View
 from partwright.render.raycast import Scene
 from partwright.textures import Colours, bake, load_colours, part_map
+from partwright.textures.likeness import SIDE, VIEWS, around, map_colours, picture, psnr, seen
 
 NAMES = ("dirty/Duck.glb", "dirty/CesiumMilkTruck.glb", "dirty/fuze.obj")
 PAINTED = ("toys/mug.ply", "toys/penguin.ply", "toys/ycb_mustard_bottle.ply")
 FINE = 1 / 150  # of the longest side: edges of painted shapes
-SIZE = 512
-VIEWS = 8
-
-
-def views(shape: Any) -> list[View]:
-    """Eight around the shape, from a little above and below in turn."""
-    cameras = [
-        Camera(azimuth=360 * i / VIEWS, elevation=25 if i % 2 == 0 else -10, up=shape.up or "y")
-        for i in range(VIEWS)
-    ]
-    return [camera.fitted(shape.vertices, SIZE, SIZE) for camera in cameras]
-
-
-def seen(scene: Scene, view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Pixels that meet the scene, faces, barycentric weights (N, 3) and places."""
-    rays = view.rays(SIZE, SIZE)
-    face, distance, uv = scene.first_hit(np.broadcast_to(view.eye, rays.shape), rays)
-    pixel = np.flatnonzero(face >= 0)
-    u, v = uv[pixel].T
-    return (
-        pixel,
-        face[pixel],
-        np.stack([1 - u - v, u, v], axis=1),
-        view.eye + distance[pixel, None] * rays[pixel],
-    )
-
-
-def picture(pixel: np.ndarray, colours: np.ndarray) -> np.ndarray:
-    result = np.full((SIZE * SIZE, 3), 255.0)
-    result[pixel] = colours
-    return result
-
-
-def map_colours(assembly: Assembly, points: np.ndarray) -> np.ndarray:
-    owner = np.abs(assembly.part_distances(points)).argmin(axis=0)
-    result = np.zeros((len(points), 3))
-    for i, part in enumerate(assembly.parts):
-        mine = np.flatnonzero(owner == i)
-        texture = part_map(part)
-        if not len(mine) or texture is None:
-            continue
-        own = [Similarity(1.0, c.rotation, c.translation).inverse()(points[mine]) for c in part.copies]
-        off = [np.abs(part.field(one.astype(np.float32))) for one in own]
-        local = np.stack(own)[np.argmin(off, axis=0), np.arange(len(mine))]
-        result[mine] = texture.at(part.field, local)
-    return result
 
 
 def mean_colours(assembly: Assembly, points: np.ndarray) -> np.ndarray:
     owner = np.abs(assembly.part_distances(points)).argmin(axis=0)
     means = [t.image.mean(axis=(0, 1)) if (t := part_map(part)) else np.zeros(3) for part in assembly.parts]
     return np.array(means)[owner]
-
-
-def psnr(a: np.ndarray, b: np.ndarray) -> float:
-    error = float(((a - b) ** 2).mean())
-    return 10 * np.log10(255**2 / max(error, 1e-9))
 
 
 def painted(path: Path, folder: Path) -> Path:
@@ -128,11 +79,11 @@ def write_pictures(shapes: Path, quality: str, size: int, path: Path) -> None:
     rows = []
     for name, edit in ((NAMES[0], _bent), (NAMES[2], _squared)):
         shape, colours, _, baked, _ = fitted(shapes / name, quality, size)
-        view = views(shape)[0]
+        view = around(shape.vertices, shape.up)[0]
         pixel, face, weights, _ = seen(Scene(colours.vertices, colours.faces), view)
         row = [picture(pixel, colours.on_faces(face, weights))]
         row += [picture_of(one, view) for one in (baked, edit(baked))]
-        rows.append(np.concatenate([one.reshape(SIZE, SIZE, 3) for one in row], axis=1))
+        rows.append(np.concatenate([one.reshape(SIDE, SIDE, 3) for one in row], axis=1))
     image = Image.fromarray(np.concatenate(rows).clip(0, 255).round().astype(np.uint8))
     path.parent.mkdir(parents=True, exist_ok=True)
     image.resize((image.width * 5 // 8, image.height * 5 // 8), Image.Resampling.LANCZOS).save(
@@ -164,7 +115,16 @@ def measured(path: Path, name: str, quality: str, size: int) -> list[str]:
     truth = Scene(colours.vertices, colours.faces)
     mesh = mesh_assembly(baked)
     parts = Scene(mesh.vertices, mesh.faces)
-    exported, took = {}, {"maps": f"{seconds[0]:.0f} + {seconds[1]:.1f}"}
+    start = time.process_time()
+    plain = bake(result.assembly, colours, size, optimise=False)
+    plainly = time.process_time() - start
+    exported, took = (
+        {},
+        {
+            "maps": f"{seconds[0]:.0f} + {seconds[1]:.1f}",
+            "maps, not optimised": f"{plainly:.1f}",
+        },
+    )
     for kind, options in (("GLB", {}), ("GLB, joined", {"joined": True})):
         with tempfile.TemporaryDirectory() as folder:
             start = time.process_time()
@@ -173,11 +133,12 @@ def measured(path: Path, name: str, quality: str, size: int) -> list[str]:
             glb = load_colours(Path(folder) / "a.glb")
         exported[kind] = glb, Scene(glb.vertices, glb.faces)
     scores: dict[str, list[tuple[float, float]]] = {}
-    for view in views(shape):
+    for view in around(shape.vertices, shape.up):
         pixel, face, weights, _ = seen(truth, view)
         want = picture(pixel, colours.on_faces(face, weights))
         own, _, _, places = seen(parts, view)
         found = {"maps": (own, map_colours(baked, places))}
+        found["maps, not optimised"] = (own, map_colours(plain, places))
         for kind, (glb, scene) in exported.items():
             at, face, weights, _ = seen(scene, view)
             found[kind] = (at, glb.on_faces(face, weights))
@@ -218,7 +179,7 @@ def main() -> None:
     lines = [
         "# Colours in maps of parts",
         "",
-        f"Made by `{command}`: {VIEWS} views of {SIZE} x {SIZE} pixels without light, maps of "
+        f"Made by `{command}`: {VIEWS} views of {SIDE} x {SIDE} pixels without light, maps of "
         f"{arguments.size} texels a side, quality {arguments.quality}. Painted: colours that are functions",
         "of the place, made here. Seconds are CPU seconds: of the fit and the maps, and of the export.",
         "",

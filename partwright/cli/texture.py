@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.atomic_io import report_path
 from partwright.cli.outputs import add_output, given
 
 
@@ -14,16 +15,21 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="give an assembly's parts the colours of the shape that they stand for",
         description="Bakes the colours of a mesh (of vertices, faces, materials and their images) into a map "
         "for each part, in the part's own coordinates, so that it stays right when the part is changed. "
-        "Writes the assembly with its maps to FILE (.json); `partwright export` then writes them to GLB "
-        "and HTML.",
+        "The maps are optimised against views from all around. Writes the assembly with its maps to FILE "
+        "(.json), and to FILE.report.json the PSNR of eight other views before and after; `partwright "
+        "export` then writes the maps to GLB, USD, Blender's script and HTML.",
     )
     option = command.add_argument
     option("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
     option("shape", metavar="SHAPE", type=Path, help="a mesh with colours: GLB, glTF, OBJ, PLY or OFF")
-    add_output(command, "FILE", "where to write", reads=_reads, writes=lambda a: [a.output])
+    add_output(command, "FILE", "where to write", reads=_reads, writes=_writes)
     option("--size", metavar="N", type=int, default=128, help="texels a side (default: %(default)s)")
     command.set_defaults(run="texture")
 
 
 def _reads(arguments: argparse.Namespace) -> list[Path]:
     return given(arguments.assembly, arguments.shape)
+
+
+def _writes(arguments: argparse.Namespace) -> list[Path]:
+    return [arguments.output, report_path(arguments.output)]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Part
-from partwright.textures import part_map
+from partwright.textures.maps import part_map
 from partwright.textures.unwrapping import unwrapped
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.assembly import Part
 from partwright.fields import Field, SuperFrustum
 
 Floats = NDArray[np.float64]
@@ -50,6 +51,15 @@ def folded(directions: Floats, sign: Floats | None = None) -> Floats:
     n = directions / np.maximum(np.abs(directions).sum(axis=1, keepdims=True), _LEAST)
     flat = np.where(sign[:, 2:] < 0, (1 - np.abs(n[:, 1::-1])) * sign[:, :2], n[:, :2])
     return np.asarray(flat / 2 + 0.5)
+
+
+def of_nearest_copy(part: Part, points: Floats) -> Floats:
+    """Points (N, 3) in the frame of the part, or of its copy that is nearest to each."""
+    own = [copy.pose.inverse()(points) for copy in part.copies]
+    if len(own) == 1:
+        return np.asarray(own[0])
+    off = [np.abs(part.field(np.ascontiguousarray(one, np.float32))) for one in own]
+    return np.asarray(np.stack(own)[np.argmin(off, axis=0), np.arange(len(points))])
 
 
 def _unbent(solid: SuperFrustum, x: Floats, z: Floats) -> tuple[Floats, Floats]:

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import argparse
+import json
+import time
 
+from partwright import __version__
 from partwright.assembly import load_assembly
+from partwright.atomic_io import report_path, write_bytes
 from partwright.cli.terminal import say
 from partwright.errors import UnsupportedFormatError
 from partwright.textures import bake, load_colours
+from partwright.textures.likeness import SIDE, VIEWS, likeness
 from partwright.textures.maps import KEY
 
 
@@ -17,9 +22,27 @@ def run(arguments: argparse.Namespace) -> int:
             f"cannot write the maps to {arguments.output.name}: use a .json, then partwright export"
         )
     assembly = load_assembly(arguments.assembly)
-    baked = bake(assembly, load_colours(arguments.shape), arguments.size)
+    colours = load_colours(arguments.shape)
+    start = time.process_time()
+    baked = bake(assembly, colours, arguments.size)
+    seconds = time.process_time() - start
+    before, after = likeness([bake(assembly, colours, arguments.size, optimise=False), baked], colours)
+    report = {
+        "file": arguments.output.name,
+        "version": __version__,
+        "texels_a_side": arguments.size,
+        "cpu_seconds": round(seconds, 2),
+        "psnr": {"views": VIEWS, "side": SIDE, "before": _told(before), "after": _told(after)},
+    }
     baked.save(arguments.output)
+    write_bytes(report_path(arguments.output), (json.dumps(report, indent=2) + "\n").encode())
     count = sum(KEY in part.metadata for part in baked.parts)
     size = arguments.output.stat().st_size / 1000
-    say(f"wrote {arguments.output}: {len(baked)} parts, {count} with a map, {size:.3g} kB")
+    said = f"wrote {arguments.output}: {len(baked)} parts, {count} with a map, {size:.3g} kB"
+    say(f"{said}; PSNR of {VIEWS} views {after[0]:.1f} dB, {before[0]:.1f} before they were optimised")
     return 0
+
+
+def _told(scores: tuple[float, float]) -> dict[str, float]:
+    """In dB."""
+    return {"pictures": round(scores[0], 2), "surface": round(scores[1], 2)}
