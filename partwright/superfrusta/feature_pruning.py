@@ -10,47 +10,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.meshing.manifolds import surface_of
-from partwright.superfrusta.far_places import Solid
 from partwright.superfrusta.feature_mending import FAR
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
 
-_DEARER = 2.0  # times its price, that a feature has to explain where hardly anything shows without it
-_SHOWS = 0.018  # unit lengths, 1 % of the longest side: a person draws what is as far off without it
 _NEARLY = 0.75  # of `FAR`: beyond edges, the distance of a fold is less than the way to it
 _FURTHER = 1e-3  # unit lengths, by which a place that is far off may be further off
 
 
 def pruned(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
-    """The tree without features that explain less than their price, the vainest first, and without those
-    that explain less than twice as much and hardly show: on the way they might have been needed.
+    """The tree without features that explain less than their price, the vainest first.
 
-    Of the first, none goes without which its own place is far off that was not before; of the second, none
-    without which any point is further off by what shows. What is missed and what is too much are those of
-    the tree as given.
+    None goes without which its own place is far off that was not before. What is missed and what is
+    too much are those of the tree as given.
     """
     if len(tree.features) < 2:
         return tree
     masks = [_mask(feature, search.points) for feature in tree.features]
     kept = list(range(len(tree.features)))
     needed: set[int] = set()
-    shape = Solid(search.body, search.samples.measure)
     score = search.score_of(_fold(tree, masks, kept))
     while True:
         tried = [i for i in kept[1:] if i not in needed and tree.features[i].sides]
         scores = {i: search.score_of(_fold(tree, masks, [k for k in kept if k != i])) for i in tried}
-        prices = {i: search.price(tree.features[i].sides) for i in tried}
-        gains = {i: scores[i] - score + _DEARER * prices[i] for i in tried}
+        gains = {i: scores[i] - score + search.price(tree.features[i].sides) for i in tried}
         vain = max(gains, key=gains.__getitem__, default=None)
         if vain is None or gains[vain] <= 0:
             break
         left = [k for k in kept if k != vain]
         boxes = [copy.bounds() for part in tree.features[vain].parts for copy in part.copies]
-        before, after = _only(tree, kept), _only(tree, left)
-        pays = gains[vain] <= (_DEARER - 1) * prices[vain]
-        if _shows(shape, before, after, boxes) if pays else _is_far(search, before, after, boxes):
+        before, after = (farthest_corner(search, _only(tree, some), boxes) for some in (kept, left))
+        if after > max(_NEARLY * FAR, before + _FURTHER):
             needed.add(vain)
             continue
         kept, score = left, scores[vain]
@@ -70,31 +62,6 @@ def farthest_corner(
     )
     sticking = search.samples.measure(outside).max(initial=0.0)
     return float(max(sticking, tree.distance(missed).max(initial=0.0)))
-
-
-def _is_far(
-    search: FeatureSearch, before: FeatureTree, after: FeatureTree, boxes: Sequence[NDArray[np.float64]]
-) -> bool:
-    off = farthest_corner(search, after, boxes)
-    return off > max(_NEARLY * FAR, farthest_corner(search, before, boxes) + _FURTHER)
-
-
-def _shows(
-    shape: Solid, before: FeatureTree, after: FeatureTree, boxes: Sequence[NDArray[np.float64]]
-) -> bool:
-    """Whether points of the surfaces in one of the boxes (2, 3) are further off than before by what shows:
-    between corners, too, for a groove that is filled has all of its own on the surface or where it was."""
-    old, new = (Solid(tree.body(), tree.distance) for tree in (before, after))
-    for box in boxes:
-        around = np.stack([box[0] - _FURTHER, box[1] + _FURTHER])
-        drawn, left = shape.points(around), new.points(around)
-        if len(drawn) and (new.surface.unsigned(drawn) > old.surface.unsigned(drawn) + _SHOWS).any():
-            return True
-        # What has not moved as far was off before, too.
-        moved = left[old.surface.unsigned(left) > _SHOWS] if len(left) else left
-        if len(moved) and (shape.surface.unsigned(moved) > _SHOWS).any():
-            return True
-    return False
 
 
 def _in_boxes(
