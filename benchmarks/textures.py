@@ -6,8 +6,9 @@ Each shape is fitted, its colours are baked into maps of 128 texels a side, and 
 by the same rays, from other sides than those that maps are optimised for. "Not optimised" are means of what
 is nearest to the surface. PSNR is of all pixels ("picture": outlines count) and of those where both are met
 ("surface": colours alone). Then GLB as it is exported and read again, part by part and as the one surface of
-all parts (--joined). For comparison, the part's mean colour instead of its map. Three shapes have textures of
-their own, three are painted here: bands and blots that are functions of the place.
+all parts (--joined). Normals: the same views of a white surface in light, with smooth parts and with
+normal maps where these pay. For comparison, the part's mean colour instead of its map. Three shapes have
+textures of their own, three are painted here: bands and blots that are functions of the place.
 """
 
 from __future__ import annotations
@@ -29,7 +30,18 @@ from partwright.meshing import mesh_assembly
 from partwright.render.camera import View
 from partwright.render.raycast import Scene
 from partwright.textures import Colours, bake, load_colours, part_map
-from partwright.textures.likeness import SIDE, VIEWS, around, map_colours, picture, psnr, seen
+from partwright.textures.likeness import (
+    SIDE,
+    VIEWS,
+    around,
+    likeness,
+    map_colours,
+    picture,
+    psnr,
+    seen,
+    without_relief,
+)
+from partwright.textures.maps import RELIEF
 
 NAMES = ("dirty/Duck.glb", "dirty/CesiumMilkTruck.glb", "dirty/fuze.obj")
 PAINTED = ("toys/mug.ply", "toys/penguin.ply", "toys/ycb_mustard_bottle.ply")
@@ -153,6 +165,12 @@ def measured(path: Path, name: str, quality: str, size: int) -> list[str]:
         whole, surface = np.mean(values, axis=0)
         head = f"{name} | {len(baked)} | {result.scores.iou:.3f} | {kilobytes:.0f}" if not rows else " | | |"
         rows.append(f"| {head} | {kind} | {whole:.1f} | {surface:.1f} | {took.get(kind, '')} |")
+    bent = [p for p in baked.parts if RELIEF in p.metadata]
+    kilobytes = sum(len(str(p.metadata[RELIEF])) for p in bent) / 1000
+    lit = likeness([without_relief(baked), baked], colours, lit=True)
+    for kind, (whole, surface) in zip(("", f"{kilobytes:.0f}"), lit, strict=True):
+        told = f"{len(bent)} normal maps" if kind else "smooth"
+        rows.append(f"|  | | | {kind} | white in light, {told} | {whole:.1f} | {surface:.1f} |  |")
     return rows
 
 

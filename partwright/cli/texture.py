@@ -14,10 +14,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "texture",
         help="give an assembly's parts the colours of the shape that they stand for",
         description="Bakes the colours of a mesh (of vertices, faces, materials and their images) into a map "
-        "for each part, in the part's own coordinates, so that it stays right when the part is changed. "
-        "The maps are optimised against views from all around. Writes the assembly with its maps to FILE "
-        "(.json), and to FILE.report.json the PSNR of eight other views before and after; `partwright "
-        "export` then writes the maps to GLB, USD, Blender's script and HTML.",
+        "for each part, and its normals into another where that pays: in the part's own coordinates, so that "
+        "they stay right when the part is changed. The maps are optimised against views from all around. "
+        "Writes the assembly with its maps to FILE (.json), and to FILE.report.json the PSNR of eight other "
+        "views before and after; `partwright export` then writes the maps to GLB, USD, Blender's script and "
+        "HTML (the latter without normals).",
     )
     option = command.add_argument
     option("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")

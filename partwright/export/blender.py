@@ -39,12 +39,13 @@ _PARAMETERS = ("size", "roundness", "dilation", "taper", "bulge", "onion")
 @dataclass(frozen=True)
 class _Solid:
     """One object: what the script knows of it, its mesh, and of a part with a map the coordinates (F, 3, 2)
-    of its faces' corners and the picture, a PNG."""
+    of its faces' corners, the picture, a PNG, and that of its normals, if it has one."""
 
     entry: dict[str, Any]
     surface: trimesh.Trimesh
     corners: np.ndarray | None = None
     png: bytes = b""
+    relief: bytes = b""
 
     @property
     def mesh(self) -> tuple[list[list[float]], list[list[int]]]:
@@ -77,8 +78,10 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 24) -> None:
         {"name": name, "colour": colour} | solid.entry
         for (name, solid), colour in zip(solids.items(), colours, strict=True)
     ]
-    pictures = list(dict.fromkeys(solid.png for solid in solids.values() if solid.png))
+    every = [png for solid in solids.values() for png in (solid.png, solid.relief) if png]
+    pictures = list(dict.fromkeys(every))
     mapped = [(name, solid, pictures.index(solid.png)) for name, solid in solids.items() if solid.png]
+    reliefs = {name: pictures.index(solid.relief) for name, solid in solids.items() if solid.relief}
     lines = [
         f"# {comment(assembly.name) or 'Assembly'}: {len(parts)} parts, for Blender 3.4 or later.",
         "# Run it by: blender -P FILE, or from Blender's text editor.",
@@ -106,6 +109,9 @@ def write(assembly: Assembly, path: str | Path, resolution: int = 24) -> None:
         "MAPS = {",
         *(f"    {_literal(name)}: ({_literal(solid.coordinates)}, {i})," for name, solid, i in mapped),
         "}",
+        "",
+        "# name: a number in PICTURES, of parts with a normal map at the same places",
+        f"RELIEFS = {_literal(reliefs)}",
         "",
         "# PNG, in base 64",
         "PICTURES = [",
@@ -174,7 +180,7 @@ def _looking(entry: dict[str, Any], mesh: trimesh.Trimesh, part: Part, placed: b
     vertices, number = np.unique(np.asarray(found.mesh.vertices), axis=0, return_inverse=True)
     faces = np.asarray(found.mesh.faces)
     whole = tm.Trimesh(vertices, number.reshape(-1)[faces], process=False)
-    return _Solid(entry, whole, found.uv[faces], found.png)
+    return _Solid(entry, whole, found.uv[faces], found.png, found.relief_png)
 
 
 def _literal(value: Any) -> str:

@@ -43,7 +43,7 @@ from partwright.export.identifiers import free_name
 from partwright.export.shared_groups import Shared, shared
 from partwright.export.texturing import own_colour, textured
 from partwright.meshing import mesh_part
-from partwright.textures.maps import KEY
+from partwright.textures.maps import KEY, RELIEF
 
 if TYPE_CHECKING:
     import trimesh
@@ -87,6 +87,7 @@ def write(
     def describe(tree: dict[str, Any]) -> None:
         tree["asset"]["generator"] = f"Partwright {__version__}"
         tree["asset"]["extras"] = _about(assembly)
+        _name_attributes(tree)
         _say_targets(tree)
         if collide is not None:
             collide(tree)
@@ -105,6 +106,14 @@ def write(
         body.write_report(path)
     data = export_glb(scene, include_normals=False, tree_postprocessor=describe)
     write_bytes(path, data)
+
+
+def _name_attributes(tree: dict[str, Any]) -> None:
+    """Normals and tangents by the names that glTF has for them."""
+    for primitive in (one for mesh in tree.get("meshes", ()) for one in mesh["primitives"]):
+        for name in ("NORMAL", "TANGENT"):
+            if f"_{name}" in primitive["attributes"]:
+                primitive["attributes"][name] = primitive["attributes"].pop(f"_{name}")
 
 
 def _say_targets(tree: dict[str, Any]) -> None:
@@ -247,7 +256,10 @@ class _Scene:
         if found is None:
             own = own_colour(part)
             return coloured(mesh, self.colours[part.name] if own is None else own)
-        found.mesh.visual = with_image(found.uv, found.image)
+        found.mesh.visual = with_image(found.uv, found.image, found.relief)
+        known = found.mesh.vertex_attributes
+        for name in list(known):  # as trimesh writes those that it does not know
+            known[f"_{name}"] = np.asarray(known.pop(name), np.float32)
         return found.mesh
 
     def _name_of_whole(self, node: Node) -> str:
@@ -292,16 +304,19 @@ def _extras(part: Part) -> dict[str, Any]:
     }
     if part.instances:
         own["instances"] = [instance_dict(move) for move in part.instances]
-    known = {name: value for name, value in part.metadata.items() if name != KEY}  # which is an image here
+    known = {name: value for name, value in part.metadata.items() if name not in (KEY, RELIEF)}  # images here
     return own | ({"metadata": known} if known else {})
 
 
-def with_image(uv: np.ndarray, image: Any) -> Any:
-    """A matt look: an image (PIL, sRGB) at texture coordinates (V, 2) from its lower left."""
+def with_image(uv: np.ndarray, image: Any, relief: Any = None) -> Any:
+    """A matt look: an image (PIL, sRGB) at texture coordinates (V, 2) from its lower left; relief: a normal
+    map there."""
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial
 
-    material = PBRMaterial(baseColorTexture=image, metallicFactor=0.0, roughnessFactor=0.7)
+    material = PBRMaterial(
+        baseColorTexture=image, normalTexture=relief, metallicFactor=0.0, roughnessFactor=0.7
+    )
     return TextureVisuals(uv=uv, material=material)
 
 

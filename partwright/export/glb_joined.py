@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Assembly, Part, Similarity
+from partwright.export.texturing import CORNERS
 from partwright.meshing import mesh_assembly
+from partwright.shapes.corner_normals import corner_normals
 
 if TYPE_CHECKING:
     import trimesh
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
 def patches(assembly: Assembly, resolution: int) -> Iterator[tuple[Part, int, Similarity, trimesh.Trimesh]]:
     """Of each copy of a part that has some of the surface: the part, which copy (0 for the part itself), its
-    pose, and its triangles, in its frame.
+    pose, and its triangles, in its frame, with normals of the whole at their corners.
 
     resolution: cells along the longest side of the whole.
 
@@ -33,6 +35,7 @@ def patches(assembly: Assembly, resolution: int) -> Iterator[tuple[Part, int, Si
 
     mesh = mesh_assembly(assembly, resolution)
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    corners = corner_normals(vertices, faces).astype(np.float64)
     middles = vertices[faces].mean(axis=1)
     owner = np.abs(assembly.part_distances(middles)).argmin(axis=0)
     for i, part in enumerate(assembly.parts):
@@ -40,11 +43,16 @@ def patches(assembly: Assembly, resolution: int) -> Iterator[tuple[Part, int, Si
         poses = [copy.pose for copy in part.copies]
         nearest = _nearest(part, poses, middles[mine])
         for k, pose in enumerate(poses):
-            own = faces[mine[nearest == k]]
+            chosen = mine[nearest == k]
+            own = faces[chosen]
             if len(own):
                 used, corner = np.unique(own, return_inverse=True)
                 places = pose.inverse()(vertices[used])
-                yield part, k, pose, tm.Trimesh(places, corner.reshape(-1, 3), process=False)
+                back = pose.inverse()
+                turned = (back(corners[chosen].reshape(-1, 3)) - back(np.zeros((1, 3)))).reshape(-1, 3, 3)
+                normals = {CORNERS: turned}
+                patch = tm.Trimesh(places, corner.reshape(-1, 3), face_attributes=normals, process=False)
+                yield part, k, pose, patch
 
 
 def add_patches(

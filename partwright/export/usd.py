@@ -28,10 +28,18 @@ from partwright.export.identifiers import file_name, free_name
 from partwright.export.shared_groups import shared
 from partwright.export.texturing import own_colour, textured
 from partwright.export.usd_physics import add_physics, body_of, check_physics
-from partwright.export.usd_prims import define_mesh, define_texture, define_xform, exported, place, to_linear
+from partwright.export.usd_prims import (
+    define_mesh,
+    define_normals,
+    define_texture,
+    define_xform,
+    exported,
+    place,
+    to_linear,
+)
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
-from partwright.textures.maps import KEY
+from partwright.textures.maps import KEY, RELIEF
 
 _AXES = {"y": "Y", "z": "Z"}
 _NO_SURFACE = "no surface of its own at this resolution"
@@ -182,7 +190,12 @@ class _Writer:
         found = None if subtracted else textured(mesh, part, placed)
         if found is not None:
             prim = define_mesh(self.stage, path, found.mesh)
-            define_texture(prim, f"{below.GetPath()}/material", found.uv, self._picture(part.name, found.png))
+            relief = None
+            if found.relief is not None:
+                relief = self._picture(f"{part.name}_normals", found.relief_png)
+                define_normals(prim, found.mesh.vertex_attributes["NORMAL"])
+            picture = self._picture(part.name, found.png)
+            define_texture(prim, f"{below.GetPath()}/material", found.uv, picture, relief)
         else:
             prim = define_mesh(self.stage, path, mesh, self.colours[part.name])
         if subtracted:
@@ -199,7 +212,7 @@ class _Writer:
 
 
 def _about(part: Part, subtracted: bool) -> dict[str, Any]:
-    metadata = {key: value for key, value in part.metadata.items() if key != KEY}  # a picture beside the file
+    metadata = {key: value for key, value in part.metadata.items() if key not in (KEY, RELIEF)}  # pictures
     own = {"field": part.field.to_dict(), "blend": part.blend, "metadata": metadata}
     return own | ({"role": "subtracted"} if subtracted else {})
 

@@ -42,9 +42,18 @@ def define_mesh(stage: Any, path: Any, mesh: Any, colour: np.ndarray | None = No
     return prim
 
 
-def define_texture(mesh: Any, path: str, uv: np.ndarray, picture: str) -> None:
-    """A mesh's coordinates (V, 2) and a material with a picture beside the file, bound to it."""
-    from pxr import Sdf, UsdGeom, UsdShade, Vt
+def define_normals(mesh: Any, normals: Any) -> None:
+    """Of a mesh's vertices (V, 3)."""
+    from pxr import UsdGeom, Vt
+
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.asarray(normals, np.float32)))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+
+
+def define_texture(mesh: Any, path: str, uv: np.ndarray, picture: str, relief: str | None = None) -> None:
+    """A mesh's coordinates (V, 2) and a material with a picture beside the file, bound to it; relief: a
+    normal map, too."""
+    from pxr import Gf, Sdf, UsdGeom, UsdShade, Vt
 
     kinds, stage = Sdf.ValueTypeNames, mesh.GetPrim().GetStage()
     primvars = UsdGeom.PrimvarsAPI(mesh)
@@ -54,18 +63,28 @@ def define_texture(mesh: Any, path: str, uv: np.ndarray, picture: str) -> None:
     reader = UsdShade.Shader.Define(stage, f"{path}/coordinates")
     reader.CreateIdAttr("UsdPrimvarReader_float2")
     reader.CreateInput("varname", kinds.String).Set("st")
-    texture = UsdShade.Shader.Define(stage, f"{path}/picture")
-    texture.CreateIdAttr("UsdUVTexture")
-    texture.CreateInput("file", kinds.Asset).Set(Sdf.AssetPath(f"./{picture}"))
-    texture.CreateInput("sourceColorSpace", kinds.Token).Set("sRGB")
-    for axis in ("wrapS", "wrapT"):
-        texture.CreateInput(axis, kinds.Token).Set("clamp")
     place = reader.CreateOutput("result", kinds.Float2)
-    texture.CreateInput("st", kinds.Float2).ConnectToSource(place)
+
+    def read(name: str, file: str, space: str) -> Any:
+        texture = UsdShade.Shader.Define(stage, f"{path}/{name}")
+        texture.CreateIdAttr("UsdUVTexture")
+        texture.CreateInput("file", kinds.Asset).Set(Sdf.AssetPath(f"./{file}"))
+        texture.CreateInput("sourceColorSpace", kinds.Token).Set(space)
+        for axis in ("wrapS", "wrapT"):
+            texture.CreateInput(axis, kinds.Token).Set("clamp")
+        texture.CreateInput("st", kinds.Float2).ConnectToSource(place)
+        return texture
+
     shader = UsdShade.Shader.Define(stage, f"{path}/surface")
     shader.CreateIdAttr("UsdPreviewSurface")
-    colour = texture.CreateOutput("rgb", kinds.Float3)
+    colour = read("picture", picture, "sRGB").CreateOutput("rgb", kinds.Float3)
     shader.CreateInput("diffuseColor", kinds.Color3f).ConnectToSource(colour)
+    if relief is not None:
+        texture = read("relief", relief, "raw")
+        texture.CreateInput("scale", kinds.Float4).Set(Gf.Vec4f(2, 2, 2, 1))
+        texture.CreateInput("bias", kinds.Float4).Set(Gf.Vec4f(-1, -1, -1, 0))
+        bent = texture.CreateOutput("rgb", kinds.Float3)
+        shader.CreateInput("normal", kinds.Normal3f).ConnectToSource(bent)
     shader.CreateInput("roughness", kinds.Float).Set(0.7)
     surface = shader.CreateOutput("surface", kinds.Token)
     material.CreateSurfaceOutput().ConnectToSource(surface)

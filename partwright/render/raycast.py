@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from partwright.render.camera import View
-from partwright.render.normals import corner_normals, face_normals
+from partwright.shapes.corner_normals import corner_normals, face_normals
 
 _MISS = -1
 

@@ -12,12 +12,16 @@ from partwright.errors import NoSurfaceError
 from partwright.methods import check_count
 from partwright.shapes.sampling import sample_triangles
 from partwright.textures.colours import Colours
-from partwright.textures.coordinates import directions, folded, is_hollow, of_nearest_copy
-from partwright.textures.maps import KEY, LARGEST, PartMap
-from partwright.textures.sightings import sightings
-from partwright.textures.texels import Texels, filled
+from partwright.textures.coordinates import directions, folded, frames, is_hollow, of_nearest_copy
+from partwright.textures.maps import KEY, LARGEST, RELIEF, PartMap
+from partwright.textures.sightings import Sightings, sightings
+from partwright.textures.texels import Texels, corners, filled
 
 _NEAR = 0.01  # of the longest side: parts whose surface is so near to a point of the whole are coloured by it
+_SPAN = 127.5  # of normals' coordinates, -1 to 1, as bytes
+_STEEP = 0.2  # normals further from the surface's own are of something else
+_SMOOTH = 0.03  # of a normal's length: surfaces that are as smooth as this need no map
+_GAIN = 0.8  # of the squared error of normals that a map must leave at most
 _ASIDE = 1e-3  # weight of a point for parts that are near to it, but not nearest
 
 Floats = NDArray[np.float64]
@@ -31,9 +35,11 @@ def bake(
     Points of the assembly's surface take the colour of the place nearest to them, and pixels of views from
     all around that of the input in the same pixel; each is one of the map of the part that it is of. Texels
     are such that, read between them as renderers do, the map has these colours, in least squares. optimise:
-    False for no views, and means of the colours around each texel instead. Texels that nothing reaches, on
-    sides that nobody sees, take the colour of the nearest one that has. Quadrics, which have no end of their
-    own, get their mean as `metadata["colour"]`.
+    False for no views, and means of the colours around each texel instead; a part keeps these where they are
+    nearer to views that no map is made of. Normals are baked likewise, into `metadata["normals"]`, where
+    those views say that it pays. Texels that nothing reaches, on sides that nobody sees, take the colour of
+    the nearest one that has. Quadrics, which have no end of their own, get their mean as
+    `metadata["colour"]`.
 
     Raises:
         SettingError: the size cannot be used.
@@ -49,7 +55,7 @@ def bake(
         for i, (part, one) in enumerate(zip(assembly.parts, sums, strict=True)):
             near = np.flatnonzero(off[i] <= reach + part.blend)
             share = np.where(nearest[near] == i, 1.0, _ASIDE)
-            one.add(seen.points[near], seen.colours[near], share * seen.weights[near])
+            one.see(seen, near, share * seen.weights[near])
     for part, one in zip(assembly.parts, sums, strict=True):
         assembly = assembly.replace_part(part.name, one.coloured(colours))
     return assembly
@@ -62,17 +68,34 @@ class _Sums:
         self.part, self.size, self.optimised = part, size, optimised
         self.bounded = part.field.quadric() is None and bool(np.isfinite(np.array(part.field.bounds())).all())
         self.sides = 2 if is_hollow(part.field) else 1
-        self.texels = Texels(size, self.sides, 3)
+        self.sampled = Texels(size, self.sides, 3)  # colours of nearest places
+        self.texels = Texels(size, self.sides, 6)  # of all that is seen
         self.mean = np.zeros(4)
+        self.held: list[tuple[Floats, NDArray[np.bool_], Floats, Floats]] = []
 
-    def add(self, points: Floats, colours: Floats, weights: Floats) -> None:
-        """Points (N, 3) in own units and place, shared out to the four texels around each."""
-        self.mean += np.append((weights[:, None] * colours).sum(axis=0), weights.sum())
-        if not self.bounded or not len(points):
+    def see(self, seen: Sightings, near: NDArray[np.int64], weights: Floats) -> None:
+        """Some of what is seen, with weights (N,)."""
+        colours = seen.colours[near]
+        if not seen.held:
+            self.mean += np.append((weights[:, None] * colours).sum(axis=0), weights.sum())
+        if not self.bounded or not len(near):
             return
-        points = of_nearest_copy(self.part, points)
-        towards, inner = directions(self.part.field, points)
-        self.texels.add(folded(towards), inner, colours, weights)
+        field = self.part.field
+        points, smooth, normals = of_nearest_copy(
+            self.part, seen.points[near], seen.smooth[near], seen.normals[near]
+        )
+        towards, inner = directions(field, points)
+        across, turned = frames(field, points, smooth)
+        up = turned[:, None] * np.cross(smooth, across)
+        bent = np.stack([(normals * axis).sum(axis=1) for axis in (across, up, smooth)], axis=1)
+        bent[bent[:, 2] < _STEEP] = (0, 0, 1)
+        place, values = folded(towards), np.column_stack([colours, _SPAN * (bent + 1)])
+        if seen.held:
+            self.held.append((place, inner, values, weights))
+            return
+        self.texels.add(place, inner, values, weights)
+        if seen.sampled:
+            self.sampled.add(place, inner, colours, weights)
 
     def coloured(self, colours: Colours) -> Part:
         metadata = dict(self.part.metadata)
@@ -85,7 +108,39 @@ class _Sums:
             self._add_own(colours)
         if not self.texels.any:
             return self.part
-        return replace(self.part, metadata=metadata | {KEY: PartMap(self._image()).text()})
+        plain = self._image(*self.sampled.means()) if self.sampled.any else None
+        image = self._image(*self.texels.solved()) if self.optimised or plain is None else None
+        looks = [one[..., :3] for one in (image, plain) if one is not None]
+        metadata[KEY] = PartMap(np.ascontiguousarray(min(looks, key=self._off))).text()
+        metadata.pop(RELIEF, None)
+        if image is not None and self._pays(image[..., 3:]):
+            metadata[RELIEF] = PartMap(np.ascontiguousarray(image[..., 3:])).text()
+        return replace(self.part, metadata=metadata)
+
+    def _off(self, image: NDArray[np.uint8]) -> float:
+        """Squared error of colours in views that no map is made of."""
+        return float(
+            sum(
+                weights @ ((values[:, :3] - self._read(image, place, inner)) ** 2).sum(axis=1)
+                for place, inner, values, weights in self.held
+            )
+        )
+
+    def _pays(self, image: NDArray[np.uint8]) -> bool:
+        """Whether normals of views that no map is made of are met better with it than without."""
+        flat = bent = total = 0.0
+        for place, inner, values, weights in self.held:
+            found, wanted = self._read(image, place, inner) / _SPAN - 1, values[:, 3:] / _SPAN - 1
+            found /= np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-20)
+            flat += float(weights @ ((wanted - (0, 0, 1)) ** 2).sum(axis=1))
+            bent += float(weights @ ((wanted - found) ** 2).sum(axis=1))
+            total += float(weights.sum())
+        return flat > _SMOOTH**2 * total and bent < _GAIN * flat
+
+    def _read(self, image: NDArray[np.uint8], place: Floats, inner: NDArray[np.bool_]) -> Floats:
+        texel, share = corners(place, self.size)
+        column = texel[:, :, 0] + np.where(inner, self.size, 0)[:, None]
+        return np.asarray((share[:, :, None] * image[texel[:, :, 1], column]).sum(axis=1))
 
     def _add_own(self, colours: Colours) -> None:
         """Of a part that nobody sees, its own surface."""
@@ -97,8 +152,9 @@ class _Sums:
             return
         vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
         points, _ = sample_triangles(vertices, faces, 4 * self.size**2, 0)
-        self.add(points, colours.at(points), np.ones(len(points)))
+        towards, inner = directions(self.part.field, points)
+        values = np.column_stack([colours.at(points), np.tile((_SPAN, _SPAN, 2 * _SPAN), (len(points), 1))])
+        self.texels.add(folded(towards), inner, values, np.ones(len(points)))
 
-    def _image(self) -> NDArray[np.uint8]:
-        values, known = self.texels.solved() if self.optimised else self.texels.means()
+    def _image(self, values: Floats, known: NDArray[np.bool_]) -> NDArray[np.uint8]:
         return np.round(np.clip(filled(values, known, self.sides), 0, 255)).astype(np.uint8)

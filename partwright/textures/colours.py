@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.errors import NoColoursError
+from partwright.shapes.corner_normals import corner_normals
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.loading import READ_BY_TRIMESH, load_scene
 from partwright.textures.images import check_images
@@ -35,6 +36,12 @@ class Colours:
     image: NDArray[np.int64]
     uv: NDArray[np.float32]
     images: tuple[NDArray[np.float32], ...]
+    normals: NDArray[np.float32]
+    """(F, 3, 3): of the faces' corners, those of the file or else smooth ones between creases."""
+    relief: NDArray[np.int64]
+    """(F,): which of `reliefs` bends the normals of a face, -1 for none."""
+    reliefs: tuple[NDArray[np.float32], ...]
+    """Normal maps (h, w, 3): across, up and away from the face, -1 to 1."""
 
     @cached_property
     def _frame(self) -> tuple[Floats, float]:
@@ -48,11 +55,15 @@ class Colours:
 
     def at(self, points: NDArray[np.floating]) -> Floats:
         """Colours (N, 3), sRGB, 0 to 255, at the places of the surface nearest to points (N, 3)."""
+        return self.on_faces(*self.nearest(points))
+
+    def nearest(self, points: NDArray[np.floating]) -> tuple[NDArray[np.int64], Floats]:
+        """The faces (N,) nearest to points (N, 3), and barycentric weights (N, 3) there."""
         centre, scale = self._frame
         local = (np.asarray(points, np.float64) - centre) * scale
         face, _ = self._surface.nearest(local)
         corners = ((self.vertices - centre) * scale)[self.faces[face]]
-        return self.on_faces(face.astype(np.int64), _barycentric(corners, local))
+        return face.astype(np.int64), barycentric(corners, local)
 
     def on_faces(self, face: NDArray[np.int64], weights: Floats) -> Floats:
         """Colours (N, 3), sRGB, 0 to 255, on faces (N,) at barycentric weights (N, 3)."""
@@ -62,6 +73,26 @@ class Colours:
             mine = np.flatnonzero(self.image[face] == i)
             result[mine] *= _read(image, uv[mine])
         return 255 * to_srgb(result)
+
+    def normals_on_faces(self, face: NDArray[np.int64], weights: Floats) -> Floats:
+        """Unit normals (N, 3) on faces (N,) at barycentric weights (N, 3), with what normal maps say."""
+        result = _unit(np.einsum("nc,ncd->nd", weights, self.normals[face].astype(np.float64)))
+        uv = np.einsum("nc,ncd->nd", weights, self.uv[face].astype(np.float64))
+        for i, image in enumerate(self.reliefs):
+            mine = np.flatnonzero(self.relief[face] == i)
+            bent = _read(image, uv[mine])
+            across, up = self._tangents(face[mine], result[mine])
+            result[mine] = _unit(bent[:, :1] * across + bent[:, 1:2] * up + bent[:, 2:] * result[mine])
+        return result
+
+    def _tangents(self, face: NDArray[np.int64], normals: Floats) -> tuple[Floats, Floats]:
+        """Directions (N, 3) across and up an image on faces (N,), at right angles to normals (N, 3)."""
+        corners, uv = self.vertices[self.faces[face]], self.uv[face].astype(np.float64)
+        (e, f), (g, h) = ((one[:, 1] - one[:, 0], one[:, 2] - one[:, 0]) for one in (corners, uv))
+        turned = np.where(g[:, 0] * h[:, 1] - h[:, 0] * g[:, 1] < 0, -1.0, 1.0)[:, None]
+        across = turned * (h[:, 1:] * e - g[:, 1:] * f)
+        across = _unit(across - (across * normals).sum(axis=1, keepdims=True) * normals)
+        return across, turned * np.cross(normals, across)
 
 
 def load_colours(path: str | Path) -> Colours:
@@ -79,6 +110,7 @@ def load_colours(path: str | Path) -> Colours:
     check_images(path)
     scene = load_scene(path, path.suffix.lower(), colours=True)
     images: list[NDArray[np.float32]] = []
+    reliefs: list[NDArray[np.float32]] = []
     pieces: list[tuple[Any, ...]] = []
     found, total = False, 0
     is_gltf = path.suffix.lower() in (".glb", ".gltf")
@@ -98,11 +130,19 @@ def load_colours(path: str | Path) -> Colours:
         white = np.ones((count, 3, 3))
         colour = corners if corners is not None else white if image is not None else plain
         vertices = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-        pieces.append((vertices, np.asarray(mesh.faces) + total, colour, np.full(count, index), uv))
+        relief, bends = _relief(mesh), -1
+        if relief is not None:
+            bends, uv = len(reliefs), np.asarray(mesh.visual.uv, np.float64)[mesh.faces]
+            reliefs.append(relief)
+        normals = _normals(mesh, np.asarray(matrix, np.float64))
+        own = (vertices, np.asarray(mesh.faces) + total, colour, np.full(count, index), uv)
+        pieces.append((*own, normals, np.full(count, bends)))
         total += len(vertices)
     if not found:
         raise NoColoursError(f"{path.name}: has no colours: neither of vertices or faces nor of materials")
-    places, triangles, shades, which, where = (np.concatenate(one) for one in zip(*pieces, strict=True))
+    places, triangles, shades, which, where, normals, bend = (
+        np.concatenate(one) for one in zip(*pieces, strict=True)
+    )
     return Colours(
         places.astype(np.float64),
         triangles.astype(np.int64),
@@ -110,6 +150,9 @@ def load_colours(path: str | Path) -> Colours:
         which.astype(np.int64),
         where.astype(np.float32),
         tuple(images),
+        normals.astype(np.float32),
+        bend.astype(np.int64),
+        tuple(reliefs),
     )
 
 
@@ -162,6 +205,31 @@ def _look(mesh: Any, is_gltf: bool) -> tuple[Floats | None, Floats, NDArray[np.f
     return (each if is_gltf else to_linear(each)), uv, None
 
 
+def _relief(mesh: Any) -> NDArray[np.float32] | None:
+    """The normal map of its material."""
+    image = getattr(getattr(mesh.visual, "material", None), "normalTexture", None)
+    if image is None or mesh.visual.uv is None:
+        return None
+    return (np.asarray(image.convert("RGB")) / 127.5 - 1).astype(np.float32)
+
+
+def _normals(mesh: Any, matrix: Floats) -> Floats:
+    """Of the faces' corners (F, 3, 3), placed: the file's own, where it has usable ones."""
+    faces, vertices = np.asarray(mesh.faces), np.asarray(mesh.vertices, np.float64)
+    own = np.asarray(mesh.vertex_normals, np.float64) if "vertex_normals" in mesh._cache else None
+    if own is not None and own.shape == vertices.shape and (np.linalg.norm(own, axis=1) > 0.5).all():
+        corners = own[faces]
+    else:
+        places, number = np.unique(vertices, axis=0, return_inverse=True)  # files part them at seams
+        corners = corner_normals(places, number.reshape(-1)[faces]).astype(np.float64)
+    turn = np.linalg.pinv(matrix[:3, :3]).T
+    return _unit((corners @ turn.T).reshape(-1, 3)).reshape(-1, 3, 3)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-20)
+
+
 def _read(image: NDArray[np.float32], uv: Floats) -> Floats:
     """Bilinear, repeated beyond the image; uv (N, 2) from its lower left."""
     height, width = image.shape[:2]
@@ -175,7 +243,7 @@ def _read(image: NDArray[np.float32], uv: Floats) -> Floats:
     return np.asarray((1 - fy) * upper + fy * lower)
 
 
-def _barycentric(corners: Floats, points: Floats) -> Floats:
+def barycentric(corners: Floats, points: Floats) -> Floats:
     """Weights (N, 3) of the place on each triangle (N, 3, 3) that is nearest to its point (N, 3), about:
     of points off the triangle they are cut to its edges."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]

@@ -13,6 +13,7 @@ from partwright.fields import Field, SuperFrustum
 Floats = NDArray[np.float64]
 
 _LEAST = 1e-12
+_STEP = 1e-5  # of the longest side, for derivatives
 
 
 def directions(field: Field, points: NDArray[np.floating]) -> tuple[Floats, NDArray[np.bool_]]:
@@ -53,13 +54,42 @@ def folded(directions: Floats, sign: Floats | None = None) -> Floats:
     return np.asarray(flat / 2 + 0.5)
 
 
-def of_nearest_copy(part: Part, points: Floats) -> Floats:
-    """Points (N, 3) in the frame of the part, or of its copy that is nearest to each."""
-    own = [copy.pose.inverse()(points) for copy in part.copies]
-    if len(own) == 1:
-        return np.asarray(own[0])
-    off = [np.abs(part.field(np.ascontiguousarray(one, np.float32))) for one in own]
-    return np.asarray(np.stack(own)[np.argmin(off, axis=0), np.arange(len(points))])
+def frames(
+    field: Field, points: Floats, normals: Floats, sign: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """Tangents (N, 3), of unit length along the map's rows, and whether up the map is normal x tangent (N,),
+    1, or against it, -1, at points (N, 3) of the field's own frame with unit normals (N, 3).
+
+    sign: as of `folded`.
+    """
+    towards, _ = directions(field, points)
+    sign = np.where(towards < 0, -1.0, 1.0) if sign is None else sign
+    low, high = field.bounds()
+    step = _STEP * float(np.max(np.subtract(high, low)))
+    start = folded(towards, sign)
+    slope = np.stack(
+        [(folded(directions(field, points + move)[0], sign) - start) / step for move in step * np.eye(3)],
+        axis=2,
+    )
+    slope -= (slope @ normals[:, :, None]) * normals[:, None]
+    across = np.cross(slope[:, 1], normals)
+    across *= np.where((across * slope[:, 0]).sum(axis=1) < 0, -1.0, 1.0)[:, None]
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    turned = (np.cross(normals, across) * slope[:, 1]).sum(axis=1)
+    return across, np.where(turned < 0, -1.0, 1.0)
+
+
+def of_nearest_copy(part: Part, points: Floats, *vectors: Floats) -> list[Floats]:
+    """Points (N, 3), and vectors (N, 3) there, in the frame of the part, or of its copy that is nearest."""
+    poses = [copy.pose.inverse() for copy in part.copies]
+    own = [pose(points) for pose in poses]
+    nearest = np.zeros(len(points), np.int64)
+    if len(own) > 1:
+        off = [np.abs(part.field(np.ascontiguousarray(one, np.float32))) for one in own]
+        nearest = np.argmin(off, axis=0)
+    every, origin = np.arange(len(points)), np.zeros((1, 3))
+    turned = [np.stack([pose(one) - pose(origin) for pose in poses])[nearest, every] for one in vectors]
+    return [np.stack(own)[nearest, every], *turned]
 
 
 def _unbent(solid: SuperFrustum, x: Floats, z: Floats) -> tuple[Floats, Floats]:

@@ -24,7 +24,7 @@ _BIN = 0x004E4942
 
 
 def check_images(path: Path) -> None:
-    """That the pictures of the materials' colours are there, are pictures, and are not huge.
+    """That the pictures of the materials' colours and normals are there, are pictures, and are not huge.
 
     Raises:
         UnreadableFileError: one of them is not.
@@ -111,15 +111,16 @@ def _of_gltf(path: Path) -> Iterator[tuple[str, bytes]]:
 
 
 def _used(tree: dict[str, Any]) -> set[int]:
-    """Pictures that the materials' base colours are read of."""
+    """Pictures that the materials' base colours and normals are read of."""
     textures = tree.get("textures", [])
     used = set()
     for material in tree.get("materials", []):
-        index = material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {}).get("index")
-        if isinstance(index, int) and 0 <= index < len(textures):
-            source = textures[index].get("source")
-            if isinstance(source, int):
-                used.add(source)
+        colour = material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
+        for index in (colour.get("index"), material.get("normalTexture", {}).get("index")):
+            if isinstance(index, int) and 0 <= index < len(textures):
+                source = textures[index].get("source")
+                if isinstance(source, int):
+                    used.add(source)
     return used
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,8 +11,8 @@ from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
 from partwright.textures.colours import Colours
-from partwright.textures.coordinates import of_nearest_copy
-from partwright.textures.maps import part_map
+from partwright.textures.coordinates import frames, of_nearest_copy
+from partwright.textures.maps import RELIEF, part_map
 
 if TYPE_CHECKING:
     from partwright.render.camera import View
@@ -21,6 +22,7 @@ Floats = NDArray[np.float64]
 
 SIDE = 512  # pixels
 VIEWS = 8
+_AMBIENT = 0.2
 _NEVER = 1e-9  # of a squared step of 255: pictures that are the same have 130 dB
 
 
@@ -70,13 +72,44 @@ def map_colours(assembly: Assembly, points: Floats) -> Floats:
             said = str(part.metadata.get("colour", "#000000"))
             result[mine] = [int(said[k : k + 2], 16) for k in (1, 3, 5)]
         else:
-            result[mine] = texture.at(part.field, of_nearest_copy(part, points[mine]))
+            result[mine] = texture.at(part.field, of_nearest_copy(part, points[mine])[0])
     return result
 
 
-def likeness(assemblies: Sequence[Assembly], colours: Colours) -> list[tuple[float, float]]:
+def map_normals(assembly: Assembly, points: Floats, smooth: Floats) -> Floats:
+    """Normals (N, 3) at points (N, 3) of the surface, whose own are `smooth`, as parts' maps bend them."""
+    owner = np.abs(assembly.part_distances(points)).argmin(axis=0)
+    result = smooth.copy()
+    for i, part in enumerate(assembly.parts):
+        mine = np.flatnonzero(owner == i)
+        relief = part_map(part, RELIEF)
+        if relief is None or not len(mine):
+            continue
+        axes = (np.broadcast_to(axis, (len(mine), 3)) for axis in np.eye(3))
+        own, away, *axes_there = of_nearest_copy(part, points[mine], smooth[mine], *axes)
+        across, turned = frames(part.field, own, away)
+        up = turned[:, None] * np.cross(away, across)
+        x, y, z = (relief.at(part.field, own) / 127.5 - 1).T[:, :, None]
+        bent = x * across + y * up + z * away
+        bent /= np.maximum(np.linalg.norm(bent, axis=1, keepdims=True), 1e-20)
+        result[mine] = np.stack([(bent * axis).sum(axis=1) for axis in axes_there], axis=1)
+    return result
+
+
+def shaded(colours: Floats, normals: Floats, view: View) -> Floats:
+    """Colours (N, 3) in light from over the viewer's left shoulder; normals (N, 3) away from the surface."""
+    light = view.back + 0.5 * view.up - 0.5 * view.right
+    share = np.maximum(normals @ (light / np.linalg.norm(light)), 0)
+    return (_AMBIENT + (1 - _AMBIENT) * share)[:, None] * colours
+
+
+def likeness(
+    assemblies: Sequence[Assembly], colours: Colours, lit: bool = False
+) -> list[tuple[float, float]]:
     """Of assemblies that differ in their maps alone: mean PSNR, in dB, of whole pictures, outlines and all,
     and of the pixels where both are met.
+
+    lit: with light, which shows the normals, and the same white surface instead of colours.
 
     Raises:
         NoSurfaceError: nothing is inside of the assembly.
@@ -90,8 +123,27 @@ def likeness(assemblies: Sequence[Assembly], colours: Colours) -> list[tuple[flo
     scores = []
     for view in around(colours.vertices, assemblies[0].up):
         pixel, face, weights, _ = seen(truth, view)
-        own, _, _, places = seen(parts, view)
-        want, both = picture(pixel, colours.on_faces(face, weights)), np.intersect1d(own, pixel)
-        each = [picture(own, map_colours(one, places)) for one in assemblies]
+        own, mine, shares, places = seen(parts, view)
+        if lit:
+            normals = colours.normals_on_faces(face, weights)
+            normals[truth.face_normals[face] @ view.back < 0] *= -1
+            want = picture(pixel, shaded(np.full((len(pixel), 3), 255.0), normals, view))
+            white = np.full((len(own), 3), 255.0)
+            smooth = np.einsum("nc,ncd->nd", shares, parts.corner_normals[mine].astype(np.float64))
+            smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1e-20)
+            each = [picture(own, shaded(white, map_normals(one, places, smooth), view)) for one in assemblies]
+        else:
+            want = picture(pixel, colours.on_faces(face, weights))
+            each = [picture(own, map_colours(one, places)) for one in assemblies]
+        both = np.intersect1d(own, pixel)
         scores.append([(psnr(one, want), psnr(one[both], want[both])) for one in each])
     return [(float(whole), float(surface)) for whole, surface in np.mean(scores, axis=0)]
+
+
+def without_relief(assembly: Assembly) -> Assembly:
+    """The same with smooth parts."""
+    for part in assembly.parts:
+        if RELIEF in part.metadata:
+            kept = {key: value for key, value in part.metadata.items() if key != RELIEF}
+            assembly = assembly.replace_part(part.name, replace(part, metadata=kept))
+    return assembly

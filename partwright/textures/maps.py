@@ -18,6 +18,9 @@ from partwright.textures.coordinates import directions, folded
 
 KEY = "texture"
 """Of a part's metadata."""
+RELIEF = "normals"
+"""Of a part's metadata: its normal map, of the same form. Colours are x, y and z from -1 to 1: z is away from
+the surface, x along the map's rows and y up its columns."""
 LARGEST = 1024  # texels a side
 _PREFIX = "data:image/png;base64,"
 
@@ -96,12 +99,12 @@ class PartMap:
         return cls(np.ascontiguousarray(image[::-1]))
 
 
-def part_map(metadata: Mapping[str, str | float] | Part) -> PartMap | None:
-    """The map of a part, by the part or by its metadata; None where it has none.
+def part_map(metadata: Mapping[str, str | float] | Part, key: str = KEY) -> PartMap | None:
+    """The map of a part, by the part or by its metadata; None where it has none. key: KEY, or RELIEF.
 
     Raises:
         ParameterError: what it has is no map.
     """
     known = metadata.metadata if isinstance(metadata, Part) else metadata
-    text = known.get(KEY)
+    text = known.get(key)
     return PartMap.read(str(text)) if text is not None else None

@@ -5,32 +5,44 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
 from partwright.shapes.sampling import sample_triangles
-from partwright.textures.colours import Colours
+from partwright.textures.colours import Colours, barycentric
+
+if TYPE_CHECKING:
+    from partwright.render.camera import Camera
 
 Floats = NDArray[np.float64]
+_Place = tuple[NDArray[np.int64], Floats]  # faces (N,) and barycentric weights (N, 3)
 
 _PER_TEXEL = 3  # samples of the surface
 _MOST_SAMPLES = 3_000_000
 _AT_ONCE = 1 << 17
 _VIEWS = 24
+_HELD = 6  # views more, that maps are judged by
 _SIDE = 384  # pixels
 _APART = 0.03  # of the longest side: where a ray meets both further apart, they are not the same place
-_UNSEEN = 0.05  # weight of a sample beside that of a pixel: views come first, samples fill what they miss
+_UNSEEN = 0.5  # weight of a sample beside that of a pixel
 
 
 @dataclass(frozen=True)
 class Sightings:
-    """points (N, 3) of the assembly's surface, colours (N, 3) there, 0 to 255, and weights (N,)."""
+    """points (N, 3) of the assembly's surface, its normals (N, 3), colours (N, 3) and normals (N, 3) of the
+    input there, and weights (N,). sampled: they are of the whole surface, not of a view. held: they are no
+    part of what maps are made of, but to judge them by."""
 
     points: Floats
+    smooth: Floats
     colours: Floats
+    normals: Floats
     weights: Floats
+    sampled: bool
+    held: bool
 
 
 def sightings(assembly: Assembly, colours: Colours, size: int, seed: int, views: bool) -> Iterator[Sightings]:
@@ -39,31 +51,53 @@ def sightings(assembly: Assembly, colours: Colours, size: int, seed: int, views:
     size: texels a side of a map.
     """
     from partwright.meshing import mesh_assembly
-    from partwright.render.camera import Camera
     from partwright.render.raycast import Scene
 
     mesh = mesh_assembly(assembly)
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    count = min(_MOST_SAMPLES, _PER_TEXEL * size * size * max(1, len(assembly)))
-    points, _ = sample_triangles(vertices, faces, count, seed)
-    for start in range(0, count, _AT_ONCE):
-        some = points[start : start + _AT_ONCE]
-        yield Sightings(some, colours.at(some), np.full(len(some), _UNSEEN))
-    if not views:
-        return
     here, there = Scene(vertices, faces), Scene(colours.vertices, colours.faces)
+
+    def at(points: Floats, own: _Place, its: _Place, weight: float, held: bool = False) -> Sightings:
+        smooth = _unit(np.einsum("nc,ncd->nd", own[1], here.corner_normals[own[0]].astype(np.float64)))
+        # A side that faces inwards counts as its other one does.
+        turned = (here.face_normals[own[0]] * there.face_normals[its[0]]).sum(axis=1, keepdims=True)
+        normals = np.where(turned < 0, -1.0, 1.0) * colours.normals_on_faces(*its)
+        weights = np.full(len(points), weight)
+        return Sightings(points, smooth, colours.on_faces(*its), normals, weights, weight < 1, held)
+
+    count = min(_MOST_SAMPLES, _PER_TEXEL * size * size * max(1, len(assembly)))
+    points, face = sample_triangles(vertices, faces, count, seed)
+    for start in range(0, count, _AT_ONCE):
+        some, on_face = points[start : start + _AT_ONCE], face[start : start + _AT_ONCE]
+        yield at(some, (on_face, barycentric(vertices[faces[on_face]], some)), colours.nearest(some), _UNSEEN)
     reach = _APART * there.size
-    for i in range(_VIEWS):
-        height = 1 - (2 * i + 1) / _VIEWS
-        camera = Camera(math.degrees(i * math.pi * (3 - math.sqrt(5))), math.degrees(math.asin(height)))
+    for i in range(_VIEWS + _HELD if views else 0):
+        held = i >= _VIEWS
+        camera = _camera(i - _VIEWS, _HELD, 1.0) if held else _camera(i, _VIEWS, 0.0)
         view = camera.fitted(vertices, _SIDE, _SIDE)
         rays = view.rays(_SIDE, _SIDE)
         eyes = np.broadcast_to(view.eye, rays.shape)
-        _, own, _ = here.first_hit(eyes, rays)
-        face, distance, uv = there.first_hit(eyes, rays)
-        length = np.linalg.norm(rays, axis=1)
+        mine, distance, weights = here.first_hit(eyes, rays)
+        struck, far, others = there.first_hit(eyes, rays)
         with np.errstate(invalid="ignore"):  # inf - inf, of rays that miss both
-            met = np.flatnonzero(np.abs(own - distance) * length < reach)
-        u, v = uv[met].T
-        seen = colours.on_faces(face[met].astype(np.int64), np.stack([1 - u - v, u, v], axis=1))
-        yield Sightings(view.eye + own[met, None] * rays[met], seen, np.ones(len(met)))
+            met = np.flatnonzero(np.abs(distance - far) * np.linalg.norm(rays, axis=1) < reach)
+        on = mine[met].astype(np.int64), _all_three(weights[met])
+        its = struck[met].astype(np.int64), _all_three(others[met])
+        yield at(view.eye + distance[met, None] * rays[met], on, its, 1.0, held)
+
+
+def _camera(i: int, count: int, start: float) -> Camera:
+    """One of `count` from all around, spread as evenly as may be; start: of the first azimuth."""
+    from partwright.render.camera import Camera
+
+    azimuth = start + i * math.pi * (3 - math.sqrt(5))
+    return Camera(math.degrees(azimuth), math.degrees(math.asin(1 - (2 * i + 1) / count)))
+
+
+def _all_three(uv: Floats) -> Floats:
+    """Barycentric weights (N, 3) by the last two."""
+    return np.column_stack([1 - uv.sum(axis=1), uv])
+
+
+def _unit(vectors: Floats) -> Floats:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-20)

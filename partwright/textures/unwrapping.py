@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.fields import Field
-from partwright.textures.coordinates import directions, folded
+from partwright.textures.coordinates import directions, folded, frames
 from partwright.textures.maps import PartMap
 
 if TYPE_CHECKING:
@@ -17,19 +17,30 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-def unwrapped(mesh: trimesh.Trimesh, field: Field, texture: PartMap) -> tuple[trimesh.Trimesh, Floats, Any]:
+def unwrapped(
+    mesh: trimesh.Trimesh, field: Field, texture: PartMap, normals: Floats | None = None
+) -> tuple[trimesh.Trimesh, Floats, Any]:
     """The mesh cut where the map has its folds, uv (V, 2) from the image's lower left, and the image (PIL).
 
     mesh: in the field's own frame. Its triangles are cut along the planes between the octants of directions,
-    so that each lies within one of them and has coordinates that do not jump.
+    so that each lies within one of them and has coordinates that do not jump. normals (F, 3, 3): of its
+    faces' corners, in that frame; then the result has NORMAL (V, 3) and TANGENT (V, 4) among its vertices'
+    attributes, as glTF means them: directions along the map's rows, and 1 where up is normal x tangent.
     """
     import trimesh as tm
     from PIL import Image
 
     vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces)
+    around = np.zeros((len(vertices), 0))
+    if normals is not None:  # a vertex at a crease becomes several
+        each = np.asarray(normals, np.float64).reshape(-1, 3)
+        key = np.column_stack([faces.ravel(), each])
+        _, first, back = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        vertices, around = vertices[faces.ravel()[first]], each[first]
+        faces = back.reshape(-1, 3)
     towards, inner = directions(field, vertices)
-    # Vertices, directions and sides are cut alike.
-    values = np.column_stack([vertices, towards, inner.astype(np.float64)])
+    # Vertices, directions, sides and normals are cut alike.
+    values = np.column_stack([vertices, towards, inner.astype(np.float64), around])
     for axis in (3, 4, 5):
         values, faces = _cut(values, faces, axis)
     middle = values[faces].mean(axis=1)
@@ -45,6 +56,12 @@ def unwrapped(mesh: trimesh.Trimesh, field: Field, texture: PartMap) -> tuple[tr
     place = np.clip(place, 0.5 / texture.size, 1 - 0.5 / texture.size)
     place[:, 0] = (place[:, 0] + kind[first, 3]) / texture.sides
     result = tm.Trimesh(values[corner[first], :3], back.reshape(-1, 3), process=False)
+    if normals is not None:
+        smooth = values[corner[first], 7:]
+        smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1e-20)
+        across, turned = frames(field, values[corner[first], :3], smooth, kind[first, :3])
+        result.vertex_attributes["NORMAL"] = smooth
+        result.vertex_attributes["TANGENT"] = np.column_stack([across, turned])
     return result, place, Image.fromarray(texture.image[::-1])
 
 

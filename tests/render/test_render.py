@@ -19,10 +19,10 @@ from partwright.meshing import mesh_assembly
 from partwright.render import Camera, preview, render_mesh, sheet, turntable, write_png
 from partwright.render.camera import picture_axes
 from partwright.render.deviation_map import add_legend, deviation_colours, round_limit
-from partwright.render.normals import corner_normals
 from partwright.render.part_colours import surface_parts
 from partwright.render.raycast import Scene, cast
 from partwright.render.shading import BACKGROUND
+from partwright.shapes.corner_normals import corner_normals
 
 
 def seen(image: np.ndarray) -> np.ndarray:

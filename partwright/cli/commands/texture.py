@@ -12,8 +12,8 @@ from partwright.atomic_io import report_path, write_bytes
 from partwright.cli.terminal import say
 from partwright.errors import UnsupportedFormatError
 from partwright.textures import bake, load_colours
-from partwright.textures.likeness import SIDE, VIEWS, likeness
-from partwright.textures.maps import KEY
+from partwright.textures.likeness import SIDE, VIEWS, likeness, without_relief
+from partwright.textures.maps import KEY, RELIEF
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -27,12 +27,15 @@ def run(arguments: argparse.Namespace) -> int:
     baked = bake(assembly, colours, arguments.size)
     seconds = time.process_time() - start
     before, after = likeness([bake(assembly, colours, arguments.size, optimise=False), baked], colours)
+    smooth, bent = likeness([without_relief(baked), baked], colours, lit=True)
     report = {
         "file": arguments.output.name,
         "version": __version__,
         "texels_a_side": arguments.size,
         "cpu_seconds": round(seconds, 2),
         "psnr": {"views": VIEWS, "side": SIDE, "before": _told(before), "after": _told(after)},
+        "psnr_lit": {"smooth": _told(smooth), "normal_maps": _told(bent)},
+        "normal_maps": sum(RELIEF in part.metadata for part in baked.parts),
     }
     baked.save(arguments.output)
     write_bytes(report_path(arguments.output), (json.dumps(report, indent=2) + "\n").encode())
