@@ -2,7 +2,7 @@
 
     python benchmarks/parts_pictures.py --families FOLDER [--only cars] [--seen chairs]
 
-FOLDER holds the prepared families chairs, cars, mixers and vehicles, as configs/ name them. The first test shapes are
+FOLDER holds the prepared families chairs, cars and mixers, as configs/ name them. The first test shapes are
 reconstructed without labels or poses; edits and interpolations are of training shapes. A mixer's helix, which
 hides in its tube, is drawn before it. Pictures go to docs/images/parts/, one a family. `--seen`: instead,
 what is found in one picture each of a family's first test shapes, those of benchmarks/partsdf_images.py.
@@ -35,7 +35,7 @@ from partwright.render import Camera, render_mesh, sheet, write_png
 TARGET = Path(__file__).parents[1] / "docs" / "images" / "parts"
 CAMERA = Camera(margin=0.12)
 PANEL, ITERATIONS = 220, 200
-RESOLUTION = {"mixers": 192, "vehicles": 160}  # of what is thin or small; 96 for the others
+RESOLUTION = {"mixers": 192}  # of thin walls; 96 for the others
 BEFORE = {"helix": (0.0, -1.0, -0.1)}  # unit lengths that a hidden part is moved by
 SEEN = 6
 TESTED, STEPS = 2, 6  # test shapes, pictures of an interpolation
@@ -59,9 +59,8 @@ EDITS: dict[str, tuple[str, Callable[[NeuralShape], NeuralShape]]] = {
     "chairs": ("another's back", another_back),
     "cars": ("larger wheels", larger_wheels),
     "mixers": ("a wider tube", wider_tube),
-    "vehicles": ("larger wheels", larger_wheels),
 }
-WAYS = {"chairs": ("0", "1"), "cars": ("0", "11"), "mixers": ("0", "1"), "vehicles": ("0", "5")}  # ends of interpolations
+WAYS = {"chairs": ("0", "1"), "cars": ("0", "11"), "mixers": ("0", "1")}  # ends of interpolations
 
 
 def page(name: str, family: PreparedFamily) -> np.ndarray:

@@ -25,7 +25,14 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
-from partwright.partsdf.starts import UPRIGHT, Quaternion, Start, exchanged_parts, find_starts
+from partwright.partsdf.starts import (
+    UPRIGHT,
+    Quaternion,
+    Start,
+    exchanged_parts,
+    find_starts,
+    latents_by_part,
+)
 from partwright.partsdf.targets import Target
 from partwright.shapes import Shape
 
@@ -79,7 +86,10 @@ def reconstruct(
     # Latents start at N(0, 0.01^2), as the authors': near the centre of their prior.
     noise = torch.Generator().manual_seed(seed)
     latents = 0.01 * torch.randn(start.latents.shape, generator=noise)
-    start = replace(start, latents=latents, poses=pose_tensors(shape, model.config))
+    poses = pose_tensors(shape, model.config)
+    if settings.exchange and settings.iterations:  # or each near that of a training shape's part
+        latents = latents + latents_by_part(model, poses, target)
+    start = replace(start, latents=latents, poses=poses)
     return _optimised(start, target, settings, seed, told, checkpoint, move_poses=False)[0]
 
 

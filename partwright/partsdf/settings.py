@@ -31,7 +31,8 @@ class ReconstructionSettings:
     """So many nearest shapes are tried for an eighth of the iterations each, and the best goes on."""
     exchange: bool = True
     """Single parts of the best start are exchanged for those of other training shapes where that comes
-    closer; where poses are unknown only."""
+    closer. Where parts are known, each starts as the training shape's that is closest; else at the mean, as
+    the paper's."""
     pose_rate: float = 2e-3
     """Of Adam, for poses."""
     pose_delay: float = 0.1

@@ -18,7 +18,7 @@ from torch import Tensor
 from partwright.assembly.similarity import quaternion_product
 from partwright.errors import ModelError, SettingError
 from partwright.partsdf.encoder import Encoder, load_encoder
-from partwright.partsdf.losses import aggregate
+from partwright.partsdf.losses import aggregate, clamped_error
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors, local_points
@@ -41,6 +41,7 @@ _FROM_Z: dict[str, Quaternion] = {
 _CLEARLY = 0.85  # of the error as the shape stands: less is worth a turn
 _JUDGES, _TURNS = 32, 2  # training shapes that turns are judged by, and how many of these go on
 _AT_ONCE = 16  # shapes that are decoded together
+_PART_SAMPLES = 2048  # of a target with known parts
 _OTHERS, _SAMPLES = 48, 512  # training shapes that parts are taken from, and samples they are judged at
 
 
@@ -180,6 +181,32 @@ def exchanged_parts(shape: NeuralShape, target: Target, seed: int = 0) -> Neural
                 shape, latents=latents[least].clone(), poses=poses.map(lambda t, i=least: t[i].clone())
             )
     return shape
+
+
+@torch.no_grad()
+def latents_by_part(model: Model, poses: PoseTensors, target: Target) -> Tensor:
+    """(P, Z): of each part, the latent of the training shape whose part is closest, in the pose (P, ...) that
+    is known, at the samples of a target with known parts. Parts that no sample is nearest to have the mean's.
+
+    From the mean alone a blade that winds the other way, say, is never found.
+    """
+    rows = _rows(target, _PART_SAMPLES)
+    assert target.part is not None
+    points, owner = target.points[rows], target.part[rows]
+    known = target.sdf[rows]
+    member = torch.nn.functional.one_hot(owner, len(model.parts)).float()
+    errors = []
+    for first in range(0, len(model.latents), _AT_ONCE):
+        latents = model.latents[first : first + _AT_ONCE]
+        count = len(latents)
+        placed = poses.map(lambda t, count=count: t.expand(count, *t.shape))
+        each = model.condition(latents, placed)(local_points(points, placed))
+        own = each.gather(1, owner.expand(count, 1, -1)).squeeze(1)
+        errors.append(clamped_error(own, known, model.config.losses) @ member)
+    worst = torch.cat(errors).masked_fill(~model.present, torch.inf)
+    best = model.latents[worst.argmin(dim=0), torch.arange(len(model.parts))]
+    seen = member.any(dim=0) & model.present.any(dim=0)
+    return torch.where(seen[:, None], best, model.mean_latent)
 
 
 def _rows(target: Target, count: int) -> Tensor:

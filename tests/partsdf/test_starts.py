@@ -16,7 +16,14 @@ from partwright.assembly import Similarity
 from partwright.partsdf.familiarity import ODD, POOR, Familiarity, familiarity, oddness
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.starts import UPRIGHT, best_starts, errors_of, exchanged_parts, ways_to_stand
+from partwright.partsdf.starts import (
+    UPRIGHT,
+    best_starts,
+    errors_of,
+    exchanged_parts,
+    latents_by_part,
+    ways_to_stand,
+)
 from partwright.partsdf.targets import Target
 
 
@@ -80,6 +87,22 @@ def test_parts_are_exchanged_one_by_one(model: Model) -> None:
     )
     assert after < 0.5 * before
     assert exchanged_parts(own, target_of(own)).latents.equal(own.latents)
+
+
+def test_known_parts_start_as_the_closest_of_the_training_shapes(model: Model) -> None:
+    """A lamp with the plate of another: each part's latent is that of the lamp that it is of."""
+    own, other = (NeuralShape.trained(model, name) for name in ("lamp0", "lamp4"))
+    latents = own.latents.clone()
+    latents[0] = other.latents[0]
+    shape = replace(own, latents=latents)
+    target = target_of(shape)
+    part = torch.from_numpy(shape.part_distances(target.points.numpy())).argmin(dim=0)
+    found = latents_by_part(model, own.poses, replace(target, part=part))
+    assert found[0].equal(other.latents[0])
+    for number in own.present.nonzero().squeeze(1).tolist()[1:]:
+        assert found[number].equal(own.latents[number])
+    unseen = replace(target, part=torch.zeros_like(part))
+    assert latents_by_part(model, own.poses, unseen)[1].equal(model.mean_latent[1])
 
 
 def test_a_fit_says_how_it_is_turned_and_what_is_no_such_shape(model: Model, tmp_path: Path) -> None:
