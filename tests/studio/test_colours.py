@@ -188,7 +188,8 @@ def test_colours_are_baked_from_the_page_and_kept_once(
     edited = from_text(page.assembly())
     (journal,) = (tmp_path / "state").rglob("*.jsonl")
     images = [json.loads(line) for line in journal.read_text().splitlines() if '"image"' in line]
-    assert len(images) == 3
+    # Three of colours, and of normals where those pay; each once, however often its part is moved.
+    assert 3 <= len(images) == len({image["data"] for image in images}) <= 6
     assert journal.stat().st_size < 1.2 * sum(len(image["data"]) for image in images) + 40_000
     page.page.reload()
     page.wait("() => !!window.live && live.link.revision > 3 && partwright.viewport.maps.maps?.count === 3")
