@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from partwright.errors import SettingError
+from partwright.methods import DEVICES
 
 if TYPE_CHECKING:
     import torch
@@ -18,8 +19,9 @@ def device_of(name: str) -> torch.device:
     """
     import torch
 
-    if name not in ("auto", "cpu", "cuda"):
-        raise SettingError(f"device is {name!r}; expected auto, cpu or cuda")
-    if name == "cuda" and not torch.cuda.is_available():
+    if name not in DEVICES:
+        raise SettingError(f"device is {name!r}; expected one of {', '.join(DEVICES)}")
+    found = torch.cuda.is_available()
+    if name == "cuda" and not found:
         raise SettingError("device cuda was asked for, but PyTorch finds none; use --device cpu")
-    return torch.device("cuda" if name == "cuda" or (name == "auto" and torch.cuda.is_available()) else "cpu")
+    return torch.device("cuda" if found and name != "cpu" else "cpu")

@@ -89,8 +89,7 @@ def load_pretraining_dataset(path: Path, parts: int, points: int, seed: int) -> 
 
 def make_pretraining_dataset(parts: int, points: int, seed: int, workers: int = 1) -> PretrainingDataset:
     """The first `parts` CAD parts of a seed, `points` points each; the same by however many processes."""
-    few = -(-parts // _AT_ONCE)
-    jobs = [range(i * _AT_ONCE, min((i + 1) * _AT_ONCE, parts)) for i in range(few)]
+    jobs = [range(parts)[first : first + _AT_ONCE] for first in range(0, parts, _AT_ONCE)]
     make = partial(_made, points=points, seed=seed)
     if workers > 1:
         with ProcessPoolExecutor(workers, get_context("spawn")) as pool:

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from partwright.errors import SettingError
-from partwright.methods import Cancellation
+from partwright.methods import Cancellation, check_count
 from partwright.partsdf.model import Model
 
 _DECAY, _WARMUP = 1e-2, 50
@@ -19,10 +19,12 @@ Told = Callable[[int, list[float]], None]
 """The number of a step, from 1, and the means of the terms since it was last told."""
 
 
-def check_trainable(model: Model, steps: int, purpose: str) -> None:
-    """Raise SettingError for less than one step, or a model without poses, which `purpose` names."""
+def check_trainable(model: Model, steps: int, batch: int, purpose: str) -> None:
+    """Raise SettingError for less than one step, or nothing a step, or a model without poses, which `purpose`
+    names."""
     if steps < 1:
         raise SettingError(f"steps is {steps}; expected 1 or more")
+    check_count("batch", batch, low=1)
     check_posed(model, purpose)
 
 

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from partwright.datasets.prepared import PreparedFamily
 from partwright.devices import device_of
-from partwright.methods import Cancellation, check_count
+from partwright.methods import Cancellation
 from partwright.partsdf.clouds import PartClouds, draw
 from partwright.partsdf.companion_training import check_trainable, descend
 from partwright.partsdf.encoder import Encoder, EncoderNetwork, EncoderSettings
@@ -59,8 +59,7 @@ def train_encoder(
         SettingError: fewer than one step or cloud, a model of one part, which has no poses, or no
             such device.
     """
-    check_trainable(model, steps, "an encoder predicts")
-    check_count("batch", batch, low=1)
+    check_trainable(model, steps, batch, "an encoder predicts")
     place, settings = device_of(device), settings or EncoderSettings()
     vectors = PartVectors.of(model)
     known, own, clouds = vectors.to(place), model.to(place), PartClouds.of(family, model).to(place)

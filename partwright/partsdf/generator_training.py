@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from partwright.devices import device_of
 from partwright.errors import SettingError
-from partwright.methods import Cancellation, check_count
+from partwright.methods import Cancellation
 from partwright.partsdf.companion_training import check_posed, check_trainable, descend, follow
 from partwright.partsdf.diffusion import noised
 from partwright.partsdf.generator import Generator, GeneratorSettings, networks, tidy
@@ -58,8 +58,7 @@ def train_generator(
         SettingError: fewer than one step or shape a step, fewer than two shapes, a model without poses, or no
             such device.
     """
-    check_trainable(model, steps, _FIRST)
-    check_count("batch", batch, low=1)
+    check_trainable(model, steps, batch, _FIRST)
     _check_shapes(model)
     place, settings = device_of(device), settings or GeneratorSettings()
     vectors = PartVectors.of(model)

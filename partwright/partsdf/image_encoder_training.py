@@ -69,9 +69,8 @@ def train_image_encoder(
         SettingError: fewer than one step, view or picture, a model of one part, which has no poses, or no
             such device.
     """
-    check_trainable(model, steps, "an encoder predicts")
+    check_trainable(model, steps, batch, "an encoder predicts")
     check_count("views", views, low=1)
-    check_count("batch", batch, low=1)
     place, settings = device_of(device), settings or ImageSettings()
     vectors = PartVectors.of(model)
     views = min(views, steps * batch)  # no more than are looked at

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from partwright.atomic_io import check_files
 from partwright.cli.interrupts import INTERRUPTED, stopping
@@ -24,6 +24,12 @@ class Companion(Protocol):
 
 
 C = TypeVar("C", bound=Companion)
+
+
+def how(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What `add_training` asks for, for the functions that train."""
+    asked = {name: getattr(arguments, name) for name in ("steps", "seed", "device", "batch")}
+    return {name: value for name, value in asked.items() if value is not None}
 
 
 def train_beside(

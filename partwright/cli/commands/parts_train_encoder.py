@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from partwright.cli.commands.companions import train_beside
+from partwright.cli.commands.companions import how, train_beside
 from partwright.cli.progress import Count
 from partwright.datasets.prepared import PreparedFamily
 from partwright.methods import Cancellation
@@ -25,18 +25,16 @@ def run(arguments: argparse.Namespace) -> int:
             count.show(step.number, step.of, f"latents {step.latents:.3f}  poses {step.poses:.3f}")
 
         family, width = PreparedFamily(arguments.family), arguments.width
-        how = {"steps": arguments.steps, "seed": arguments.seed, "device": arguments.device}
-        how |= {"batch": arguments.batch} if arguments.batch is not None else {}
         if arguments.sees == "points":
             settings = EncoderSettings(width=width)
-            return train_encoder(model, family, settings=settings, told=told, cancel=cancel, **how)
+            return train_encoder(model, family, settings=settings, told=told, cancel=cancel, **how(arguments))
 
         def drawn(done: int, of: int) -> None:
             count.show(done, of, "views drawn")
 
         return train_image_encoder(
             model, family, settings=ImageSettings.of_width(width), views=arguments.views, drawn=drawn,
-            told=told, cancel=cancel, **how,
+            told=told, cancel=cancel, **how(arguments),
         )  # fmt: skip
 
     def about(_: Model) -> str:

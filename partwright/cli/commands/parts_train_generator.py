@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from partwright.cli.commands.companions import train_beside
+from partwright.cli.commands.companions import how, train_beside
 from partwright.cli.progress import Count
 from partwright.cli.terminal import counted
 from partwright.methods import Cancellation
@@ -18,8 +18,6 @@ def run(arguments: argparse.Namespace) -> int:
         def told(step: GeneratorStep) -> None:
             count.show(step.number, step.of, f"poses {step.layouts:.3f}  latents {step.forms:.3f}")
 
-        how = {"steps": arguments.steps, "seed": arguments.seed, "device": arguments.device}
-        how |= {"batch": arguments.batch} if arguments.batch is not None else {}
-        return train_generator(model, told=told, cancel=cancel, **how)
+        return train_generator(model, told=told, cancel=cancel, **how(arguments))
 
     return train_beside(arguments, KIND, train, lambda model: f", of {counted(len(model.shapes), 'shape')}:")
