@@ -7,6 +7,7 @@ import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -24,6 +25,16 @@ from partwright.partsdf.training import train
 from partwright.partsdf.validation import occupancy_iou
 
 CONFIGS = Path(__file__).parents[1] / "configs"
+ROWS = (
+    ("the paper's", "paper", "held"),
+    ("the paper's, L_inter over all points", "paper", "all"),
+    ("local, L_inter over held points", "local", "held"),
+    ("local", "local", "all"),
+)
+MEANS: dict[str, dict[str, Any]] = {
+    "held": {"inter_over": "held", "inter": 1.0},
+    "all": {"inter_over": "all", "inter": 5.0},
+}
 PROBED, KEPT = 6, 5  # epochs of a probe; every fifth sample is measured at, not fitted to
 HEAD = [
     "| | steps | s a step | residual % | IoU % | pIoU % | s a reconstruction | s a mesh |",
@@ -35,26 +46,29 @@ def decoders(arguments: argparse.Namespace) -> None:
     """Each by its own configuration in configs/, of one batch, without validation."""
     family = PreparedFamily(arguments.family)
     lines = [
-        f"# PartSDF: two decoders after {arguments.seconds:.0f} processor seconds on {family.name}",
+        f"# PartSDF: two decoders, and two means of L_inter, after {arguments.seconds:.0f} processor seconds "
+        f"on {family.name}",
         "",
         "Trained by configs/NAME.toml and configs/NAME-local.toml, with the same points a step, in as many "
         "epochs as fit; one thread. Held-out shapes are reconstructed with known parts, in "
         f"{arguments.iterations} iterations of {arguments.points:,} points, and scored at the samples near "
         "their surfaces that were not fitted, where a little more or less tells most. The residual is the "
-        "mean error of the distance, as a share of the clamp. Means over "
+        "mean error of the distance, as a share of the clamp. L_inter is a mean over the points that several "
+        "parts hold, with a weight of 1, as in the paper, or over all points, with one of 5. Means over "
         f"{arguments.shapes} shapes; a mesh of the whole has {arguments.resolution} cells along the box.",
         "",
         command_line(),
         "",
         *HEAD,
     ]
-    for label, variant in (("the paper's", "paper"), ("local", "local")):
+    for label, variant, mean in ROWS:
         named = CONFIGS / f"{family.name}-{variant}.toml"  # the one that ships has the family's own name
         config = read_config(named if named.exists() else CONFIGS / f"{family.name}.toml")
         training = replace(
             config.training, validate=0, batch=4, points=512, precision="32-true", warmup=0, threads=1
         )
-        config = replace(config, family=arguments.family, training=training)
+        losses = replace(config.losses, **MEANS[mean])
+        config = replace(config, family=arguments.family, losses=losses, training=training)
         lines.append(f"| {label} | {_row(config, family, arguments)} |")
         print(lines[-1], flush=True)
     write(f"decoders-{family.name}", lines)

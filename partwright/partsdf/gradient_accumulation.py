@@ -1,8 +1,9 @@
 """One training step's gradients, a few shapes at a time where memory is short.
 
 The shapes of a batch meet in one place only: L_inter (eq. 9) is a mean over the points of all shapes that
-several parts hold. So the rest goes backward a few shapes at a time, and those points, seldom many, go
-through the decoder once more when their number is known: the gradient is that of the whole batch.
+several parts hold, unless `losses.inter_over` is "all". So the rest goes backward a few shapes at a time, and
+those points, seldom many, go through the decoder once more when their number is known: the gradient is that
+of the whole batch.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ def backward(
         weight: of this process: its part of the batch times the number of processes; 0 if its shapes are
             another's.
     """
+    meeting = config.losses.inter_over == "held"
     most, losses = config.training.at_once or len(shapes), config.losses
     found = LossTerms(*drawn[1].new_zeros(3))
     several = torch.zeros(drawn[1].shape, dtype=torch.bool, device=shapes.device)
@@ -58,15 +60,17 @@ def backward(
             return LossTerms(*(term.detach() for term in each))
         if fabric.world_size > 1:
             held = held_by_several(distances.detach()).sum() * (weight > 0)
-            inter = each.inter * (held / _mean(fabric, held).clamp(min=1 / fabric.world_size))
-            each = LossTerms(weight * each.whole, weight * each.part, inter)
+            shared = held / _mean(fabric, held).clamp(min=1 / fabric.world_size) if meeting else weight
+            each = LossTerms(weight * each.whole, weight * each.part, shared * each.inter)
             # A sum over shapes, which an average over processes would divide.
             fabric.backward(each.total(losses) + (fabric.world_size if weight else 0) * penalty)
             return LossTerms(*_mean(fabric, torch.stack([term.detach() for term in each])))
-        apart = each._replace(inter=torch.zeros_like(each.inter))
+        apart = each._replace(inter=torch.zeros_like(each.inter)) if meeting else each
         fabric.backward(share * apart.total(losses) + penalty)
         found = LossTerms(*(sum_ + share * term.detach() for sum_, term in zip(found, apart, strict=True)))
         several[some] = held_by_several(distances.detach())
+    if not meeting:
+        return found
     return found._replace(inter=_inter(fabric, model, shapes, drawn[0], poses, config, several))
 
 
@@ -91,7 +95,7 @@ def _inter(
         held = points[i, several[i]][None]
         one = slice(i, i + 1)
         distances, _ = model(shapes[one], held, poses.map(lambda t, one=one: t[one]))
-        term = intersection(distances, config.losses.temperature) * several[i].sum() / whole
+        term = intersection(distances, config.losses) * several[i].sum() / whole
         fabric.backward(config.losses.inter * term)
         result += term.detach()
     return result

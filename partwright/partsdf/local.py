@@ -37,6 +37,7 @@ class LocalDecoder(nn.Module):
     """
 
     room: Tensor
+    unit: Tensor
 
     def __init__(self, parts: int, settings: DecoderSettings) -> None:
         super().__init__()
@@ -46,6 +47,7 @@ class LocalDecoder(nn.Module):
         self.pose = nn.Linear(_POSE, token)
         self.part = nn.Parameter(0.5 * torch.randn(parts, token))
         self.register_buffer("room", torch.full((parts, 3), 1.25))
+        self.register_buffer("unit", torch.ones(parts, 3))
         self.talk = None
         if settings.cross_part and settings.blocks:
             block = nn.TransformerEncoderLayer(
@@ -66,6 +68,7 @@ class LocalDecoder(nn.Module):
         self.modulation = nn.Linear(token, told)
         self.shift = nn.Parameter(torch.zeros(parts, sum(self.sizes) - told))
         with torch.no_grad():
+            self.latent.weight.mul_(settings.latent**0.5)  # latents have norms of 1, not entries
             self.modulation.weight.mul_(0.3)
             self.modulation.bias.mul_(0.3)
 
@@ -74,6 +77,8 @@ class LocalDecoder(nn.Module):
         """How far parts reach along their axes, (P, 3) in half-lengths of their cuboids, which fit and do not
         hold them."""
         self.room.copy_((ROOM * needed).clamp(min=ROOM))
+        # A sheet that holds what lies deep below it has a room many times as thick as its cuboid.
+        self.unit.copy_(self.room)
 
     def condition(self, latents: Tensor, poses: PoseTensors | None = None) -> Conditioned:
         """Latents (B, P, Z) and poses (B, P, ...) taken in, once for any number of points."""
@@ -97,7 +102,7 @@ class LocalDecoder(nn.Module):
                 else:
                     weight = weight.expand(len(values), -1, -1, -1)
                 layers.append((weight.flatten(0, 1), shift.flatten(0, 1)))
-        return _Local(tuple(layers), poses.scale, self.room, self.settings.octaves, kind)
+        return _Local(tuple(layers), poses.scale, self.room, self.unit, self.settings.octaves, kind)
 
     def forward(self, latents: Tensor, local: Tensor, poses: PoseTensors | None = None) -> Tensor:
         """Distances (B, P, N) of latents (B, P, Z) at local points (B, P, N, 3) of poses (B, P, ...)."""
@@ -106,12 +111,14 @@ class LocalDecoder(nn.Module):
 
 @dataclass(frozen=True)
 class _Local:
-    """layers: a weight (B P, I, O) and a shift (B P, O) each. scale: half-lengths (B, P, 3). room: (P, 3).
-    kind: of numbers in hidden layers."""
+    """layers: a weight (B P, I, O) and a shift (B P, O) each. scale: half-lengths (B, P, 3). room: (P, 3),
+    and unit: (P, 3) in which the networks see places, both in half-lengths. kind: of numbers in hidden
+    layers."""
 
     layers: tuple[tuple[Tensor, Tensor], ...]
     scale: Tensor
     room: Tensor
+    unit: Tensor
     octaves: int
     kind: torch.dtype
 
@@ -129,11 +136,12 @@ class _Local:
 
     def _network(self, points: Tensor, counts: Tensor, owner: Tensor, filled: bool | None) -> Tensor:
         """(M,) at local points (M, 3), `counts` (B P,) of each part of each shape, which stand together."""
+        unit = self.unit.expand_as(self.scale).flatten(0, 1).index_select(0, owner)
         lengths = self.scale.flatten(0, 1).index_select(0, owner)
-        y = torch.cat([positional_encoding(points, self.octaves), points * lengths], dim=-1)
+        y = torch.cat([positional_encoding(points / unit, self.octaves), points * lengths], dim=-1)
         filled = y.is_cuda if filled is None else filled
         y = self._filled(y, counts) if filled else self._one_by_one(y, counts.cumsum(dim=0).tolist())
-        return y.squeeze(1) * lengths.amin(dim=1)  # a small part's errors are small
+        return y.squeeze(1) * (lengths * unit).amin(dim=1)  # a small part's errors are small
 
     def _one_by_one(self, y: Tensor, ends: list[int]) -> Tensor:
         for n, (weight, shift) in enumerate(self._typed(y.dtype)):

@@ -31,7 +31,7 @@ def terms(
     return LossTerms(
         clamped_error(aggregate(distances, decoder), sdf, losses).mean(),
         clamped_error(nearest, sdf, losses).mean(),
-        intersection(distances, losses.temperature),
+        intersection(distances, losses),
     )
 
 
@@ -55,16 +55,18 @@ def clamped_error(predicted: Tensor, sdf: Tensor, losses: LossSettings) -> Tenso
     return weight * error.abs()
 
 
-def intersection(distances: Tensor, temperature: float) -> Tensor:
-    """L_inter (eq. 9) of distances (B, P, N): mean over points inside two parts or more, else 0.
+def intersection(distances: Tensor, losses: LossSettings) -> Tensor:
+    """L_inter (eq. 9) of distances (B, P, N): a mean over points inside two parts or more, else 0; or over
+    all points, of which only these count, as `losses.inter_over` says.
 
     The softmax over the negative distances has no gradient: parts that reach in least are pushed out most.
     """
     negative, several = distances < 0, held_by_several(distances)[:, None]
     with torch.no_grad():
-        logits = torch.where(negative & several, distances / temperature, -torch.inf)
+        logits = torch.where(negative & several, distances / losses.temperature, -torch.inf)
         weight = torch.softmax(torch.where(several, logits, 0.0), dim=1) * several
-    return -(weight * distances).sum() / several.sum().clamp(min=1)
+    among = several.sum().clamp(min=1) if losses.inter_over == "held" else several.numel()
+    return -(weight * distances).sum() / among
 
 
 def held_by_several(distances: Tensor) -> Tensor:

@@ -103,10 +103,10 @@ def settings_for(family: PreparedFamily, name: str, steps: int, seed: int = 0, t
         family=str(family.folder),
         name=name,
         decoder=DecoderSettings(architecture="local", latent=64, width=64, layers=5, octaves=5),
-        losses=LossSettings(latent=1e-5, ramp=20),
+        losses=LossSettings(latent=1e-5, inter=5.0, inter_over="all", ramp=20),
         training=TrainingSettings(
-            epochs=epochs, batch=_BATCH, points=256, balance=0.5, validation=True, rate=4e-3,
-            latent_rate=5e-3, latent_spread=0.1, warmup=min(150, 1 + steps // 10), anneal=0.28,
+            epochs=epochs, batch=_BATCH, points=256, balance=0.25, validation=True, rate=4e-3,
+            latent_rate=5e-3, warmup=min(150, 1 + steps // 10), anneal=1.0,
             threads=threads, validate=epochs, validate_shapes=1, checkpoint=1, seed=seed,
         ),
     )  # fmt: skip

@@ -261,7 +261,7 @@ def _loss(
     decoder = shape.model.config.decoder
     if target.low is not None:
         off = target.error(aggregate(each, decoder)[0], rows, losses).mean()
-        overlap = intersection(each, losses.temperature)
+        overlap = intersection(each, losses)
         return losses.whole * off + losses.inter * overlap + latent_penalty(latents, losses, losses.ramp)
     sdf = target.sdf[rows][None]
     known = target.part is not None

@@ -13,7 +13,7 @@ import torch
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import SettingError
 from partwright.partsdf.autodecoder import AutoDecoder
-from partwright.partsdf.config import Config, DecoderSettings, TrainingSettings
+from partwright.partsdf.config import Config, DecoderSettings, LossSettings, TrainingSettings
 from partwright.partsdf.gradient_accumulation import backward
 from partwright.partsdf.losses import intersection, latent_penalty, terms
 from partwright.partsdf.poses import PoseTensors
@@ -24,9 +24,10 @@ SHAPES, PARTS, POINTS = 5, 3, 40
 DECODER = DecoderSettings(latent=6, width=16, layers=5)
 
 
-def config(at_once: int) -> Config:
+def config(at_once: int, inter_over: str) -> Config:
     training = TrainingSettings(batch=SHAPES, at_once=at_once)
-    return Config("family", "model", decoder=DECODER, training=training)
+    losses = LossSettings(inter_over=inter_over)
+    return Config("family", "model", decoder=DECODER, losses=losses, training=training)
 
 
 def batch() -> tuple:
@@ -42,8 +43,9 @@ def batch() -> tuple:
     return torch.tensor([3, 0, 4, 2, 1]), drawn, poses
 
 
+@pytest.mark.parametrize("inter_over", ["held", "all"])
 @pytest.mark.parametrize("at_once", [1, 2, 3, 5, 9])
-def test_gradients_and_terms_are_those_of_the_whole_batch(at_once: int) -> None:
+def test_gradients_and_terms_are_those_of_the_whole_batch(at_once: int, inter_over: str) -> None:
     torch.manual_seed(0)
     model = AutoDecoder(SHAPES, PARTS, DECODER).double()
     shapes, (points, sdf, part), poses = batch()
@@ -55,10 +57,10 @@ def test_gradients_and_terms_are_those_of_the_whole_batch(at_once: int) -> None:
     distances, latents = model(shapes, points, poses)
     held = ((distances < 0).sum(dim=1) >= 2).sum(dim=1)
     assert len(held.unique()) > 2  # a mean of the shapes' means would be another one
-    settings = config(at_once)
+    settings = config(at_once, inter_over)
     expected = terms(distances, sdf, part, settings.losses, DECODER)
     assert expected.inter > 0
-    torch.testing.assert_close(expected.inter, intersection(distances, settings.losses.temperature))
+    torch.testing.assert_close(expected.inter, intersection(distances, settings.losses))
     total = expected.total(settings.losses) + latent_penalty(latents, settings.losses, 50)
     wanted = torch.autograd.grad(total, list(model.parameters()))
     fabric = SimpleNamespace(backward=lambda loss: loss.backward(), world_size=1)

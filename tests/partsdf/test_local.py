@@ -65,6 +65,17 @@ def test_far_parts_are_left_out_and_near_ones_are_each_as_if_alone() -> None:
         torch.testing.assert_close(conditioned(local[:, :, n : n + 1]), found[:, :, n : n + 1])
 
 
+def test_a_sheet_is_seen_as_its_room_is() -> None:
+    """A cuboid that is thinner by as much as its room is thicker has the same room, and the same values."""
+    made, (z, points, poses) = decoder(), placed()
+    torch.testing.assert_close(made.unit, made.room)
+    conditioned, local = made.condition(z, poses), local_points(points, poses)
+    thin = torch.tensor([1.0, 1.0, 50.0], dtype=torch.float64)
+    units = {"room": made.room * thin, "unit": made.unit * thin}
+    sheet = replace(conditioned, scale=poses.scale / thin, **units)  # type: ignore[type-var]
+    torch.testing.assert_close(sheet(local * thin), conditioned(local))
+
+
 @pytest.mark.parametrize("changes", [{}, {"modulation": False}])
 def test_gradients_agree_with_finite_differences(changes: dict[str, object]) -> None:
     made, (z, points, poses) = decoder(replace(SMALL, **changes)), placed(points=3)  # type: ignore[arg-type]

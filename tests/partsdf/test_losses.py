@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
@@ -40,13 +41,19 @@ def test_intersection_is_eq_9() -> None:
     distances = torch.tensor([[[-0.02, -0.1, 0.3], [-0.04, 0.1, 0.3], [0.1, 0.2, 0.1]]], dtype=torch.float64)
     weights = [math.exp(-1.0), math.exp(-2.0)]
     expected = (weights[0] * 0.02 + weights[1] * 0.04) / sum(weights)  # only the first point counts
-    assert float(intersection(distances, 0.02)) == pytest.approx(expected)
-    assert float(intersection(distances.abs(), 0.02)) == 0.0
+    assert float(intersection(distances, LOSSES)) == pytest.approx(expected)
+    assert float(intersection(distances.abs(), LOSSES)) == 0.0
+
+
+def test_intersection_over_all_points_leaves_a_few_no_more_than_their_share() -> None:
+    distances = torch.tensor([[[-0.02, -0.1, 0.3], [-0.04, 0.1, 0.3], [0.1, 0.2, 0.1]]], dtype=torch.float64)
+    over_all = intersection(distances, replace(LOSSES, inter_over="all"))
+    assert float(over_all) == pytest.approx(float(intersection(distances, LOSSES)) / 3)
 
 
 def test_intersection_pushes_parts_out_and_the_shallow_one_more() -> None:
     distances = torch.tensor([[[-0.02], [-0.06]]], dtype=torch.float64, requires_grad=True)
-    intersection(distances, 0.02).backward()
+    intersection(distances, LOSSES).backward()
     assert distances.grad is not None
     shallow, deep = distances.grad.flatten().tolist()
     assert shallow < deep < 0  # descent raises both, the shallow one faster
