@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 _TOUCHING = 1e-9  # of the segments' lengths: what crosses by less touches
+_PAIRS = 1 << 18  # of segments that are looked at at once
 
 
 def first_crossing(loops: Sequence[np.ndarray]) -> np.ndarray | None:
@@ -15,21 +16,26 @@ def first_crossing(loops: Sequence[np.ndarray]) -> np.ndarray | None:
     end = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
     low, high = np.minimum(start, end), np.maximum(start, end)
     way = end - start
-    for i in range(len(start) - 1):
-        near = (low[i + 1 :] <= high[i]).all(axis=1) & (high[i + 1 :] >= low[i]).all(axis=1)
-        other = i + 1 + np.flatnonzero(near)
-        if not len(other):
-            continue
-        along = _cross(way[i], start[other] - start[i]), _cross(way[i], end[other] - start[i])
-        back = _cross(way[other], start[i] - start[other]), _cross(way[other], end[i] - start[other])
-        least = _TOUCHING * np.linalg.norm(way[i]) * np.linalg.norm(way[other], axis=1)
+    length = np.linalg.norm(way, axis=1)
+    rows = max(1, _PAIRS // len(start))
+    for first in range(0, len(start), rows):
+        some = slice(first, first + rows)
+        near = np.arange(len(start)) > np.arange(len(start))[some, None]
+        for k in range(2):
+            near &= low[:, k] <= high[some, k, None]
+            near &= high[:, k] >= low[some, k, None]
+        one, other = np.nonzero(near)
+        one += first
+        along = _cross(way[one], start[other] - start[one]), _cross(way[one], end[other] - start[one])
+        back = _cross(way[other], start[one] - start[other]), _cross(way[other], end[one] - start[other])
+        least = _TOUCHING * length[one] * length[other]
         apart = [np.minimum(*pair) < -least for pair in (along, back)]
         beyond = [np.maximum(*pair) > least for pair in (along, back)]
-        crossing = apart[0] & apart[1] & beyond[0] & beyond[1]
-        if crossing.any():
-            k = int(other[crossing.argmax()])
-            share = back[0][crossing.argmax()] / (back[0] - back[1])[crossing.argmax()]
-            return np.asarray(start[i] + share * way[i]) if k >= 0 else None
+        crossing = np.flatnonzero(apart[0] & apart[1] & beyond[0] & beyond[1])
+        if len(crossing):
+            k = int(crossing[0])
+            share = back[0][k] / (back[0] - back[1])[k]
+            return np.asarray(start[one[k]] + share * way[one[k]])
     return None
 
 

@@ -73,6 +73,11 @@ class Solid:
         vertices, faces = surface_of(self.body)
         return MeshDistance(vertices, faces, faces, True)
 
+    @cached_property
+    def count(self) -> int:
+        """Connected bodies, crumbs left out."""
+        return sum(1 for _ in bodies(self.body, _CRUMB * max(float(self.body.volume()), 0.0), 0.0))
+
     def sign(self, points: Floats) -> Floats:
         return self.distance(points.astype(np.float32)).astype(np.float64)
 
@@ -103,7 +108,7 @@ def reach(shape: Solid, other: Solid, box: Floats) -> float:
 def loose_places(shape: Solid, other: Solid) -> list[Place]:
     """Where pieces of the other body nearly touch its largest, if it has more of them than the shape."""
     pieces = sorted(bodies(other.body, _CRUMB * shape.body.volume(), 0.0), key=lambda piece: -piece[0])
-    if len(pieces) < 2 or len(pieces) <= count(shape.body):
+    if len(pieces) < 2 or len(pieces) <= shape.count:
         return []
     found = []
     largest = pieces[0][1]
@@ -117,11 +122,6 @@ def loose_places(shape: Solid, other: Solid) -> list[Place]:
         if (shape.sign(middle) < 0).mean() > _WITHIN:
             found.append(Place(np.concatenate([near, across]), True, float(gap.min()), gap=True))
     return found
-
-
-def count(body: Manifold) -> int:
-    """Connected bodies, crumbs left out."""
-    return sum(1 for _ in bodies(body, _CRUMB * max(float(body.volume()), 0.0), 0.0))
 
 
 def _apart(

@@ -22,7 +22,6 @@ from partwright.superfrusta.far_places import (
     NEARLY,
     Place,
     Solid,
-    count,
     far_places,
     loose_places,
     reach,
@@ -165,9 +164,10 @@ def _joined(
 
     solid = Solid(body, distance)
     off = reach(shape, solid, place.box + np.array([[-_LOOKED], [_LOOKED]]))
-    bodies, before = count(body), count(start.solid.body)
-    better = off < NEARLY * FAR and bodies < before if place.gap else off < _BETTER * place.off
-    return _Mended(tree, solid, parts, off) if better and bodies <= before else None
+    if off >= (NEARLY * FAR if place.gap else _BETTER * place.off):
+        return None
+    fewer = start.solid.count - solid.count
+    return _Mended(tree, solid, parts, off) if fewer >= (1 if place.gap else 0) else None
 
 
 def _with_copies(

@@ -12,14 +12,7 @@ from partwright.errors import CancelledError, EmptyShapeError
 from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outcome, timed
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_steps import FeatureTree
-from partwright.superfrusta.featured import (
-    SURE,
-    assembly,
-    feature_tree,
-    freeform_warnings,
-    mended_assembly,
-    wants_features,
-)
+from partwright.superfrusta.featured import SURE, FeaturedFit, freeform_warnings, wants_features
 from partwright.superfrusta.outcome import assembly_of
 from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import FitSamples
@@ -47,11 +40,16 @@ def fit(request: FitRequest[Settings]) -> Fitted:
     with timed(seconds, "prepare"):
         samples = FitSamples.of(shape, settings, run, checkpoint)
     features: FeatureTree | None = None
+    featured = FeaturedFit(request, samples, checkpoint)
     if wants_features(request):
         with timed(seconds, "features"):
-            features, interrupted = feature_tree(request, samples, checkpoint)
-        if features is not None and (interrupted or features.score >= SURE or settings.min_iou is not None):
-            return _of_features(shape, features, "interrupted" if interrupted else "converged", seconds, [])
+            features, interrupted = featured.tree()
+        if features is not None and interrupted:
+            return _of_features(shape, featured.assembly(features), "interrupted", seconds, [])
+        if features is not None and (features.score >= SURE or settings.min_iou is not None):
+            with timed(seconds, "freeform"):
+                features = featured.mended(features)
+            return _of_features(shape, featured.assembly(features), "converged", seconds, [])
     assembled = partial(assembly_of, shape, settings=settings, fixed=fixed)
     search = ResidualFit(samples, settings, run.told, len(fixed), assembled, checkpoint, seconds=seconds)
     try:
@@ -70,14 +68,18 @@ def fit(request: FitRequest[Settings]) -> Fitted:
             "can see. Check its thickness, or use --quality high"
         )
     leaves = search.leaves or [RepeatedPart(row) for row in search.best]
-    if features is not None and _preferred(features, search, len(leaves)):
-        return _of_features(shape, features, outcome, search.seconds, search.history)
     whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
-    if features is not None and outcome != "interrupted":
-        with timed(seconds, "freeform"):
-            whole, off = mended_assembly(request, samples, whole)
-        if off > features.off:  # nothing may be far off that need not be
-            return _of_features(shape, features, outcome, search.seconds, search.history)
+    if features is not None:
+        # Of the search none says how it would be drawn: there a part costs more than a feature does.
+        rival = search.objective(search.best, len(leaves)) - (_DEARER - 1) * settings.alpha * len(leaves)
+        preferred = features.objective - features.off >= rival
+        if outcome != "interrupted":
+            with timed(seconds, "freeform"):
+                whole, preferred = _mended(featured, features, whole, rival)
+        elif preferred:
+            whole = featured.assembly(features)
+        if preferred:
+            return _of_features(shape, whole, outcome, search.seconds, search.history)
     whole = _with_locked(whole, request)
     curve: list[CurvePoint] = []
     for step in search.curve:
@@ -90,21 +92,34 @@ def fit(request: FitRequest[Settings]) -> Fitted:
 
 def _of_features(
     shape: Shape,
-    features: FeatureTree,
+    whole: Assembly,
     outcome: Outcome,
     seconds: dict[str, float],
     history: list[dict[str, float | str]],
 ) -> Fitted:
-    whole = assembly(shape, features)
     return Fitted(whole, outcome, seconds, history, warnings=freeform_warnings(shape, whole))
 
 
-def _preferred(features: FeatureTree, search: ResidualFit, parts: int) -> bool:
-    """Whether features are the result, and not that many parts of the search, of which none says how it would
-    be drawn: there a part costs more than a feature does."""
-    assert search.best is not None
-    dear = (_DEARER - 1) * search.settings.alpha * parts
-    return features.objective - features.off >= search.objective(search.best, parts) - dear
+def _mended(
+    featured: FeaturedFit, features: FeatureTree, whole: Assembly, rival: float
+) -> tuple[Assembly, bool]:
+    """The features, or what the search found, with freeform where it is far off; and whether it is the
+    features.
+
+    rival: the search's objective. The one that explains more is mended first, the other only where that does
+    not bring it near: nothing may be far off that need not be.
+    """
+    mended: FeatureTree | None = None
+    if features.objective >= rival:
+        mended = featured.mended(features)
+        if mended.objective - mended.off >= rival:
+            return featured.assembly(mended), True
+    whole, off = featured.mended_assembly(whole)
+    if off and mended is None:
+        mended = featured.mended(features)
+    if mended is not None and off > mended.off:
+        return featured.assembly(mended), True
+    return whole, False
 
 
 def _with_locked(whole: Assembly, request: FitRequest[Settings]) -> Assembly:

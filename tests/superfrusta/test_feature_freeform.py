@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +16,12 @@ from partwright.assembly import Assembly, Part
 from partwright.fields import Box, Cylinder, Sphere
 from partwright.meshing import mesh_assembly
 from partwright.meshing.csg import solid_of
-from partwright.superfrusta.far_places import Solid, count, far_places
+from partwright.superfrusta.far_places import Solid, far_places
+from partwright.superfrusta.feature_assembly import FeatureAssembly
 from partwright.superfrusta.feature_freeform import with_freeform
 from partwright.superfrusta.feature_mending import FAR
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
-from partwright.superfrusta.featured import _as_made
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.solids import Settings
 
@@ -44,12 +44,12 @@ def mended(whole: Assembly, *parts: Part, most: int | None = None) -> tuple[Feat
     search = search_of(whole)
     shape = pw.load_shape(mesh_assembly(whole))
     first = [Feature(True, part, np.zeros(0, bool), 4) for part in parts]
-    made = partial(_as_made, shape)
+    made = FeatureAssembly(shape).in_unit_frame
     tree = with_freeform(search, search.scored(FeatureTree(first)), made, most)
     result = made(tree)
     other = Solid(solid_of(result, 1e-3), result.distance)
     places = far_places(Solid(search.body, search.samples.measure), other)
-    return tree, max((place.off for place in places), default=0.0), count(other.body)
+    return tree, max((place.off for place in places), default=0.0), other.count
 
 
 def test_a_ball_is_a_few_steps_and_a_block_is_one() -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold
 
-from partwright.fields.profile import Profile
+from partwright.fields.profile import Profile, Side
 from partwright.fields.profile_distance import profile_distance
 from partwright.fields.rims import Rim
 from partwright.shapes.topology import area_vectors
@@ -56,11 +57,15 @@ def top_rim(faces: Leaning, profile: Profile, high: float) -> Rim:
 
 def _rim(faces: Leaning, off: np.ndarray, facing: np.ndarray, profile: Profile) -> Rim:
     """off: (F, 3) how far below the end the corners are. facing: (F,) the normals' part beyond the end."""
+    low, high = profile.bounds()
     own = (facing > 0) & (off.min(axis=1) > -_OFF) & (off.max(axis=1) < _MOST)
-    off, facing, area = np.maximum(off[own], 0), facing[own], faces.area[own]
-    lengths = np.array([_perimeter(Profile(loop)) for loop in profile.loops])
+    around = faces.corners[own][..., :2]
+    own[own] = ((around > low - _OFF) & (around < high + _OFF)).all(axis=(1, 2))
+    lengths = np.array([_perimeter(loop) for loop in profile.sides])
+    area = faces.area[own]
     if area.sum() < _COVERED * _LEAST * lengths.sum():
         return SHARP
+    off, facing = np.maximum(off[own], 0), facing[own]
     flat = faces.corners[own][..., :2].reshape(-1, 2)
     deep = -profile_distance(profile, flat).reshape(-1, 3)
     # Of a circle that touches both, through a point; of a chamfer's end points it is the chamfer.
@@ -70,19 +75,27 @@ def _rim(faces: Leaning, off: np.ndarray, facing: np.ndarray, profile: Profile) 
     alike = (np.abs(depth - found) < _ALIKE * found + _OFF / 4).all(axis=1) if np.isfinite(found) else own[:0]
     if not _LEAST <= found < math.inf or not alike.any():
         return SHARP
-    total = float(area[alike].sum())
+    area, facing, depth, flat = area[alike], facing[alike], depth[alike], flat[np.repeat(alike, 3)]
+    total = float(area.sum())
     tilted = np.abs(facing - math.sqrt(0.5)) < _AT_45
-    chamfer = float(area[alike & tilted].sum()) > _CHAMFERED * total
+    chamfer = float(area[tilted].sum()) > _CHAMFERED * total
     width = found * (math.sqrt(2) if chamfer else math.pi / 2)
+    if total < _COVERED * lengths.sum() * width:
+        return SHARP
     apart = [
-        np.abs(profile_distance(Profile(loop), flat)).reshape(-1, 3).sum(axis=1) for loop in profile.loops
+        np.abs(profile_distance(profile, flat, sides)).reshape(-1, 3).sum(axis=1) for sides in _loops(profile)
     ]
-    along = np.argmin(apart, axis=0)
-    there = np.bincount(along[alike], area[alike], minlength=len(lengths))
+    there = np.bincount(np.argmin(apart, axis=0), area, minlength=len(lengths))
     if (there < _COVERED * lengths * width).any():
         return SHARP
-    exact = float(np.average(depth[alike].ravel(), weights=np.repeat(area[alike], 3)))
+    exact = float(np.average(depth.ravel(), weights=np.repeat(area, 3)))
     return Rim(0.0, exact) if chamfer else Rim(exact, 0.0)
+
+
+def _loops(profile: Profile) -> Iterator[np.ndarray]:
+    """Of each loop which corners (V,) are its own."""
+    corner = np.arange(len(profile.corners))
+    return ((corner >= first) & (corner < last) for first, last in pairwise(profile.starts.tolist()))
 
 
 def _most_common(values: np.ndarray, weights: np.ndarray) -> float:
@@ -98,8 +111,7 @@ def _most_common(values: np.ndarray, weights: np.ndarray) -> float:
     return float(np.median(values[first : ends[first]]))
 
 
-def _perimeter(profile: Profile) -> float:
-    sides = (side for loop in profile.sides for side in loop)
+def _perimeter(sides: Sequence[Side]) -> float:
     return sum(abs(s.sweep) * s.radius if s.centre else math.dist(s.start, s.end) for s in sides)
 
 

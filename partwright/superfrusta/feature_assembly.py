@@ -1,0 +1,110 @@
+"""The assembly that a tree of features becomes: holes apart, open ends further out, groups, plain numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+
+from partwright.approximation.part_roles import FREEFORM, with_role_names
+from partwright.approximation.plain_numbers import plain_move, with_plain_numbers
+from partwright.approximation.sketches.ends import with_open_ends
+from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
+from partwright.assembly import Assembly, Node, Part
+from partwright.assembly.group_copies import in_runs
+from partwright.fields import Cylinder
+from partwright.shapes import Shape
+from partwright.superfrusta.feature_groups import grouped
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, image_of
+
+_PLAIN = 1e-4  # unit lengths: how far numbers are moved to become plain
+
+
+class FeatureAssembly:
+    """Makes assemblies of the trees of one shape; what a feature becomes by itself is asked once for all of
+    them."""
+
+    def __init__(self, shape: Shape) -> None:
+        self.shape, self.distance = shape, shape.unit_distance
+        self._known: dict[tuple[int, bool], tuple[Feature, list[tuple[Feature, bool]]]] = {}
+
+    def named(self, tree: FeatureTree) -> Assembly:
+        """The features as a tree of unions and differences, named, in the shape's own units."""
+        return with_role_names(dataclasses.replace(self._plain(tree), unit=self.shape.unit))
+
+    def in_unit_frame(self, tree: FeatureTree) -> Assembly:
+        """The same without names, as it is measured: rounded numbers may leave skins."""
+        return in_unit_frame(self.shape, self._plain(tree))
+
+    def _plain(self, tree: FeatureTree) -> Assembly:
+        frame = self.shape.frame
+        whole = grouped(self._numbered(tree)).scaled(1 / frame.scale).translated(frame.centre)
+        return _with_plain_numbers(whole, _PLAIN / frame.scale)
+
+    def _numbered(self, tree: FeatureTree) -> list[Feature]:
+        """Round holes of profiles apart, each size once; ends that are open further out; names until they say
+        more."""
+        result: list[Feature] = []
+        drilled: list[Part] = []
+        for i, feature in enumerate(tree.features):
+            for own, empty in self._alone(feature, i == 0):
+                if empty:
+                    drilled += own.parts
+                else:
+                    result.append(own)
+        none = np.zeros(0, bool)
+        result += [Feature(False, hole, none, 0) for hole in merged_holes(drilled, self.distance)]
+        stems = {True: "part", False: "cut"}
+        names = [f"{stems[f.added]}_{i:02d}" for i, f in enumerate(result, start=1)]
+        for k, i in enumerate((i for i, f in enumerate(result) if f.freeform), start=1):
+            names[i] = f"{FREEFORM}_{k}"
+        return [
+            dataclasses.replace(f, part=dataclasses.replace(f.part, name=name))
+            for f, name in zip(result, names, strict=True)
+        ]
+
+    def _alone(self, feature: Feature, is_base: bool) -> list[tuple[Feature, bool]]:
+        """Its holes apart, ends that are open further out; and of each whether it is a drilled hole in which
+        there is nothing of the shape."""
+        key = id(feature), is_base
+        if key not in self._known:
+            self._known[key] = feature, list(self._steps(feature, is_base))
+        return self._known[key][1]
+
+    def _steps(self, feature: Feature, is_base: bool) -> Iterator[tuple[Feature, bool]]:
+        if feature.freeform:
+            yield feature, False
+            return
+        part, holes = holes_apart(feature.part) if feature.added else (feature.part, ())
+        if not is_base and not all(is_empty(hole, self.distance) for hole in holes):
+            part, holes = feature.part, ()  # cut by themselves they would open what is there before
+        parts = [(part, feature.added), *((hole, False) for hole in holes)]
+        for k, (one, added) in enumerate(parts):
+            longer = one if is_base and k == 0 else with_open_ends(one, added, self.distance)
+            if feature.image is not None and longer is not one:
+                image = with_open_ends(image_of(one, feature.image), added, self.distance)
+                if image.field.bounds()[1][2] != longer.field.bounds()[1][2]:
+                    longer = one  # which goes on in but one of both places
+            own = dataclasses.replace(feature, part=longer, added=added)
+            drilled = not added and isinstance(longer.field, Cylinder)
+            yield own, drilled and is_empty(longer, self.distance)
+
+
+def in_unit_frame(shape: Shape, whole: Assembly) -> Assembly:
+    x, y, z = (-float(middle) for middle in shape.frame.centre)
+    return whole.translated((x, y, z)).scaled(shape.frame.scale)
+
+
+def _with_plain_numbers(node: Assembly, within: float) -> Assembly:
+    children: list[Node] = []
+    for child, copies in in_runs(node):
+        if isinstance(child, Part):
+            children.append(with_plain_numbers(child, within))
+            continue
+        plain = _with_plain_numbers(child, within)
+        children.append(plain)
+        for k, copy in enumerate(copies, start=2):  # exactly what the first is
+            move = plain_move(copy.move, within)
+            children.append(dataclasses.replace(copy, move=move).of(plain, k))
+    return dataclasses.replace(node, children=tuple(children))
