@@ -33,8 +33,10 @@ def terraces(
     low, high = view.levels[0], view.levels[-1]
     count = int(np.clip(math.ceil((high - low) / tolerance * _STEPS), 2, _MOST_SECTIONS))
     step = (high - low) / count
-    seen = about @ frame
-    sections = [_section(view, low + (k + 0.5) * step, tolerance, seen[:, :2]) for k in range(count)]
+    square = CrossSection.square((tolerance, tolerance)).translate((-tolerance / 2, -tolerance / 2))
+    seen = [square.translate((x, y)) for x, y, _ in about @ frame]
+    places = CrossSection.batch_boolean(seen, OpType.Add)
+    sections = [_section(view, low + (k + 0.5) * step, tolerance, places) for k in range(count)]
     allowed = max(1, int(tolerance / step))
     parts: list[Part] = []
     start = 0
@@ -54,15 +56,10 @@ def terraces(
     return parts or None
 
 
-def _section(view: View, height: float, tolerance: float, about: np.ndarray) -> CrossSection:
-    """Regions about points (N, 2), without what is thinner than can be far off."""
+def _section(view: View, height: float, tolerance: float, places: CrossSection) -> CrossSection:
+    """Regions that meet places, without what is thinner than can be far off."""
     whole = view.body.slice(height)
     thick = whole.offset(-_LEAST * tolerance, JoinType.Miter).offset(_LEAST * tolerance, JoinType.Miter)
-    half = tolerance / 2
-    places = CrossSection.batch_boolean(
-        [CrossSection.square((tolerance, tolerance)).translate((x - half, y - half)) for x, y in about],
-        OpType.Add,
-    )
     regions = (thick ^ whole).simplify(_SIMPLER * tolerance).decompose()
     kept = [region for region in regions if not (region ^ places).is_empty()]
     return CrossSection.compose(kept) if kept else CrossSection()
