@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from partwright.errors import ParameterError
-from partwright.fields import Profile
+from partwright.fields import Profile, profile_crossings
 from partwright.fields.profile import circle, circle_of
 from partwright.fields.profile_distance import profile_distance, profile_gradients, reference
 from partwright.fields.profile_offset import offset
@@ -136,3 +136,19 @@ def test_the_parallel_curve_has_the_right_area() -> None:
         offset(corner, 0.6)
     with pytest.raises(ParameterError, match="arc meets a side at a corner"):
         offset(Profile([(0, 0), (1, 0), (1, 1, 0.3), (0, 1)]), 0.1)
+
+
+@pytest.mark.parametrize("pairs", [1, 200, 1 << 18])
+def test_crossings_are_found_however_many_pairs_are_looked_at_at_once(
+    pairs: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(profile_crossings, "_PAIRS", pairs)
+    turns = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+    ring = np.column_stack([np.cos(turns), np.sin(turns)])
+    assert profile_crossings.first_crossing([ring, 0.5 * ring]) is None
+    assert (
+        profile_crossings.first_crossing([ring, ring + np.array([2.0, 0.0])]) is None
+    )  # they touch at a corner
+    apart = profile_crossings.first_crossing([ring, 0.5 * ring, ring + np.array([1.0, 0.0])])
+    assert apart is not None
+    np.testing.assert_allclose(apart, [0.5, math.sqrt(0.75)], atol=2e-3)
