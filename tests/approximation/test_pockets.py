@@ -59,6 +59,17 @@ def test_other_parts_stay(floor: Part) -> None:
     assert not list(as_pockets(Part(WALL), floor))
 
 
+def test_a_hole_that_a_floor_closes_but_for_a_slit_stays_open() -> None:
+    """However narrow the slit, or the hole itself: neither is looked for on a lattice."""
+    slit = [(-0.55, -0.35), (0.0, -0.35), (0.0, 0.2), (0.01, 0.2), (0.01, -0.35), (0.55, -0.35)]
+    notched = Extrusion(Profile([*slit, (0.55, 0.35), (-0.55, 0.35)]), 0.1)
+    assert not list(as_pockets(Part(WALL), Part(notched, (0, 0, -0.15))))
+    narrow = Profile([(-0.5, -0.3), (-0.499, -0.3), (0.5, 0.3), (0.499, 0.3)])
+    wall = Part(Extrusion(Profile(WALL.profile.outline, [narrow.outline]), 0.4))
+    assert not list(as_pockets(wall, Part(Box((0.5, 0.5, 0.1)), (0, 0, -0.15))))
+    assert list(as_pockets(wall, Part(Box((1.1, 0.7, 0.1)), (0, 0, -0.15))))
+
+
 def test_a_floor_in_the_middle_leaves_pockets_above_and_below_of_every_copy() -> None:
     """Of which one may be within another solid; the copies of the floor come in any order."""
     turn, far = Similarity(rotation=(0.0, 0.0, 0.0, 1.0)), Similarity(translation=(2, 0, 0))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from manifold3d import CrossSection, FillRule, JoinType
 
 from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.holes import hole_parts
@@ -13,11 +14,9 @@ from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Cylinder, Extrusion
 from partwright.fields.profile import Loop, Profile, circle
-from partwright.fields.profile_distance import profile_distance
 
 _FLUSH = 3e-3  # unit lengths: how far ends, and outlines, that are one may lie apart
 _PARALLEL = 1e-6  # of a cosine
-_LATTICE = 20
 _THICKEST = 0.9  # of the wall's height, that the floor has
 
 
@@ -70,20 +69,12 @@ def _pocketed(wall: Part, floor: Part) -> Iterator[Pocketed]:
     else:
         choices = [(above,), (below,), (below, above)]
 
-    def onto_floor(flat: np.ndarray) -> np.ndarray:
-        """(N,) of the floor's outline at points of the wall's plane (N, 2)."""
-        points = np.column_stack([flat, np.full(len(flat), at)]) @ frame.T + wall.translation
-        local = (points - floor.translation) @ other
-        return np.asarray(profile_distance(Profile(lid.profile.outline), local[:, :2]))
-
-    def onto_wall(flat: np.ndarray) -> np.ndarray:
-        points = np.column_stack([flat, np.zeros(len(flat))]) @ other.T + floor.translation
-        local = (points - wall.translation) @ frame
-        return np.asarray(profile_distance(Profile(field.profile.outline), local[:, :2]))
-
-    edge = np.concatenate(Profile(lid.profile.outline).polylines(1e-2))
-    closed = [loop for loop in field.profile.holes if (onto_floor(_within(loop)) < _FLUSH).all()]
-    if not closed or (onto_wall(edge) > _FLUSH).any():
+    # As it lies in the wall's plane, whichever side of it is up.
+    lines = np.concatenate(Profile(lid.profile.outline).polylines(_FLUSH / 4))
+    placed = np.column_stack([lines, np.zeros(len(lines))]) @ other.T + floor.translation
+    cover = _section([((placed - wall.translation) @ frame)[:, :2]])
+    closed = [loop for loop in field.profile.holes if _holds(cover, _filled(loop))]
+    if not closed or not _holds(_filled(field.profile.outline), cover):
         return
     rest = tuple(loop for loop in field.profile.holes if loop not in closed)
     middle = frame.T @ np.array(wall.translation)
@@ -107,11 +98,14 @@ def _upright(part: Part) -> Extrusion | None:
     return field if isinstance(field, Extrusion) and not field.taper and not field.has_rims else None
 
 
-def _within(loop: Loop) -> np.ndarray:
-    """(N, 2) points in it."""
-    profile = Profile(loop)
-    low, high = profile.bounds()
-    steps = (np.arange(_LATTICE) + 0.5) / _LATTICE
-    grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    flat = low + grid * (high - low)
-    return np.asarray(flat[profile_distance(profile, flat) < 0])
+def _filled(loop: Loop) -> CrossSection:
+    return _section(Profile(loop).polylines(_FLUSH / 4))
+
+
+def _section(lines: Sequence[np.ndarray]) -> CrossSection:
+    return CrossSection(list(lines), FillRule.EvenOdd)
+
+
+def _holds(one: CrossSection, other: CrossSection) -> bool:
+    """Whether a region holds another, but for what is flush."""
+    return bool((other - one.offset(_FLUSH, JoinType.Miter)).is_empty())
