@@ -14,40 +14,31 @@ LEAK = 1e-3  # share of the gradient that passes the clamp from outside [0, 1], 
 ALPHA = 0.2  # eq. 5, section 4.1
 
 
-class _Positive(torch.autograd.Function):
+class _Leaking(torch.autograd.Function):
+    """Values clipped to [0, high], or to at least 0, whose gradient is that of torch's clamp or relu."""
+
     @staticmethod
-    def forward(ctx: Any, x: Tensor) -> Tensor:
+    def forward(ctx: Any, x: Tensor, high: float | None) -> Tensor:
         ctx.save_for_backward(x)
-        return x.relu()
+        ctx.high = high
+        return x.clamp(0, high)
 
     @staticmethod
-    def backward(ctx: Any, *gradients: Tensor) -> Tensor:
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None]:
         (x,), (gradient,) = ctx.saved_tensors, gradients
-        return gradient * ((x > 0) + LEAK * ((x <= 0) & (gradient < 0)))
-
-
-class _Clamp(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx: Any, x: Tensor) -> Tensor:
-        ctx.save_for_backward(x)
-        return x.clamp(0, 1)
-
-    @staticmethod
-    def backward(ctx: Any, *gradients: Tensor) -> Tensor:
-        (x,), (gradient,) = ctx.saved_tensors, gradients
-        back = ((x > 1) & (gradient > 0)) | ((x < 0) & (gradient < 0))
-        within = (x >= 0) & (x <= 1)
-        return gradient * (within + LEAK * back)
+        within = x > 0 if ctx.high is None else (x >= 0) & (x <= ctx.high)
+        back = ~within & ((gradient > 0) == (x > 0))
+        return gradient * (within + LEAK * back), None
 
 
 def clamp(x: Tensor) -> Tensor:
     """The clip C of eq. 4 to [0, 1]. Values outside still get `LEAK` of a gradient that leads them back."""
-    return cast(Tensor, _Clamp.apply(x))
+    return cast(Tensor, _Leaking.apply(x, 1.0))
 
 
 def positive(x: Tensor) -> Tensor:
     """The relu of eq. 2, with `LEAK` of a gradient that leads negative values back."""
-    return cast(Tensor, _Positive.apply(x))
+    return cast(Tensor, _Leaking.apply(x, None))
 
 
 def intersection(distance: Tensor, selection: Tensor, leaks: bool = False) -> Tensor:
