@@ -30,6 +30,7 @@ from partwright.export.brep_rims import shallower
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
 from partwright.export.brep_swept_profile import swept_profile
+from partwright.export.brep_topology import faces_of
 from partwright.fields import Field, SuperFrustum, Swept
 from partwright.meshing import mesh_part
 
@@ -179,22 +180,17 @@ def _places(shape: TopoDS_Shape, chord: float) -> np.ndarray:
     """Places (N, 3) float32 on the shape's surface."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
     from OCP.TopLoc import TopLoc_Location
-    from OCP.TopoDS import TopoDS
 
     BRepMesh_IncrementalMesh(shape, chord, False, 0.3, False)
     places = []
-    faces = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
-    while faces.More():
+    for face in faces_of(shape):
         location = TopLoc_Location()
-        triangles = BRep_Tool.Triangulation_s(TopoDS.Face(faces.Current()), location)
+        triangles = BRep_Tool.Triangulation_s(face, location)
         if triangles is not None:
             pose = location.Transformation()
             nodes = (triangles.Node(i + 1).Transformed(pose) for i in range(triangles.NbNodes()))
             places += [(node.X(), node.Y(), node.Z()) for node in nodes]
-        faces.Next()
     return np.array(places, np.float32).reshape(-1, 3)
 
 

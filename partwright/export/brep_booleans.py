@@ -18,6 +18,7 @@ import numpy as np
 from partwright.errors import NoSurfaceError
 from partwright.export.brep import volume_and_area
 from partwright.export.brep_errors import opencascade_errors
+from partwright.export.brep_topology import faces_of
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -39,25 +40,13 @@ class Repairs:
 
     def allow(self, solids: Sequence[TopoDS_Shape]) -> bool:
         """Whether there is a try more, which then is paid."""
-        self.left -= sum(map(face_count, solids))
+        self.left -= sum(1 for solid in solids for _ in faces_of(solid))
         return self.left > 0
 
     @property
     def spent(self) -> bool:
         """Whether tries were left out."""
         return self.left <= 0
-
-
-def face_count(solid: TopoDS_Shape) -> int:
-    """Of a solid."""
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-
-    faces, count = TopExp_Explorer(solid, TopAbs_ShapeEnum.TopAbs_FACE), 0
-    while faces.More():
-        count += 1
-        faces.Next()
-    return count
 
 
 def operated(

@@ -12,6 +12,7 @@ import numpy as np
 
 from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
+from partwright.export.brep_topology import side_by_side
 from partwright.export.plane_patches import boundary_loops, patches, twins_of
 from partwright.meshing.csg import solid_of
 from partwright.meshing.manifolds import simplified, surface_of
@@ -57,17 +58,7 @@ def flat_faced(places: np.ndarray, triangles: np.ndarray, flat: float) -> TopoDS
     places (V, 3), triangles (F, 3) indices, outwards. flat: how far a face's corners may lie from its plane,
     a length.
     """
-    from OCP.BRep import BRep_Builder
-    from OCP.TopoDS import TopoDS_Compound
-
-    pieces = _pieces(places, triangles)
-    if len(pieces) == 1:
-        return _solid(places, pieces[0], flat)
-    builder, compound = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(compound)
-    for shells in pieces:
-        builder.Add(compound, _solid(places, shells, flat))
-    return compound
+    return side_by_side([_solid(places, shells, flat) for shells in _pieces(places, triangles)])
 
 
 def _pieces(places: np.ndarray, triangles: np.ndarray) -> list[list[np.ndarray]]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from partwright.errors import ParameterError
+from partwright.export.brep_topology import side_by_side
 from partwright.fields import NormalForm
 
 if TYPE_CHECKING:
@@ -89,9 +90,9 @@ def _round(form: NormalForm, half: float) -> TopoDS_Shape:
             BRepPrimAPI_MakeCone(_along(0.0), 0.0, wide, half),
             BRepPrimAPI_MakeCone(_along(-half), wide, 0.0, half),
         ]
-        return _compound([nappe.Shape() for nappe in nappes])
+        return side_by_side([nappe.Shape() for nappe in nappes])
     axis = gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1))
-    return _compound([BRepPrimAPI_MakeRevol(face, axis).Shape() for face in _profiles(form, half)])
+    return side_by_side([BRepPrimAPI_MakeRevol(face, axis).Shape() for face in _profiles(form, half)])
 
 
 def _quartered_ball() -> TopoDS_Shape:
@@ -188,14 +189,3 @@ def _placed(shape: TopoDS_Shape, form: NormalForm) -> TopoDS_Shape:
     pose = gp_Trsf()
     pose.SetValues(*np.column_stack([form.axes, form.centre]).ravel().tolist())
     return BRepBuilderAPI_Transform(shape, pose, True).Shape()
-
-
-def _compound(shapes: list[TopoDS_Shape]) -> TopoDS_Shape:
-    from OCP.BRep import BRep_Builder
-    from OCP.TopoDS import TopoDS_Compound
-
-    compound, builder = TopoDS_Compound(), BRep_Builder()
-    builder.MakeCompound(compound)
-    for shape in shapes:
-        builder.Add(compound, shape)
-    return compound

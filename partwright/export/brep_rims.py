@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 
 from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
+from partwright.export.brep_topology import edges_of
 from partwright.fields import Extrusion, Swept
 from partwright.fields.extrusion import RIMS
 from partwright.fields.rims import Rim
 
 if TYPE_CHECKING:
-    from OCP.TopoDS import TopoDS_Edge, TopoDS_Shape
+    from OCP.TopoDS import TopoDS_Shape
 
 _SHARES = (1.0, 1 - 1e-5)
 """Of a rim's depth: where two rims meet, or one takes all of a side, OpenCASCADE wants something left. As
@@ -57,18 +58,7 @@ def _with_rim(solid: TopoDS_Shape, face: TopoDS_Shape, rim: Rim, share: float) -
     from OCP.BRepFilletAPI import BRepFilletAPI_MakeChamfer, BRepFilletAPI_MakeFillet
 
     making = BRepFilletAPI_MakeFillet(solid) if rim.fillet else BRepFilletAPI_MakeChamfer(solid)
-    for edge in _edges(face):
+    for edge in edges_of(face):
         making.Add(share * rim.depth, edge)
     making.Build()
     return making.Shape()
-
-
-def _edges(face: TopoDS_Shape) -> Iterator[TopoDS_Edge]:
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
-
-    found = TopExp_Explorer(face, TopAbs_ShapeEnum.TopAbs_EDGE)
-    while found.More():
-        yield TopoDS.Edge(found.Current())
-        found.Next()

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from partwright.errors import NoSurfaceError
 from partwright.export.brep_profile import Arc, Edge, Outline, Point, pieces
+from partwright.export.brep_topology import faces_of
 
 if TYPE_CHECKING:
     from OCP.gp import gp_Pnt
@@ -104,8 +105,6 @@ class Sweep:
         from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolygon
         from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
         from OCP.gp import gp_Vec
-        from OCP.TopAbs import TopAbs_ShapeEnum
-        from OCP.TopExp import TopExp_Explorer
 
         half = self._half(side)
         if not isinstance(edge, Arc):
@@ -132,10 +131,7 @@ class Sweep:
         room = BRepPrimAPI_MakePrism(
             BRepBuilderAPI_MakeFace(wedge.Wire(), True).Face(), gp_Vec(0, 0, high - low)
         )
-        faces = TopExp_Explorer(BRepAlgoAPI_Common(whole, room.Shape()).Shape(), TopAbs_ShapeEnum.TopAbs_FACE)
-        while faces.More():
-            yield faces.Current()
-            faces.Next()
+        yield from faces_of(BRepAlgoAPI_Common(whole, room.Shape()).Shape())
 
     def _edge(self, side: int, edge: Edge, along: float) -> TopoDS_Edge:
         from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge

@@ -10,6 +10,7 @@ from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_rims import with_rims
 from partwright.export.brep_swept import sewn
+from partwright.export.brep_topology import solids_of
 from partwright.fields import Extrusion, Profile, Revolution, Swept
 from partwright.fields.profile import Loop, Side, circle_of
 from partwright.fields.profile_offset import Wall
@@ -70,11 +71,8 @@ def _revolved(field: Revolution) -> TopoDS_Shape:
 def _oriented(shape: TopoDS_Shape) -> TopoDS_Shape:
     """Right side out."""
     from OCP.BRepLib import BRepLib
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
 
-    solid = TopoDS.Solid(TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_SOLID).Current())
+    solid = next(solids_of(shape))
     BRepLib.OrientClosedSolid_s(solid)
     return solid
 

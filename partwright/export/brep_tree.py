@@ -18,6 +18,7 @@ from partwright.export.brep_booleans import Repairs, operated, operated_on_moved
 from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
+from partwright.export.brep_topology import side_by_side, solids_of
 from partwright.meshing import has_exact_mesh, mesh_csg
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ def _stepwise(
         raise NoSurfaceError(
             f"OpenCASCADE fails at the {node.operation} of {_label(node)}; move its parts a little"
         )
-    return _side_by_side(whole)
+    return side_by_side(whole)
 
 
 _Way = Callable[["_Steps", Node, "TopoDS_Shape", float | None], "TopoDS_Shape"]
@@ -216,8 +217,6 @@ def _unified(node: Assembly, solid: TopoDS_Shape) -> TopoDS_Shape:
     """
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
 
     if len(node.children) > 1:
         unify = ShapeUpgrade_UnifySameDomain(solid, True, True, False)
@@ -225,22 +224,9 @@ def _unified(node: Assembly, solid: TopoDS_Shape) -> TopoDS_Shape:
             unify.Build()
             if BRepCheck_Analyzer(unify.Shape()).IsValid() or not BRepCheck_Analyzer(solid).IsValid():
                 solid = unify.Shape()
-    if not TopExp_Explorer(solid, TopAbs_ShapeEnum.TopAbs_SOLID).More():
+    if next(solids_of(solid), None) is None:
         raise NoSurfaceError(f"nothing to export: the {node.operation} of {_label(node)} is empty")
     return solid
-
-
-def _side_by_side(solids: list[TopoDS_Shape]) -> TopoDS_Shape:
-    from OCP.BRep import BRep_Builder
-    from OCP.TopoDS import TopoDS_Compound
-
-    if len(solids) == 1:
-        return solids[0]
-    builder, compound = BRep_Builder(), TopoDS_Compound()
-    builder.MakeCompound(compound)
-    for solid in solids:
-        builder.Add(compound, solid)
-    return compound
 
 
 def placed(part: Part, ball: Ball) -> TopoDS_Shape:

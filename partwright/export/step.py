@@ -29,6 +29,7 @@ from partwright.errors import NoSurfaceError, OutputError
 from partwright.export.brep import built
 from partwright.export.brep_facets import FacetsWarning, faceted
 from partwright.export.brep_rims import SHALLOW
+from partwright.export.brep_topology import faces_of
 from partwright.export.brep_tree import Compromises, combined
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
@@ -181,18 +182,13 @@ def _readable(shape: TopoDS_Shape) -> TopoDS_Shape:
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.GeomAbs import GeomAbs_CurveType, GeomAbs_SurfaceType
     from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideAngle
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
-    from OCP.TopoDS import TopoDS
 
-    faces = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
-    while faces.More():
-        surface = BRepAdaptor_Surface(TopoDS.Face(faces.Current()))
+    for face in faces_of(shape):
+        surface = BRepAdaptor_Surface(face)
         turned = surface.GetType() == GeomAbs_SurfaceType.GeomAbs_SurfaceOfRevolution
         if turned and surface.BasisCurve().GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
             divided = ShapeUpgrade_ShapeDivideAngle(math.pi, shape)
             return divided.Result() if divided.Perform() else shape
-        faces.Next()
     return shape
 
 

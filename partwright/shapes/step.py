@@ -103,12 +103,13 @@ def _solids_below(label: TDF_Label, place: TopLoc_Location, name: str) -> Iterat
             yield from _solids_below(product, there, _name(component, name))
         return
     shape = XCAFDoc_ShapeTool.GetShape_s(label).Moved(place)
-    solids = list(_parts_of(shape, TopAbs_ShapeEnum.TopAbs_SOLID))
+    solids = list(parts_of(shape, TopAbs_ShapeEnum.TopAbs_SOLID))
     for solid in solids or [shape]:
         yield name or "solid", solid
 
 
-def _parts_of(shape: TopoDS_Shape, kind: object) -> Iterator[TopoDS_Shape]:
+def parts_of(shape: TopoDS_Shape, kind: object) -> Iterator[TopoDS_Shape]:
+    """Of one kind of OpenCASCADE's `TopAbs_ShapeEnum`."""
     from OCP.TopExp import TopExp_Explorer
 
     explorer = TopExp_Explorer(shape, kind)
@@ -158,7 +159,7 @@ def _triangles(shape: TopoDS_Shape) -> tuple[np.ndarray, np.ndarray]:
 
     vertices: list[tuple[float, float, float]] = []
     faces: list[tuple[int, int, int]] = []
-    for face in _parts_of(shape, TopAbs_ShapeEnum.TopAbs_FACE):
+    for face in parts_of(shape, TopAbs_ShapeEnum.TopAbs_FACE):
         place = TopLoc_Location()
         mesh = BRep_Tool.Triangulation_s(TopoDS.Face(face), place)
         if mesh is None:
