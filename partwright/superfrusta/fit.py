@@ -107,19 +107,21 @@ def _mended(
     features.
 
     rival: the search's objective. The one that explains more is mended first, the other only where that does
-    not bring it near: nothing may be far off that need not be.
+    not bring it near: nothing may be far off that need not be. Where both stay far off, how far counts with
+    each.
     """
     mended: FeatureTree | None = None
     if features.objective >= rival:
         mended = featured.mended(features)
-        if mended.objective - mended.off >= rival:
+        if not mended.off and mended.objective >= rival:
             return featured.assembly(mended), True
     whole, off = featured.mended_assembly(whole)
     if off and mended is None:
         mended = featured.mended(features)
-    if mended is not None and off > mended.off:
-        return featured.assembly(mended), True
-    return whole, False
+    if mended is None:
+        return whole, False
+    preferred = mended.objective - mended.off >= rival - off if mended.off else off > 0
+    return (featured.assembly(mended) if preferred else whole), preferred
 
 
 def _with_locked(whole: Assembly, request: FitRequest[Settings]) -> Assembly:
