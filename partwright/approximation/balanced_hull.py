@@ -44,7 +44,7 @@ def balanced_hulls(pieces: Sequence[Piece], solid: Manifold, deepest: float) -> 
     `deepest`, a length, or as deep as the hull bridges."""
     hulls = [piece.hull for piece in pieces]
     near = [
-        [k for k, other in enumerate(pieces) if k != i and boxes_touch(other.hull, one.hull)]
+        [k for k, other in enumerate(pieces) if k != i and boxes_touch(other.box, one.box)]
         for i, one in enumerate(pieces)
     ]
     for i in sorted(range(len(pieces)), key=lambda i: -pieces[i].extra):

@@ -158,9 +158,10 @@ def _covered(node: Node, kinds: Sequence[type[Field]], allowed: float) -> list[P
     frame = Similarity(side, translation=tuple(middle.tolist()))
     forms: list[Part | trimesh.Trimesh] = []
     unit = simplified(unit, allowed / side)
+    native = [kind for kind in kinds if kind in CONVEX_KINDS]
     for hull in balanced_hulls(convex_cover(unit, Limits(allowed / side, _EXTRA)), unit, allowed / side):
-        fits = convex_fits(hull, [kind for kind in kinds if kind in CONVEX_KINDS], "nearest")
-        if fits and fits[0].volume_error_ratio <= _AS_GOOD and fits[0].deviation * side <= allowed:
+        fits = convex_fits(hull, native, "nearest", allowed / side, _AS_GOOD)
+        if fits:
             forms.append(fits[0].part.transformed(frame))
         else:
             corners, faces = surface_of(light_hull(hull, _LIGHT * allowed / side)[0])

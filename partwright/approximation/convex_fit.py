@@ -92,16 +92,24 @@ class _Body:
         return np.asarray((directions @ self.corners.T).max(axis=1))
 
 
-def convex_fits(hull: Manifold, kinds: Sequence[type[Field]], mode: Mode) -> list[ConvexFit]:
+def convex_fits(
+    hull: Manifold,
+    kinds: Sequence[type[Field]],
+    mode: Mode,
+    deviation: float = math.inf,
+    error: float = math.inf,
+) -> list[ConvexFit]:
     """The best solid of each kind by volume, the best of all first; kinds without one are left out.
 
     hull: convex. kinds: of `CONVEX_KINDS`. mode: "around" contains every
-    corner of the hull, "within" lies inside all its faces.
+    corner of the hull, "within" lies inside all its faces. deviation, error: what a solid may be off by, as
+    `ConvexFit` has it.
     """
     body = _Body.of(hull)
     best = []
     for kind in kinds:
-        tried = (_measured(body, field, pose, mode) for field, pose in _candidates(body, kind, mode))
+        placed = _candidates(body, kind, mode)
+        tried = (_measured(body, field, pose, mode, deviation, error) for field, pose in placed)
         fits = [fit for fit in tried if fit is not None]
         if fits:
             best.append(min(fits, key=lambda fit: fit.volume_error_ratio))
@@ -141,23 +149,27 @@ def volume(field: Field) -> float:
     raise AssertionError(f"{field.kind} has no volume here")
 
 
-def _measured(body: _Body, field: Field, pose: Similarity, mode: Mode) -> ConvexFit | None:
-    """With its size and place as the mode asks for."""
+def _measured(
+    body: _Body, field: Field, pose: Similarity, mode: Mode, most: float, worst: float
+) -> ConvexFit | None:
+    """With its size and place as the mode asks for; None for one that deviates more than `most`, or whose
+    volume error is more than `worst`, which is measured last: it costs most."""
     turn = pose.matrix()[:3, :3]
     if mode == "within":
         room = body.offsets - body.normals @ np.array(pose.translation)
         if (room <= 0).any():
             return None
         field = field.scaled((1 - _MARGIN) * float((room / support(field, body.normals @ turn)).min()))
+    error = abs(volume(field) / body.volume - 1)  # all that it is off by where one contains the other
+    if error > worst:
+        return None
     directions = np.concatenate([_directions(), body.normals])
     own = support(field, directions @ turn) + directions @ np.array(pose.translation)
     deviation = float(np.abs(own - body.support(directions)).max())
-    if mode == "around":
-        error = volume(field) / body.volume - 1
-    elif mode == "within":
-        error = 1 - volume(field) / body.volume
-    else:
-        error = _volume_error(body, field, pose)
+    if deviation > most:
+        return None
+    if mode == "nearest" and (error := _volume_error(body, field, pose)) > worst:
+        return None
     return ConvexFit(Part(field, pose.translation, pose.rotation), error, deviation)
 
 

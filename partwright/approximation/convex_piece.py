@@ -44,6 +44,11 @@ class Piece:
         return self.solid.hull()
 
     @cached_property
+    def box(self) -> np.ndarray:
+        """(2, 3) lower and upper corner."""
+        return np.reshape(self.solid.bounding_box(), (2, 3))
+
+    @cached_property
     def extra(self) -> float:
         """Volume that the hull adds."""
         return max(self.hull.volume() - self.solid.volume(), 0.0)

@@ -100,7 +100,8 @@ def exchanged(pieces: Sequence[Piece], limits: Limits, cut: Callable[[Piece], li
         left = [*(piece for piece in pieces if piece is not worst), *parts]
         pairs = [pair for pair in combinations(left, 2) if not set(pair) <= set(parts)]
         for pair in pairs:
-            costs.setdefault(frozenset(pair), _cost(*pair))
+            if frozenset(pair) not in costs:
+                costs[frozenset(pair)] = _cost(*pair)
         cheapest = min(pairs, key=lambda pair: costs[frozenset(pair)], default=None)
         if len(parts) != 2 or cheapest is None or costs[frozenset(cheapest)] >= gain:
             kept.add(worst)
@@ -119,13 +120,14 @@ def _cost(a: Piece, b: Piece) -> float:
     """Volume that the hull of both adds; infinite for those that lie apart."""
     from manifold3d import Manifold
 
-    if not boxes_touch(a.hull, b.hull, _ROOM):
+    if not boxes_touch(a.box, b.box, _ROOM):
         return np.inf
     return float(Manifold.batch_hull([a.hull, b.hull]).volume() - a.hull.volume() - b.hull.volume())
 
 
-def boxes_touch(a: Manifold, b: Manifold, share: float = 0.0) -> bool:
-    """Whether their boxes touch, with room to spare: a share of the longest side of both together."""
-    first, second = (np.reshape(one.bounding_box(), (2, 3)) for one in (a, b))
-    room = share * float(np.ptp(np.concatenate([first, second]), axis=0).max())
-    return bool(((first[0] <= second[1] + room) & (second[0] <= first[1] + room)).all())
+def boxes_touch(a: np.ndarray, b: np.ndarray, share: float = 0.0) -> bool:
+    """Whether two boxes (2, 3), lower and upper corners, touch, with room to spare: a share of the longest
+    side of both together."""
+    reach = np.maximum(a[1], b[1]) - np.minimum(a[0], b[0])
+    gap = np.maximum(a[0], b[0]) - np.minimum(a[1], b[1])
+    return bool(gap.max() <= share * reach.max())
