@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from partwright.cli.terminal import counted, note, say, warn
 from partwright.robots import Collided, CollideOptions, collide, save
 from partwright.robots.report import LinkReport, warnings
 from partwright.robots.spheres import LinkSpheres, sphere_warnings
+
+_Link = TypeVar("_Link", bound=LinkReport | LinkSpheres)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -32,27 +35,27 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _table(links: Sequence[LinkReport]) -> list[str]:
-    if not links:
-        return []
-    wide = max(len("link"), *(len(link.link) for link in links))
-    lines = [f"{'link':{wide}}  shapes                        missing    extra  largest deviation"]
-    for link in links:
+    def cells(link: LinkReport) -> str:
         kinds = ", ".join(f"{number} {kind}" for kind, number in link.shapes.items())
-        errors = f"{100 * link.missing:6.1f} %  {100 * link.extra:6.1f} %"
         far = f"{1000 * link.deviation:.2f} mm" + (" (over)" if link.deviation > link.tolerance else "")
-        lines.append(f"{link.link:{wide}}  {kinds:28}  {errors}  {far}")
-    return lines
+        return f"{kinds:28}  {_errors(link)}  {far}"
+
+    return _lines("shapes                        missing    extra  largest deviation", links, cells)
 
 
 def _sphere_table(links: Sequence[LinkSpheres]) -> list[str]:
-    if not links:
-        return []
-    wide = max(len("link"), *(len(link.link) for link in links))
-    lines = [f"{'link':{wide}}  spheres  missing    extra"]
-    for link in links:
-        errors = f"{100 * link.missing:6.1f} %  {100 * link.extra:6.1f} %"
-        lines.append(f"{link.link:{wide}}  {len(link.balls):7}  {errors}")
-    return lines
+    return _lines("spheres  missing    extra", links, lambda link: f"{len(link.balls):7}  {_errors(link)}")
+
+
+def _lines(heads: str, links: Sequence[_Link], cells: Callable[[_Link], str]) -> list[str]:
+    """A line a link below one of heads; none of no links."""
+    wide = max(map(len, ("link", *(link.link for link in links))))
+    lines = [f"{link.link:{wide}}  {cells(link)}" for link in links]
+    return [f"{'link':{wide}}  {heads}", *lines] if lines else []
+
+
+def _errors(link: LinkReport | LinkSpheres) -> str:
+    return f"{100 * link.missing:6.1f} %  {100 * link.extra:6.1f} %"
 
 
 def _summary(result: Collided) -> str:
