@@ -17,8 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from partwright.approximation.ellipsoid import Ellipsoid
-from partwright.assembly import Part, Similarity
-from partwright.errors import ParameterError, RobotError, UnreadableFileError
+from partwright.errors import RobotError, UnreadableFileError
 from partwright.export.mjcf import geom_size
 from partwright.export.rigid_body import numbers
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
@@ -29,9 +28,9 @@ from partwright.robots.mjcf_defaults import (
     kept_path,
     mesh_matrix,
     pose_of,
-    span,
     values,
 )
+from partwright.robots.mjcf_solids import native_geom
 from partwright.robots.model import Files, Link, MeshUse, RobotFile, Shape
 from partwright.robots.xml_files import parsed, serialised
 
@@ -184,7 +183,11 @@ class Mjcf(RobotFile):
             parent,
             tuple(self._use(name, geom) for geom in meshes if geom.collides),
             tuple(self._use(name, geom) for geom in meshes if not geom.collides),
-            tuple(n for geom in geoms if geom.collides and (n := _native(geom, name)) is not None),
+            tuple(
+                solid
+                for geom in geoms
+                if geom.collides and (solid := native_geom(geom.said, geom.pose, name)) is not None
+            ),
         )
 
     def _use(self, link: str, geom: _Geom) -> MeshUse:
@@ -292,37 +295,6 @@ def _inline(said: Mapping[str, str], where: str) -> Any:
             corners, values(said, "face", (), where).astype(int).reshape(-1, 3), process=False
         )
     return trimesh.Trimesh(corners).convex_hull
-
-
-def _native(geom: _Geom, link: str) -> Part | None:
-    """A colliding geom that is a solid; None for a plane and a field of heights."""
-    kind = geom.said.get("type", "sphere")
-    if kind in ("plane", "hfield", "sdf", "mesh") or "mesh" in geom.said:
-        return None
-    size = values(geom.said, "size", (), f"link {link!r}: geom").tolist()
-    if (
-        "fromto" in geom.said and size
-    ):  # its length is said by its ends; of boxes both sides by the first size
-        half = span(geom.said, f"link {link!r}: geom") / 2
-        size = [size[0], half] if kind in ("cylinder", "capsule") else [size[0], size[0], half]
-    try:
-        match kind, size:
-            case "box", [x, y, z]:
-                field: Field = Box((2 * x, 2 * y, 2 * z))
-            case "sphere", [radius, *_]:
-                field = Sphere(radius)
-            case "cylinder", [radius, half, *_]:
-                field = Cylinder(radius, 2 * half)
-            case "capsule", [radius, half, *_]:
-                field = Capsule(radius, 2 * half)
-            case "ellipsoid", [x, y, z]:
-                field = Ellipsoid((x, y, z))
-            case _:
-                return None
-    except ParameterError as error:
-        raise RobotError(f"link {link!r}: geom: {error}") from error
-    pose = Similarity.from_matrix(geom.pose)
-    return Part(field, pose.translation, pose.rotation)
 
 
 def _new_element(tag: str, **attributes: str) -> Any:
