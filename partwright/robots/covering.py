@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,7 @@ from partwright.robots.enclosing import halves
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-_Measure = Callable[[np.ndarray, float], np.ndarray]
+_Measure = Callable[[np.ndarray, float], np.ndarray]  # distances to a centre, and the radius
 _SEGMENTS = 48  # of a sphere, where volumes are measured
 
 # where balls begin, and what they lack over what they add: the cover of least volume is taken
@@ -79,10 +80,7 @@ def _shrunk(points: np.ndarray, balls: Balls) -> Balls:
 
 def outside_of_balls(points: np.ndarray, balls: Balls) -> np.ndarray:
     """(N,) how far points are outside of all balls; negative inside."""
-    far = np.full(len(points), np.inf)
-    for x, y, z, radius in balls.tolist():
-        np.minimum(far, np.linalg.norm(points - (x, y, z), axis=1) - radius, out=far)
-    return far
+    return _lowest(balls, lambda centre, radius: np.linalg.norm(points - centre, axis=1) - radius)[0]
 
 
 def _around(points: np.ndarray, owner: np.ndarray, balls: Balls) -> Balls:
@@ -107,12 +105,20 @@ def _power(far: np.ndarray, radius: float) -> np.ndarray:
 
 def _owners(points: np.ndarray, balls: Balls, measure: _Measure) -> np.ndarray:
     """(N,) the ball by whose distance and radius the measure of a point is least."""
-    best, owner = np.full(len(points), np.inf), np.zeros(len(points), int)
+    return _lowest(balls, lambda centre, radius: measure(np.linalg.norm(points - centre, axis=1), radius))[1]
+
+
+def _lowest(balls: Balls, value: Callable[[np.ndarray, float], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """The least value (N,) that any ball gives, by its centre and radius, and which ball (N,) does."""
+    best, owner = np.full(1, np.inf), np.zeros(1, int)
     for i, (x, y, z, radius) in enumerate(balls.tolist()):
-        value = measure(np.linalg.norm(points - (x, y, z), axis=1), radius)
-        less = value < best
-        best[less], owner[less] = value[less], i
-    return owner
+        found = value(np.array((x, y, z)), radius)
+        best, owner = np.minimum(best, found), np.where(found < best, i, owner)
+    return best, owner
+
+
+def _sticking_out(triangles: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
+    return np.asarray(np.linalg.norm(triangles - centre, axis=2).max(axis=1) - radius)
 
 
 def _grown(balls: Balls, triangles: np.ndarray, fine: float) -> Balls:
@@ -120,11 +126,7 @@ def _grown(balls: Balls, triangles: np.ndarray, fine: float) -> Balls:
     balls = balls.copy()
     left = triangles
     while len(left):
-        beyond, owner = np.full(len(left), np.inf), np.zeros(len(left), int)
-        for i, (x, y, z, radius) in enumerate(balls.tolist()):
-            out = np.linalg.norm(left - (x, y, z), axis=2).max(axis=1) - radius
-            less = out < beyond
-            beyond[less], owner[less] = out[less], i
+        beyond, owner = _lowest(balls, partial(_sticking_out, left))
         left, owner, beyond = (each[beyond > 0] for each in (left, owner, beyond))
         edges = np.linalg.norm(left - np.roll(left, 1, axis=1), axis=2)
         joins = (edges.max(axis=1, initial=0.0) <= fine) | (len(left) > _MOST)
