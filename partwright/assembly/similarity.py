@@ -91,6 +91,10 @@ class Similarity:
             result = result @ rotation_matrix(self.rotation).T
         return self.scale * result + np.array(self.translation)
 
+    def turned(self, vectors: np.ndarray) -> np.ndarray:
+        """Directions (N, 3), turned, their lengths as they are."""
+        return np.asarray(vectors, dtype=np.float64) @ rotation_matrix(self.rotation).T
+
     def __matmul__(self, first: Similarity) -> Similarity:
         """`first`, then this one."""
         return Similarity(

@@ -43,7 +43,7 @@ from partwright.export.identifiers import free_name
 from partwright.export.shared_groups import Shared, shared
 from partwright.export.texturing import own_colour, textured
 from partwright.meshing import mesh_part
-from partwright.textures.maps import KEY, RELIEF
+from partwright.textures.maps import without_maps
 
 if TYPE_CHECKING:
     import trimesh
@@ -304,7 +304,7 @@ def _extras(part: Part) -> dict[str, Any]:
     }
     if part.instances:
         own["instances"] = [instance_dict(move) for move in part.instances]
-    known = {name: value for name, value in part.metadata.items() if name not in (KEY, RELIEF)}  # images here
+    known = without_maps(part.metadata)
     return own | ({"metadata": known} if known else {})
 
 

@@ -8,7 +8,7 @@ maps meet at the seams.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.export.texturing import CORNERS
 from partwright.meshing import mesh_assembly
 from partwright.shapes.corner_normals import corner_normals
+from partwright.textures.maps import RELIEF
 
 if TYPE_CHECKING:
     import trimesh
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 
 def patches(assembly: Assembly, resolution: int) -> Iterator[tuple[Part, int, Similarity, trimesh.Trimesh]]:
     """Of each copy of a part that has some of the surface: the part, which copy (0 for the part itself), its
-    pose, and its triangles, in its frame, with normals of the whole at their corners.
+    pose, and its triangles, in its frame, with normals of the whole at their corners where a part has a map
+    of normals.
 
     resolution: cells along the longest side of the whole.
 
@@ -35,7 +37,8 @@ def patches(assembly: Assembly, resolution: int) -> Iterator[tuple[Part, int, Si
 
     mesh = mesh_assembly(assembly, resolution)
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    corners = corner_normals(vertices, faces).astype(np.float64)
+    bent = any(RELIEF in part.metadata for part in assembly.parts)  # others need no normals
+    corners = corner_normals(vertices, faces).astype(np.float64) if bent else None
     middles = vertices[faces].mean(axis=1)
     owner = np.abs(assembly.part_distances(middles)).argmin(axis=0)
     for i, part in enumerate(assembly.parts):
@@ -47,11 +50,11 @@ def patches(assembly: Assembly, resolution: int) -> Iterator[tuple[Part, int, Si
             own = faces[chosen]
             if len(own):
                 used, corner = np.unique(own, return_inverse=True)
-                places = pose.inverse()(vertices[used])
                 back = pose.inverse()
-                turned = (back(corners[chosen].reshape(-1, 3)) - back(np.zeros((1, 3)))).reshape(-1, 3, 3)
-                normals = {CORNERS: turned}
-                patch = tm.Trimesh(places, corner.reshape(-1, 3), face_attributes=normals, process=False)
+                normals: dict[str, Any] = {} if corners is None else {CORNERS: back.turned(corners[chosen])}
+                patch = tm.Trimesh(
+                    back(vertices[used]), corner.reshape(-1, 3), face_attributes=normals, process=False
+                )
                 yield part, k, pose, patch
 
 

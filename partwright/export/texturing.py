@@ -69,7 +69,7 @@ def textured(mesh: trimesh.Trimesh, part: Part, placed: bool = False) -> Texture
         result.vertices = pose(np.asarray(result.vertices))
         for name, known in result.vertex_attributes.items():
             turned = np.array(known)
-            turned[:, :3] = pose(turned[:, :3]) - pose(np.zeros((1, 3)))
+            turned[:, :3] = pose.turned(turned[:, :3])
             result.vertex_attributes[name] = turned
     return Textured(result, uv, image, None if relief is None else Image.fromarray(relief.image[::-1]))
 

@@ -39,7 +39,7 @@ from partwright.export.usd_prims import (
 )
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
-from partwright.textures.maps import KEY, RELIEF
+from partwright.textures.maps import without_maps
 
 _AXES = {"y": "Y", "z": "Z"}
 _NO_SURFACE = "no surface of its own at this resolution"
@@ -212,8 +212,7 @@ class _Writer:
 
 
 def _about(part: Part, subtracted: bool) -> dict[str, Any]:
-    metadata = {key: value for key, value in part.metadata.items() if key not in (KEY, RELIEF)}  # pictures
-    own = {"field": part.field.to_dict(), "blend": part.blend, "metadata": metadata}
+    own = {"field": part.field.to_dict(), "blend": part.blend, "metadata": without_maps(part.metadata)}
     return own | ({"role": "subtracted"} if subtracted else {})
 
 

@@ -8,8 +8,8 @@ of its inner side.
 
 from __future__ import annotations
 
-from partwright.textures.baking import bake
+from partwright.textures.baking import bake, bake_both
 from partwright.textures.colours import Colours, load_colours
 from partwright.textures.maps import PartMap, part_map
 
-__all__ = ["Colours", "PartMap", "bake", "load_colours", "part_map"]
+__all__ = ["Colours", "PartMap", "bake", "bake_both", "load_colours", "part_map"]

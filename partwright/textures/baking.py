@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from partwright.textures.colours import Colours
 from partwright.textures.coordinates import directions, folded, frames, is_hollow, of_nearest_copy
 from partwright.textures.maps import KEY, LARGEST, RELIEF, PartMap
 from partwright.textures.sightings import Sightings, sightings
-from partwright.textures.texels import Texels, corners, filled
+from partwright.textures.texels import Texels, filled, read
 
 _NEAR = 0.01  # of the longest side: parts whose surface is so near to a point of the whole are coloured by it
 _SPAN = 127.5  # of normals' coordinates, -1 to 1, as bytes
@@ -45,27 +46,49 @@ def bake(
         SettingError: the size cannot be used.
         NoSurfaceError: nothing is inside of the assembly.
     """
+    sums = _seen(assembly, colours, size, seed, optimise)
+    return _with_maps(assembly, sums, colours, optimise)
+
+
+def bake_both(
+    assembly: Assembly, colours: Colours, size: int = 128, seed: int = 0
+) -> tuple[Assembly, Assembly]:
+    """What `bake` makes without `optimise`, and with it.
+
+    Raises:
+        SettingError, NoSurfaceError: as of `bake`.
+    """
+    sums = _seen(assembly, colours, size, seed, True)
+    return _with_maps(assembly, sums, colours, False), _with_maps(assembly, sums, colours, True)
+
+
+def _with_maps(assembly: Assembly, sums: Sequence[_Sums], colours: Colours, optimise: bool) -> Assembly:
+    for part, one in zip(assembly.parts, sums, strict=True):
+        assembly = assembly.replace_part(part.name, one.coloured(colours, optimise))
+    return assembly
+
+
+def _seen(assembly: Assembly, colours: Colours, size: int, seed: int, views: bool) -> list[_Sums]:
+    """What is seen of each part."""
     check_count("size", size, low=4)
     size = min(size, LARGEST)
-    sums = [_Sums(part, size, optimise) for part in assembly.parts]
+    sums = [_Sums(part, size) for part in assembly.parts]
     reach = _NEAR * float(np.ptp(colours.vertices, axis=0).max())
-    for seen in sightings(assembly, colours, size, seed, views=optimise):
+    for seen in sightings(assembly, colours, size, seed, views):
         off = np.abs(assembly.part_distances(seen.points))
         nearest = off.argmin(axis=0)
         for i, (part, one) in enumerate(zip(assembly.parts, sums, strict=True)):
             near = np.flatnonzero(off[i] <= reach + part.blend)
             share = np.where(nearest[near] == i, 1.0, _ASIDE)
             one.see(seen, near, share * seen.weights[near])
-    for part, one in zip(assembly.parts, sums, strict=True):
-        assembly = assembly.replace_part(part.name, one.coloured(colours))
-    return assembly
+    return sums
 
 
 class _Sums:
     """Colours and weights of a part's texels."""
 
-    def __init__(self, part: Part, size: int, optimised: bool) -> None:
-        self.part, self.size, self.optimised = part, size, optimised
+    def __init__(self, part: Part, size: int) -> None:
+        self.part, self.size = part, size
         self.bounded = part.field.quadric() is None and bool(np.isfinite(np.array(part.field.bounds())).all())
         self.sides = 2 if is_hollow(part.field) else 1
         self.sampled = Texels(size, self.sides, 3)  # colours of nearest places
@@ -97,7 +120,7 @@ class _Sums:
         if seen.sampled:
             self.sampled.add(place, inner, colours, weights)
 
-    def coloured(self, colours: Colours) -> Part:
+    def coloured(self, colours: Colours, optimise: bool) -> Part:
         metadata = dict(self.part.metadata)
         if not self.bounded:
             if self.mean[3] > 0:
@@ -109,7 +132,7 @@ class _Sums:
         if not self.texels.any:
             return self.part
         plain = self._image(*self.sampled.means()) if self.sampled.any else None
-        image = self._image(*self.texels.solved()) if self.optimised or plain is None else None
+        image = self._image(*self.texels.solved()) if optimise or plain is None else None
         looks = [one[..., :3] for one in (image, plain) if one is not None]
         metadata[KEY] = PartMap(np.ascontiguousarray(min(looks, key=self._off))).text()
         metadata.pop(RELIEF, None)
@@ -121,7 +144,7 @@ class _Sums:
         """Squared error of colours in views that no map is made of."""
         return float(
             sum(
-                weights @ ((values[:, :3] - self._read(image, place, inner)) ** 2).sum(axis=1)
+                weights @ ((values[:, :3] - read(image, place, inner)) ** 2).sum(axis=1)
                 for place, inner, values, weights in self.held
             )
         )
@@ -130,17 +153,12 @@ class _Sums:
         """Whether normals of views that no map is made of are met better with it than without."""
         flat = bent = total = 0.0
         for place, inner, values, weights in self.held:
-            found, wanted = self._read(image, place, inner) / _SPAN - 1, values[:, 3:] / _SPAN - 1
+            found, wanted = read(image, place, inner) / _SPAN - 1, values[:, 3:] / _SPAN - 1
             found /= np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-20)
             flat += float(weights @ ((wanted - (0, 0, 1)) ** 2).sum(axis=1))
             bent += float(weights @ ((wanted - found) ** 2).sum(axis=1))
             total += float(weights.sum())
         return flat > _SMOOTH**2 * total and bent < _GAIN * flat
-
-    def _read(self, image: NDArray[np.uint8], place: Floats, inner: NDArray[np.bool_]) -> Floats:
-        texel, share = corners(place, self.size)
-        column = texel[:, :, 0] + np.where(inner, self.size, 0)[:, None]
-        return np.asarray((share[:, :, None] * image[texel[:, :, 1], column]).sum(axis=1))
 
     def _add_own(self, colours: Colours) -> None:
         """Of a part that nobody sees, its own surface."""

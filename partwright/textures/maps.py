@@ -15,6 +15,7 @@ from partwright.assembly import Part
 from partwright.errors import ParameterError
 from partwright.fields import Field
 from partwright.textures.coordinates import directions, folded
+from partwright.textures.texels import read
 
 KEY = "texture"
 """Of a part's metadata."""
@@ -54,20 +55,8 @@ class PartMap:
 
     def at(self, field: Field, points: NDArray[np.floating]) -> NDArray[np.float64]:
         """Colours (n, 3), 0 to 255, at points (n, 3) of the field's own frame: bilinear."""
-        n = self.size
         towards, inner = directions(field, points)
-        place = folded(towards) * n - 0.5
-        low = np.floor(place)
-        share = place - low
-        result = np.zeros((len(place), 3))
-        shift = np.where(inner & (self.sides == 2), n, 0)
-        for dx in (0, 1):
-            for dy in (0, 1):
-                x = np.clip(low[:, 0] + dx, 0, n - 1).astype(int) + shift
-                y = np.clip(low[:, 1] + dy, 0, n - 1).astype(int)
-                weight = np.abs(1 - dx - share[:, 0]) * np.abs(1 - dy - share[:, 1])
-                result += weight[:, None] * self.image[y, x]
-        return result
+        return read(self.image, folded(towards), inner & (self.sides == 2))
 
     def text(self) -> str:
         """For the metadata."""
@@ -97,6 +86,11 @@ class PartMap:
         except (binascii.Error, OSError, ValueError, SyntaxError) as error:
             raise ParameterError(f"a part's map is no PNG that can be read: {error}") from error
         return cls(np.ascontiguousarray(image[::-1]))
+
+
+def without_maps(metadata: Mapping[str, str | float]) -> dict[str, str | float]:
+    """What else a part's metadata says: formats keep the maps as pictures."""
+    return {key: value for key, value in metadata.items() if key not in (KEY, RELIEF)}
 
 
 def part_map(metadata: Mapping[str, str | float] | Part, key: str = KEY) -> PartMap | None:

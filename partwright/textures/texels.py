@@ -96,6 +96,14 @@ def corners(place: Floats, size: int) -> tuple[NDArray[np.int64], Floats]:
     return texel, share
 
 
+def read(image: NDArray[np.uint8], place: Floats, side: NDArray[np.bool_]) -> Floats:
+    """Values (N, C) of a map's image at places (N, 2) in [0, 1]^2 of either square (N,): bilinear."""
+    size = image.shape[0]
+    texel, share = corners(place, size)
+    column = texel[:, :, 0] + np.where(side, size, 0)[:, None]
+    return np.asarray((share[:, :, None] * image[texel[:, :, 1], column]).sum(axis=1))
+
+
 def filled(values: Floats, known: NDArray[np.bool_], sides: int) -> Floats:
     """Texels that nothing was seen of take the values of the nearest one; of a whole side, of the first."""
     from scipy.ndimage import distance_transform_edt

@@ -11,7 +11,7 @@ from partwright.assembly import load_assembly
 from partwright.atomic_io import report_path, write_bytes
 from partwright.cli.terminal import say
 from partwright.errors import UnsupportedFormatError
-from partwright.textures import bake, load_colours
+from partwright.textures import bake_both, load_colours
 from partwright.textures.likeness import SIDE, VIEWS, likeness, without_relief
 from partwright.textures.maps import KEY, RELIEF
 
@@ -24,9 +24,9 @@ def run(arguments: argparse.Namespace) -> int:
     assembly = load_assembly(arguments.assembly)
     colours = load_colours(arguments.shape)
     start = time.process_time()
-    baked = bake(assembly, colours, arguments.size)
+    plain, baked = bake_both(assembly, colours, arguments.size)
     seconds = time.process_time() - start
-    before, after = likeness([bake(assembly, colours, arguments.size, optimise=False), baked], colours)
+    before, after = likeness([plain, baked], colours)
     smooth, bent = likeness([without_relief(baked), baked], colours, lit=True)
     report = {
         "file": arguments.output.name,
