@@ -8,14 +8,10 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from partwright.approximation.convex_piece import Limits, Piece
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
 
 _LEAST_SAVED = 5e-4  # of the volume: what one piece more has to save where the limits ask for none
 _ROOM = 0.05  # of both: how far apart the boxes of two may lie that are joined
