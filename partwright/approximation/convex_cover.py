@@ -10,6 +10,7 @@ a limit, not the aim.
 from __future__ import annotations
 
 import heapq
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,7 +36,9 @@ if TYPE_CHECKING:
 _EXACT = 5  # candidates whose pieces are really made
 _MOVED = 2  # of these, the best, that are moved and turned to where less is left
 _LOOKED_AT, _MADE = 6, 3  # planes of faces that are tried and really cut along, where one cut gains nothing
-_TRIES, _CHANGED = 4, 0.005  # of simplifying, and the share of the volume that it may change
+_TRIES, _CHANGED = 7, 0.005  # of simplifying, and the share of the volume that it may change
+_FINER = 2  # times, from one try to the next
+_CHEAP = 5000  # triangles: a copy with no more of them is finer than it need be
 _GAIN = 0.03  # of what a hull adds: a cut that takes less off it looks one cut ahead
 _SLIVER = 1e-5  # of the whole volume: pieces below it are left out
 _COARSE = 0.05  # of the tolerance: how far the copy that is searched may lie from the solid
@@ -52,6 +55,7 @@ def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
     pieces = joined(pieces, solid.volume(), limits)
     least = _SLIVER * solid.volume()
 
+    @cache
     def cut(piece: Piece) -> list[Piece]:
         return _best_cut(piece, least)
 
@@ -60,14 +64,17 @@ def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
 
 def simplified(solid: Manifold, deviation: float) -> Manifold:
     """With fewer triangles, for a search that allows this deviation (a length), as far as that leaves its
-    volume alone: walls may be thinner than what is allowed."""
-    own, by = solid.volume(), _COARSE * deviation
+    volume alone: walls may be thinner than what is allowed. As fine as few triangles allow: what is cut off
+    here, no hull has again."""
+    own, by, found = solid.volume(), _COARSE * deviation, solid
     for _ in range(_TRIES):
         simple = solid.simplify(by)
+        if found is not solid and simple.num_tri() > _CHEAP:
+            break
         if abs(simple.volume() - own) <= _CHANGED * own:
-            return simple
-        by /= 4
-    return solid
+            found = simple
+        by /= _FINER
+    return found
 
 
 def _far_off(solid: Manifold, pieces: list[Piece], deviation: float) -> list[Piece]:
@@ -96,7 +103,7 @@ def _sticks_out(solid: Manifold, pieces: list[Piece], by: float) -> bool:
     corners = surface_of(solid)[0]
     for piece in sorted(pieces, key=lambda piece: -piece.hull.volume()):
         normals, offsets = faces_of(plain_hull(piece.hull))
-        lower, upper = np.reshape(piece.hull.bounding_box(), (2, 3))
+        lower, upper = piece.box
         near = ((corners >= lower - by) & (corners <= upper + by)).all(axis=1)
         near[near] = (corners[near] @ normals.T - offsets).max(axis=1) <= by
         corners = corners[~near]

@@ -24,8 +24,8 @@ _FEWEST, _DENSEST = 12.0, 60.0  # points along the longest side of a hull, whate
 class Limits:
     """deviation: how far a hull's surface may lie from the solid's, as a length. extra: volume that all hulls
     may add, over the solid's. most: pieces at most; this one is kept where not all can be. worth: of the mean
-    of what hulls add, what one piece more has to save to be made though the limits ask for none; None for
-    none."""
+    of what hulls add, what one piece more has to save to be made though the limits ask for none, and beyond
+    many pieces though they ask for more; None for none."""
 
     deviation: float
     extra: float = 0.03

@@ -13,7 +13,8 @@ import numpy as np
 
 from partwright.approximation.convex_piece import Limits, Piece
 
-_LEAST_SAVED = 5e-4  # of the volume: what one piece more has to save where the limits ask for none
+_SAVED = 5e-4  # of the volume: what one piece more has to save where the limits ask for none
+_MANY, _SAVED_BY_MANY = 32, 2e-3  # beyond so many pieces each has to save more, whatever the deviation is
 _ROOM = 0.05  # of both: how far apart the boxes of two may lie that are joined
 _EXCHANGES = 24  # pieces that are tried to be cut once there are as many as may be
 
@@ -38,7 +39,8 @@ def joined(pieces: Sequence[Piece], volume: float, limits: Limits) -> list[Piece
         cost, i, j = heapq.heappop(heap)
         if i not in alive or j not in alive:
             continue
-        forced = len(alive) > limits.most
+        dear = limits.worth is not None and len(alive) > _MANY and cost < _SAVED_BY_MANY * volume
+        forced = dear or len(alive) > limits.most
         both = _both(alive[i], alive[j])
         if not forced:
             if total + cost > limits.extra * volume:
@@ -64,7 +66,8 @@ def spent(
     kept: set[Piece] = set()
     while len(pieces) < limits.most:
         total = sum(piece.extra for piece in pieces)
-        least = max(limits.worth * total / len(pieces), _LEAST_SAVED * volume)
+        price = (_SAVED if len(pieces) < _MANY else _SAVED_BY_MANY) * volume
+        least = max(limits.worth * total / len(pieces), price)
         left = [piece for piece in pieces if piece not in kept and piece.extra > least]
         if not left:
             break

@@ -42,7 +42,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "longest side (default: 2%%, and no less than 0.3%% of the robot's)",
     )
     option(
-        "--max-parts", metavar="N", type=int, default=32, help="shapes a link at most (default: %(default)s)"
+        "--max-parts", metavar="N", type=int, default=48, help="shapes a link at most (default: %(default)s)"
     )
     option(
         "--extra",

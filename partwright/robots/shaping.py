@@ -32,8 +32,9 @@ if TYPE_CHECKING:
     from partwright.fields import Field
 
 NATIVE_FOR = 0.03  # of its volume, or `extra`: by how much a native solid may be worse than the hull it saves
+_NATIVE_PIECE = 3e-3  # of the link's volume: the same for one of several, which are as near as this
 _LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners, or add for fewer faces
-_LOST = 1e-3  # of its volume: what a hull of fewer corners may lack
+_LOST, _MOST_LOST = 3e-5, 0.01  # of the link's volume, and of its own: what a hull of fewer corners may lack
 _FLAWS = 1e-3  # of its volume: what a hull may add to a convex link
 _ROUNDING = 1e-9  # of its volume: what a hull adds to a link without a dent
 _CORNERS = 1024  # of a convex link's exact hull
@@ -76,7 +77,7 @@ def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
         hulls = balanced_hulls(pieces, solid, wishes.tolerance)
     else:
         hulls = [inscribed(piece.hull, target.solid) for piece in pieces]
-    chosen = [_chosen(hull, target, wishes) for hull in hulls]
+    chosen = [_chosen(hull, len(hulls) == 1, target, wishes) for hull in hulls]
     if wishes.mode == "within":
         chosen = [one for shape in chosen if (one := _within(shape, target)) is not None]
     names = [name] if len(chosen) == 1 else [f"{name}_{i}" for i in range(1, len(chosen) + 1)]
@@ -91,16 +92,16 @@ def _convex(solid: Manifold, wishes: Wishes) -> Shape | None:
     dented = whole.extra > _ROUNDING * solid.volume()
     if dented and whole.deviation(wishes.tolerance) > wishes.tolerance:
         return None
-    near = _near(plain_hull(whole.hull), wishes)
+    near = _near(plain_hull(whole.hull), wishes, NATIVE_FOR)
     return Shape("", near.part) if near is not None else Shape("", mesh=as_mesh(whole.hull))
 
 
-def _near(hull: Manifold, wishes: Wishes) -> ConvexFit | None:
-    """The native solid that is near enough and hardly worse than the hull."""
-    fits = convex_fits(hull, wishes.kinds, wishes.mode) if wishes.kinds else []
-    worse = min(NATIVE_FOR, wishes.extra)
-    near = (fit for fit in fits if fit.deviation <= wishes.tolerance and fit.volume_error_ratio <= worse)
-    return next(near, None)
+def _near(hull: Manifold, wishes: Wishes, worse: float) -> ConvexFit | None:
+    """The native solid that is near enough and worse than the hull by no more than a share of its volume."""
+    if not wishes.kinds:
+        return None
+    worse = min(worse, wishes.extra)
+    return next(iter(convex_fits(hull, wishes.kinds, wishes.mode, wishes.tolerance, worse)), None)
 
 
 def _enclosing(pieces: list[Piece], target: Target, wishes: Wishes) -> list[Manifold]:
@@ -116,13 +117,16 @@ def _enclosing(pieces: list[Piece], target: Target, wishes: Wishes) -> list[Mani
     ]
 
 
-def _chosen(hull: Manifold, target: Target, wishes: Wishes) -> Shape:
-    """By volume: a native solid where it is near enough and hardly worse than the hull."""
+def _chosen(hull: Manifold, alone: bool, target: Target, wishes: Wishes) -> Shape:
+    """By volume: a native solid where it is near enough and hardly worse than the hull. alone: whether it is
+    all of the link."""
     if not wishes.hulls:
         return _native(convex_fits(hull, wishes.kinds, wishes.mode)[0].part, target, wishes)
+    share = target.solid.volume() / hull.volume()
     if wishes.mode != "around":
-        hull = light_hull(hull, _LIGHT * wishes.tolerance, lost=_LOST)[0]
-    near = _near(hull, wishes)
+        hull = light_hull(hull, _LIGHT * wishes.tolerance, lost=min(_LOST * share, _MOST_LOST))[0]
+    worse = NATIVE_FOR if alone else min(NATIVE_FOR, _NATIVE_PIECE * share)
+    near = _near(hull, wishes, worse)
     return _native(near.part, target, wishes) if near is not None else Shape("", mesh=as_mesh(hull))
 
 

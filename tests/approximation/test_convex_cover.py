@@ -9,7 +9,7 @@ import pytest
 from manifold3d import Manifold, OpType
 
 from partwright.approximation.balanced_hull import balanced_hulls
-from partwright.approximation.convex_cover import convex_cover
+from partwright.approximation.convex_cover import convex_cover, simplified
 from partwright.approximation.convex_piece import Limits, Piece
 from partwright.approximation.cutting_planes import Corners, moved
 from partwright.approximation.half_space import Surface
@@ -84,6 +84,25 @@ def test_pieces_are_spent_where_they_save_most() -> None:
     assert len(few) == len(saving) < len(more) == 16
     assert sum(piece.extra for piece in more) < 0.1 * sum(piece.extra for piece in few)
     assert len(plain) == 1
+
+
+def test_many_pieces_have_to_save_more_where_no_tolerance_was_given() -> None:
+    """Chords of a fine ring deviate more than allowed in 32 pieces, too; more hardly save any volume."""
+    outer = Manifold.cylinder(0.5, 1.0, circular_segments=192)
+    ring = outer - Manifold.cylinder(2, 0.9, circular_segments=192, center=True)
+    asked, free = (convex_cover(ring, Limits(1e-3, extra=0.3, most=64, worth=w)) for w in (None, 0.7))
+    assert len(free) < 40 < len(asked)
+
+
+def test_what_is_searched_is_as_fine_as_few_triangles_allow() -> None:
+    """A bore is not filled up by chords that would count as pieces' own."""
+    drilled = box(0, 0, 0, 3, 2, 1) - Manifold.cylinder(3, 0.3, circular_segments=96).translate((1, 1, -1))
+    noisy = Manifold.sphere(1.0, 400)
+    assert noisy.num_tri() > 20_000
+    assert simplified(drilled, 0.3).volume() == pytest.approx(drilled.volume(), rel=1e-4)
+    few = simplified(noisy, 0.3)
+    assert few.num_tri() < noisy.num_tri() / 2
+    assert few.volume() == pytest.approx(noisy.volume(), rel=5e-3)
 
 
 def test_limits_are_kept_and_hulls_cover() -> None:

@@ -38,6 +38,19 @@ def test_the_solid_that_it_is_wins(field: Field, mode: str) -> None:
     assert np.allclose(best.part.translation, (5, 6, 7), atol=0.01)
 
 
+@pytest.mark.parametrize("mode", ["nearest", "around", "within"])
+def test_what_is_off_by_more_than_asked_for_is_left_out(mode: str) -> None:
+    hull = Manifold.cylinder(2, 0.5, circular_segments=96, center=True).rotate(TURN)
+    every = convex_fits(hull, KINDS, mode)  # type: ignore[arg-type]
+    for limits in ({"deviation": 0.2}, {"error": 0.2}):
+        ((name, most),) = limits.items()
+        known = {"deviation": lambda fit: fit.deviation, "error": lambda fit: fit.volume_error_ratio}[name]
+        near = convex_fits(hull, KINDS, mode, **limits)  # type: ignore[arg-type]
+        assert near[0] == every[0]
+        assert all(known(fit) <= most for fit in near)
+        assert len(near) < len(every)
+
+
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from(KINDS))
 def test_around_contains_and_within_is_contained(seed: int, kind: type[Field]) -> None:
