@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import resource
 import sys
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,8 @@ from statistics import mean, median
 import recorded
 from fit import Entry, find_shapes, fit_once, machine
 
+import partwright as pw
+from partwright.approximation.part_roles import FREEFORM
 from partwright.atomic_io import write_bytes
 
 HERE = Path(__file__).parent
@@ -35,7 +38,8 @@ REACH = "mean IoU 0.90 or more, 16 parts or fewer on average, median of 15 secon
 
 @dataclass(frozen=True)
 class Row:
-    """One fit. deviation: the largest, in % of the longest side. Scores are nan where the fit failed."""
+    """One fit. deviation: the largest, in % of the longest side. freeform: parts that are no features.
+    Scores are nan where the fit failed."""
 
     variant: str
     name: str
@@ -48,34 +52,48 @@ class Row:
     deviation: float
     seconds: float
     cpu_seconds: float
+    freeform: float = 0.0
 
 
 SCORES = ("iou", "bi_surface_iou", "parts", "instances", "overlap", "deviation")
-NUMBERS = (*SCORES, "seconds", "cpu_seconds")
 
 
-def run(variant: str, entry: Entry, keep: Path | None) -> Row:
+def run(variant: str, entry: Entry, out: Path) -> Row:
     """One process; its CPU seconds are those of all threads, the start of Python and the files included."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    made = fit_once(entry, 0, VARIANTS[variant], keep)
+    made = fit_once(entry, 0, VARIANTS[variant], out)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     scores = {name: float("nan") if (v := getattr(made, name)) is None else float(v) for name in SCORES}
-    return Row(variant, entry.name, made.outcome, **scores, seconds=made.seconds, cpu_seconds=cpu)
+    whole = out / "assembly.json"
+    names = [part.name for part in pw.load_assembly(whole).parts] if whole.exists() else []
+    freeform = sum(name.startswith(FREEFORM) for name in names)
+    return Row(
+        variant,
+        entry.name,
+        made.outcome,
+        **scores,
+        seconds=made.seconds,
+        cpu_seconds=cpu,
+        freeform=float(freeform),
+    )
 
 
 def summary(rows: list[Row]) -> Iterator[str]:
     """A line a variant: means, and medians of the seconds."""
-    yield "| variant | shapes | IoU | bi-surface IoU | parts (copies) | overlap | deviation % | s | CPU s |"
-    yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|"
+    yield (
+        "| variant | shapes | IoU | bi-surface IoU | parts (copies) | freeform | overlap | deviation % "
+        "| s | CPU s |"
+    )
+    yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
     for variant in VARIANTS:
         good = [row for row in rows if row.variant == variant and row.iou == row.iou]
         if not good:
             continue
-        m = {name: mean(getattr(row, name) for row in good) for name in SCORES}
+        m = {name: mean(getattr(row, name) for row in good) for name in (*SCORES, "freeform")}
         yield (
             f"| {variant} | {len(good)} | {m['iou']:.3f} | {m['bi_surface_iou']:.3f} | {m['parts']:.1f} "
-            f"({m['instances']:.1f}) | {m['overlap']:.2f} | {m['deviation']:.1f} | "
+            f"({m['instances']:.1f}) | {m['freeform']:.1f} | {m['overlap']:.2f} | {m['deviation']:.1f} | "
             f"{median(row.seconds for row in good):.1f} | {median(row.cpu_seconds for row in good):.1f} |"
         )
 
@@ -93,7 +111,8 @@ def shape_by_shape(rows: list[Row]) -> Iterator[str]:
             elif row.iou != row.iou:
                 cells += [row.outcome, "", "", f"{row.cpu_seconds:.1f}"]
             else:
-                cells += [f"{row.iou:.3f}", f"{row.bi_surface_iou:.3f}", f"{row.parts:g}"]
+                parts = f"{row.parts:g}" + (f" ({row.freeform:g})" if row.freeform else "")
+                cells += [f"{row.iou:.3f}", f"{row.bi_surface_iou:.3f}", parts]
                 cells += [f"{row.cpu_seconds:.1f}"]
         yield f"| {name} | {' | '.join(cells)} |"
 
@@ -108,7 +127,8 @@ def document(rows: list[Row], command: str, planned: int) -> str:
         "",
         "Means over the shapes, medians of the seconds; default settings, seed 0. Seconds are those of whole",
         "processes, files read and written; CPU seconds add up all threads. Deviations are the largest, in",
-        f"% of the longest side. First reach of solids: {REACH}.",
+        "% of the longest side. Freeform, in brackets below: parts that are no features, but follow the",
+        f"shape where they would be far off. First reach of solids: {REACH}.",
         "",
         *summary(rows),
         "",
@@ -129,8 +149,8 @@ def main() -> int:
             rows = recorded.read(path, Row)
             if any(row.variant == variant and row.name == entry.name for row in rows):
                 continue
-            keep = options.fits / variant / entry.name if options.fits else None
-            row = run(variant, entry, keep)
+            with tempfile.TemporaryDirectory() as folder:
+                row = run(variant, entry, (options.fits or Path(folder)) / variant / entry.name)
             recorded.append(path, row)
             print(
                 f"{variant}: {entry.name}: IoU {row.iou:.3f}, {row.parts:g} parts, {row.seconds:.1f} s",
