@@ -17,14 +17,11 @@ if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
 
 _NEARLY = 0.75  # of `FAR`: beyond edges, the distance of a fold is less than the way to it
-_LONG = 12  # features: a longer tree is hard to read
-_DEARER = 2.0  # times its price, that a feature of such a tree explains to stay
 _FURTHER = 1e-3  # unit lengths, by which a place that is far off may be further off
 
 
 def pruned(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
-    """The tree without features that explain less than their price, the vainest first; twice that as long as
-    the tree is a long one.
+    """The tree without features that explain less than their price, the vainest first.
 
     None goes without which its own place is far off that was not before. What is missed and what is
     too much are those of the tree as given.
@@ -38,8 +35,7 @@ def pruned(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
     while True:
         tried = [i for i in kept[1:] if i not in needed and tree.features[i].sides]
         scores = {i: search.score_of(_fold(tree, masks, [k for k in kept if k != i])) for i in tried}
-        times = _DEARER if len(kept) > _LONG else 1.0
-        gains = {i: scores[i] - score + times * search.price(tree.features[i].sides) for i in tried}
+        gains = {i: scores[i] - score + search.price(tree.features[i].sides) for i in tried}
         vain = max(gains, key=gains.__getitem__, default=None)
         if vain is None or gains[vain] <= 0:
             break

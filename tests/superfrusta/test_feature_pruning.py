@@ -70,21 +70,3 @@ def test_what_is_drawn_stays_if_it_pays_at_all(
     given = FeatureSearch(shape, samples, gain / share)
     left = pruned(given, tree(given, (PLATE, True), (part, added)))
     assert len(left.features) == 1 + stays
-
-
-@pytest.mark.parametrize(("count", "left"), [(12, 12), (15, 12)])
-def test_in_a_long_tree_a_feature_has_to_explain_twice_its_price(count: int, left: int) -> None:
-    """Of ribs that each explain a little more than their price all stay in a tree of a dozen steps."""
-    ribs = [Part(Box((0.06, 0.8, 0.36)), (0.12 * k - 0.8, 0.0, 0.0)) for k in range(count - 1)]
-    settings = Settings.for_quality("draft")
-    shape = pw.load_shape(mesh_assembly(Assembly((PLATE, *ribs))))
-    samples = FitSamples.of(shape, settings)
-    drawn = [(PLATE, True), *((rib, True) for rib in ribs)]
-    free = FeatureSearch(shape, samples, settings.alpha)
-    gains = [
-        free.scored(tree(free, *drawn)).score - tree(free, *drawn[:k], *drawn[k + 1 :]).score
-        for k in range(1, count)
-    ]
-    assert max(gains) < 1.9 * min(gains)
-    given = FeatureSearch(shape, samples, min(gains) / 1.02)
-    assert len(pruned(given, tree(given, *drawn)).features) == left
