@@ -19,6 +19,7 @@ from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
 from partwright.export.brep_topology import side_by_side, solids_of
+from partwright.fields import Sphere
 from partwright.meshing import has_exact_mesh, mesh_csg
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 _OVERLAP = 0.02  # of a union's volume: more of it twice, and facets stand for the union
 _CHORD = 5e-5  # of the longest side: how far an exact mesh may lie from its surface
 _SAME_MESH = 5e-3  # share of the volume by which what stands for an exact mesh may have less
+_SAME_SOLID = 1e-4  # share of volume and area that a solid keeps when its faces become fewer
 
 
 @dataclass
@@ -198,6 +200,24 @@ def _as_facets(steps: _Steps, child: Node, solid: TopoDS_Shape, volume: float | 
     return result
 
 
+def volume_off(
+    nodes: Sequence[Node], volume: float, solids: Sequence[TopoDS_Shape], made: Compromises
+) -> float:
+    """By which share the volume of all is off what it is to be, 0 as far as it may be.
+
+    That is the volume of their exact meshes, which facets follow less closely, and a union with solids that
+    stand apart may have more of; of those that have none, or are built as one solid, it is that of the solid
+    as it was made.
+    """
+    right = 0.0
+    for node, solid in zip(nodes, solids, strict=True):
+        exact = _exact_volume(node) if isinstance(node, Assembly) and len(node) > 1 else None
+        right += volume_and_area(solid)[0] if exact is None else exact
+    off = volume / right - 1
+    less, more = (_OVERLAP if rough else _SAME_MESH for rough in (made.faceted, made.faceted or made.apart))
+    return 0.0 if -less <= off <= more else off
+
+
 def _exact_volume(node: Assembly) -> float | None:
     """By its exact mesh; None where it has none, or no end."""
     if not has_exact_mesh(node) or not np.isfinite(node.bounds()).all():
@@ -210,20 +230,24 @@ def _exact_volume(node: Assembly) -> float | None:
 
 
 def _unified(node: Assembly, solid: TopoDS_Shape) -> TopoDS_Shape:
-    """Faces of one surface made one.
+    """Faces of one surface made one, unless that loses some: OpenCASCADE may, and calls the rest valid.
 
     Raises:
         NoSurfaceError: nothing is left.
     """
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain
 
     if len(node.children) > 1:
-        unify = ShapeUpgrade_UnifySameDomain(solid, True, True, False)
+        # Of a copy: where it fails it leaves the given edges changed, and a volume that is another.
+        unify = ShapeUpgrade_UnifySameDomain(BRepBuilderAPI_Copy(solid).Shape(), True, True, False)
         with suppress(*opencascade_errors()):  # then the faces stay several
             unify.Build()
-            if BRepCheck_Analyzer(unify.Shape()).IsValid() or not BRepCheck_Analyzer(solid).IsValid():
-                solid = unify.Shape()
+            fewer = unify.Shape()
+            kept = np.allclose(volume_and_area(fewer), volume_and_area(solid), rtol=_SAME_SOLID, atol=0)
+            if kept and (BRepCheck_Analyzer(fewer).IsValid() or not BRepCheck_Analyzer(solid).IsValid()):
+                solid = fewer
     if next(solids_of(solid), None) is None:
         raise NoSurfaceError(f"nothing to export: the {node.operation} of {_label(node)} is empty")
     return solid
@@ -234,7 +258,10 @@ def placed(part: Part, ball: Ball) -> TopoDS_Shape:
     form = ball.form(part)
     if form is not None:
         return _moved(quadric_solid(form, ball.radius), NO_ROTATION, ball.centre.tolist())
-    return _moved(solid_of(part.field), part.rotation, part.translation)
+    # A ball is the same however it is turned; copies around a ring have their poles and seams in the edges
+    # of what they meet if turned with it, and OpenCASCADE loses faces there.
+    turn = NO_ROTATION if isinstance(part.field, Sphere) else part.rotation
+    return _moved(solid_of(part.field), turn, part.translation)
 
 
 def _moved(shape: TopoDS_Shape, rotation: Sequence[float], place: Sequence[float]) -> TopoDS_Shape:

@@ -3,7 +3,7 @@
 Straight parts are exact, whatever their taper, hole, rounding and dilation, and so are bent ones without
 taper, and quadrics (saddles and their like are refused). Bent ones with taper are surfaces through sections;
 what cannot be built becomes the nearest solid, and where a boolean operation goes wrong, or the file does not
-read as a valid solid, flat facets of the exact mesh stand for it. Further tries have a budget
+read as a valid solid of its volume, flat facets of the exact mesh stand for it. Further tries have a budget
 (brep_booleans). Blends become sharp edges. FILE.report.json lists all but the exact.
 """
 
@@ -26,11 +26,11 @@ from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node
 from partwright.atomic_io import replacing
 from partwright.errors import NoSurfaceError, OutputError
-from partwright.export.brep import built
+from partwright.export.brep import built, volume_and_area
 from partwright.export.brep_facets import FacetsWarning, faceted
 from partwright.export.brep_rims import SHALLOW
 from partwright.export.brep_topology import faces_of
-from partwright.export.brep_tree import Compromises, combined
+from partwright.export.brep_tree import Compromises, combined, volume_off
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.fields import Extrusion, Field
@@ -44,6 +44,13 @@ if TYPE_CHECKING:
 _MOST_AGAIN = 30  # parts: more would take minutes
 _RESORTED = (
     "what OpenCASCADE makes of its surfaces does not read as a valid solid, so flat facets stand for all"
+)
+_RESORTED_VOLUME = (
+    "what OpenCASCADE makes of its surfaces reads as a solid of another volume, so flat facets stand for all"
+)
+_OTHER_VOLUME = (
+    "the file reads as a solid whose volume is off by {:+.1f} %; move parts a little that nearly touch, or "
+    "export a mesh"
 )
 _NOT_VALID = (
     "the file does not read as a valid solid; move parts a little that nearly touch, or export a mesh"
@@ -62,7 +69,8 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
         OutputError: the file cannot be written.
 
     Warns:
-        FacetsWarning: facets stand for all of a product, or the file does not read as a valid solid.
+        FacetsWarning: facets stand for all of a product, or the file does not read as a valid solid
+            of its volume.
     """
     unit = canonical_unit(assembly.unit) if assembly.unit else None
     scale = METRES[unit] / _WORKING if unit else 1.0
@@ -108,34 +116,55 @@ def _saved(
     save: Callable[[list[TopoDS_Shape], Path], None],
     again: bool,
 ) -> tuple[Compromises, list[Change]]:
-    """Saves the products so that the file reads as valid solids: as they are, with wider tolerances (again:
-    whether to try those), as facets; and what that cost. As they are where nothing helps, which is told."""
+    """Saves the products so that the file reads as valid solids of their volumes: as they are, with wider
+    tolerances (again: whether to try those), as facets; and what that cost. As they are where nothing helps,
+    which is told."""
     made = Compromises()
-    save([combined(product, ball, made) for product in products], path)
-    if _reads_valid(path):
+    solids = [combined(product, ball, made) for product in products]
+    save(solids, path)
+    off = _read_off(path, products, solids, made)
+    if off == 0:
         return made, []
     spare = path.with_name(f"{path.name}.again")
     try:
         if again and not made.repairs.spent:  # slivers that the file's digits lose
             rough = Compromises(rough=True, repairs=made.repairs)
-            save([combined(product, ball, rough) for product in products], spare)
-            if _reads_valid(spare):
+            solids = [combined(product, ball, rough) for product in products]
+            save(solids, spare)
+            if _read_off(spare, products, solids, rough) == 0:
                 spare.replace(path)
                 return rough, []
         parts = tuple(part.name for product in products for part in product.parts)
         if all(has_exact_mesh(product) and np.isfinite(product.bounds()).all() for product in products):
             with contextlib.suppress(NoSurfaceError):  # of facets that are too small; told below
-                save([faceted(product, fine=True) for product in products], spare)
-                if _reads_valid(spare):
+                solids = [faceted(product, fine=True) for product in products]
+                save(solids, spare)
+                if _read_off(spare, products, solids, Compromises(faceted=list(parts))) == 0:
                     spare.replace(path)
-                    return Compromises(repairs=made.repairs), [Change(parts, "flat facets", note=_RESORTED)]
+                    note = _RESORTED if off is None else _RESORTED_VOLUME
+                    return Compromises(repairs=made.repairs), [Change(parts, "flat facets", note=note)]
+        if off is not None:
+            note = _OTHER_VOLUME.format(100 * off)
+            return made, [Change(parts, "a solid of another volume", note=note)]
         return made, [Change(parts, "a solid that is not valid", note=_NOT_VALID)]
     finally:
         spare.unlink(missing_ok=True)
 
 
-def _reads_valid(path: Path) -> bool:
-    """Whether OpenCASCADE finds what it reads from a STEP file valid."""
+def _read_off(
+    path: Path, products: Sequence[Node], solids: Sequence[TopoDS_Shape], made: Compromises
+) -> float | None:
+    """By which share the volume that a file of these solids reads as is off, 0 as far as it may be.
+
+    None where it does not read as valid solids."""
+    volume = _volume_read(path)
+    return None if volume is None else volume_off(products, volume, solids, made)
+
+
+def _volume_read(path: Path) -> float | None:
+    """That of the solids that OpenCASCADE reads from a STEP file; None where it does not find them valid.
+
+    Valid says little of the volume: a face may bound the wrong side of its edges."""
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.STEPControl import STEPControl_Reader
 
@@ -143,7 +172,9 @@ def _reads_valid(path: Path) -> bool:
     reader.ReadFile(str(path))
     reader.TransferRoots()
     shape = reader.OneShape()
-    return not shape.IsNull() and bool(BRepCheck_Analyzer(shape).IsValid())
+    if shape.IsNull() or not BRepCheck_Analyzer(shape).IsValid():
+        return None
+    return volume_and_area(shape)[0]
 
 
 def _with_note(change: Change, assembly: Assembly, made: Assembly) -> Change:
