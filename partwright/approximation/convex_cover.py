@@ -139,7 +139,7 @@ def _cut_up(solid: Manifold, limits: Limits) -> list[Piece]:
     while open_ and len(done) + len(open_) < most:
         total = sum(-entry[0] for entry in open_)
         piece = heapq.heappop(open_)[2]
-        if total <= allowed and piece.deviation(limits.deviation) <= limits.deviation:
+        if total <= allowed and piece.within(limits.deviation):
             done.append(piece)
             continue
         parts = _best_cut(piece, least)

@@ -57,13 +57,20 @@ class Piece:
     def corners(self) -> Corners:
         return Corners.of(self.solid)
 
-    def deviation(self, limit: float) -> float:
-        """How far the hull's surface lies from the solid's at most, by points dense enough for the limit."""
+    def within(self, limit: float) -> bool:
+        """Whether the hull's surface lies no farther than a length from the solid's, by points dense enough
+        for it. Most hulls that are too far off are so in the middle of a face: these points come first."""
         vertices, faces = surface_of(self.solid)
         side = float(np.ptp(vertices, axis=0).max())
-        spacing = float(np.clip(_SAMPLES * limit, side / _DENSEST, side / _FEWEST))
-        fine = self.hull.refine_to_length(spacing).to_mesh()
-        points = np.asarray(fine.vert_properties)[:, :3]
         middle, scale = vertices.mean(axis=0), 1.0 / side
         there = MeshDistance((vertices - middle) * scale, faces, faces, True)
-        return float(there.unsigned((points - middle) * scale).max(initial=0.0)) / scale
+
+        def near(points: np.ndarray) -> bool:
+            return float(there.unsigned((points - middle) * scale).max(initial=0.0)) <= limit * scale
+
+        corners, triangles = surface_of(self.hull)
+        if not near(corners[triangles].mean(axis=1)):
+            return False
+        spacing = float(np.clip(_SAMPLES * limit, side / _DENSEST, side / _FEWEST))
+        fine = self.hull.refine_to_length(spacing).to_mesh()
+        return near(np.asarray(fine.vert_properties)[:, :3])

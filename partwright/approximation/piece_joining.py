@@ -45,7 +45,7 @@ def joined(pieces: Sequence[Piece], volume: float, limits: Limits) -> list[Piece
         if not forced:
             if total + cost > limits.extra * volume:
                 break
-            if both.deviation(limits.deviation) > limits.deviation:
+            if not both.within(limits.deviation):
                 continue
         total += max(cost, 0.0)
         del alive[i], alive[j]

@@ -90,7 +90,7 @@ def _convex(solid: Manifold, wishes: Wishes) -> Shape | None:
     if not wishes.hulls or whole.extra > _FLAWS * solid.volume() or whole.hull.num_vert() > _CORNERS:
         return None
     dented = whole.extra > _ROUNDING * solid.volume()
-    if dented and whole.deviation(wishes.tolerance) > wishes.tolerance:
+    if dented and not whole.within(wishes.tolerance):
         return None
     near = _near(plain_hull(whole.hull), wishes, NATIVE_FOR)
     return Shape("", near.part) if near is not None else Shape("", mesh=as_mesh(whole.hull))

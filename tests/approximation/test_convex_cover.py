@@ -70,7 +70,7 @@ def test_a_ring_is_as_many_pieces_as_its_chords_ask_for(deviation: float) -> Non
     pieces = convex_cover(ring, Limits(deviation, extra=1.0))
     least = math.ceil(math.pi / math.acos(1 - deviation / 0.8))
     assert least <= len(pieces) <= 2 * least
-    assert all(piece.deviation(deviation) <= deviation for piece in pieces)
+    assert all(piece.within(deviation) for piece in pieces)
 
 
 def test_pieces_are_spent_where_they_save_most() -> None:
