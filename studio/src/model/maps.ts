@@ -1,5 +1,5 @@
 /**
- * Colours that are baked into parts: an image in each part's own coordinates, as a PNG in its metadata (see
+ * Colours and normals that are baked into parts: images in each part's own coordinates, as PNGs in its metadata (see
  * partwright/textures). Octahedral: directions from the middle, in shares of the half extents, folded into a square.
  */
 
@@ -17,8 +17,11 @@ export interface Maps {
 const LARGEST = 256; // texels a side
 const MOST = 256; // what every device can hold in layers
 
-const textOf = (part: Part): string | null => {
-  const text = part.metadata.texture;
+/** Of a part's metadata. */
+export type Baked = "texture" | "normals";
+
+const textOf = (part: Part, key: Baked): string | null => {
+  const text = part.metadata[key];
   return typeof text === "string" && text.startsWith("data:image/png;base64,") ? text : null;
 };
 
@@ -30,16 +33,16 @@ export class PartMaps {
   /** changed: told when images have come that were asked for. */
   constructor(private changed: () => void) {}
 
-  /** The layer of each part's image; -1 where it has none, or none yet. */
-  of(parts: Part[]): number[] {
-    const texts = parts.map(textOf);
+  /** The layer of each part's image of colours, or of normals; -1 where it has none, or none yet. */
+  of(parts: Part[], key: Baked = "texture"): number[] {
+    const texts = parts.map((part) => textOf(part, key));
     const missing = new Set(texts.filter((text): text is string => text !== null && !this.layers.has(text) && !this.loading.has(text)));
     if (missing.size) void this.load(missing);
     return texts.map((text) => (text !== null ? (this.layers.get(text) ?? -1) : -1));
   }
 
   static some(parts: Iterable<Part>): boolean {
-    for (const part of parts) if (textOf(part)) return true;
+    for (const part of parts) if (textOf(part, "texture") || textOf(part, "normals")) return true;
     return false;
   }
 

@@ -5,14 +5,17 @@
 import { sideTexels } from "./profiles";
 import { LEAF, PUSH, type Program } from "./program";
 
+/** Images of colours and of normals have one number in the table: the first one's, and this many times the second's. */
+const LAYERS = 512;
+
 /** Texels (of four floats) that an instruction has in the shader's table. */
 export const TEXELS = 8;
 
 /**
  * The table of the shader: TEXELS texels of four floats an instruction, and after those as many for each side of a
- * profile. layers: of the parts' images, or -1.
+ * profile. layers, reliefs: of the parts' images of colours and of normals, or -1.
  */
-export function table(program: Program, layers: number[] = []): Float32Array {
+export function table(program: Program, layers: number[] = [], reliefs: number[] = []): Float32Array {
   const sides: number[] = [];
   const begins = program.swept.map((profile) => {
     const begin = program.count + sides.length / (TEXELS * 4);
@@ -27,7 +30,8 @@ export function table(program: Program, layers: number[] = []): Float32Array {
     const isQuadric = program.quadrics[i];
     // A push knows by what, and how softly, its group is folded in.
     const third = action === PUSH ? program.roles[i] : part;
-    const layer = action === LEAF && !isQuadric ? (layers[part] ?? -1) + 1 : 0;
+    const mapped = action === LEAF && !isQuadric;
+    const layer = mapped ? (layers[part] ?? -1) + 1 + LAYERS * ((reliefs[part] ?? -1) + 1) : 0;
     const profile = program.swept[i];
     result.set([action * 16 + operation * 4 + isQuadric * 2 + (profile ? 1 : 0), blend, third, layer], at);
     result.set(program.balls.subarray(i * 4, i * 4 + 4), at + 4);

@@ -108,9 +108,9 @@ const MARK = "partwright-image:";
 
 function readMetadata(data: Value | undefined, known: Images): Record<string, string | number> {
   const result = (data ?? {}) as Record<string, string | number>;
-  const { texture } = result;
-  if (typeof texture !== "string" || !texture.startsWith(MARK)) return result;
-  return { ...result, texture: known.get(texture.slice(MARK.length)) ?? texture };
+  const named = Object.entries(result).filter(([, value]) => typeof value === "string" && value.startsWith(MARK));
+  const found = named.map(([key, value]) => [key, known.get(String(value).slice(MARK.length)) ?? value]);
+  return found.length ? { ...result, ...Object.fromEntries(found) } : result;
 }
 
 function readGroup(data: Json, place: string, depth: number, known: Images): Group {

@@ -127,7 +127,7 @@ export class Scene {
     renderer.setMesh("learned", { places: places.map((v, i) => v * scale + offset[i % 3]), normals: smoothNormals(this.learned), colours, triangles });
   }
 
-  /** Whether parts that have baked colours show them. */
+  /** Whether parts that have baked colours, and normals, show them. */
   baked = true;
   showBaked(on: boolean): void {
     this.baked = on;
@@ -144,9 +144,10 @@ export class Scene {
     this.placeLearned();
     if (renderer) {
       const layers = this.layers;
+      const reliefs = this.baked ? this.maps.of(this.store.program.parts, "normals") : [];
       if (this.maps.maps !== this.uploadedMaps) renderer.setMaps((this.uploadedMaps = this.maps.maps));
       renderer.setColours(store.program.parts.map((part) => rgb(store.colourOf(part))));
-      renderer.setProgram(store.program, layers);
+      renderer.setProgram(store.program, layers, reliefs);
     }
     this.mark();
     this.drawOverlay();

@@ -27,6 +27,7 @@ export class Marcher {
   view: View | null = null;
   tilesDirty = true;
   private layers: number[] = [];
+  private reliefs: number[] = [];
   private cones: Target | null = null;
   private tileCount: [number, number] = [1, 1];
   private marched: { quick: Target | null; full: Target | null } = { quick: null, full: null };
@@ -48,12 +49,12 @@ export class Marcher {
     this.setMaps(null);
   }
 
-  /** layers: of each part, the number of its image; -1 where it has none. */
-  setProgram(program: Program, layers: number[] = this.layers): void {
+  /** layers, reliefs: of each part, the number of its image of colours, and of normals; -1 where it has none. */
+  setProgram(program: Program, layers: number[] = this.layers, reliefs: number[] = this.reliefs): void {
     this.program = program;
-    this.layers = layers;
+    [this.layers, this.reliefs] = [layers, reliefs];
     const { gl } = this.gpu;
-    const numbers = table(program, layers);
+    const numbers = table(program, layers, reliefs);
     const rows = Math.max(1, Math.ceil(numbers.length / (64 * TEXELS * 4)));
     const data = new Float32Array(rows * 64 * TEXELS * 4);
     data.set(numbers);

@@ -118,9 +118,9 @@ export class Renderer {
 
   // What is to be seen
 
-  /** layers: of each part, the number of its image; -1 where it has none. */
-  setProgram(program: Program, layers?: number[]): void {
-    this.marcher.setProgram(program, layers);
+  /** layers, reliefs: of each part, the number of its image of colours, and of normals; -1 where it has none. */
+  setProgram(program: Program, layers?: number[], reliefs?: number[]): void {
+    this.marcher.setProgram(program, layers, reliefs);
     if (this.look.heat) this.picture.meshes.input.dirty = true;
     this.changed();
   }

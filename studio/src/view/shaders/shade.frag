@@ -1,6 +1,7 @@
 // Normal, colour and part where the rays have met the surface.
 uniform highp sampler2D uColours; // of parts, 256 a row
 uniform highp sampler2DArray uMaps; // of parts: octahedral, of the outside and of a hollow part's inside
+const int LAYERS = 512; // as in the table: images of colours are counted up to it, those of normals in multiples
 
 vec3 texel(ivec2 at, int side, int layer) {
     int n = textureSize(uMaps, 0).y;
@@ -8,24 +9,58 @@ vec3 texel(ivec2 at, int side, int layer) {
     return texelFetch(uMaps, ivec3(at.x + side * n, at.y, layer), 0).rgb;
 }
 
-// Colour of a part's own map at a point (partwright/textures/coordinates.py), in shares of its half extents.
-vec3 mapped(vec3 p, int i, int layer) {
-    vec4 q = vec4(p, 1.0);
-    vec3 v = vec3(dot(row(i, 2), q), dot(row(i, 3), q), dot(row(i, 4), q));
+// Where on a part's map a point of its own frame is (partwright/textures/coordinates.py): by the direction in shares of
+// its half extents, in the octant that is given by its signs, if any; and whether it is on the inside.
+vec3 mapPlace(vec3 v, int i, inout vec3 octant) {
     vec4 a = row(i, 5), b = row(i, 6), c = row(i, 7);
     vec2 place = c.x > 0.0 ? bend(v.x, v.z, a.z, c.xyz) : v.xz;
     float across = cross_section(vec2(place.x, v.y), a.xy, a.w);
     float t = clamp((place.y / a.z + 1.0) / 2.0, 0.0, 1.0);
     bool inner = b.z < 1e8 && across < (b.y * t + mix(b.z, b.w, t)) / 2.0;
     vec3 n = vec3(place.x, v.y, place.y) / max(a.xyz + b.x, 1e-9);
+    if (octant == vec3(0.0)) octant = vec3(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0, n.z < 0.0 ? -1.0 : 1.0);
     n /= max(abs(n.x) + abs(n.y) + abs(n.z), 1e-9);
-    vec2 folded = n.z < 0.0 ? (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0) : n.xy;
-    vec2 at = (folded / 2.0 + 0.5) * float(textureSize(uMaps, 0).y) - 0.5;
+    return vec3(octant.z < 0.0 ? (1.0 - abs(n.yx)) * octant.xy : n.xy, inner ? 1.0 : 0.0);
+}
+
+vec3 mapTexel(vec3 place, int layer) {
+    vec2 at = (place.xy / 2.0 + 0.5) * float(textureSize(uMaps, 0).y) - 0.5;
     ivec2 low = ivec2(floor(at));
     vec2 s = at - floor(at);
-    int side = inner ? 1 : 0;
+    int side = int(place.z);
     return mix(mix(texel(low, side, layer), texel(low + ivec2(1, 0), side, layer), s.x),
                mix(texel(low + ivec2(0, 1), side, layer), texel(low + ivec2(1), side, layer), s.x), s.y);
+}
+
+vec3 inPart(vec4 q, int i) { return vec3(dot(row(i, 2), q), dot(row(i, 3), q), dot(row(i, 4), q)); }
+
+// Colour of a part's own map at a point.
+vec3 mapped(vec3 p, int i, int layer) {
+    vec3 octant = vec3(0.0);
+    return mapTexel(mapPlace(inPart(vec4(p, 1.0), i), i, octant), layer);
+}
+
+// The normal there as the part's own map bends it: x along the map's rows, y up its columns, z away from the surface.
+vec3 bentNormal(vec3 p, int i, int layer, vec3 normal) {
+    vec3 v = inPart(vec4(p, 1.0), i), away = normalize(inPart(vec4(normal, 0.0), i)), octant = vec3(0.0);
+    vec3 place = mapPlace(v, i, octant);
+    vec4 a = row(i, 5);
+    float e = 1e-3 * (max(a.x, max(a.y, a.z)) + row(i, 6).x);
+    vec3 along = vec3(0.0), up = vec3(0.0);
+    for (int k = 0; k < 3; k++) {
+        vec3 step_ = vec3(k == 0 ? e : 0.0, k == 1 ? e : 0.0, k == 2 ? e : 0.0);
+        vec2 slope = mapPlace(v + step_, i, octant).xy - mapPlace(v - step_, i, octant).xy;
+        along[k] = slope.x;
+        up[k] = slope.y;
+    }
+    up -= dot(up, away) * away;
+    vec3 tangent = cross(up, away);
+    if (dot(tangent, tangent) < 1e-20) return normal;
+    tangent = normalize(dot(tangent, along) < 0.0 ? -tangent : tangent);
+    vec3 other = cross(away, tangent);
+    vec3 bent = 2.0 * mapTexel(place, layer) - 1.0;
+    bent = bent.x * tangent + bent.y * (dot(other, up) < 0.0 ? -other : other) + bent.z * away;
+    return normalize(bent.x * row(i, 2).xyz + bent.y * row(i, 3).xyz + bent.z * row(i, 4).xyz);
 }
 
 mat4 shades;  // rgb in 24 bits, pushed beside the distances
@@ -56,8 +91,8 @@ vec2 popShade() {
 float packed(vec3 c) { return dot(floor(c * 255.0 + 0.5), vec3(1.0, 256.0, 65536.0)); }
 vec3 unpacked(float c) { return vec3(mod(c, 256.0), mod(floor(c / 256.0), 256.0), floor(c / 65536.0)) / 255.0; }
 
-// Colour of the surface at p, and in `part` the index of the part whose own surface is there.
-vec3 colourAt(vec3 p, int start, int count, out int part) {
+// Colour of the surface at p, and in `leaf_` the instruction of the part whose own surface is there, or -1.
+vec3 colourAt(vec3 p, int start, int count, out int leaf_) {
     float result = FAR, owner = -1.0;
     vec3 colour = vec3(0.5);
     int end = start + count;
@@ -87,9 +122,10 @@ vec3 colourAt(vec3 p, int start, int count, out int part) {
         } else {
             if (beyond(p, i, operation, result, head.y)) continue;
             int index = int(head.z);
-            nextColour = head.w > 0.5 ? mapped(p, i, int(head.w) - 1) : texelFetch(uColours, ivec2(index & 255, index >> 8), 0).rgb;
+            int layer = int(head.w) % LAYERS - 1;
+            nextColour = layer >= 0 ? mapped(p, i, layer) : texelFetch(uColours, ivec2(index & 255, index >> 8), 0).rgb;
             next = leaf(p, i, (code & 2) != 0, (code & 1) != 0);
-            nextOwner = head.z;
+            nextOwner = float(i);
         }
         // Positive where the next one's surface is the nearer to what is seen.
         float lead = operation == UNION ? result - next : operation == SUBTRACT ? -next - result : next - result;
@@ -98,7 +134,7 @@ vec3 colourAt(vec3 p, int start, int count, out int part) {
         result = fold(operation, result, next, head.y);
         if (weight > 0.5) owner = nextOwner;
     }
-    part = int(owner);
+    leaf_ = int(owner);
     return colour;
 }
 
@@ -137,8 +173,11 @@ void main() {
         normal += k * field(p + e * k, start, count, false);
     }
     normal = normalize(normal);
-    int part;
-    vec3 colour = colourAt(p, start, count, part);
+    int leaf_;
+    vec3 colour = colourAt(p, start, count, leaf_);
+    vec4 head = leaf_ < 0 ? vec4(0.0) : row(leaf_, 0);
+    int part = leaf_ < 0 ? -1 : int(head.z), relief = int(head.w) / LAYERS - 1;
+    if (relief >= 0) normal = bentNormal(p, leaf_, relief, normal);
     uvec3 c = uvec3(colour * 255.0 + 0.5);
     result = uvec4(floatBitsToUint(t), packSnorm2x16(octahedral(normal)), c.x | c.y << 8 | c.z << 16, uint(part + 1));
 }
