@@ -53,11 +53,12 @@ def containing(hulls: Sequence[Manifold], triangles: np.ndarray, fine: float) ->
     ]
 
 
-def outer_hull(hull: Manifold, by: float, most: int, room: float) -> Manifold:
+def outer_hull(hull: Manifold, by: float, most: int, room: float, farthest: float = np.inf) -> Manifold:
     """A convex solid of few faces that contains another one.
 
     Of the other's face planes those first that cut off most, each moved out by `room`: until no corner is
-    farther than `by` out of any plane, or there are `most` of them. Lengths.
+    farther than `by` out of any plane, or there are `most` of them and none is farther than `farthest`.
+    Lengths.
     """
     from manifold3d import Manifold
 
@@ -69,10 +70,10 @@ def outer_hull(hull: Manifold, by: float, most: int, room: float) -> Manifold:
     result = Manifold.cube(tuple((upper - lower + 2 * size).tolist())).translate(
         tuple((lower - size).tolist())
     )  # so large that none of its own faces is left
-    for _ in range(most):
+    for count in range(len(normals)):
         excess = (surface_of(result)[0] @ normals.T - offsets).max(axis=0)
         worst = int(excess.argmax())
-        if excess[worst] <= by:
+        if excess[worst] <= by or (count >= most and excess[worst] <= farthest):
             break
         result = result.trim_by_plane(tuple((-normals[worst]).tolist()), -float(offsets[worst]))
     return result

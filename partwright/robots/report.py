@@ -83,9 +83,10 @@ def warnings(links: Sequence[LinkReport]) -> list[str]:
     result = []
     for link in links:
         if link.deviation > link.tolerance:
+            nearer = "more shapes (--max-parts)" if "hull" in link.shapes else "hulls (--kinds), more shapes"
             result.append(
                 f"link {link.link!r}: the shapes are {1000 * link.deviation:.1f} mm off somewhere, and "
-                f"{1000 * link.tolerance:.1f} mm were asked for; allow more with --max-parts, or more kinds"
+                f"{1000 * link.tolerance:.1f} mm were asked for; {nearer} would be nearer"
             )
         if link.sticking_out:
             result.append(

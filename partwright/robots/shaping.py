@@ -38,7 +38,8 @@ _LOST, _MOST_LOST = 3e-5, 0.01  # of the link's volume, and of its own: what a h
 _FLAWS = 1e-3  # of its volume: what a hull may add to a convex link
 _ROUNDING = 1e-9  # of its volume: what a hull adds to a link without a dent
 _CORNERS = 1024  # of a convex link's exact hull
-_FACES = 64  # of an enclosing hull
+_FACES = 64  # of an enclosing hull, and more as long as a corner is out by a share of the tolerance
+_OUT = 0.9  # that share: a corner is a little farther from the hull than from its planes
 _ROOM = 1e-6  # of the size: by how much an enclosing shape is larger than it need be, for rounding
 _POINTS = 50_000  # of the triangles, for the hulls of wrapped pieces
 _LEAST = 1e-3  # of a wrapped piece's volume: a hull of points below it is a sheet
@@ -109,12 +110,13 @@ def _enclosing(pieces: list[Piece], target: Target, wishes: Wishes) -> list[Mani
     triangle."""
     fine, room = _LIGHT * wishes.tolerance, _ROOM * target.size
     hulls = _tight(pieces, target, fine) if target.loose else [piece.hull for piece in pieces]
-    hulls = [outer_hull(hull, fine, _FACES, room) for hull in hulls]
+
+    def plain(hull: Manifold) -> Manifold:
+        return outer_hull(hull, fine, _FACES, room, _OUT * wishes.tolerance)
+
+    hulls = [plain(hull) for hull in hulls]
     more = containing(hulls, target.vertices[target.faces], fine)
-    return [
-        new if new is old else outer_hull(new, fine, _FACES, room)
-        for old, new in zip(hulls, more, strict=True)
-    ]
+    return [new if new is old else plain(new) for old, new in zip(hulls, more, strict=True)]
 
 
 def _chosen(hull: Manifold, alone: bool, target: Target, wishes: Wishes) -> Shape:

@@ -10,6 +10,7 @@ import trimesh
 from manifold3d import Manifold, OpType
 
 from partwright.approximation.hull_faces import faces_of
+from partwright.meshing.manifolds import surface_of
 from partwright.robots import CollideOptions, collide
 from partwright.robots.enclosing import containing, outer_hull
 from tests.robots.robots import urdf
@@ -61,6 +62,9 @@ def test_an_outer_hull_contains_with_few_faces() -> None:
     assert (ball - outer).volume() < 1e-12
     assert outer.num_vert() <= 2 * 64 - 4 < ball.num_vert() / 10
     assert outer.volume() < 1.1 * ball.volume()
+    corners = surface_of(outer_hull(ball, 0.02, 64, 1e-6, farthest=0.04))[0]
+    assert np.linalg.norm(surface_of(outer)[0], axis=1).max() > 1.05
+    assert np.linalg.norm(corners, axis=1).max() < 1.041
     turned = cube(0, 0, 0).rotate((10, 20, 30))
     exact = outer_hull(turned, 0.1, 64, 1e-9)
     assert exact.volume() == pytest.approx(1.0, rel=1e-6)
