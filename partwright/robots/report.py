@@ -83,7 +83,7 @@ def warnings(links: Sequence[LinkReport]) -> list[str]:
     result = []
     for link in links:
         if link.deviation > link.tolerance:
-            nearer = "more shapes (--max-parts)" if "hull" in link.shapes else "hulls (--kinds), more shapes"
+            nearer = "more shapes (--max-parts)" if "hull" in link.shapes else "hulls (--kinds)"
             result.append(
                 f"link {link.link!r}: the shapes are {1000 * link.deviation:.1f} mm off somewhere, and "
                 f"{1000 * link.tolerance:.1f} mm were asked for; {nearer} would be nearer"
