@@ -26,6 +26,7 @@ from partwright.methods import Checkpoint
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_mending import farthest, mended
+from partwright.superfrusta.feature_own_bodies import OwnBodies
 from partwright.superfrusta.feature_steps import FeatureTree, covers
 from partwright.superfrusta.feature_symmetry import symmetries
 from partwright.superfrusta.samples import FitSamples
@@ -52,6 +53,7 @@ _ALIKE = 0.6  # IoU of a piece and what is drawn along it where no face says so
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
+_POOR = 0.95  # R to which a shape is also built up of bodies of its own
 
 
 class FeatureSearch:
@@ -81,6 +83,7 @@ class FeatureSearch:
         self.turns, self.mirrors = symmetries(self.body, directions, samples.surface, samples.measure)
         self._masks: dict[int, tuple[Candidate, NDArray[np.float32]]] = {}
         self._of_piece: dict[tuple[float, ...], list[Candidate]] = {}
+        self._own_bodies = OwnBodies(self)
 
     def run(self) -> FeatureTree | None:
         """The best tree; None where the surface encloses nothing to take sections of."""
@@ -100,14 +103,38 @@ class FeatureSearch:
             tree = self._grown(self.extended(empty, own[index], True), others, best)
             if best is None or tree.objective > best.objective:
                 best = tree
+        if best is not None and best.score < _POOR:
+            built = self._built_up(empty, own, others, gains)
+            if built is not None and built.objective > best.objective:
+                best = built
         return replace(whole := mended(self, best), off=farthest(self, whole)) if best is not None else None
 
-    def _grown(self, tree: FeatureTree, own: Sequence[Candidate], best: FeatureTree | None) -> FeatureTree:
-        """Until nothing pays, or it is well behind where the best so far was after as many steps."""
+    def _built_up(
+        self,
+        empty: FeatureTree,
+        own: Sequence[Candidate],
+        others: Sequence[Candidate],
+        gains: NDArray[np.float64],
+    ) -> FeatureTree | None:
+        """Of bodies that are the shape's own, the largest first, as long as there are any, and then of all
+        else: rings with balls, or a bent rod, are not cut from an outline."""
+        order = np.argsort(-gains).tolist()
+        first = next((i for i in order if own[i] in self._own_bodies), None)
+        if first is None:
+            return None
+        tree = self._grown(self.extended(empty, own[first], True), others, None, True)
+        return self._grown(tree, others, None)
+
+    def _grown(
+        self, tree: FeatureTree, own: Sequence[Candidate], best: FeatureTree | None, only_own: bool = False
+    ) -> FeatureTree:
+        """Until nothing pays, or it is well behind where the best so far was after as many steps.
+
+        only_own: of what is added, only bodies that are the shape's own."""
         while len(tree.features) < self.most:
             if self.checkpoint is not None:
                 self.checkpoint()
-            step = self._step(tree, own)
+            step = self._step(tree, own, only_own)
             if step is None:
                 break
             tree = step
@@ -123,11 +150,13 @@ class FeatureSearch:
         rival = best.objectives[min(count, len(best.objectives) - 1)]
         return count >= _PATIENT and tree.objective < rival - _BEHIND
 
-    def _step(self, tree: FeatureTree, own: Sequence[Candidate]) -> FeatureTree | None:
+    def _step(self, tree: FeatureTree, own: Sequence[Candidate], only_own: bool) -> FeatureTree | None:
         """The tree and what raises R most beyond its price."""
         missed = self._pieces(tree.missed, self.inside & ~tree.covered)
         excess = self._pieces(tree.excess, ~self.inside & tree.covered)
         adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
+        if only_own:
+            adding = [c for c in adding if c in self._own_bodies]
         cutting = [c for piece in excess for c in self.candidates_of(piece)]
         rivals: list[tuple[float, Candidate, bool]] = []
         for pool, added in ((adding, True), (cutting, False)):

@@ -277,6 +277,21 @@ def test_a_bend_is_turned_as_far_as_it_goes() -> None:
     assert inner.volume() < body.volume() < outer.volume()
 
 
+def test_a_rod_ends_where_it_bends_though_faces_of_other_parts_lie_across_it() -> None:
+    """A rod that is straight from x = -0.6 to 0.4, bends there, and has a rib across at x = 0."""
+    rod = named_solid(Cylinder(0.08, 1.0), 1e-4).rotate((0, 90, 0)).translate((-0.1, 0, 0))
+    bend = named_solid(Revolution(Profile.circle(0.08, (0.4, 0.0)), 120.0), 1e-4)  # about z, from angle 0
+    bend = bend.rotate((0, 0, 30)).translate((0.4, -0.4, 0))
+    rib = named_solid(Box((0.1, 0.4, 0.1)), 1e-4).translate((0, -0.2, 0))
+    along_x = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    parts = [one.part for one in candidates(rod + bend + rib, [along_x], holes=True)]
+    rods = [
+        p for p in parts if isinstance(p.field, Cylinder) and p.field.radius == pytest.approx(0.08, rel=0.01)
+    ]
+    ends = [part.bounds()[:, 0].tolist() for part in rods]
+    assert any(end == pytest.approx([-0.6, 0.4], abs=0.04) for end in ends)
+
+
 def test_open_sides_of_a_cut_move_out() -> None:
     plate = Part(Box((1.0, 1.0, 0.2)))
     notch = Part(Box((0.2, 0.4, 0.2)), (0.4, 0.0, 0.0))

@@ -9,7 +9,7 @@ import pytest
 
 import partwright as pw
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution
+from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution, Sphere
 from partwright.fields.extrusion import RIMS
 from partwright.meshing import mesh_assembly
 from partwright.shapes import Shape, load_shape
@@ -132,3 +132,13 @@ def test_a_hook_is_turned_as_far_as_it_goes() -> None:
     assert len(turned) == 1
     assert 199 < turned[0].angle < 224  # it goes on within the block
     assert result.scores.iou > 0.99
+
+
+def test_rings_with_balls_are_what_they_are() -> None:
+    """Which no outline is that holds cut from it: each is a body of its own."""
+    outer = Part(Revolution(Profile([(33, -10), (40, -10), (40, 10), (33, 10), (33, 4), (32, 0), (33, -4)])))
+    inner = Part(Revolution(Profile([(15, -10), (22, -10), (22, -4), (23, 0), (22, 4), (22, 10), (15, 10)])))
+    ball = Part(Sphere(6), (27.5, 0, 0), instances=around(9))
+    result = fitted(Assembly((outer, inner, ball)))
+    assert sorted(len(part.copies) for part in result.assembly.parts) == [1, 1, 9]
+    assert result.scores.iou > 0.98

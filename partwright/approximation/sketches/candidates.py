@@ -30,6 +30,9 @@ _LEAST_AXIS = 0.2  # of the area of all walls, that those about an axis have
 _NEAR_AXIS = 4e-3
 _BALANCED = 0.98  # of the largest second moment of a section's area, that the least has
 _MOST_SLABS = 10
+_LEAVES = 0.005  # of a round section, that lies outside where a rod ends in a bend
+_HALVINGS = 7  # of a slab, for the height at which it does
+_AT_LEVEL = 0.02  # unit lengths: where it does so near to a level it ends there
 _ALL_RIM = 0.95  # of a slab's height
 
 
@@ -67,6 +70,33 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
                     done.add(key)
                     yield from _extruded(view, region, slabs[a][0], slabs[b][1], holes)
                     yield from _rounded(view, region, slabs, a, b, holes)
+            if _is_round(region):
+                yield from _extruded(view, region, *_reach(view, region, slabs, i), holes)
+
+
+def _reach(view: View, region: Region, slabs: list[tuple[float, float]], i: int) -> tuple[float, float]:
+    """From where to where a region of a slab's middle goes on: a rod ends where it bends, not at a face."""
+    middles = [(low + high) / 2 for low, high in slabs]
+
+    def end(beyond: Sequence[float], last: float) -> float:
+        inside = middles[i]
+        for height in (*beyond, last + 0.02 * (middles[i] - last)):
+            if not _goes_on(region, view.regions(height), _LEAVES):
+                break
+            inside = height
+        else:
+            return last
+        outside = height
+        for _ in range(_HALVINGS):
+            between = (inside + outside) / 2
+            if _goes_on(region, view.regions(between), _LEAVES):
+                inside = between
+            else:
+                outside = between
+        level = min((z for slab in slabs for z in slab), key=lambda z: abs(z - inside))
+        return level if abs(level - inside) < _AT_LEVEL else inside
+
+    return end(middles[:i][::-1], slabs[0][0]), end(middles[i + 1 :], slabs[-1][1])
 
 
 def _is_round(region: Region) -> bool:
@@ -85,13 +115,13 @@ def _regions(view: View, low: float, high: float) -> Iterator[Region]:
                 yield region
 
 
-def _goes_on(region: Region, others: Sequence[Region]) -> bool:
+def _goes_on(region: Region, others: Sequence[Region], least: float = _INSIDE) -> bool:
     left = region.section
     for other in others:
         left = left - other.section
         if left.is_empty():
             return True
-    return bool(left.area() < _INSIDE * region.area)
+    return bool(left.area() < least * region.area)
 
 
 def _outlines(region: Region, holes: bool) -> Iterator[tuple[CrossSection, Profile | None]]:
