@@ -53,7 +53,7 @@ _ALIKE = 0.6  # IoU of a piece and what is drawn along it where no face says so
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
-_POOR = 0.95  # R to which a shape is also built up of bodies of its own
+_POOR = 0.95  # R below which a shape is also built up of bodies of its own, which then have to reach it
 
 
 class FeatureSearch:
@@ -105,7 +105,7 @@ class FeatureSearch:
                 best = tree
         if best is not None and best.score < _POOR:
             built = self._built_up(empty, own, others, gains)
-            if built is not None and built.objective > best.objective:
+            if built is not None and built.score >= _POOR and built.objective > best.objective:
                 best = built
         return replace(whole := mended(self, best), off=farthest(self, whole)) if best is not None else None
 
@@ -117,7 +117,7 @@ class FeatureSearch:
         gains: NDArray[np.float64],
     ) -> FeatureTree | None:
         """Of bodies that are the shape's own, the largest first, as long as there are any, and then of all
-        else: rings with balls, or a bent rod, are not cut from an outline."""
+        else: rings with balls are not cut from an outline."""
         order = np.argsort(-gains).tolist()
         first = next((i for i in order if own[i] in self._own_bodies), None)
         if first is None:

@@ -11,7 +11,7 @@ import partwright as pw
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution, Sphere
 from partwright.fields.extrusion import RIMS
-from partwright.meshing import mesh_assembly
+from partwright.meshing import mesh_assembly, mesh_csg
 from partwright.shapes import Shape, load_shape
 
 OCTAGON = Profile.regular(8, 8.0)
@@ -139,6 +139,7 @@ def test_rings_with_balls_are_what_they_are() -> None:
     outer = Part(Revolution(Profile([(33, -10), (40, -10), (40, 10), (33, 10), (33, 4), (32, 0), (33, -4)])))
     inner = Part(Revolution(Profile([(15, -10), (22, -10), (22, -4), (23, 0), (22, 4), (22, 10), (15, 10)])))
     ball = Part(Sphere(6), (27.5, 0, 0), instances=around(9))
-    result = fitted(Assembly((outer, inner, ball)))
+    coarse = load_shape(mesh_csg(Assembly((outer, inner, ball)), 0.03), unit="mm")
+    result = pw.fit(coarse, "solids", quality="draft")
     assert sorted(len(part.copies) for part in result.assembly.parts) == [1, 1, 9]
     assert result.scores.iou > 0.98

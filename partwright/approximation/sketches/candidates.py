@@ -71,7 +71,9 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
                     yield from _extruded(view, region, slabs[a][0], slabs[b][1], holes)
                     yield from _rounded(view, region, slabs, a, b, holes)
             if _is_round(region):
-                yield from _extruded(view, region, *_reach(view, region, slabs, i), holes)
+                low, high = _reach(view, region, slabs, i)
+                if _is_straight(view, region, low, high):
+                    yield from _extruded(view, region, low, high, holes)
 
 
 def _reach(view: View, region: Region, slabs: list[tuple[float, float]], i: int) -> tuple[float, float]:
@@ -97,6 +99,18 @@ def _reach(view: View, region: Region, slabs: list[tuple[float, float]], i: int)
         return level if abs(level - inside) < _AT_LEVEL else inside
 
     return end(middles[:i][::-1], slabs[0][0]), end(middles[i + 1 :], slabs[-1][1])
+
+
+def _is_straight(view: View, region: Region, low: float, high: float) -> bool:
+    """Whether a round region is nowhere part of a wider round one, as in a cone."""
+    heights = (low + share * (high - low) for share in _ELSEWHERE)
+    return not any(
+        _is_round(other)
+        and other.area > (1 + _SAME_AREA) * region.area
+        and _goes_on(region, [other], _LEAVES)
+        for height in heights
+        for other in view.regions(height)[:_MOST_REGIONS]
+    )
 
 
 def _is_round(region: Region) -> bool:
