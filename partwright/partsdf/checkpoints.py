@@ -114,6 +114,7 @@ def _check_settings(path: Path, before: dict[str, object], now: dict[str, object
             "validate",
             "validate_shapes",
             "checkpoint",
+            "start",
         ):
             training[name] = None
     if before != now:

@@ -150,6 +150,9 @@ class TrainingSettings:
     anneal: float = 0.0
     """Share of the epochs, the last ones, over which both rates fall to nothing along a cosine; 0 for the two
     drops of `decay` instead."""
+    ease: float = 0.0
+    """Share of the epochs, the last ones, in which L_inter has a tenth of its weight: parts that it keeps
+    apart to the end are shy of one another, and leave slits between them."""
     accelerator: str = "auto"
     """"auto", "cpu" or "cuda", as Lightning Fabric has them."""
     devices: int = 1
@@ -166,6 +169,9 @@ class TrainingSettings:
     """Minutes between checkpoints."""
     seed: int = 0
     """Of weights, latents, the order of shapes and the points drawn."""
+    start: str = ""
+    """A model of the same parts and decoder that training begins with, as `load_model` takes it; latents are
+    taken over by the shapes' names. "" for random numbers."""
 
     def __post_init__(self) -> None:
         for name in ("epochs", "batch", "points", "devices", "validate_shapes"):
@@ -173,7 +179,7 @@ class TrainingSettings:
         for name in ("at_once", "samples", "shapes", "threads", "validate", "checkpoint", "seed", "warmup"):
             _at_least(f"training.{name}", getattr(self, name), 0)
         _positive("training.latent_spread", self.latent_spread)
-        for name in ("balance", "anneal"):
+        for name in ("balance", "anneal", "ease"):
             if not 0 <= getattr(self, name) <= 1:
                 raise SettingError(f"training.{name} is {getattr(self, name)}; expected 0 to 1")
         for name in ("rate", "latent_rate", "decay"):

@@ -107,7 +107,7 @@ def settings_for(family: PreparedFamily, name: str, steps: int, seed: int = 0, t
         training=TrainingSettings(
             epochs=epochs, batch=_BATCH, points=256, balance=0.25, validation=True, rate=4e-3,
             latent_rate=5e-3, warmup=min(150, 1 + steps // 10), anneal=1.0,
-            threads=threads, validate=epochs, validate_shapes=1, checkpoint=1, seed=seed,
+            threads=threads, ease=0.2, validate=epochs, validate_shapes=1, checkpoint=1, seed=seed,
         ),
     )  # fmt: skip
 

@@ -36,12 +36,13 @@ from partwright.partsdf.gradient_accumulation import backward
 from partwright.partsdf.lipschitz import measured_lipschitz
 from partwright.partsdf.local import LocalDecoder
 from partwright.partsdf.logs import Log
-from partwright.partsdf.model import Model
+from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.poses import PoseTensors, identity
 from partwright.partsdf.validation import Validation
 
 MODEL, CHECKPOINT = "model.safetensors", "checkpoint.safetensors"
 _RATE_DROPS = (0.8, 0.9)  # shares of the steps
+_EASED = 0.1  # of the weight of L_inter, in the last epochs
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,8 @@ class Trainer:
         self.plain = AutoDecoder(len(samples), len(self.parts), config.decoder, self.settings.latent_spread)
         if isinstance(self.plain.decoder, LocalDecoder):
             self.plain.decoder.fit_room(needed_room(samples))
+        if self.settings.start:
+            self.plain.begin_with(load_model(self.settings.start), self.parts, samples.names)
         optimiser = torch.optim.Adam(
             [
                 {"params": self.plain.decoder.parameters(), "lr": self.settings.rate},
@@ -174,11 +177,18 @@ class Trainer:
         poses = self.samples.poses.map(lambda t: t[shapes])
         self.optimiser.zero_grad()
         own = points[mine], sdf[mine], part[mine]
-        found = backward(self.fabric, self.model, shapes, own, poses, self.config, self.epoch, weight)
+        found = backward(self.fabric, self.model, shapes, own, poses, self._config_now(), self.epoch, weight)
         self.optimiser.step()
         self.plain.limit_latents()
         self.state.sums += torch.stack(found)
         self.state.step += 1
+
+    def _config_now(self) -> Config:
+        """With less of L_inter in the last epochs."""
+        losses, settings = self.config.losses, self.settings
+        if self.state.step < (1 - settings.ease) * settings.epochs * self.steps:
+            return self.config
+        return replace(self.config, losses=replace(losses, inter=_EASED * losses.inter))
 
     def _batch(self) -> Tensor:
         """The step's shapes (B,), over all processes: an epoch goes through all in an order of its own."""

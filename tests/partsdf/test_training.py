@@ -39,6 +39,52 @@ def test_it_learns_the_shapes_and_their_parts(model: Model, lamps: PreparedFamil
     assert np.mean(right) > 0.9
 
 
+def test_a_training_begins_with_a_model(model: Model, lamps: PreparedFamily, tmp_path: Path) -> None:
+    """One step from it is as good as it was; by name, so that new shapes begin with nothing."""
+    file = tmp_path / "before.safetensors"
+    model.save(file)
+    config = small_config(lamps, epochs=1, batch=26)
+    begun = replace(config, training=replace(config.training, start=str(file), rate=1e-9, latent_rate=1e-9))
+    again = train(begun, tmp_path / "again").model
+    for name in again.shapes:
+        one, two = NeuralShape.trained(model, name), NeuralShape.trained(again, name)
+        torch.testing.assert_close(one.latents, two.latents, atol=1e-6, rtol=0)
+        points = np.random.default_rng(0).uniform(-1, 1, (200, 3))
+        np.testing.assert_allclose(one.distances(points), two.distances(points), atol=1e-5)
+    wide = replace(begun, decoder=replace(begun.decoder, width=2 * begun.decoder.width))
+    with pytest.raises(SettingError, match="lamps has other settings of its decoder"):
+        train(wide, tmp_path / "wide")
+    with pytest.raises(SettingError, match="lamps has other parts"):
+        train(replace(begun, one_part=True), tmp_path / "one")
+    strangers = AutoDecoder(2, len(model.parts), model.config.decoder)
+    with pytest.raises(SettingError, match="knows none of the 2 shapes"):
+        strangers.begin_with(model, model.parts, ("stool", "desk"))
+    strangers.begin_with(model, model.parts, ("stool", model.shapes[3]))
+    assert strangers.latents[1].equal(model.latents[3])
+    assert not strangers.latents[0].equal(model.latents[0])
+    with pytest.raises(ModelError):
+        train(replace(begun, training=replace(begun.training, start="nobody")), tmp_path / "nobody")
+
+
+def test_the_last_epochs_have_less_of_l_inter(lamps: PreparedFamily, tmp_path: Path) -> None:
+    """Eased all along is a tenth of its weight; eased for the last half is neither that nor all of it."""
+    plain = small_config(lamps, epochs=2, batch=26)
+    plain = replace(plain, losses=replace(plain.losses, inter=5.0))
+
+    def latents(name: str, ease: float, inter: float) -> torch.Tensor:
+        config = replace(
+            plain,
+            losses=replace(plain.losses, inter=inter),
+            training=replace(plain.training, ease=ease),
+        )
+        return train(config, tmp_path / name).model.latents
+
+    none, half, all_along = latents("none", 0.0, 5.0), latents("half", 0.5, 5.0), latents("all", 1.0, 5.0)
+    assert all_along.equal(latents("tenth", 0.0, 0.5))
+    assert not half.equal(none)
+    assert not half.equal(all_along)
+
+
 def test_a_stopped_training_goes_on_to_the_same_bytes(lamps: PreparedFamily, tmp_path: Path) -> None:
     """Stopped by Ctrl-C in the middle of an epoch, twice; the log is the same, too, but for the seconds."""
     config = small_config(lamps, epochs=4, batch=12)
