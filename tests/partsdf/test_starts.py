@@ -13,7 +13,7 @@ import trimesh
 
 import partwright as pw
 from partwright.assembly import Similarity
-from partwright.partsdf.familiarity import ODD, POOR, Familiarity, familiarity, oddness
+from partwright.partsdf.familiarity import ODD, STRANGE, Familiarity, familiarity, oddness
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.starts import (
@@ -114,7 +114,7 @@ def test_a_fit_says_how_it_is_turned_and_what_is_no_such_shape(model: Model, tmp
     odd = pw.fit(pw.load_shape(ring), settings)
     lines = [line for line in odd.warnings if "no shape of the family that lamps knows" in line]
     assert len(lines) == 1
-    assert odd.report["learned"][0]["residual"] > POOR
+    assert odd.report["learned"][0]["residual"] > STRANGE
     half = math.sqrt(0.5)
     ball = trimesh.creation.icosphere(3, 0.38).apply_translation((0.2, 0, 0.53))
     lying = trimesh.util.concatenate([trimesh.creation.box((1.6, 1.2, 0.3)), ball])
@@ -143,3 +143,8 @@ def test_oddness_is_one_at_the_farthest_training_shape(model: Model) -> None:
     (line,) = Familiarity("lamps", 0.3, {"ball": 2.0}).warnings()
     assert "30 %" in line
     assert "ball is 2.0 times as odd" in line
+    # A part that is odd alone is no stranger, nor is what is off a little; together they are.
+    assert Familiarity("lamps", 0.03, {"ball": 2.0}).warnings() == []
+    assert Familiarity("lamps", 0.1, {"ball": ODD}).warnings() == []
+    assert Familiarity("lamps", 0.1, {"ball": 2.0}).warnings()
+    assert "odd" not in Familiarity("lamps", 0.3, {"ball": ODD}).warnings()[0]
