@@ -2,10 +2,11 @@
 
     python benchmarks/parts_pictures.py --families FOLDER [--only cars] [--seen chairs]
 
-FOLDER holds the prepared families chairs, cars and mixers, as configs/ name them. The first test shapes are
-reconstructed without labels or poses; edits and interpolations are of training shapes. A mixer's helix, which
-hides in its tube, is drawn before it. Pictures go to docs/images/parts/, one a family. `--seen`: instead,
-what is found in one picture each of a family's first test shapes, those of benchmarks/partsdf_images.py.
+FOLDER holds the prepared families chairs, cars, mixers and vehicles, as configs/ name them. The first test
+shapes are reconstructed without labels or poses; edits and interpolations are of training shapes. A mixer's
+helix, which hides in its tube, is drawn before it. Pictures go to docs/images/parts/, one a family. `--seen`:
+instead, what is found in one picture each of a family's first test shapes, those of
+benchmarks/partsdf_images.py.
 """
 
 from __future__ import annotations
@@ -59,8 +60,14 @@ EDITS: dict[str, tuple[str, Callable[[NeuralShape], NeuralShape]]] = {
     "chairs": ("another's back", another_back),
     "cars": ("larger wheels", larger_wheels),
     "mixers": ("a wider tube", wider_tube),
+    "vehicles": ("larger wheels", larger_wheels),
 }
-WAYS = {"chairs": ("0", "1"), "cars": ("0", "11"), "mixers": ("0", "1")}  # ends of interpolations
+WAYS = {
+    "chairs": ("0", "1"),
+    "cars": ("0", "11"),
+    "mixers": ("0", "1"),
+    "vehicles": ("4", "8"),
+}  # ends of interpolations
 
 
 def page(name: str, family: PreparedFamily) -> np.ndarray:

@@ -5,6 +5,8 @@
     python benchmarks/partsdf.py encode --family FOLDER --model MODEL [--shapes N]
     python benchmarks/partsdf.py images --family FOLDER --model MODEL [--shapes N] [--views N]
     python benchmarks/partsdf.py scans --family FOLDER --model MODEL [--shapes N] [--surface]
+    python benchmarks/partsdf.py familiarity --families FOLDER [--shapes N] [--others N]
+    python benchmarks/partsdf.py real --shapes-from FOLDER
     python benchmarks/partsdf.py generate --family FOLDER --model MODEL [--held N] [--fresh N]
     python benchmarks/partsdf.py ablations --family FOLDER [--epochs N] [--width N] [--shapes N]
     python benchmarks/partsdf.py decoders --family FOLDER [--seconds S]
@@ -14,10 +16,12 @@
 `reconstruct` with CONFIG also trains the same on all parts as one ("1P"), in --work, for a row of its own.
 `encode` has held-out shapes from points by the model's encoder, `images` from one render each by its image
 encoder, `scans` from few points, noise and missing halves, `generate` new ones against held-out ones.
-`decoders` trains the paper's and the local one for the same seconds. `ablations` trains every variant in
---work, one after another. `training` tables trainings in FOLDER/mixers, chairs and cars, and keeps their
-logs. Trainings go on where they were stopped, and every shape's scores are kept in
-benchmarks/results/partsdf-*.csv and not measured again, so that each command can be stopped and go on.
+`real` finds real chairs and vehicles by models of made ones. `familiarity` shows every model that ships
+shapes of its own family and of the others': who is warned of. `decoders` trains the paper's and the local one
+for the same seconds. `ablations` trains every variant in --work, one after another. `training` tables
+trainings in FOLDER/NAME, and keeps their logs. Trainings go on where they were stopped, and every shape's
+scores are kept in benchmarks/results/partsdf-*.csv and not measured again, so that each command can be
+stopped and go on.
 Tables go to benchmarks/results/partsdf-*.md. One file a table: partsdf_*.py.
 """
 
@@ -32,8 +36,10 @@ import torch
 from partsdf_ablations import ablations
 from partsdf_decoders import decoders
 from partsdf_encoder import encoding
+from partsdf_familiarity import strangers
 from partsdf_generation import generation
 from partsdf_images import imaging
+from partsdf_real import reality
 from partsdf_reconstruct import reconstruction, robots
 from partsdf_scans import scanning
 from partsdf_speed import speed
@@ -87,6 +93,11 @@ def main() -> None:
     one.add_argument("--family", required=True)
     one.add_argument("--model", required=True)
     one.add_argument("--surface", action="store_true", help="come close to the surface laid through points")
+    one = command("real", reality)
+    one.add_argument("--shapes-from", type=Path, required=True, help="folder of toys/ and parts/")
+    one = measuring("familiarity", strangers)
+    one.add_argument("--families", type=Path, required=True, help="folder of prepared families")
+    one.add_argument("--others", type=int, default=2, help="shapes of each other family")
     one = command("generate", generation)
     one.add_argument("--family", required=True)
     one.add_argument("--model", required=True)

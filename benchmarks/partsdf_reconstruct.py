@@ -16,6 +16,7 @@ from partsdf_scores import (
     line,
     measured,
     published,
+    remeshed,
     scale_of,
     trained,
     unknown,
@@ -24,6 +25,7 @@ from partsdf_scores import (
 
 from partwright.datasets import prepare
 from partwright.datasets.prepared import PreparedFamily
+from partwright.metrics.reconstruction import reconstruction_scores
 from partwright.partsdf.config import Config, read_config
 from partwright.partsdf.model import Model, load_model
 
@@ -45,6 +47,9 @@ def reconstruction(arguments: argparse.Namespace) -> None:
     name = f"reconstruct-{family.name}"
     for label, how in (("known parts", known), ("part-agnostic", unknown)):
         lines.append(line(label, measured(name, label, family, model, how, arguments)))
+    itself = [family.load(i) for i in family.split("test")[: arguments.shapes]]
+    best = [reconstruction_scores(remeshed(shape, arguments.resolution), shape) for shape in itself]
+    lines.append(line("the shape itself, meshed alike", best))
     if arguments.config:
         scores = measured(name, "one part", family, one_part(arguments), known, arguments)
         lines.append(line("one part (1P)", scores, parts=False))

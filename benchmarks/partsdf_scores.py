@@ -11,13 +11,15 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 import torch
 
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import NoSurfaceError
+from partwright.meshing import mesh_field
 from partwright.metrics.reconstruction import ReconstructionScores, mean_scores, reconstruction_scores
 from partwright.partsdf.config import Config, DecoderSettings, LossSettings, TrainingSettings
-from partwright.partsdf.meshing import labelled_surface, mesh_shape
+from partwright.partsdf.meshing import LabelledSurface, labelled_surface, mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.reconstruction import (
@@ -27,9 +29,10 @@ from partwright.partsdf.reconstruction import (
 )
 from partwright.partsdf.targets import Target
 from partwright.partsdf.training import train
+from partwright.shapes.distance import MeshDistance
 
 RESULTS = Path(__file__).parent / "results"
-# As configs/ has it for the models that ship.
+# The paper's network, as configs/NAME-paper.toml have it.
 SMALL = DecoderSettings(latent=64, width=128)
 LOSSES = LossSettings(latent=1e-5, ramp=20)
 TRAINING = TrainingSettings(
@@ -70,6 +73,18 @@ def score(found: NeuralShape, truth: PreparedShape, resolution: int) -> Reconstr
     except NoSurfaceError:
         surface = None
     return reconstruction_scores(surface, truth)
+
+
+def remeshed(truth: PreparedShape, resolution: int) -> LabelledSurface:
+    """The shape itself as a mesh as fine as those of reconstructions, each face of the part that is nearest:
+    what a perfect model would score."""
+    faces = np.asarray(truth.faces, dtype=np.int64)
+    distance = MeshDistance(np.asarray(truth.vertices, dtype=np.float64), faces, faces, closed=True)
+    mesh = mesh_field(distance.signed, np.full(3, -1.0), np.full(3, 1.0), resolution)
+    nearest, _ = distance.nearest(mesh.triangles_center)
+    return LabelledSurface(
+        np.asarray(mesh.vertices), np.asarray(mesh.faces), np.asarray(truth.label)[nearest]
+    )
 
 
 def measured(

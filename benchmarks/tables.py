@@ -55,14 +55,21 @@ TABLES = (
           "--shapes {data} --sets cad --rows mesh,voxels,points,solids,superfrusta,planes,weights,auto,union,"
           "flat,aligned,seven,first,cheap,double,dear,paper,tenth,whole", 600),
     Table("partsdf-reconstruct-cars.md", "partsdf.py", None, 0,
-          "reconstruct --family families/cars --model cars --config configs/cars.toml --shapes 3 "
-          "--iterations 200 --resolution 128 --threads 1", 90, "families/, made by partwright parts prepare"),
+          "reconstruct --family families/cars --model cars --shapes 5 --iterations 200 --resolution 128 "
+          "--threads 1", 5, "families/, made by partwright parts prepare"),
     Table("partsdf-reconstruct-chairs.md", "partsdf.py", None, 0,
-          "reconstruct --family families/chairs --model chairs --config configs/chairs.toml --shapes 3 "
-          "--iterations 200 --resolution 128 --threads 1", 90, "families/"),
+          "reconstruct --family families/chairs --model chairs --shapes 5 --iterations 200 --resolution 128 "
+          "--threads 1", 5, "families/"),
+    Table("partsdf-reconstruct-vehicles.md", "partsdf.py", None, 0,
+          "reconstruct --family families/vehicles --model vehicles --shapes 5 --iterations 200 "
+          "--resolution 128 --threads 1", 8, "families/"),
     Table("partsdf-reconstruct-mixers.md", "partsdf.py", None, 0,
           "reconstruct --family families/mixers --model mixers --shapes 5 --iterations 200 "
-          "--resolution 192 --threads 1", 120, "families/"),
+          "--resolution 192 --threads 1", 8, "families/"),
+    Table("partsdf-real.md", "partsdf.py", None, 0, "real --shapes-from {data} --threads 1", 8),
+    Table("partsdf-familiarity.md", "partsdf.py", None, 0,
+          "familiarity --families families --shapes 6 --others 2 --iterations 200 --threads 1", 10,
+          "families/"),
     Table("partsdf-encode-mixers.md", "partsdf.py", None, 0,
           "encode --family families/mixers --model mixers --shapes 5 --iterations 200 --threads 1", 2,
           "families/"),

@@ -55,7 +55,7 @@ class Settings(ReconstructionSettings):
     method: ClassVar[str] = "parts"
 
     model: str
-    """A model that ships (cars, chairs, mixers), or a file (.safetensors)."""
+    """A model that ships (cars, chairs, mixers, vehicles), or a file (.safetensors)."""
     resolution: int | None = None
     """Cells along the unit frame of the surface's mesh, a multiple of 8 (None: 128, up to 256 where walls are
     thin)."""

@@ -10,7 +10,7 @@ from partwright.goals import Parameters
 from partwright.goals.steady import broken_by, gradients, held_parts, moved
 from partwright.partsdf import NeuralShape, load_model, to_assembly
 
-_LIMIT = 1e-3
+_LIMIT = 1e-4
 
 
 @pytest.fixture(scope="module")

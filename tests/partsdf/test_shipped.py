@@ -20,19 +20,12 @@ from partwright.partsdf.photos import Photo, look_at
 from partwright.render import Camera, render_mesh
 
 # Mean IoU; walls of mixers are so thin that little of a cell more or less counts.
-LEAST = {"mixers": 0.75, "chairs": 0.93, "cars": 0.96}
-
-# A family may be made before a model of it ships.
-WITH_MODEL = [name for name in FAMILIES if (SHIPPED / f"{name}.safetensors").is_file()]
+LEAST = {"mixers": 0.75, "chairs": 0.93, "cars": 0.96, "vehicles": 0.93}
 
 
-@pytest.fixture(params=WITH_MODEL)
+@pytest.fixture(params=sorted(FAMILIES))
 def shipped(request: pytest.FixtureRequest) -> Model:
     return load_model(request.param)
-
-
-def test_mixers_chairs_and_cars_ship() -> None:
-    assert {"mixers", "chairs", "cars"} <= set(WITH_MODEL)
 
 
 def test_they_are_small_and_know_their_family(shipped: Model) -> None:
@@ -88,7 +81,7 @@ def test_a_chair_is_seen_in_one_picture() -> None:
     assert encoder is not None
     mean = NeuralShape.mean(encoder.model)
     off, seen, usual = [], [], []
-    for number, azimuth in ((400, 40.0), (401, 140.0), (402, 300.0)):
+    for number, azimuth in ((500, 40.0), (501, 140.0), (502, 300.0), (503, 220.0)):
         made = make_shape("chairs", FAMILIES["chairs"], 0, number)
         image = render_mesh(made.whole, Camera(azimuth, 20.0), (192, 192), (150, 90, 50))
         sight = look_at(encoder, Photo(image.astype(np.float32) / 255, None)).sight
