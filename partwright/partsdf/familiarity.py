@@ -11,7 +11,7 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.targets import Target
 
-# Measured by benchmarks/partsdf_familiarity.py: shapes of a family that were held out come to 0.07 at most,
+# Measured by benchmarks/partsdf_familiarity.py: shapes of a family that were held out come to 0.08 at most,
 # those of other families to 0.2 at least. Odd latents alone say little: many latents mean the same form.
 STRANGE = 0.12
 ODD = 1.5  # times the farthest training shape's distance from the mean latent: as far as held-out shapes' lie

@@ -243,8 +243,6 @@ def _model(about: dict[str, Any], tensors: dict[str, Tensor]) -> Model:
         _check_shape(f"average_pose.{name}", getattr(average, name), (len(parts), width))
     prefix = "decoder."
     weights = {k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)}
-    if config.decoder.architecture == "local":  # files of before 0.3 have none
-        weights.setdefault("unit", torch.ones(len(parts), 3))
     decoder = _decoder_of(len(parts), config.decoder, weights)
     return Model(config, parts, decoder, latents, poses, present, average, shapes, float(about["slope"]))
 
