@@ -33,8 +33,9 @@ $(INSTALLED): .venv/torch $(BUILD_INPUTS)
 demo: $(PACKAGE)
 	$(BIN)/partwright fit $(DEMO_SHAPE) -o demo-output
 
+# PyTorch's threads are not to spin while they wait: with a process a core they would take each other's.
 test: setup
-	$(BIN)/python -m pytest -n auto
+	OMP_WAIT_POLICY=PASSIVE $(BIN)/python -m pytest -n auto
 
 # The lowest versions that pyproject.toml declares. Takes some minutes, so it is not in .ci/run: before a
 # release, and when a dependency is used in a new way.

@@ -67,6 +67,7 @@ def test_what_is_no_good_end_is_noticed(
     monkeypatch.syspath_prepend(BENCHMARKS)
     fuzz = pytest.importorskip("fuzz")
     monkeypatch.setattr(fuzz, "load", load)
+    monkeypatch.setattr(fuzz, "MEMORY", 1 << 40)  # a forked process has its parent's, of all tests before
     folder = tmp_path / "case"
     folder.mkdir()
     assert fuzz.run_case(["load", "a.stl"], folder, 1).way == way

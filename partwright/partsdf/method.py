@@ -8,6 +8,7 @@ from partwright.assembly import Similarity
 from partwright.errors import SettingError
 from partwright.methods import Ability, Checkpoint, FitRequest, Fitted, Method, Progress, preset, timed
 from partwright.partsdf.assemblies import to_assembly
+from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.familiarity import familiarity
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
@@ -38,6 +39,7 @@ class LearnedParts(Method[Settings]):
         presets = {name: Settings(model, **values) for name, values in _PRESETS.items()}
         return preset(presets, quality, changes)
 
+    @one_core_each()
     def fit(self, request: FitRequest[Settings]) -> Fitted:
         """The parts of the model that a plain shape is made of. It may stand otherwise than those
         that the model was trained on: turned about its up axis, and with another where that is unknown.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from torch import Tensor
 
 from partwright.assembly.similarity import Similarity
 from partwright.errors import SettingError
+from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.losses import aggregate
 from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, local_points
@@ -20,7 +20,6 @@ from partwright.partsdf.poses import PoseTensors, local_points
 _WALL_PLACES, _CUBOID_MARGIN = 1000, 1.05  # where walls are looked for, in and around a part's cuboid
 _WALL_QUANTILE = 0.95  # of the depths inside, which is half a wall
 CHUNK = 1 << 11  # pairs of point and part that are decoded at once, so that they stay in the cache
-_threads_lock = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ class NeuralShape:
         def decode(chunk: Tensor) -> Tensor:
             return conditioned(local_points(chunk, self.poses)[None])[0][self.present]
 
-        return torch.cat(_one_core_each(decode, chunks), dim=1).numpy()
+        return torch.cat(_side_by_side(decode, chunks), dim=1).numpy()
 
     def walls(self) -> np.ndarray:
         """(Q,) about how thin each part that is there is, unit frame: twice a depth that few places inside
@@ -115,19 +114,9 @@ def _wall(depth: np.ndarray) -> float:
     return float(2 * np.quantile(inside, _WALL_QUANTILE)) if len(inside) else np.inf
 
 
-def _one_core_each(decode: Callable[[Tensor], Tensor], chunks: Sequence[Tensor]) -> list[Tensor]:
-    """Chunks side by side, each on one core.
-
-    PyTorch would share out each of a chunk's many small products instead, and wait for the slowest core after
-    each of them: on cores that others use too, that takes six times as long.
-    """
-    with _threads_lock:  # the number of threads is the whole process's
-        threads = torch.get_num_threads()
-        if threads == 1:
+def _side_by_side(decode: Callable[[Tensor], Tensor], chunks: Sequence[Tensor]) -> list[Tensor]:
+    with one_core_each() as cores:
+        if min(cores, len(chunks)) <= 1:
             return [decode(chunk) for chunk in chunks]
-        torch.set_num_threads(1)
-        try:
-            with ThreadPoolExecutor(threads) as pool:
-                return list(pool.map(decode, chunks))
-        finally:
-            torch.set_num_threads(threads)
+        with ThreadPoolExecutor(cores) as pool:
+            return list(pool.map(decode, chunks))

@@ -19,6 +19,7 @@ from partwright.datasets.prepared import PreparedShape
 from partwright.errors import CancelledError, ModelError
 from partwright.methods import Cancellation, Checkpoint
 from partwright.partsdf.config import LossSettings
+from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.data import pose_tensors, present_parts
 from partwright.partsdf.losses import aggregate, intersection, latent_penalty, terms
 from partwright.partsdf.model import Model
@@ -56,6 +57,7 @@ LEAST = 1e-3
 _SCOUTED = 8  # of the iterations, the part that each start is given
 
 
+@one_core_each()
 def reconstruct(
     model: Model,
     shape: Shape | PreparedShape,
@@ -123,6 +125,7 @@ def reconstruct_standing(
     return reconstruct_from(starts, settings, seed, told, checkpoint)
 
 
+@one_core_each()
 def reconstruct_from(
     starts: list[Start],
     settings: ReconstructionSettings,

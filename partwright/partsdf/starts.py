@@ -17,6 +17,7 @@ from torch import Tensor
 
 from partwright.assembly.similarity import quaternion_product
 from partwright.errors import ModelError, SettingError
+from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.encoder import Encoder, load_encoder
 from partwright.partsdf.losses import aggregate, clamped_error
 from partwright.partsdf.model import Model
@@ -56,6 +57,7 @@ class Start:
     encoded: bool = False
 
 
+@one_core_each()
 def find_starts(
     model: Model, target: Target, turns: list[Quaternion], settings: ReconstructionSettings
 ) -> list[Start]:
