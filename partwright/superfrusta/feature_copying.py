@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,7 @@ from partwright.approximation.sketches.repeats import moves_between, planes_betw
 from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.meshing.csg import solid_of
-from partwright.superfrusta.feature_steps import Feature, FeatureTree, as_move, covers, image_of
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, Step, as_move, covers, image_of
 from partwright.superfrusta.feature_symmetry import reflected, reflection
 
 if TYPE_CHECKING:
@@ -28,24 +28,6 @@ _EXACT = 1e-4  # unit lengths: moves whose means differ by less are as good
 _POINTS = 200
 _DIGITS = 9  # of shifts that are told apart
 _CHORD = 1e-3  # unit lengths: how far chords of a cut with moved sides may be off
-
-
-@dataclass(frozen=True)
-class Step:
-    """A candidate with its copies.
-
-    covered: (N,) the samples within the tree with them; within: those within them. score: R of that tree.
-    planes: mirrors that may make another solid of the part.
-    """
-
-    chosen: Candidate
-    added: bool
-    part: Part
-    covered: NDArray[np.bool_]
-    within: NDArray[np.bool_]
-    score: float
-    objective: float
-    image: Similarity | None = None
 
 
 def with_copies(
@@ -140,10 +122,21 @@ def joined_by(search: FeatureSearch, tree: FeatureTree, step: Step) -> FeatureTr
     feature = Feature(added, part, step.within, chosen.sides, image)
     cuts = (Feature(False, cut, step.within, 0) for cut in chosen.cuts)
     price = tree.price + search.price(chosen.sides)
-    steps = (*tree.objectives, step.objective)
-    return FeatureTree(
-        [*tree.features, feature, *cuts], step.covered, missed, excess, step.score, price, steps
-    )
+    features, steps = [*tree.features, feature, *cuts], (*tree.steps, step)
+    return FeatureTree(features, step.covered, missed, excess, step.score, price, steps)
+
+
+def without(search: FeatureSearch, tree: FeatureTree, dropped: Collection[int]) -> FeatureTree:
+    """The tree of all steps but some, as if those had never been taken."""
+    result = search.empty
+    for k, step in enumerate(tree.steps):
+        if k not in dropped:
+            covered = result.covered | step.within if step.added else result.covered & ~step.within
+            score = search.score_of(covered)
+            objective = score - result.price - search.price(step.chosen.sides)
+            again = replace(step, covered=covered, score=score, objective=objective)
+            result = joined_by(search, result, again)
+    return result
 
 
 def _matrix(move: Similarity) -> NDArray[np.float64]:

@@ -48,7 +48,7 @@ def pruned(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
         kept, score = left, scores[vain]
     if len(kept) == len(tree.features):
         return tree
-    return replace(search.scored(_only(tree, kept)), off=tree.off, objectives=tree.objectives)
+    return replace(search.scored(_only(tree, kept)), off=tree.off)
 
 
 def farthest_corner(
@@ -74,7 +74,7 @@ def _in_boxes(
 
 
 def _only(tree: FeatureTree, kept: list[int]) -> FeatureTree:
-    return replace(tree, features=[tree.features[k] for k in kept])
+    return replace(tree, features=[tree.features[k] for k in kept], steps=())
 
 
 def _mask(feature: Feature, points: NDArray[np.float32]) -> NDArray[np.bool_]:

@@ -27,6 +27,7 @@ from partwright.shapes import Shape
 from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_mending import farthest, mended
 from partwright.superfrusta.feature_own_bodies import OwnBodies
+from partwright.superfrusta.feature_recasting import recast
 from partwright.superfrusta.feature_steps import FeatureTree, covers
 from partwright.superfrusta.feature_symmetry import symmetries
 from partwright.superfrusta.samples import FitSamples
@@ -92,7 +93,7 @@ class FeatureSearch:
         own = candidates(self.body, self.frames, holes=True)
         if not own:
             return None
-        empty = FeatureTree(covered=np.zeros(len(self.inside), bool), missed=self.body)
+        empty = self.empty
         gains = self._gains(empty, own, True)
         order = _bases(own, gains)
         best: FeatureTree | None = None
@@ -107,7 +108,14 @@ class FeatureSearch:
             built = self._built_up(empty, own, others, gains)
             if built is not None and built.score >= _POOR and built.objective > best.objective:
                 best = built
+        if best is not None:
+            best = recast(self, best, others)
         return replace(whole := mended(self, best), off=farthest(self, whole)) if best is not None else None
+
+    @property
+    def empty(self) -> FeatureTree:
+        """Of nothing yet."""
+        return FeatureTree(covered=np.zeros(len(self.inside), bool), missed=self.body)
 
     def _built_up(
         self,
@@ -132,9 +140,7 @@ class FeatureSearch:
 
         only_own: of what is added, only bodies that are the shape's own."""
         while len(tree.features) < self.most:
-            if self.checkpoint is not None:
-                self.checkpoint()
-            step = self._step(tree, own, only_own)
+            step = self.step(tree, own, only_own)
             if step is None:
                 break
             tree = step
@@ -146,18 +152,28 @@ class FeatureSearch:
 
     @staticmethod
     def _behind(tree: FeatureTree, best: FeatureTree) -> bool:
-        count = len(tree.objectives) - 1
-        rival = best.objectives[min(count, len(best.objectives) - 1)]
+        count = len(tree.steps) - 1
+        rival = best.steps[min(count, len(best.steps) - 1)].objective
         return count >= _PATIENT and tree.objective < rival - _BEHIND
 
-    def _step(self, tree: FeatureTree, own: Sequence[Candidate], only_own: bool) -> FeatureTree | None:
-        """The tree and what raises R most beyond its price."""
+    def step(
+        self,
+        tree: FeatureTree,
+        own: Sequence[Candidate],
+        only_own: bool = False,
+        banned: tuple[float, ...] | None = None,
+    ) -> FeatureTree | None:
+        """The tree and what raises R most beyond its price, but for the candidate of one key."""
+        if self.checkpoint is not None:
+            self.checkpoint()
         missed = self._pieces(tree.missed, self.inside & ~tree.covered)
         excess = self._pieces(tree.excess, ~self.inside & tree.covered)
         adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
         if only_own:
             adding = [c for c in adding if c in self._own_bodies]
         cutting = [c for piece in excess for c in self.candidates_of(piece)]
+        if banned is not None:
+            adding, cutting = ([c for c in pool if c.key != banned] for pool in (adding, cutting))
         rivals: list[tuple[float, Candidate, bool]] = []
         for pool, added in ((adding, True), (cutting, False)):
             if pool:

@@ -8,6 +8,7 @@ import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
+from partwright.approximation.sketches.candidate import Candidate
 from partwright.assembly import Part, Similarity
 from partwright.assembly.motion import Motion
 from partwright.assembly.similarity import rotation_matrix
@@ -38,13 +39,31 @@ class Feature:
         return (self.part,) if self.image is None else (self.part, image_of(self.part, self.image))
 
 
+@dataclass(frozen=True)
+class Step:
+    """A candidate with its copies.
+
+    covered: (N,) the samples within the tree with them; within: those within them. score: R of that tree.
+    image: as of a feature.
+    """
+
+    chosen: Candidate
+    added: bool
+    part: Part
+    covered: NDArray[np.bool_]
+    within: NDArray[np.bool_]
+    score: float
+    objective: float
+    image: Similarity | None = None
+
+
 @dataclass
 class FeatureTree:
     """Features in order, and the samples (N,) within their fold.
 
     missed, excess: what of the shape the fold lacks, and what it has too much, as bodies without the skins
-    that chords leave. objectives: after each step. off: how far a place is off that nothing mends, unit
-    lengths; 0 where none is.
+    that chords leave. steps: that led to it, where they are known. off: how far a place is off that nothing
+    mends, unit lengths; 0 where none is.
     """
 
     features: list[Feature] = field(default_factory=list)
@@ -53,7 +72,7 @@ class FeatureTree:
     excess: Manifold = field(default_factory=Manifold)
     score: float = 0.0
     price: float = 0.0
-    objectives: tuple[float, ...] = ()
+    steps: tuple[Step, ...] = ()
     off: float = 0.0
 
     def at(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
