@@ -1,4 +1,5 @@
-// The Python face of the kernel. Arguments are checked by partwright/fields/kernel.py, which is the only caller.
+// The Python face of the kernel. Arguments are checked by its callers: fields/kernel.py, fields/profile_distance.py,
+// meshing/hulls.py, approximation/half_space.py.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
@@ -6,6 +7,7 @@
 #include <cstring>
 
 #include "evaluate.hpp"
+#include "hull.hpp"
 #include "morphology.hpp"
 #include "normal_equations.hpp"
 #include "optimise.hpp"
@@ -53,6 +55,11 @@ std::vector<Stage> stages_of(const In<float>& a) {
   std::vector<Stage> stages;
   for (size_t i = 0; i < a.shape(0); ++i) stages.push_back({a.data()[2 * i], int(a.data()[2 * i + 1])});
   return stages;
+}
+
+Mesh mesh_of(const In<double>& vertices, const In<int64_t>& faces, const In<int64_t>& edges) {
+  return {vertices.data(), faces.data(), edges.data(), int64_t(vertices.shape(0)), int64_t(faces.shape(0)),
+          int64_t(edges.shape(0))};
 }
 
 Limits limits_of(const In<float>& a) {
@@ -217,4 +224,33 @@ NB_MODULE(_kernel, m) {
     return nb::make_tuple(out, by_point);
   }, "corners"_a, "starts"_a, "counts"_a, "points"_a, "upstream"_a, "threads"_a,
      "Derivatives (V, 3) of sum(upstream * distance) by the corners, and (N, 2) of each distance by its point.");
+
+  m.def("convex_hull", [](In<double> points, bool plain) {
+    Hull hull;
+    {
+      nb::gil_scoped_release release;
+      hull = convex_hull(points.data(), int64_t(points.shape(0)), plain);
+    }
+    auto faces = array<int64_t>({hull.faces.size(), 3});
+    for (size_t i = 0; i < hull.faces.size(); ++i) std::copy_n(hull.faces[i].begin(), 3, faces.data() + 3 * i);
+    return nb::make_tuple(faces, hull.volume);
+  }, "points"_a, "plain"_a,
+     "Faces (F, 3) of the hull of points (N, 3), and its volume.");
+
+  m.def("split_hull_volumes", [](In<double> vertices, In<int64_t> faces, In<int64_t> edges, In<double> planes, double slack) {
+    auto out = array<double>({planes.shape(0)});
+    nb::gil_scoped_release release;
+    split_hull_volumes(mesh_of(vertices, faces, edges), planes.data(), int64_t(planes.shape(0)), slack, out.data());
+    return out;
+  }, "vertices"_a, "faces"_a, "edges"_a, "planes"_a, "slack"_a,
+     "Volume (P,) of the hulls of a mesh's two sides of each plane.");
+
+  m.def("volumes_beyond", [](In<double> vertices, In<int64_t> faces, In<double> areas, In<double> normal, In<double> offsets) {
+    auto out = array<double>({offsets.shape(0)});
+    nb::gil_scoped_release release;
+    volumes_beyond(mesh_of(vertices, faces, faces), areas.data(), normal.data(), offsets.data(), int64_t(offsets.shape(0)),
+                   out.data());
+    return out;
+  }, "vertices"_a, "faces"_a, "areas"_a, "normal"_a, "offsets"_a,
+     "Volume (K,) of a solid beyond each of parallel planes.");
 }

@@ -160,9 +160,9 @@ def _best_cut(piece: Piece, least: float) -> list[Piece]:
     corners = piece.corners
     planes = candidates(corners)
     whole = piece.hull.volume()
-    left = np.array([corners.hulls(normal, offset) for normal, offset in planes])
-    if not len(left):
+    if not planes:
         return [piece]
+    left = corners.hulls(planes)
     order = np.argsort(np.round(left / whole, 6), kind="stable")[:_EXACT]  # the earlier ones are plainer
     chosen = [planes[index] for index in order]
     chosen += [better for plane in chosen[:_MOVED] if (better := moved(corners, plane)) is not plane]
@@ -194,7 +194,7 @@ def _after_a_cut(piece: Piece, least: float) -> float:
     """Volume of the hulls after the best further cut, of a few; the plainest are really made, and may fall
     apart."""
     few = _few(piece.corners)
-    known = [piece.hull.volume(), *(piece.corners.hulls(normal, offset) for normal, offset in few)]
+    known = [piece.hull.volume(), *piece.corners.hulls(few).tolist()]
     for normal, offset in few[:_MADE]:
         known.append(sum(one.hull.volume() for one in _cut(piece, normal, offset, least)))
     return min(known)

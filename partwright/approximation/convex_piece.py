@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.cutting_planes import Corners
+from partwright.meshing.hulls import hull_of
 from partwright.meshing.manifolds import surface_of
 from partwright.shapes import MeshDistance
 
@@ -41,7 +42,12 @@ class Piece:
 
     @cached_property
     def hull(self) -> Manifold:
-        return self.solid.hull()
+        return hull_of(surface_of(self.solid)[0])
+
+    @cached_property
+    def hull_corners(self) -> np.ndarray:
+        """(N, 3) of the hull."""
+        return surface_of(self.hull)[0]
 
     @cached_property
     def box(self) -> np.ndarray:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.meshing.hulls import split_hull_volumes
 from partwright.meshing.manifolds import surface_of
 from partwright.shapes.topology import area_vectors, doubled_areas
 
@@ -21,6 +23,7 @@ _HALVING = 0.9  # of a plane that halves an angle, beside one that continues a f
 _SAME = (0.05, 0.01)  # normals, and offsets over the size, that count as the same plane
 _TURNS = (0.2, 0.1, 0.05, 0.025, 0.0125)  # radians, by which a plane is turned
 _SHIFT = 0.3  # of the size for a radian, by which it is moved
+_SLACK = 1e-7  # of the size: what is no farther from a plane lies in it
 _LESS = 1e-4  # of the hulls: what moves for less stays
 
 Plane = tuple[np.ndarray, float]
@@ -68,27 +71,11 @@ class Corners:
         centred = middle - np.average(middle, axis=0, weights=area)
         return np.linalg.eigh((centred * area[:, None]).T @ centred)[1].T[::-1]
 
-    def hulls(self, normal: np.ndarray, offset: float) -> float:
-        """Volume of the hulls of the two sides of a plane together; infinite where one side has nothing."""
-        from manifold3d import Manifold
-
-        height = self.vertices @ normal - offset
-        slack = 1e-7 * self.size
-        if height.max() < slack or height.min() > -slack:
-            return np.inf
-        start, stop = height[self.edges].T
-        crossing = start * stop < 0
-        share = (start[crossing] / (start[crossing] - stop[crossing]))[:, None]
-        first, last = self.vertices[self.edges[crossing].T]
-        between = first + share * (last - first)
-        sides = (self._side(height, slack), self._side(-height, slack))
-        return sum(Manifold.hull_points(np.concatenate([side, between])).volume() for side in sides)
-
-    def _side(self, height: np.ndarray, slack: float) -> np.ndarray:
-        """Corners (N, 3) above a plane, and those in it that belong to a triangle that reaches above."""
-        used = np.zeros(len(height), bool)
-        used[self.faces[(height[self.faces] > slack).any(axis=1)]] = True
-        return self.vertices[used & (height >= -slack)]
+    def hulls(self, planes: Sequence[Plane]) -> np.ndarray:
+        """(P,) volume of the hulls of the two sides of each plane together; infinite where one side has
+        nothing."""
+        rows = np.array([[*normal, offset] for normal, offset in planes]).reshape(-1, 4)
+        return split_hull_volumes(self.vertices, self.faces, self.edges, rows, _SLACK * self.size)
 
 
 def candidates(corners: Corners) -> list[Plane]:
@@ -102,7 +89,7 @@ def moved(corners: Corners, plane: Plane) -> Plane:
     where it is best."""
     normal, offset = plane
     middle = corners.vertices.mean(axis=0)
-    least = corners.hulls(normal, offset)
+    least = corners.hulls([plane])[0]
     for turn in _TURNS:
         across = np.linalg.svd(normal[None])[2][1:]
         place = offset - normal @ middle
@@ -110,7 +97,7 @@ def moved(corners: Corners, plane: Plane) -> Plane:
         for way in (*across, *-across):
             turned = (normal + turn * way) / np.hypot(1, turn)
             tried.append((turned, float(turned @ middle + place)))
-        left = [corners.hulls(*one) for one in tried]
+        left = corners.hulls(tried)
         at = int(np.argmin(left))
         if left[at] < (1 - _LESS) * least:
             (normal, offset), least = tried[at], left[at]

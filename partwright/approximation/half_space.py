@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright import _kernel
 from partwright.meshing.manifolds import surface_of
 from partwright.shapes.topology import area_vectors
 
@@ -25,7 +26,8 @@ class Surface:
     @classmethod
     def of(cls, solid: Manifold) -> Surface:
         vertices, faces = surface_of(solid)
-        return cls(vertices, faces, area_vectors(vertices[faces]) / 2)
+        areas = area_vectors(vertices[faces]) / 2
+        return cls(np.ascontiguousarray(vertices), np.ascontiguousarray(faces), np.ascontiguousarray(areas))
 
     def beyond(self, normal: np.ndarray, offsets: np.ndarray) -> np.ndarray:
         """(K,) volume where normal . p > offset, for each of the offsets (K,).
@@ -33,13 +35,6 @@ class Surface:
         Every triangle is the top or the bottom of a prism that ends on the plane: what counts is its area
         along the normal (3,), signed, and the mean height of it beyond the plane.
         """
-        height = (self.vertices @ normal)[self.faces]
-        reaching = height.max(axis=1) > offsets.min()
-        low, middle, high = np.sort(height[reaching], axis=1).T[:, :, None]
-        below, above = offsets - low, high - offsets  # (F, K)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            under = below**3 / (3 * (middle - low) * (high - low))
-            tip = above**3 / (3 * (high - low) * (high - middle))
-        mean = (low + middle + high) / 3 - offsets
-        mean = np.where(below > 0, np.where(offsets < middle, mean + under, tip), mean)
-        return np.asarray((self.areas[reaching] @ normal) @ np.where(above > 0, mean, 0.0))
+        normal = np.ascontiguousarray(normal, dtype=np.float64)
+        offsets = np.ascontiguousarray(offsets, dtype=np.float64)
+        return _kernel.volumes_beyond(self.vertices, self.faces, self.areas, normal, offsets)

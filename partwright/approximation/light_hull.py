@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.hull_faces import faces_of
+from partwright.meshing.hulls import hull_of
 from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
@@ -21,14 +22,12 @@ _FEW, _SHARE = 8, 8  # corners that are taken at once: so many, or one for this 
 
 def plain_hull(hull: Manifold) -> Manifold:
     """Without the corners that hardly count: at once, where `light_hull` chooses."""
-    from manifold3d import Manifold
-
     if hull.num_vert() <= _FEW:
         return hull
     size = float(np.ptp(np.reshape(hull.bounding_box(), (2, 3)), axis=0).max())
     # Of a hull as thin as rounding, no copy may have the volume.
     for halving in range(_HALVINGS):
-        plain = Manifold.hull_points(surface_of(hull.simplify(_EDGES * size / 2**halving))[0])
+        plain = hull_of(surface_of(hull.simplify(_EDGES * size / 2**halving))[0])
         if plain.volume() >= (1 - _PLAIN) * hull.volume():
             return plain
     return hull
@@ -39,8 +38,6 @@ def light_hull(hull: Manifold, by: float, most: int = _MOST, lost: float = _LOST
     the others sticks out of it: no more than `by`, unless that would take more than `most` corners.
 
     lost: share of its volume that it may lose."""
-    from manifold3d import Manifold
-
     corners = surface_of(hull)[0]
     if len(corners) <= _FEW:
         return hull, 0.0
@@ -49,7 +46,7 @@ def light_hull(hull: Manifold, by: float, most: int = _MOST, lost: float = _LOST
     both = np.concatenate([directions, -directions])
     chosen = set((both @ corners.T).argmax(axis=1).tolist())
     while True:
-        light = Manifold.hull_points(corners[sorted(chosen)])
+        light = hull_of(corners[sorted(chosen)])
         if light.is_empty() or light.volume() <= 0:
             return hull, 0.0
         normals, offsets = faces_of(light)

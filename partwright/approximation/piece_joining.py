@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from partwright.approximation.convex_piece import Limits, Piece
+from partwright.meshing.hulls import hull_volume
 
 _SAVED = 5e-4  # of the volume: what one piece more has to save where the limits ask for none
 _MANY, _SAVED_BY_MANY = 32, 2e-3  # beyond so many pieces each has to save more, whatever the deviation is
@@ -117,11 +118,10 @@ def _both(a: Piece, b: Piece) -> Piece:
 
 def _cost(a: Piece, b: Piece) -> float:
     """Volume that the hull of both adds; infinite for those that lie apart."""
-    from manifold3d import Manifold
-
     if not boxes_touch(a.box, b.box, _ROOM):
         return np.inf
-    return float(Manifold.batch_hull([a.hull, b.hull]).volume() - a.hull.volume() - b.hull.volume())
+    both = hull_volume(np.concatenate([a.hull_corners, b.hull_corners]))
+    return both - a.hull.volume() - b.hull.volume()
 
 
 def boxes_touch(a: np.ndarray, b: np.ndarray, share: float = 0.0) -> bool:

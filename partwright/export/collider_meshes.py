@@ -10,6 +10,7 @@ from partwright.approximation.collision import Geometry
 from partwright.approximation.light_hull import light_hull
 from partwright.errors import NoSurfaceError
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
+from partwright.meshing.hulls import hull_of
 from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
@@ -54,13 +55,12 @@ def _solid(field: Field) -> trimesh.Trimesh:
 def _hull(places: np.ndarray) -> trimesh.Trimesh:
     """At a size of 1: hulls of meshes in micrometres would lose their triangles in metres."""
     import trimesh
-    from manifold3d import Manifold
 
     lower, upper = places.min(axis=0), places.max(axis=0)
     middle, side = (lower + upper) / 2, float((upper - lower).max())
     if not side > 0:
         raise NoSurfaceError("a collider has no size")
-    whole = Manifold.hull_points((places - middle) / side)
+    whole = hull_of((places - middle) / side)
     corners, faces = surface_of(light_hull(whole, _LOST, MOST_CORNERS)[0])
     if whole.volume() <= 0:
         raise NoSurfaceError("a collider is flat")

@@ -11,6 +11,7 @@ from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.approximation.hull_faces import faces_of
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
+from partwright.meshing.hulls import hull_of
 from partwright.robots.model import Shape
 
 if TYPE_CHECKING:
@@ -69,11 +70,9 @@ def shape_planes(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
 
 def shape_solid(shape: Shape) -> Manifold:
     """With curved surfaces as 64 facets to a circle, on corners that lie on the surface."""
-    from manifold3d import Manifold
-
     if shape.part is None:
         assert shape.mesh is not None
-        return Manifold.hull_points(np.asarray(shape.mesh.vertices))
+        return hull_of(np.asarray(shape.mesh.vertices))
     pose = np.column_stack([rotation_matrix(shape.part.rotation), shape.part.translation])
     return _native(shape.part.field).transform(pose)
 

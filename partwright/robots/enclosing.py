@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.hull_faces import faces_of
+from partwright.meshing.hulls import hull_of
 from partwright.meshing.manifolds import surface_of
 
 if TYPE_CHECKING:
@@ -30,8 +31,6 @@ def containing(hulls: Sequence[Manifold], triangles: np.ndarray, fine: float) ->
 
     fine: a length; how far a piece may stick out of a hull before it is cut.
     """
-    from manifold3d import Manifold
-
     planes = [faces_of(hull) for hull in hulls]
     boxes = [np.reshape(hull.bounding_box(), (2, 3)) for hull in hulls]
     joining: list[list[np.ndarray]] = [[surface_of(hull)[0]] for hull in hulls]
@@ -48,7 +47,7 @@ def containing(hulls: Sequence[Manifold], triangles: np.ndarray, fine: float) ->
             changed[i] = True
         left = halves(left[~joins], edges[~joins].argmax(axis=1))
     return [
-        Manifold.hull_points(np.concatenate(points)) if more else hull
+        hull_of(np.concatenate(points)) if more else hull
         for hull, points, more in zip(hulls, joining, changed, strict=True)
     ]
 

@@ -18,6 +18,7 @@ from partwright.approximation.convex_fit import ConvexFit, Mode, convex_fits
 from partwright.approximation.convex_piece import Limits, Piece
 from partwright.approximation.hull_faces import faces_of
 from partwright.approximation.light_hull import light_hull, plain_hull
+from partwright.meshing.hulls import hull_of
 from partwright.meshing.manifolds import as_mesh
 from partwright.robots.containment import larger, shape_solid
 from partwright.robots.enclosing import containing, outer_hull
@@ -150,7 +151,7 @@ def _tight(pieces: list[Piece], target: Target, fine: float) -> list[Manifold]:
         within = points[((points >= lower) & (points <= upper)).all(axis=1)]
         for normal, offset in zip(*faces_of(plain), strict=True):
             within = within[within @ normal <= offset + room]
-        hull = Manifold.hull_points(within) if len(within) > 3 else Manifold()
+        hull = hull_of(within) if len(within) > 3 else Manifold()
         sheet = hull.is_empty() or hull.volume() < _LEAST * piece.hull.volume()
         hulls.append(piece.hull if sheet else hull)
     return hulls

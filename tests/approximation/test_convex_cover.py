@@ -206,7 +206,7 @@ def test_volumes_beyond_planes_are_those_of_what_is_cut_off() -> None:
 def test_a_plane_is_moved_to_where_two_boxes_meet() -> None:
     corners = Corners.of(union([box(0, 0, 0, 2, 1, 1), box(2, -2, -2, 3, 3, 3)]))
     start = (np.array([math.cos(0.1), math.sin(0.1), 0.0]), 2.3)
-    normal, offset = moved(corners, start)
-    assert corners.hulls(normal, offset) < 0.25 * (corners.hulls(*start) - 27) + 27
+    after, before = corners.hulls([moved(corners, start), start])
+    assert after < 0.25 * (before - 27) + 27
     best = np.array([1.0, 0.0, 0.0]), 2.0
     assert moved(corners, best) is best
