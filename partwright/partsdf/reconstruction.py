@@ -1,6 +1,7 @@
 """Shapes that the model has not seen: latents, and poses where they are unknown, that decode to them.
 
-With known parts the poses are given and every sample knows its nearest part (section 4.1). Part-agnostic, a
+With known parts every sample knows its nearest part, and poses start as they are given (section 4.1).
+Part-agnostic, a
 plain surface is all there is: latents and poses, rotations included, start from the training shape that fits
 best as it is, and all of them move (section 3.4).
 """
@@ -30,6 +31,7 @@ from partwright.partsdf.starts import (
     UPRIGHT,
     Quaternion,
     Start,
+    errors_by_part,
     exchanged_parts,
     find_starts,
     latents_by_part,
@@ -84,15 +86,14 @@ def reconstruct(
         )
     part = torch.zeros(len(shape.part)) if model.config.one_part else torch.tensor(shape.part)
     target = Target(torch.tensor(shape.points), torch.tensor(shape.sdf), part.long())
-    start = NeuralShape.mean(model, present_parts(shape, model.config))
+    poses = pose_tensors(shape, model.config)
+    start = replace(NeuralShape.mean(model, present_parts(shape, model.config)), poses=poses)
+    if settings.exchange and settings.iterations:
+        return _found_by_part(start, target, settings, seed, told, checkpoint)
     # Latents start at N(0, 0.01^2), as the authors': near the centre of their prior.
     noise = torch.Generator().manual_seed(seed)
-    latents = 0.01 * torch.randn(start.latents.shape, generator=noise)
-    poses = pose_tensors(shape, model.config)
-    if settings.exchange and settings.iterations:  # or each near that of a training shape's part
-        latents = latents + latents_by_part(model, poses, target)
-    start = replace(start, latents=latents, poses=poses)
-    return _optimised(start, target, settings, seed, told, checkpoint, move_poses=False)[0]
+    start = replace(start, latents=0.01 * torch.randn(start.latents.shape, generator=noise))
+    return _optimised(start, target, settings, seed, told, checkpoint, _posed(model, settings))[0]
 
 
 def reconstruct_unknown(
@@ -151,6 +152,31 @@ def _filling(shape: NeuralShape, target: Target) -> Tensor:
     return share >= LEAST
 
 
+def _found_by_part(
+    start: NeuralShape,
+    target: Target,
+    settings: ReconstructionSettings,
+    seed: int,
+    told: Told | None,
+    checkpoint: Checkpoint,
+) -> NeuralShape:
+    """Of known parts, each begins with that one of a few closest training shapes' which a few iterations
+    bring closest."""
+    model = start.model
+    latents = latents_by_part(model, start.poses, target, settings.starts)
+    starts = [Start(replace(start, latents=one), UPRIGHT, target) for one in latents]
+    scouts = _Scouts(starts if len(starts) > 1 else [], settings, seed, told, checkpoint)
+    tried = [one.shape for one in scouts.sent()] or [starts[0].shape]
+    if len(tried) > 1:
+        poses = PoseTensors(*(torch.stack(each) for each in zip(*(one.poses for one in tried), strict=True)))
+        found = torch.stack([one.latents for one in tried])
+        best = errors_by_part(model, found, poses, target).argmin(dim=0), torch.arange(len(model.parts))
+        start = replace(start, latents=found[best], poses=poses.map(lambda t: t[best]))
+    else:
+        start = tried[0]
+    return start if scouts.stopped else scouts.followed(Start(start, UPRIGHT, target)).shape
+
+
 def _scouted(
     starts: list[Start],
     settings: ReconstructionSettings,
@@ -160,31 +186,64 @@ def _scouted(
 ) -> Start:
     """From the start that a few iterations bring closest: one that is close as it is may be a dead end, as a
     tube with flanges is for one without. Then single parts are exchanged, and all are optimised."""
-    few = replace(settings, iterations=max(1, settings.iterations // _SCOUTED), decay=1.0)
     # What an encoder saw goes a little of the way by itself, too: its poses are near, its forms are not yet.
     alone = len(starts) == 1 and not starts[0].encoded
-    scouts = starts if settings.iterations and not alone else []
-    steps = settings.iterations + len(scouts) * few.iterations
-
-    def after(done: int, start: Start) -> Told | None:
-        if told is None:
-            return None
-        return lambda step: told(step._replace(number=done + step.number, of=steps, turn=start.turn))
-
-    tried: list[Start] = []
-    for i, start in enumerate(scouts):
-        ahead = after(i * few.iterations, start)
-        poses = start.shape.model.config.poses
-        shape, finished = _optimised(start.shape, start.target, few, seed, ahead, checkpoint, poses)
-        tried.append(replace(start, shape=shape))
-        if not finished:
-            return _closest(tried)
-    best = _closest(tried or starts)
+    scouts = _Scouts(starts if settings.iterations and not alone else [], settings, seed, told, checkpoint)
+    best = _closest(scouts.sent() or starts)
+    if scouts.stopped:
+        return best
     if settings.exchange and settings.iterations:
         best = replace(best, shape=exchanged_parts(best.shape, best.target, seed))
-    ahead, poses = after(len(scouts) * few.iterations, best), best.shape.model.config.poses
-    found = _optimised(best.shape, best.target, settings, seed, ahead, checkpoint, poses)[0]
-    return replace(best, shape=found)
+    return scouts.followed(best)
+
+
+class _Scouts:
+    """Goes a few iterations from each start, and then all of them from one; tells of these as of one way."""
+
+    def __init__(
+        self,
+        starts: list[Start],
+        settings: ReconstructionSettings,
+        seed: int,
+        told: Told | None,
+        checkpoint: Checkpoint | None,
+    ) -> None:
+        self.starts, self.settings, self.seed = starts, settings, seed
+        self.told, self.checkpoint = told, checkpoint
+        self.few = replace(settings, iterations=max(1, settings.iterations // _SCOUTED), decay=1.0)
+        self.stopped = False
+        """Whether it was cancelled on the way."""
+
+    def sent(self) -> list[Start]:
+        """As they come back; fewer once cancelled."""
+        back: list[Start] = []
+        for i, start in enumerate(self.starts):
+            shape, finished = self._go(start, self.few, i)
+            back.append(replace(start, shape=shape))
+            if not finished:
+                self.stopped = True
+                break
+        return back
+
+    def followed(self, start: Start) -> Start:
+        return replace(start, shape=self._go(start, self.settings, len(self.starts))[0])
+
+    def _go(self, start: Start, settings: ReconstructionSettings, scouts: int) -> tuple[NeuralShape, bool]:
+        """After so many scouts."""
+        done = scouts * self.few.iterations
+        steps = self.settings.iterations + len(self.starts) * self.few.iterations
+
+        def ahead(step: Step) -> None:
+            if self.told:
+                self.told(step._replace(number=done + step.number, of=steps, turn=start.turn))
+
+        poses = _posed(start.shape.model, settings)
+        return _optimised(start.shape, start.target, settings, self.seed, ahead, self.checkpoint, poses)
+
+
+def _posed(model: Model, settings: ReconstructionSettings) -> bool:
+    """Whether poses move."""
+    return model.config.poses and settings.pose_rate > 0
 
 
 def _closest(starts: list[Start]) -> Start:

@@ -28,13 +28,14 @@ class ReconstructionSettings:
     the mean of all; where poses are unknown only. "auto" tries what the encoder sees, where the model has
     one, as one of the `starts`, beside the nearest training shapes."""
     starts: int = 4
-    """So many nearest shapes are tried for an eighth of the iterations each, and the best goes on."""
+    """So many nearest shapes, or of known parts nearest ones each, are tried for an eighth of the iterations
+    each, and the best goes on."""
     exchange: bool = True
     """Single parts of the best start are exchanged for those of other training shapes where that comes
-    closer. Where parts are known, each starts as the training shape's that is closest; else at the mean, as
-    the paper's."""
+    closer. Known parts start as those of training shapes that are closest; else at the mean, as the
+    paper's."""
     pose_rate: float = 2e-3
-    """Of Adam, for poses."""
+    """Of Adam, for poses; at 0 they stay as they are known, as the paper's do where parts are known."""
     pose_delay: float = 0.1
     """Share of the iterations for which poses wait until latents have found the rough form."""
 

@@ -186,29 +186,38 @@ def exchanged_parts(shape: NeuralShape, target: Target, seed: int = 0) -> Neural
 
 
 @torch.no_grad()
-def latents_by_part(model: Model, poses: PoseTensors, target: Target) -> Tensor:
-    """(P, Z): of each part, the latent of the training shape whose part is closest, in the pose (P, ...) that
-    is known, at the samples of a target with known parts. Parts that no sample is nearest to have the mean's.
+def latents_by_part(model: Model, poses: PoseTensors, target: Target, most: int = 1) -> Tensor:
+    """(K, P, Z): of each part, the latents of the up to `most` training shapes whose part is closest, the
+    closest first, in the pose (P, ...) that is known. Parts that no sample is nearest to have the mean's.
 
     From the mean alone a blade that winds the other way, say, is never found.
     """
+    count = len(model.latents)
+    errors = errors_by_part(model, model.latents, poses.map(lambda t: t.expand(count, *t.shape)), target)
+    order = errors.masked_fill(~model.present, torch.inf).argsort(dim=0)[:most]
+    closest = model.latents[order, torch.arange(len(model.parts))]
+    assert target.part is not None
+    seen = torch.zeros(len(model.parts), dtype=torch.bool)
+    seen[target.part.unique()] = True
+    return torch.where((seen & model.present.any(dim=0))[:, None], closest, model.mean_latent)
+
+
+@torch.no_grad()
+def errors_by_part(model: Model, latents: Tensor, poses: PoseTensors, target: Target) -> Tensor:
+    """(S, P) error of each part of shapes with latents (S, P, Z) and poses (S, P, ...): the sum over those of
+    a target's samples that belong to it."""
     rows = _rows(target, _PART_SAMPLES)
     assert target.part is not None
-    points, owner = target.points[rows], target.part[rows]
-    known = target.sdf[rows]
+    points, owner, known = target.points[rows], target.part[rows], target.sdf[rows]
     member = torch.nn.functional.one_hot(owner, len(model.parts)).float()
     errors = []
-    for first in range(0, len(model.latents), _AT_ONCE):
-        latents = model.latents[first : first + _AT_ONCE]
-        count = len(latents)
-        placed = poses.map(lambda t, count=count: t.expand(count, *t.shape))
-        each = model.condition(latents, placed)(local_points(points, placed))
-        own = each.gather(1, owner.expand(count, 1, -1)).squeeze(1)
+    for first in range(0, len(latents), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        placed = poses.map(lambda t, some=some: t[some])
+        each = model.condition(latents[some], placed)(local_points(points, placed))
+        own = each.gather(1, owner.expand(len(each), 1, -1)).squeeze(1)
         errors.append(clamped_error(own, known, model.config.losses) @ member)
-    worst = torch.cat(errors).masked_fill(~model.present, torch.inf)
-    best = model.latents[worst.argmin(dim=0), torch.arange(len(model.parts))]
-    seen = member.any(dim=0) & model.present.any(dim=0)
-    return torch.where(seen[:, None], best, model.mean_latent)
+    return torch.cat(errors)
 
 
 def _rows(target: Target, count: int) -> Tensor:

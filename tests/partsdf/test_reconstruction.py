@@ -15,6 +15,7 @@ from partwright.datasets.poses import Poses
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import ModelError, SettingError
 from partwright.methods import Cancellation, Checkpoint
+from partwright.partsdf import reconstruction
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
@@ -46,10 +47,40 @@ def test_known_parts(model: Model, lamps: PreparedFamily) -> None:
     mean = NeuralShape.mean(model, torch.from_numpy(shape.present.astype(bool)))
     # Three in four samples lie within a few cells of the surface, where a small network is unsure.
     assert iou(found, shape.points, shape.sdf) > max(0.7, iou(mean, shape.points, shape.sdf) + 0.05)
-    np.testing.assert_array_equal(found.poses.translation, shape.translation)
     numbers = np.flatnonzero(shape.present)
     owner = numbers[found.part_distances(shape.points).argmin(axis=0)]
     assert (owner == shape.part)[shape.sdf < -0.03].mean() > 0.9
+
+
+def test_known_poses_move_unless_they_are_held(model: Model, lamps: PreparedFamily) -> None:
+    """By as much as they were prepared wrongly: a twentieth of the shape."""
+    shape = lamps.load(0)
+    moved = replace(shape, poses=replace(shape.poses, translation=shape.translation + np.float32(0.1)))
+    held = reconstruct(model, moved, replace(QUICK, pose_rate=0.0))
+    for mine, given in zip(held.poses, (moved.translation, moved.rotation, moved.scale), strict=True):
+        np.testing.assert_allclose(mine, given, rtol=1e-6)
+    found = reconstruct(model, moved, replace(QUICK, pose_rate=1e-2))
+    off = np.abs(found.poses.translation.numpy() - shape.translation)[shape.present.astype(bool)]
+    assert off.mean() < 0.04
+    assert iou(found, shape.points, shape.sdf) > iou(held, shape.points, shape.sdf) + 0.05
+
+
+def test_each_known_part_goes_on_from_the_start_that_came_closest(
+    model: Model, lamps: PreparedFamily, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two starts each has one part right: with rates of 0, both right ones are in the result."""
+    shape = lamps.load(0)
+    right = NeuralShape.trained(model, shape.name).latents
+    wrong = right.flip(0) + 1
+    starts = torch.stack([wrong, right])
+    starts[:, 0] = starts[:, 0].flip(0)
+    monkeypatch.setattr(reconstruction, "latents_by_part", lambda *_: starts)
+    steps: list[Step] = []
+    still = ReconstructionSettings(iterations=16, points=64, rate=0.0, pose_rate=0.0, starts=2)
+    found = reconstruct(model, shape, still, told=steps.append)
+    assert found.latents.equal(right)
+    assert [step.number for step in steps] == list(range(1, 2 * 2 + 16 + 1))
+    assert {step.of for step in steps} == {2 * 2 + 16}
 
 
 def test_a_plain_mesh_gets_its_parts(model: Model, lamps: PreparedFamily) -> None:

@@ -19,6 +19,7 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.starts import (
     UPRIGHT,
     best_starts,
+    errors_by_part,
     errors_of,
     exchanged_parts,
     latents_by_part,
@@ -97,12 +98,18 @@ def test_known_parts_start_as_the_closest_of_the_training_shapes(model: Model) -
     shape = replace(own, latents=latents)
     target = target_of(shape)
     part = torch.from_numpy(shape.part_distances(target.points.numpy())).argmin(dim=0)
-    found = latents_by_part(model, own.poses, replace(target, part=part))
+    (found,) = latents_by_part(model, own.poses, replace(target, part=part))
     assert found[0].equal(other.latents[0])
     for number in own.present.nonzero().squeeze(1).tolist()[1:]:
         assert found[number].equal(own.latents[number])
     unseen = replace(target, part=torch.zeros_like(part))
-    assert latents_by_part(model, own.poses, unseen)[1].equal(model.mean_latent[1])
+    assert latents_by_part(model, own.poses, unseen)[0, 1].equal(model.mean_latent[1])
+    three = latents_by_part(model, own.poses, replace(target, part=part), 3)
+    errors = errors_by_part(
+        model, three, own.poses.map(lambda t: t.expand(3, *t.shape)), replace(target, part=part)
+    )
+    assert three[0].equal(found)
+    assert (errors[:, own.present].diff(dim=0) > 0).all()
 
 
 def test_a_fit_says_how_it_is_turned_and_what_is_no_such_shape(model: Model, tmp_path: Path) -> None:
