@@ -1,12 +1,14 @@
 """How good, how fast and how large `partwright fit` is, on every shape of one or several sets.
 
     python benchmarks/fit.py --shapes FOLDER --sets toys,cad --seeds 0,1,2
+    python benchmarks/fit.py --shapes FOLDER --sets toys,cad --every 5 --quality normal,high --tag high
 
 Each shape is fitted as a user would: a process of its own, default settings, all files read and written. So
 the seconds contain the start of Python, and the peak memory is that of the whole process. FOLDER holds an
 index.json (a list of {"name", "set", "file"}), or just meshes; without it, the project's own shapes are
-taken. The table goes to benchmarks/results/fit.md, every single run to the CSV file beside it; both are
-brought up to date after each shape.
+taken. Of several qualities each is told beside the first, shape after shape in the same run. The table goes
+to benchmarks/results/fit.md, every single run to the CSV file beside it; both are brought up to date after
+each shape.
 """
 
 from __future__ import annotations
@@ -41,6 +43,8 @@ class Entry:
     set: str
     name: str
     path: Path
+    options: tuple[str, ...] = ()
+    """Passed on to partwright fit, for this shape alone."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +69,12 @@ class Run:
     protrusion: float | None = None
     seconds: float | None = None
     peak_mb: float = 0.0
+    cpu_seconds: float | None = None
 
 
 NUMBERS = tuple(f.name for f in fields(Run))[4:]
-SCORES = NUMBERS[:-2]
+SCORES = NUMBERS[:-3]
+SECONDS = ("seconds", "cpu_seconds")
 
 # header -> how the cell is made
 COLUMNS: dict[str, Callable[[Run], str]] = {
@@ -82,6 +88,7 @@ COLUMNS: dict[str, Callable[[Run], str]] = {
     "max deviation %": lambda r: _number(r.deviation, 2),
     "sticks out %": lambda r: _number(r.protrusion, 2),
     "seconds": lambda r: _number(r.seconds, 1),
+    "CPU seconds": lambda r: _number(r.cpu_seconds, 1),
     "peak MB": lambda r: _number(r.peak_mb, 0),
     "outcome": lambda r: r.outcome,
 }
@@ -122,12 +129,15 @@ def fit_once(entry: Entry, seed: int, options: list[str], keep: Path | None = No
         with log.open("wb") as stream:
             start = time.perf_counter()
             process = subprocess.Popen(
-                [*command, "--seed", str(seed), *options], stdout=stream, stderr=subprocess.STDOUT
+                [*command, "--seed", str(seed), *options, *entry.options],
+                stdout=stream,
+                stderr=subprocess.STDOUT,
             )
             _, status, usage = os.wait4(process.pid, 0)
             seconds = time.perf_counter() - start
         process.returncode = os.waitstatus_to_exitcode(status)
         cost = {"seconds": seconds, "peak_mb": usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)}
+        cost |= {"cpu_seconds": usage.ru_utime + usage.ru_stime}
         if process.returncode != 0:
             lines = log.read_text(encoding="utf-8", errors="replace").strip().splitlines() or ["no message"]
             message = lines[-1].replace(str(entry.path), entry.path.name)
@@ -147,10 +157,8 @@ def over_seeds(runs: list[Run]) -> Run:
     if failed:
         return failed[0]
     outcomes = ", ".join(dict.fromkeys(run.outcome for run in runs))
-    timed = all(run.seconds is not None for run in runs)
-    medians = {
-        name: median(getattr(run, name) for run in runs) for name in NUMBERS if timed or name != "seconds"
-    }
+    untimed = {name for name in SECONDS for run in runs if getattr(run, name) is None}
+    medians = {name: median(getattr(run, name) for run in runs) for name in NUMBERS if name not in untimed}
     return Run(runs[0].set, runs[0].name, "median", outcomes, **medians)
 
 
@@ -162,11 +170,11 @@ def summary(rows: list[Run]) -> Run:
     if not good:
         return total
     means = {name: mean(getattr(row, name) for row in good) for name in SCORES}
-    seconds = [row.seconds for row in good if row.seconds is not None]
+    spent = {name: [value for row in good if (value := getattr(row, name)) is not None] for name in SECONDS}
     return replace(
         total,
         **means,
-        seconds=median(seconds) if seconds else None,
+        **{name: median(seconds) if seconds else None for name, seconds in spent.items()},
         peak_mb=max(row.peak_mb for row in good),
     )
 
@@ -210,6 +218,43 @@ def _most(runs: list[Run]) -> float:
     return max(run.parts or 0.0 for run in runs)
 
 
+def beside(rows: list[Run], qualities: list[str]) -> Iterator[str]:
+    """Markdown: what each further quality has for the first one's parts and seconds, a row a set."""
+    first, *others = qualities
+    yield f"| beside {first} | IoU | bi-surface IoU | parts, times | seconds, times | CPU seconds, times |"
+    yield "|---|---:|---:|---:|---:|---:|"
+    of = {(row.set, row.name): row for row in rows if row.iou is not None}
+    for name in dict.fromkeys(
+        row.set.removesuffix(_of(first)) for row in rows if row.set.endswith(_of(first))
+    ):
+        for quality in others:
+            pairs = [
+                (row, of[name + _of(quality), shape])
+                for (group, shape), row in of.items()
+                if group == name + _of(first) and (name + _of(quality), shape) in of
+            ]
+            if pairs:
+                iou, surface = (
+                    mean(getattr(b, score) - getattr(a, score) for a, b in pairs)
+                    for score in ("iou", "bi_surface_iou")
+                )
+                parts = sum(b.parts or 0 for _, b in pairs) / sum(a.parts or 0 for a, _ in pairs)
+                times = (_number(_times(pairs, number), 2) for number in SECONDS)
+                cells = [f"{iou:+.4f}", f"{surface:+.4f}", f"{parts:.2f}", *times]
+                yield f"| {name}{_of(quality)} | {' | '.join(cells)} |"
+
+
+def _of(quality: str) -> str:
+    return f", {quality}"
+
+
+def _times(pairs: list[tuple[Run, Run]], number: str) -> float | None:
+    """The median over pairs of the second's seconds for the first's."""
+    if any(getattr(run, number) is None for pair in pairs for run in pair):
+        return None
+    return median(getattr(b, number) / getattr(a, number) for a, b in pairs)
+
+
 def worst(rows: list[Run]) -> Iterator[str]:
     """A sentence a set on the shape with the lowest IoU."""
     for name in dict.fromkeys(row.set for row in rows):
@@ -228,7 +273,9 @@ def machine() -> str:
     return f"{cores} cores, {platform.machine()}{level}"
 
 
-def document(runs: list[list[Run]], command: str, seeds: list[int], planned: int) -> str:
+def document(
+    runs: list[list[Run]], command: str, seeds: list[int], planned: int, qualities: list[str]
+) -> str:
     """The whole page, of the shapes (S, seeds) that are done."""
     rows = [over_seeds(of) for of in runs]
     done = "" if len(rows) == planned else f" Unfinished: {len(rows)} of {planned} shapes."
@@ -245,9 +292,14 @@ def document(runs: list[list[Run]], command: str, seeds: list[int], planned: int
         *table(rows),
         "",
         *([*apart(runs), ""] if len(seeds) > 1 else []),
+        *([*beside(rows, qualities), ""] if len(qualities) > 1 else []),
         *worst(rows),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _by_set(entries: list[Entry]) -> list[list[Entry]]:
+    return [[one for one in entries if one.set == name] for name in dict.fromkeys(one.set for one in entries)]
 
 
 def measure(
@@ -270,7 +322,18 @@ def main() -> int:
     names, sets = ({*filter(None, text.split(","))} for text in (options.names, options.sets))
     seeds = [int(seed) for seed in options.seeds.split(",")]
     entries = find_shapes(options.shapes, sets, names)
-    passed = ["--quality", options.quality] if options.quality else []
+    qualities = [*filter(None, options.quality.split(","))]
+    if unknown := set(qualities) - {"draft", "normal", "high"}:
+        raise SystemExit(f"--quality: no quality is called {', '.join(sorted(unknown))}")
+    if options.every > 1:
+        entries = [one for of in _by_set(entries) for one in of[:: options.every]]
+    if len(qualities) > 1:
+        entries = [
+            replace(one, set=one.set + _of(quality), options=("--quality", quality))
+            for one in entries
+            for quality in qualities
+        ]
+    passed = ["--quality", *qualities] if len(qualities) == 1 else []
     passed += ["--max-parts", str(options.max_parts)] if options.max_parts else []
     target = HERE / "results" / (f"fit-{options.tag}.md" if options.tag else "fit.md")
     target.parent.mkdir(exist_ok=True)
@@ -281,7 +344,7 @@ def main() -> int:
             runs[entry].append(replace(run, seconds=None) if options.untimed else run)
             print(f"{count}/{len(entries) * len(seeds)} {_line(run)}", flush=True)
             finished = [of for of in runs.values() if len(of) == len(seeds)]
-            text = document(finished, _command(options), seeds, len(entries))
+            text = document(finished, _command(options), seeds, len(entries), qualities)
             write_bytes(target, text.encode())
             write_bytes(
                 target.with_suffix(".csv"), recorded.text(r for of in runs.values() for r in of).encode()
@@ -307,6 +370,7 @@ def _command(options: argparse.Namespace) -> str:
     given |= {"--sets": options.sets, "--names": options.names, "--quality": options.quality}
     given |= {"--max-parts": options.max_parts, "--jobs": options.jobs if options.jobs > 1 else ""}
     given |= {"--seeds": options.seeds if options.seeds != "0" else ""}
+    given |= {"--every": options.every if options.every > 1 else ""}
     flags = ["--untimed"] if options.untimed else []
     return " ".join(["python benchmarks/fit.py", *(f"{k} {v}" for k, v in given.items() if v), *flags])
 
@@ -320,10 +384,18 @@ def parser() -> argparse.ArgumentParser:
     option("--sets", default="", metavar="A,B", help="only these sets")
     option("--names", default="", metavar="A,B", help="only these shapes")
     option("--seeds", default="0", metavar="0,1,2", help="the median over these counts")
-    option("--quality", choices=("draft", "normal", "high"), help="passed on to partwright fit")
+    option(
+        "--quality",
+        default="",
+        metavar="Q,R",
+        help="draft, normal or high; of several, each beside the first",
+    )
+    option("--every", type=int, default=1, metavar="N", help="of each set only its first shape and every Nth")
     option("--max-parts", type=int, metavar="N", help="passed on to partwright fit")
     option("--tag", default="", help="writes fit-TAG.md")
-    option("--untimed", action="store_true", help="leaves out the seconds: for a machine that is busy")
+    option(
+        "--untimed", action="store_true", help="leaves out all but CPU seconds: for a machine that is busy"
+    )
     option(
         "--jobs", type=int, default=1, metavar="N", help="fits at a time: more are faster but time nothing"
     )

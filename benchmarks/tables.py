@@ -44,8 +44,8 @@ TABLES = (
     Table("fit.md", "fit.py", "--quality draft", 2, "--shapes {data} --sets toys,cad --seeds 0,1,2", 45),
     Table("fit-draft.md", "fit.py", "--quality draft --tag draft", 2,
           "--shapes {data} --sets toys,cad --quality draft --tag draft", 8),
-    Table("fit-high.md", "fit.py", None, 0, "--shapes {data} --quality high --tag high --names "
-          "mug,duck,airplane,f360_crank_web,prusa_y_rod_holder,ttt_bearing_jig", 8),
+    Table("fit-high.md", "fit.py", None, 0,
+          "--shapes {data} --sets toys,cad --every 5 --quality normal,high --tag high", 15),
     Table("ablations.md", "ablations.py", "--names mug --rows default,cuboid", 2, "--shapes {data}", 240),
     Table("ablations-carving.md", "ablations.py", "--names mug --rows default,mended --tag carving", 1,
           '--shapes {data} --rows "default,subtracted,mended" --tag carving --jobs 2', 8),

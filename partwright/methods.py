@@ -113,13 +113,17 @@ class Checkpoint:
     then does to finish may pass the same places.
     """
 
-    def __init__(self, cancel: Cancellation) -> None:
-        self._cancel: Cancellation | None = cancel
+    def __init__(self, *cancels: Cancellation) -> None:
+        self._cancels = cancels
 
     def __call__(self) -> None:
-        if self._cancel is not None and self._cancel.requested:
-            self._cancel = None
+        if any(cancel.requested for cancel in self._cancels):
+            self._cancels = ()
             raise CancelledError("cancelled before there was anything to keep")
+
+    def another(self, also: Cancellation) -> Checkpoint:
+        """One for work in another thread, which hears of the other cancellation as well."""
+        return Checkpoint(*self._cancels, also)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -53,6 +54,26 @@ def test_the_list_of_tables_names_scripts_and_options_that_are_there() -> None:
         script = (FOLDER / table.script).read_text()
         for name in re.findall(r"--[a-z-]+", f"{table.quick or ''} {table.full or ''}"):
             assert f'"{name}"' in script or table.script == "partsdf.py", f"{table.script} has no {name}"
+
+
+def test_a_quality_is_told_beside_the_first() -> None:
+    sys.path.insert(0, str(FOLDER))
+    module = import_module("fit")
+    sys.path.remove(str(FOLDER))
+
+    def runs(quality: str, *seen: tuple[float, float, float]) -> list:
+        return [
+            module.Run(
+                f"toys, {quality}", str(i), 0, "converged", iou, iou, parts=n, seconds=s, cpu_seconds=2 * s
+            )
+            for i, (iou, n, s) in enumerate(seen)
+        ]
+
+    rows = runs("normal", (0.90, 20, 10), (0.92, 30, 20)) + runs("high", (0.91, 16, 30), (0.95, 24, 80))
+    *_, row = module.beside(rows, ["normal", "high"])
+    assert row == "| toys, high | +0.0200 | +0.0200 | 0.80 | 3.50 | 3.50 |"
+    *_, untimed = module.beside([replace(run, seconds=None) for run in rows], ["normal", "high"])
+    assert untimed == "| toys, high | +0.0200 | +0.0200 | 0.80 | - | 3.50 |"
 
 
 def test_how_far_seeds_are_apart_is_told() -> None:

@@ -99,6 +99,12 @@ class _Watched:
         return getattr(self._watched, name)
 
 
+def watched(kernel: Kernel, checkpoint: Checkpoint) -> Kernel:
+    """The kernel with this checkpoint passed before every call, in place of any other."""
+    plain = kernel._watched if isinstance(kernel, _Watched) else kernel
+    return cast(Kernel, _Watched(plain, checkpoint))
+
+
 def backend(device: str, checkpoint: Checkpoint | None = None) -> Kernel:
     """The kernel for "cpu" or "cuda"; "auto" is the compiled kernel, which needs no other package.
 
@@ -109,7 +115,7 @@ def backend(device: str, checkpoint: Checkpoint | None = None) -> Kernel:
         MissingDependencyError: PyTorch is not installed.
     """
     if checkpoint is not None:
-        return cast(Kernel, _Watched(backend(device), checkpoint))
+        return watched(backend(device), checkpoint)
     if device not in DEVICES:
         raise SettingError(f"device: expected one of {', '.join(DEVICES)}, got {device!r}")
     if device != "cuda":

@@ -17,6 +17,7 @@ from partwright.superfrusta.outcome import assembly_of
 from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.several_growths import SeveralGrowths
 from partwright.superfrusta.starting import starting_rows
 from partwright.superfrusta.symmetric_fit import RepeatedPart
 
@@ -53,7 +54,7 @@ def fit(request: FitRequest[Settings]) -> Fitted:
     assembled = partial(assembly_of, shape, settings=settings, fixed=fixed)
     search = ResidualFit(samples, settings, run.told, len(fixed), assembled, checkpoint, seconds=seconds)
     try:
-        outcome = search.run(rows)
+        outcome = search.run(rows) if settings.attempts == 1 else SeveralGrowths(search).run(rows)
         if settings.symmetry and search.best is not None:
             search.find_repeats(shape)
     except CancelledError:
@@ -63,9 +64,10 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         search.choose()
     search.enforce_budget()
     if search.best is None:
+        advice = ", or use --quality normal" if settings.near < Settings.near else ""
         raise EmptyShapeError(
             f"{shape.name}: no part could be placed; the shape has no volume that {settings.near} samples "
-            "can see. Check its thickness, or use --quality high"
+            f"can see. Check its thickness{advice}"
         )
     leaves = search.leaves or [RepeatedPart(row) for row in search.best]
     whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])

@@ -100,10 +100,10 @@ def mergers(
     single = samples.parts_of(merged, samples.points) < 0
     added = rows[:, Column.SIGN] > 0
     trials = [
-        _folded(_replaced(occupied, *pair, one), np.delete(added, pair[1]))
+        folded(_replaced(occupied, *pair, one), np.delete(added, pair[1]))
         for pair, one in zip(pairs, single, strict=True)
     ]
-    together = _folded(occupied, added)
+    together = folded(occupied, added)
     gains = np.subtract(occupancy_score(samples, np.array(trials)), occupancy_score(samples, together))
     return [Merger(pairs[i], merged[i], float(gains[i])) for i in np.argsort(-gains, kind="stable")]
 
@@ -160,7 +160,7 @@ def _replaced(rows: Any, first: int, second: int, part: Any) -> Any:
     return np.delete(merged, second, axis=0)
 
 
-def _folded(occupied: NDArray[np.bool_], added: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def folded(occupied: NDArray[np.bool_], added: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Occupancy (N,) of parts (M, N) joined from first to last without blends."""
     if added.all():
         return np.asarray(occupied.any(axis=0))

@@ -15,7 +15,7 @@ import numpy as np
 
 from partwright.assembly import Assembly
 from partwright.errors import CancelledError
-from partwright.methods import Outcome, Progress, timed
+from partwright.methods import Checkpoint, Outcome, Progress, timed
 from partwright.shapes import Shape
 from partwright.superfrusta.growing import carve, grow
 from partwright.superfrusta.hollows import with_hollows_filled
@@ -41,7 +41,7 @@ _GOOD = 0.93  # of the objective at a usual price: what is worse is tried again 
 _WORTH_CUTS = 0.01  # of the objective that such an attempt must gain, for it is the harder to edit
 _BEHIND = 0.06  # of the objective: what is so far behind
 _ROUNDS_BEHIND = 6  # after so many rounds is given up
-_MENDED = 0.9  # of the work is done when mending begins
+MENDED = 0.9  # of the work is done when mending begins
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
 
 
@@ -50,8 +50,8 @@ class ResidualFit:
     """State of one fit: the samples that all its scores are of, and the best rows so far, of which the first
     `locked` never change.
 
-    report: told of each step. assembled: makes the assembly of rows. number: of the attempt, from 0.
-    rival: the objective that an attempt to carve must reach to be kept. furthest: that progress was told.
+    report: told of each step. assembled: makes the assembly of rows. rival: the objective that an attempt to
+    carve must reach to be kept. furthest: that progress was told. unmended: the best before it was mended.
     """
 
     samples: FitSamples
@@ -59,13 +59,13 @@ class ResidualFit:
     report: Callable[[Progress], None] | None = None
     locked: int = 0
     assembled: Callable[[Rows], Assembly] | None = None
-    checkpoint: Callable[[], None] | None = None
-    number: int = 0
+    checkpoint: Checkpoint | None = None
     best: Rows | None = None
     best_objective: float = -np.inf
     rival: float | None = None
     furthest: float = 0.0
     earlier: Rows | None = None
+    unmended: Rows | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
     curve: list[Step] = field(default_factory=list)
@@ -75,18 +75,26 @@ class ResidualFit:
         return timed(self.seconds, stage)
 
     def run(self, start: Rows = NOTHING) -> Outcome:
-        """All attempts; the best of them is kept."""
-        settings = self.settings
-        converged = True
-        for self.number in range(settings.attempts):
-            converged = self.attempt(start) and converged
-            self.choose()
+        """One growth and all that follows it; several are several_growths.py's."""
+        return self.finished(self.grown(start))
+
+    def grown(self, start: Rows = NOTHING) -> bool:
+        """One growth, by parts to add and then to subtract, and mended; says whether what is kept of it
+        converged."""
+        converged = self.attempt(start)
         if self.best is not None and not len(start):
             converged = self.carved() and converged
+        if self.best is not None:
+            self.unmended = self.best
+            if self.mending:
+                self.mend(self.best)
+        return converged
+
+    def finished(self, converged: bool) -> Outcome:
+        """What the settings ask for of the best so far."""
+        settings = self.settings
         if self.best is None:
             return "converged"
-        if self.mending:
-            self.mend(self.best)
         if settings.family == "solid":
             with self.timed("settle"):
                 plain = simplify_kinds(self.samples, self.best, settings, self.locked)
@@ -102,7 +110,7 @@ class ResidualFit:
         return "converged" if converged else "budget_reached"
 
     def attempt(self, start: Rows) -> bool:
-        """Grown and thinned out from the start, beside earlier attempts; says whether growth converged."""
+        """Grown and thinned out from the start, beside an earlier attempt; says whether growth converged."""
         if self.best is not None:
             self.earlier = self.best
             self.best, self.best_objective = None, -np.inf
@@ -126,9 +134,7 @@ class ResidualFit:
         for start in (NOTHING, convex_hull_start(self.samples, self.settings), self.hollowed(brief)):
             if tried and not len(start):
                 continue
-            opening = ResidualFit(
-                self.samples, brief, locked=self.locked, number=self.number, seconds=self.seconds
-            )
+            opening = ResidualFit(self.samples, brief, locked=self.locked, seconds=self.seconds)
             try:
                 opening.growth(start)
             except CancelledError:
@@ -185,7 +191,6 @@ class ResidualFit:
         """One such attempt, kept if it is clearly better; says whether the growth of what is kept
         converged."""
         settings, self.settings = self.settings, carving
-        self.number = settings.attempts
         self.rival = self.best_objective + (0.0 if settings.subtract else _WORTH_CUTS)
         whole, converged = self.best, True
         try:
@@ -217,8 +222,8 @@ class ResidualFit:
         stale = 0
         for round_ in range(settings.rounds):
             with self.timed("grow"):
-                most = settings.at_once(round_, self.regions)
-                new = grow(self.samples, rows, replace(settings, regions=self.regions), most)
+                most = settings.at_once(round_, settings.regions)
+                new = grow(self.samples, rows, settings, most)
             if len(new) == 0:
                 return rows, True
             with self.timed("optimise"):
@@ -267,14 +272,6 @@ class ResidualFit:
             return volume_iou(self.samples, thinned) >= self.settings.min_iou
         return kept + self.settings.alpha >= whole
 
-    @property
-    def regions(self) -> int:
-        """Regions a round: each further attempt takes fewer or more, which leads it to other assemblies."""
-        if self.rival is not None:
-            return self.settings.regions
-        aside = (self.number + 1) // 2 * (2 if self.number % 2 == 0 else -2)
-        return max(1, self.settings.regions + aside)
-
     def regrowth(self, rows: Rows) -> Rows:
         with self.timed("grow"):
             new = grow(self.samples, rows, self.settings, self.settings.regions)
@@ -300,7 +297,7 @@ class ResidualFit:
         def improved(better: Rows) -> None:
             self.best = better
             reached, iou = score(self.samples, better), volume_iou(self.samples, better)
-            self.report_progress("mend", self.settings.rounds, len(better), reached, iou, _MENDED)
+            self.report_progress("mend", self.settings.rounds, len(better), reached, iou, MENDED)
 
         with self.timed("mend"):
             self.best = Mending(self.samples, self.settings, self.locked, improved)(rows)
@@ -345,8 +342,9 @@ class ResidualFit:
         total = settings.rounds + settings.cycles
         done = min(1.0, (settings.rounds + round_ if stage == "thin" else round_) / total)
         reached, iou = score(self.samples, rows), volume_iou(self.samples, rows)
-        attempts = settings.attempts + (self.may_carve or self.rival is not None)
-        fraction = (self.number + done) / attempts * (_MENDED if self.mending else 1.0)
+        carved = self.rival is not None
+        attempts = 1 + (self.may_carve or carved)
+        fraction = (carved + done) / attempts * (MENDED if self.mending else 1.0)
         self.report_progress(stage, round_, len(rows), reached, iou, fraction)
         return progressed
 

@@ -16,7 +16,7 @@ from partwright.methods import Checkpoint, Run
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid, grid_indices
 from partwright.shapes.sampling import morton_order
-from partwright.superfrusta.backend import Kernel, backend
+from partwright.superfrusta.backend import Kernel, backend, watched
 from partwright.superfrusta.settings import Settings
 
 Rows = NDArray[np.float32]
@@ -62,6 +62,8 @@ class FitSamples:
     """(n, 3) points that are no samples yet, where a part that goes astray is looked for."""
     surface: NDArray[np.float32]
     """(n, 3) points of the shape's surface, as many to each unit of area."""
+    growth: int = 0
+    """Which of several growths they serve: each optimises on others of them."""
 
     @classmethod
     def of(
@@ -87,6 +89,10 @@ class FitSamples:
             _probes(grid),
             shape.unit_surface(_SURFACE, run.seed).points.astype(np.float32),
         )
+
+    def variant(self, growth: int, checkpoint: Checkpoint, threads: int) -> FitSamples:
+        """These for one of several growths, which passes a checkpoint of its own."""
+        return replace(self, growth=growth, threads=threads, kernel=watched(self.kernel, checkpoint))
 
     def with_stray_samples(self, rows: Rows) -> FitSamples:
         """These and samples where an assembly is astray, well outside the shape; itself where it nowhere is.
@@ -183,8 +189,17 @@ class FitSamples:
 
     @cached_property
     def optimised_indices(self) -> NDArray[np.int64]:
-        """The samples that optimisation runs on: every second one near the surface, every third elsewhere."""
-        return np.concatenate([np.arange(0, self.near, 2), np.arange(self.near, len(self.points), 3)])
+        """The samples that optimisation runs on: every second one near the surface, every third elsewhere.
+
+        Of further growths as many, drawn by lot: from a hair's breadth aside growth comes to other parts.
+        """
+        if self.growth == 0:
+            return np.concatenate([np.arange(0, self.near, 2), np.arange(self.near, len(self.points), 3)])
+        rng = np.random.default_rng((self.seed, self.growth))
+        near = rng.choice(self.near, (self.near + 1) // 2, replace=False)
+        away = len(self.points) - self.near
+        rest = self.near + rng.choice(away, (away + 2) // 3, replace=False)
+        return np.concatenate([np.sort(near), np.sort(rest)])
 
     @cached_property
     def far_indices(self) -> NDArray[np.int64]:

@@ -51,7 +51,8 @@ class Settings:
     merging: bool = True
     """Replace touching pairs of parts by one where it explains as much."""
     attempts: int = 1
-    """Times that the shape is fitted from the start, each with other regions; the best is kept."""
+    """Times that the shape is grown and mended from the start, each time on others of the samples; the best
+    is kept, with groups of parts exchanged for better ones of the others."""
     cycles: int = 1
     """Times that the grown assembly is thinned out, refitted and grown again."""
     firmness: float = 0.6
@@ -129,5 +130,5 @@ class Settings:
 PRESETS: dict[str, Settings] = {
     "draft": Settings(rounds=4, regions=14, trials=1, mends=1, near=10_000, uniform=10_000, resolution=64),
     "normal": Settings(),
-    "high": Settings(attempts=3, cycles=2, mends=40, alpha=1e-3, near=45_000, uniform=45_000),
+    "high": Settings(attempts=4),
 }

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import trimesh
@@ -194,37 +192,6 @@ def test_settings_that_cannot_be_used_are_named() -> None:
             Settings.for_quality("draft", **changes)
     with pytest.raises(SettingError, match="quality: expected one of draft, normal, high"):
         Settings.for_quality("best")
-
-
-def test_of_several_attempts_the_best_is_kept(table_shape: Shape) -> None:
-    settings = Settings.for_quality("draft")
-    samples = FitSamples.of(table_shape, settings, Run(threads=1))
-    single, several = ResidualFit(samples, settings), ResidualFit(samples, replace(settings, attempts=3))
-    single.run()
-    seen: list[float] = []
-    several.report = lambda step: seen.append(step.fraction)
-    several.run()
-    assert single.best is not None
-    assert several.best is not None
-    assert several.objective(several.best) >= replace(single, samples=several.samples).objective(single.best)
-    assert several.best_objective == several.objective(several.best)
-    assert seen == sorted(seen)
-    assert len([entry for entry in several.history if entry["stage"] == "thin"]) == 3
-    assert [ResidualFit(samples, Settings(), number=i).regions for i in range(5)] == [7, 5, 9, 3, 11]
-
-
-def test_an_interruption_in_a_later_attempt_keeps_the_earlier_ones_result(table_shape: Shape) -> None:
-    cancel = Cancellation()
-
-    def stop(step: Progress) -> None:
-        if step.fraction > 0.5:
-            cancel.request()
-
-    alone = draft(table_shape, symmetry=False)
-    stopped = draft(table_shape, progress=stop, cancel=cancel, attempts=2, symmetry=False)
-    assert stopped.outcome == "interrupted"
-    assert len(stopped.assembly) <= len(alone.assembly)
-    assert reached(stopped.assembly, table_shape) > reached(alone.assembly, table_shape) - 0.01
 
 
 BRIEF = {"near": 8000, "uniform": 8000, "resolution": 64, "mends": 0, "symmetry": False}
