@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _TRIES = 8
 _WITHIN = 0.9  # of a box, that another holds
+_CUT = 0.7  # of the samples that a cut takes away, that are a body's
 
 
 def recast(search: FeatureSearch, tree: FeatureTree, own: Sequence[Candidate]) -> FeatureTree:
@@ -56,12 +57,22 @@ def _grown_without(
 
 
 def _groups(steps: Sequence[Step]) -> Iterator[tuple[int, set[int]]]:
-    """Steps but the first, each with the later ones that lie within its box; only those that have some."""
+    """Steps but the first, each with the later ones that lie within its box or are cut from it mostly; only
+    those that have some."""
     boxes = [np.array([copy.bounds() for copy in step.part.copies]) for step in steps]
     for k in range(1, len(steps)):
-        later = {j for j in range(k + 1, len(steps)) if _lie_within(boxes[j], boxes[k])}
+        later = {
+            j
+            for j in range(k + 1, len(steps))
+            if _lie_within(boxes[j], boxes[k]) or _is_cut_from(steps[j], steps[j - 1], steps[k])
+        }
         if later:
             yield k, {k, *later}
+
+
+def _is_cut_from(cut: Step, before: Step, body: Step) -> bool:
+    gone = before.covered & ~cut.covered
+    return not cut.added and float((gone & body.within).sum()) > _CUT * float(gone.sum())
 
 
 def _lie_within(boxes: NDArray[np.float64], others: NDArray[np.float64]) -> bool:

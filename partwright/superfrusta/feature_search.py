@@ -24,6 +24,7 @@ from partwright.fields import Swept
 from partwright.meshing.manifolds import simplified
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
+from partwright.superfrusta.feature_blanks import BEHIND, cut_from_blanks
 from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_mending import farthest, mended
 from partwright.superfrusta.feature_own_bodies import OwnBodies
@@ -39,7 +40,7 @@ _THIN = 2.5e-3  # unit lengths: twice the volume over the area of a skin between
 _PIECES = 10  # of what is missed, and of what is too much, that are looked at in one step
 _BASES = 4
 _RIVAL = 0.55  # of the best base's objective, that another has to have
-_BEHIND, _PATIENT = 0.03, 3  # of the objective, after so many steps
+_PATIENT = 3  # steps after which a tree may be well behind
 _COMPLEX = 20_000  # triangles of a piece that is no feature
 _MOST = 24
 _FOR_MENDING = 10
@@ -58,7 +59,8 @@ _POOR = 0.95  # R below which a shape is also built up of bodies of its own, whi
 
 
 class FeatureSearch:
-    """The search for one shape. alpha: price of a feature. most: features. told: of each tree on the way."""
+    """The search for one shape. alpha: price of a feature. most: features. told: of each tree on the way.
+    mend: what becomes of a tree that is far off, by which trees are then told apart."""
 
     def __init__(
         self,
@@ -68,7 +70,9 @@ class FeatureSearch:
         checkpoint: Checkpoint | None = None,
         most: int | None = None,
         told: Callable[[FeatureTree], None] | None = None,
+        mend: Callable[[FeatureTree], FeatureTree] | None = None,
     ) -> None:
+        self.mend = mend or (lambda tree: tree)
         self.samples, self.alpha, self.checkpoint, self.told = samples, alpha, checkpoint, told
         self.most = min(most or _MOST, _MOST)
         self.tie = _TIE[0] * math.sqrt(_TIE[1] / max(1, samples.near))
@@ -94,23 +98,26 @@ class FeatureSearch:
         if not own:
             return None
         empty = self.empty
-        gains = self._gains(empty, own, True)
+        gains = self.gains(empty, own, True)
         order = _bases(own, gains)
         best: FeatureTree | None = None
         others = [candidate for candidate in own if not candidate.cuts]
         for index in order:
             if best is not None and (gains[index] < _RIVAL * gains[order[0]] or best.score > _PERFECT):
                 break
-            tree = self._grown(self.extended(empty, own[index], True), others, best)
+            tree = self.grown(self.extended(empty, own[index], True), others, best)
             if best is None or tree.objective > best.objective:
                 best = tree
         if best is not None and best.score < _POOR:
             built = self._built_up(empty, own, others, gains)
             if built is not None and built.score >= _POOR and built.objective > best.objective:
                 best = built
-        if best is not None:
-            best = recast(self, best, others)
-        return replace(whole := mended(self, best), off=farthest(self, whole)) if best is not None else None
+        return cut_from_blanks(self, self.ended(best, others), others) if best is not None else None
+
+    def ended(self, tree: FeatureTree, others: Sequence[Candidate]) -> FeatureTree:
+        """A tree that has grown, recast and mended."""
+        whole = mended(self, recast(self, tree, others))
+        return replace(whole, off=farthest(self, whole))
 
     @property
     def empty(self) -> FeatureTree:
@@ -130,11 +137,16 @@ class FeatureSearch:
         first = next((i for i in order if own[i] in self._own_bodies), None)
         if first is None:
             return None
-        tree = self._grown(self.extended(empty, own[first], True), others, None, True)
-        return self._grown(tree, others, None)
+        tree = self.grown(self.extended(empty, own[first], True), others, None, True)
+        return self.grown(tree, others, None)
 
-    def _grown(
-        self, tree: FeatureTree, own: Sequence[Candidate], best: FeatureTree | None, only_own: bool = False
+    def grown(
+        self,
+        tree: FeatureTree,
+        own: Sequence[Candidate],
+        best: FeatureTree | None,
+        only_own: bool = False,
+        patient: int = _PATIENT,
     ) -> FeatureTree:
         """Until nothing pays, or it is well behind where the best so far was after as many steps.
 
@@ -146,7 +158,7 @@ class FeatureSearch:
             tree = step
             if self.told is not None:
                 self.told(tree)
-            if best is not None and self._behind(tree, best):
+            if best is not None and len(tree.steps) > patient and self._behind(tree, best):
                 break
         return tree
 
@@ -154,7 +166,7 @@ class FeatureSearch:
     def _behind(tree: FeatureTree, best: FeatureTree) -> bool:
         count = len(tree.steps) - 1
         rival = best.steps[min(count, len(best.steps) - 1)].objective
-        return count >= _PATIENT and tree.objective < rival - _BEHIND
+        return tree.objective < rival - BEHIND
 
     def step(
         self,
@@ -177,7 +189,7 @@ class FeatureSearch:
         rivals: list[tuple[float, Candidate, bool]] = []
         for pool, added in ((adding, True), (cutting, False)):
             if pool:
-                gains = self._gains(tree, pool, added)
+                gains = self.gains(tree, pool, added)
                 rivals += [(float(gains[i]), pool[i], added) for i in np.argsort(-gains)[:_LOOKED]]
         rivals.sort(key=lambda rival: -rival[0])
         steps = [
@@ -256,7 +268,7 @@ class FeatureSearch:
             self._masks[id(candidate)] = known
         return known[1]
 
-    def _gains(self, tree: FeatureTree, pool: Sequence[Candidate], added: bool) -> NDArray[np.float64]:
+    def gains(self, tree: FeatureTree, pool: Sequence[Candidate], added: bool) -> NDArray[np.float64]:
         """(C,) by how much each raises R beyond its price."""
         inside, outside = self.weights * self.inside[:, None], self.weights * ~self.inside[:, None]
         both = (inside * tree.covered[:, None]).sum(axis=0)

@@ -105,6 +105,7 @@ class FeaturedFit:
             self._checkpoint,
             settings.max_parts,
             self._told,
+            self._with_freeform if settings.min_iou is None else None,
         )
 
     def _with_freeform(self, tree: FeatureTree) -> FeatureTree:

@@ -87,12 +87,12 @@ def test_a_step_that_is_taken_back_leaves_what_the_others_make(search: FeatureSe
 def test_a_search_that_went_roundabout_ends_plain(
     search: FeatureSearch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = FeatureSearch._grown
+    real = FeatureSearch.grown
 
-    def misled(self: FeatureSearch, tree: FeatureTree, *rest: object) -> FeatureTree:
-        return real(self, self.extended(tree, AROUND, True), *rest)
+    def misled(self: FeatureSearch, tree: FeatureTree, *rest: object, **more: object) -> FeatureTree:
+        return real(self, self.extended(tree, AROUND, True), *rest, **more)
 
-    monkeypatch.setattr(FeatureSearch, "_grown", misled)
+    monkeypatch.setattr(FeatureSearch, "grown", misled)
     tree = search.run()
     assert tree is not None
     assert kinds(tree) == ["Box", "Cylinder", "Cylinder"]

@@ -48,6 +48,19 @@ def candidates(body: Manifold, frames: Sequence[np.ndarray], holes: bool) -> lis
     return list(found.values())
 
 
+def silhouettes(body: Manifold, frames: Sequence[np.ndarray]) -> list[Candidate]:
+    """What a body is cut from: as it is seen along each frame, from end to end; none twice, and none of a
+    body that is in pieces there."""
+    found: dict[tuple[float, ...], Candidate] = {}
+    for frame in frames if not body.is_empty() else ():
+        view = View.along(body, frame)
+        seen = view.silhouette
+        if len(seen) == 1:
+            for one in _extruded(view, seen[0], view.levels[0], view.levels[-1], True):
+                found.setdefault(one.key, one)
+    return list(found.values())
+
+
 def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
     """Each connected piece of a section as far up and down as it goes on."""
     slabs = list(view.slabs)

@@ -102,10 +102,18 @@ class View:
     def regions(self, height: float) -> list[Region]:
         """Connected pieces of the section at a height, the largest first."""
         if height not in self._sections:
-            pieces = [Region(p, p.area()) for p in self.body.slice(height).simplify(_ROUNDING).decompose()]
-            pieces = [p for p in pieces if p.area > _SLIVER]
-            self._sections[height] = sorted(pieces, key=lambda p: -p.area)
+            self._sections[height] = _regions(self.body.slice(height))
         return self._sections[height]
+
+    @cached_property
+    def silhouette(self) -> list[Region]:
+        """Of the whole, as it is seen: connected pieces, the largest first."""
+        return _regions(self.body.project())
+
+
+def _regions(section: CrossSection) -> list[Region]:
+    pieces = [Region(p, p.area()) for p in section.simplify(_ROUNDING).decompose()]
+    return sorted((p for p in pieces if p.area > _SLIVER), key=lambda p: -p.area)
 
 
 def _heights(height: np.ndarray, weight: np.ndarray, least: float) -> list[tuple[float, float]]:

@@ -1,0 +1,57 @@
+"""Trees that are cut from a blank, the silhouette of the whole from end to end: it is worth less at first
+than a section that the shape has, and in the end often more."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from partwright.approximation.sketches.candidate import Candidate
+from partwright.approximation.sketches.candidates import silhouettes
+from partwright.superfrusta.feature_steps import FeatureTree
+
+if TYPE_CHECKING:
+    from partwright.superfrusta.feature_search import FeatureSearch
+
+BEHIND = 0.03
+"""Of the objective, by which a tree is well behind another."""
+_FEW = 4  # features, of which none is left to save
+_BLANKS = 2
+_PATIENT = 6  # steps after which a tree may be well behind
+
+
+def cut_from_blanks(search: FeatureSearch, best: FeatureTree, others: Sequence[Candidate]) -> FeatureTree:
+    """The best tree, or one that is cut from a silhouette and worth more when both are mended, with no more
+    freeform. others: candidates of the whole."""
+    if len(best.features) <= _FEW:
+        return best
+    known = {candidate.key for candidate in others}
+    blanks = [blank for blank in silhouettes(search.body, search.frames) if blank.key not in known]
+    gains = search.gains(search.empty, blanks, True) if blanks else np.zeros(0)
+    found, whole, most = best, None, -math.inf
+    for index in np.argsort(-gains)[:_BLANKS]:
+        start = search.extended(search.empty, blanks[index], True)
+        tree = search.grown(start, others, best, patient=_PATIENT)
+        if tree.objective < best.objective - BEHIND:
+            continue
+        tree = search.ended(tree, others)
+        whole = search.mend(best) if whole is None else whole
+        if tree.objective > max(worth(whole) + search.tie, most):
+            most = tree.objective
+            rival = search.mend(tree)
+            if worth(rival) > worth(whole) + search.tie and _freeform(rival) <= _freeform(whole):
+                found, whole = tree, rival
+    return found
+
+
+def worth(tree: FeatureTree) -> float:
+    """R less the price, and less what is far off."""
+    return tree.objective - tree.off
+
+
+def _freeform(tree: FeatureTree) -> int:
+    """Pieces that no feature explains: a blank that leaves more of them is none that was drawn."""
+    return sum(feature.freeform for feature in tree.features)

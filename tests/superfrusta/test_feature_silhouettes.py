@@ -1,0 +1,74 @@
+"""A blank is cut from its outline where that is plainer, though no section of the shape has that outline."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+import partwright as pw
+from partwright.approximation.sketches.candidates import candidates, silhouettes
+from partwright.assembly import Assembly, Part
+from partwright.fields import Box, Extrusion, Profile
+from partwright.meshing import mesh_assembly
+from partwright.superfrusta.feature_blanks import worth
+from partwright.superfrusta.feature_search import FeatureSearch
+from partwright.superfrusta.feature_steps import FeatureTree
+from partwright.superfrusta.samples import FitSamples
+from partwright.superfrusta.solids import Settings
+
+BLANK = Part(Extrusion(Profile.rectangle(100, 60, corner=15), 40))
+CUTS = (
+    Part(Box((120, 20, 30)), (0, 0, 15)),
+    Part(Box((24, 90, 26)), (10, 0, -13)),
+    Part(Box((20, 90, 14)), (-44, 0, 20)),
+    Part(Box((120, 14, 14)), (0, 30, -20)),
+)
+
+
+@pytest.fixture(scope="module")
+def search() -> FeatureSearch:
+    settings = Settings.for_quality("draft")
+    shape = pw.load_shape(mesh_assembly(Assembly((BLANK, *CUTS), "difference")), unit="mm")
+    return FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+
+
+def test_a_blank_with_cuts_is_a_silhouette_and_as_many_cuts(search: FeatureSearch) -> None:
+    tree = search.run()
+    assert tree is not None
+    first, *cuts = tree.features
+    assert len(cuts) <= len(CUTS)
+    assert tree.score > 0.995
+    sections = candidates(search.body, search.frames, holes=True)
+    bounds = [one.part.bounds() for one in silhouettes(search.body, search.frames)]
+    assert any(np.allclose(first.part.bounds(), box, atol=1e-4) for box in bounds)
+    assert not any(first.part == one.part for one in sections)
+
+
+def test_a_silhouette_is_what_is_seen_from_end_to_end() -> None:
+    """Two bars that cross one above the other: a cross from above, which no section is."""
+    bars = Manifold.cube((4, 1, 1), center=True) + Manifold.cube((1, 4, 1), center=True).translate((0, 0, 1))
+    (cross,) = (one for one in silhouettes(bars, [np.eye(3)]))
+    assert cross.volume == pytest.approx(7 * 2)
+    assert cross.sides == 12
+    assert cross.make(0.0).volume() == pytest.approx(7 * 2)
+    apart = bars + Manifold.cube((1, 1, 1)).translate((9, 9, 0))
+    assert silhouettes(apart, [np.eye(3)]) == []
+
+
+def test_no_blank_is_taken_that_leaves_more_freeform() -> None:
+    settings = Settings.for_quality("draft")
+    shape = pw.load_shape(mesh_assembly(Assembly((BLANK, *CUTS), "difference")), unit="mm")
+    samples, asked = FitSamples.of(shape, settings), []
+
+    def mend(tree: FeatureTree) -> FeatureTree:
+        asked.append(tree)
+        odd = [replace(feature, freeform=len(asked) > 1) for feature in tree.features]
+        return replace(tree, features=odd)
+
+    drawn = FeatureSearch(shape, samples, settings.alpha, mend=mend).run()
+    assert len(asked) > 1
+    assert drawn is asked[0]
+    assert worth(replace(drawn, off=0.3)) == pytest.approx(drawn.objective - 0.3)
