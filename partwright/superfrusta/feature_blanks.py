@@ -24,8 +24,8 @@ _PATIENT = 6  # steps after which a tree may be well behind
 
 
 def cut_from_blanks(search: FeatureSearch, best: FeatureTree, others: Sequence[Candidate]) -> FeatureTree:
-    """The best tree, or one that is cut from a silhouette and worth more when both are mended, with no more
-    freeform. others: candidates of the whole."""
+    """The best tree, or one that is cut from a silhouette, no further off, and worth more when both are
+    mended, with no more freeform. others: candidates of the whole."""
     if len(best.features) <= _FEW:
         return best
     known = {candidate.key for candidate in others}
@@ -38,6 +38,8 @@ def cut_from_blanks(search: FeatureSearch, best: FeatureTree, others: Sequence[C
         if tree.objective < best.objective - BEHIND:
             continue
         tree = search.ended(tree, others)
+        if tree.off > best.off:
+            continue  # skins where a cut runs along the blank's own walls, say, which freeform does not mend
         whole = search.mend(best) if whole is None else whole
         if tree.objective > max(worth(whole) + search.tie, most):
             most = tree.objective

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,9 +32,7 @@ CUTS = (
 
 @pytest.fixture(scope="module")
 def search() -> FeatureSearch:
-    settings = Settings.for_quality("draft")
-    shape = pw.load_shape(mesh_assembly(Assembly((BLANK, *CUTS), "difference")), unit="mm")
-    return FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+    return searching()
 
 
 def test_a_blank_with_cuts_is_a_silhouette_and_as_many_cuts(search: FeatureSearch) -> None:
@@ -58,17 +58,34 @@ def test_a_silhouette_is_what_is_seen_from_end_to_end() -> None:
     assert silhouettes(apart, [np.eye(3)]) == []
 
 
-def test_no_blank_is_taken_that_leaves_more_freeform() -> None:
+def searching(**more: Callable[[FeatureTree], FeatureTree]) -> FeatureSearch:
     settings = Settings.for_quality("draft")
     shape = pw.load_shape(mesh_assembly(Assembly((BLANK, *CUTS), "difference")), unit="mm")
-    samples, asked = FitSamples.of(shape, settings), []
+    return FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha, **more)
+
+
+def test_no_blank_is_taken_that_leaves_more_freeform() -> None:
+    asked: list[FeatureTree] = []
 
     def mend(tree: FeatureTree) -> FeatureTree:
         asked.append(tree)
         odd = [replace(feature, freeform=len(asked) > 1) for feature in tree.features]
         return replace(tree, features=odd)
 
-    drawn = FeatureSearch(shape, samples, settings.alpha, mend=mend).run()
+    drawn = searching(mend=mend).run()
     assert len(asked) > 1
     assert drawn is asked[0]
-    assert worth(replace(drawn, off=0.3)) == pytest.approx(drawn.objective - 0.3)
+    assert worth(replace(asked[0], off=0.3)) == pytest.approx(asked[0].objective - 0.3)
+
+
+def test_no_blank_is_taken_that_is_further_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Paper-thin skins cost next to nothing of R, and reach as far as the blank does."""
+    real, ended = FeatureSearch.ended, []
+
+    def skinned(self: FeatureSearch, *given: Any) -> FeatureTree:
+        ended.append(replace(real(self, *given), off=0.4 if ended else 0.0))
+        return ended[-1]
+
+    monkeypatch.setattr(FeatureSearch, "ended", skinned)
+    assert searching().run() is ended[0]
+    assert len(ended) > 1
