@@ -81,6 +81,7 @@ def main() -> None:
     one = measuring("ablations", ablations)
     one.add_argument("--family", required=True)
     one.add_argument("--width", type=int, default=128, help="of the decoders")
+    one.add_argument("--config", help="of a training with the local decoder: what its pieces are worth")
     one.add_argument("--only", help="variants, separated by commas")
     one = measuring("encode", encoding)
     one.add_argument("--family", required=True)

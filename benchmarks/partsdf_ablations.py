@@ -1,4 +1,5 @@
-"""What each piece of PartSDF is worth: Tables 3, 6 (its first row) and 7 on one family, at a small scale."""
+"""What each piece of PartSDF is worth: Tables 3, 6 (its first row) and 7 on one family, at a small scale; and
+what each piece of our own decoder is, trained as a configuration says."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ from partsdf_scores import (
 )
 
 from partwright.datasets.prepared import PreparedFamily
-from partwright.partsdf.config import Config
+from partwright.partsdf.config import Config, read_config
 from partwright.partsdf.model import Model
 
 # Tables 3 and 7 of the paper, on its own cars; Table 1 for one part. CD x1e4, IoU %, IC, pIoU %.
@@ -58,23 +59,51 @@ def variants(base: Config) -> dict[str, Config]:
     }
 
 
+def variants_of_ours(base: Config) -> dict[str, Config]:
+    """The same options, of the local decoder, and what it has besides."""
+    decoder, losses = base.decoder, base.losses
+    return {
+        "local": base,
+        "one part": replace(base, one_part=True),
+        "without poses": replace(base, poses=False),
+        "without modulation": replace(base, decoder=replace(decoder, modulation=False)),
+        "parts that do not talk": replace(base, decoder=replace(decoder, cross_part=False)),
+        "softmin": replace(base, decoder=replace(decoder, aggregation="softmin")),
+        "without L_inter": replace(base, losses=replace(losses, inter=0.0)),
+        "L_inter over held points, weight 1": replace(
+            base, losses=replace(losses, inter=1.0, inter_over="held")
+        ),
+        "without octaves": replace(base, decoder=replace(decoder, octaves=0)),
+        "without balance": replace(base, training=replace(base.training, balance=0.0)),
+    }
+
+
 def ablations(arguments: argparse.Namespace) -> None:
     """Each variant trained alike in a folder of its own, where a stopped training goes on, and measured."""
     family = PreparedFamily(arguments.family)
-    training = replace(TRAINING, epochs=arguments.epochs, threads=arguments.threads, validation=True, **STEPS)
-    decoder = replace(SMALL, width=arguments.width)
-    base = Config(arguments.family, "base", decoder=decoder, losses=LOSSES, training=training)
+    if arguments.config:
+        ours = read_config(arguments.config)
+        training = replace(ours.training, epochs=arguments.epochs, threads=arguments.threads, validate=0)
+        each = variants_of_ours(replace(ours, family=arguments.family, training=training))
+        named = f"ablations-{family.name}-{ours.decoder.architecture}"
+    else:
+        training = replace(
+            TRAINING, epochs=arguments.epochs, threads=arguments.threads, validation=True, **STEPS
+        )
+        decoder = replace(SMALL, width=arguments.width)
+        base = Config(arguments.family, "base", decoder=decoder, losses=LOSSES, training=training)
+        each, named = variants(base), f"ablations-{family.name}"
     rows, sizes = [], []
-    for number, (label, config) in enumerate(variants(base).items()):
+    for number, (label, config) in enumerate(each.items()):
         if arguments.only and label not in arguments.only.split(","):
             continue
-        name = f"{family.name}-{number}"
+        name = f"{named}-{number}"
         model = trained(replace(config, name=name), arguments.work / name)
-        scores = measured(f"ablations-{family.name}", label, family, model, known, arguments)
+        scores = measured(named, label, family, model, known, arguments)
         rows.append(line(label, scores, parts=not config.one_part))
         sizes.append(f"{label} {sum(p.numel() for p in model.decoder.parameters()):,}")
         print(rows[-1], flush=True)
-        write(f"ablations-{family.name}", table(family, model, rows, sizes, arguments))
+        write(named, table(family, model, rows, sizes, arguments))
 
 
 def table(

@@ -45,7 +45,8 @@ class LocalDecoder(nn.Module):
         token, count = settings.token, settings.layers
         self.latent = nn.Linear(settings.latent, token)
         self.pose = nn.Linear(_POSE, token)
-        self.part = nn.Parameter(0.5 * torch.randn(parts, token))
+        # In place: a product of meta tensors, by which files are checked, imports much of torch: a second.
+        self.part = nn.Parameter(torch.randn(parts, token).mul_(0.5))
         self.register_buffer("room", torch.full((parts, 3), 1.25))
         self.register_buffer("unit", torch.ones(parts, 3))
         self.talk = None

@@ -232,7 +232,10 @@ class SparseLattice:
         corners, values = corners[order], middles[:, order]
         cubes = newest
         while len(newest):
-            keys = np.setdiff1d(self._keys(newest), corners)
+            keys = np.sort(self._keys(newest))  # several times as fast as what np.unique does
+            keys = keys[np.diff(keys, prepend=-1) > 0]
+            place = np.searchsorted(corners, keys).clip(max=len(corners) - 1)
+            keys = keys[corners[place] != keys]
             corners = np.concatenate([corners, keys])
             order = np.argsort(corners)
             values = np.concatenate([values, self._evaluate(self._lattice(keys))], axis=1)[:, order]
