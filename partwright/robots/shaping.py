@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 NATIVE_FOR = 0.03  # of its volume, or `extra`: by how much a native solid may be worse than the hull it saves
 _NATIVE_PIECE = 3e-3  # of the link's volume: the same for one of several, which are as near as this
+_SAVED = 2e-3  # of the link's volume: what each native solid more has to save where there are no hulls
 _LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners, or add for fewer faces
 _LOST, _MOST_LOST = 3e-5, 0.01  # of the link's volume, and of its own: what a hull of fewer corners may lack
 _FLAWS = 1e-3  # of its volume: what a hull may add to a convex link
@@ -158,7 +159,9 @@ def _tight(pieces: list[Piece], target: Target, fine: float) -> list[Manifold]:
 
 
 def _fit_for_natives(pieces: list[Piece], wishes: Wishes) -> list[Piece]:
-    """Pieces cut in halves, the worst first, until a native solid is near to each or there are enough."""
+    """Pieces cut in halves, the worst first, until a native solid is near to each or there are enough; where
+    no tolerance was given also until a solid more saves little: a round end would be a stack of boxes."""
+    least = 0.0 if wishes.worth is None else _SAVED * sum(piece.solid.volume() for piece in pieces)
 
     def fitted(piece: Piece) -> tuple[Piece, ConvexFit]:
         return piece, convex_fits(piece.hull, wishes.kinds, wishes.mode)[0]
@@ -173,7 +176,8 @@ def _fit_for_natives(pieces: list[Piece], wishes: Wishes) -> list[Piece]:
         ways = [list(map(fitted, parts)) for parts in halved(worst[0])]
         best = min(ways, key=lambda parts: sum(map(error, parts)), default=[])
         near = worst[1].deviation <= wishes.tolerance
-        if near or sum(map(error, best), start=0.0) >= error(worst) or not best:
+        saved = error(worst) - sum(map(error, best))
+        if near or not best or saved <= least * (len(best) - 1):
             done.append(worst[0])
         else:
             waiting += best

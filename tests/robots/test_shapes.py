@@ -11,6 +11,7 @@ import trimesh
 from partwright.errors import SettingError
 from partwright.robots import CollideOptions, collide
 from partwright.robots.containment import outside_of, shape_solid
+from partwright.robots.report import warnings
 from partwright.robots.solids import Solids
 from tests.robots.robots import mjcf, urdf
 
@@ -52,6 +53,26 @@ def test_a_tolerance_tells_how_many_shapes_there_are() -> None:
     assert CollideOptions().worth is not None
     for told in ({"tolerance": "2%"}, {"enclose": True}, {"inside": True}):
         assert CollideOptions(**told).worth is None
+
+
+def test_native_solids_alone_are_not_stacked_thinner_and_thinner(tmp_path: Path) -> None:
+    """Each has to save some volume, where no tolerance asks for more; the report says what is not kept."""
+    path = urdf(tmp_path)
+    cone = trimesh.creation.cone(0.5, 1.0, sections=32)
+    cone.apply_translation((0, 0, 5))  # clear of the base
+    cone.export(tmp_path / "meshes" / "rod.stl")
+    found = {}
+    for tolerance in (None, "0.1%"):
+        options = CollideOptions(kinds=("box",), tolerance=tolerance)
+        result = collide(path, options)
+        found[tolerance] = next(link for link in result.links if link.link == "arm")
+    few, many = found[None], found["0.1%"]
+    assert 4 <= few.count <= 24 < many.count == 48
+    assert few.missing + few.extra < many.missing + many.extra + 0.05
+    assert few.deviation > few.tolerance
+    (warning,) = [line for line in warnings([few]) if few.link in line]
+    assert "hulls (--kinds) would be nearer" in warning
+    assert f"{1000 * few.deviation:.1f} mm off" in warning
 
 
 def test_a_tighter_tolerance_comes_nearer_with_more_shapes(tmp_path: Path) -> None:
