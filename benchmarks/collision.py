@@ -28,12 +28,14 @@ import trimesh
 
 import partwright as pw
 from partwright.approximation.collision import TOLERANCE, geometries
+from partwright.approximation.hull_faces import faces_of
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.atomic_io import write_bytes
 from partwright.export.axes import to_metres_z_up
 from partwright.export.mjcf import GEOMS, geom_size
 from partwright.export.rigid_body import DENSITY
 from partwright.fields import Box
+from partwright.meshing.manifolds import as_manifold
 from partwright.meshing.mass import MassProperties, mass_properties
 from partwright.robots import CollideOptions
 from partwright.robots.model import Link, MeshUse
@@ -180,8 +182,7 @@ def _in_part(part: Part) -> Inside:
 
 
 def _in_hull(hull: trimesh.Trimesh) -> Inside:
-    normals, origins = hull.face_normals, hull.triangles_center
-    offsets = np.einsum("ij,ij->i", normals, origins)
+    normals, offsets = faces_of(as_manifold(hull))  # slivers in flat faces cut nothing off there
 
     def inside(points: np.ndarray) -> np.ndarray:
         near = ((points > hull.bounds[0]) & (points < hull.bounds[1])).all(axis=1)
