@@ -55,17 +55,17 @@ TABLES = (
           "--shapes {data} --sets cad --rows mesh,voxels,points,solids,superfrusta,planes,weights,auto,union,"
           "flat,aligned,seven,first,cheap,double,dear,paper,tenth,whole", 600),
     Table("partsdf-reconstruct-cars.md", "partsdf.py", None, 0,
-          "reconstruct --family families/cars --model cars --shapes 5 --iterations 200 --resolution 128 "
-          "--threads 1", 5, "families/, made by partwright parts prepare"),
+          "reconstruct --family families/cars --model cars --shapes 5 --resolution 256 --threads 1", 5,
+          "families/, made by partwright parts prepare"),
     Table("partsdf-reconstruct-chairs.md", "partsdf.py", None, 0,
-          "reconstruct --family families/chairs --model chairs --shapes 5 --iterations 200 --resolution 128 "
-          "--threads 1", 5, "families/"),
+          "reconstruct --family families/chairs --model chairs --shapes 5 --resolution 256 --threads 1", 5,
+          "families/"),
     Table("partsdf-reconstruct-vehicles.md", "partsdf.py", None, 0,
-          "reconstruct --family families/vehicles --model vehicles --shapes 5 --iterations 200 "
-          "--resolution 128 --threads 1", 8, "families/"),
+          "reconstruct --family families/vehicles --model vehicles --shapes 5 --resolution 256 "
+          "--threads 1", 8, "families/"),
     Table("partsdf-reconstruct-mixers.md", "partsdf.py", None, 0,
-          "reconstruct --family families/mixers --model mixers --shapes 5 --iterations 200 "
-          "--resolution 192 --threads 1", 8, "families/"),
+          "reconstruct --family families/mixers --model mixers --shapes 5 --resolution 256 --threads 1", 8,
+          "families/"),
     Table("partsdf-real.md", "partsdf.py", None, 0, "real --shapes-from {data} --threads 1", 8),
     Table("partsdf-familiarity.md", "partsdf.py", None, 0,
           "familiarity --families families --shapes 6 --others 2 --iterations 200 --threads 1", 10,
@@ -87,6 +87,9 @@ TABLES = (
     Table("partsdf-ablations-cars.md", "partsdf.py", None, 0,
           "ablations --family families/cars-small --epochs 84 --width 96 --shapes 4 --iterations 150 "
           "--points 1024 --resolution 128 --threads 1", 900, "families/"),
+    Table("partsdf-ablations-cars-local.md", "partsdf.py", None, 0,
+          "ablations --family families/cars --config configs/cars-first.toml --epochs 40 --shapes 3 "
+          "--iterations 200 --resolution 96 --threads 1", 25, "families/"),
     Table("partsdf-robots.md", "partsdf.py", None, 0,
           "robots --parts {data}/parts/robot_arm --held ur5,ur10e --epochs 400 --iterations 200 "
           "--resolution 128 --threads 1", 120),
