@@ -84,6 +84,10 @@ TABLES = (
           3, "families/"),
     Table("partsdf-generation-mixers.md", "partsdf.py", None, 0,
           "generate --family families/mixers --model mixers --fresh 60 --threads 1", 6, "families/"),
+    Table("partsdf-generation-chairs.md", "partsdf.py", None, 0,
+          "generate --family families/chairs --model chairs --fresh 140 --threads 1", 8, "families/"),
+    Table("partsdf-generation-cars.md", "partsdf.py", None, 0,
+          "generate --family families/cars --model cars --fresh 140 --threads 1", 5, "families/"),
     Table("partsdf-ablations-cars.md", "partsdf.py", None, 0,
           "ablations --family families/cars-small --epochs 84 --width 96 --shapes 4 --iterations 150 "
           "--points 1024 --resolution 128 --threads 1", 900, "families/"),
