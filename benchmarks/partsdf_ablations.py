@@ -42,38 +42,37 @@ PUBLISHED = {
 STEPS = {"batch": 1, "points": 256}
 
 
-def variants(base: Config) -> dict[str, Config]:
-    """Every option that the paper's tables switch, one at a time, and L_inter, as its Figure 9; octaves are
-    ours."""
+def switched(base: Config, name: str, apart: str) -> dict[str, Config]:
+    """Every option of both decoders that the paper's tables switch, one at a time, and L_inter, as its Figure
+    9. name: of the base; apart: of the parts' hearing nothing of one another."""
     decoder, losses = base.decoder, base.losses
     return {
-        "PartSDF": base,
+        name: base,
         "one part": replace(base, one_part=True),
         "without poses": replace(base, poses=False),
         "without modulation": replace(base, decoder=replace(decoder, modulation=False)),
-        "without cross-part layers": replace(base, decoder=replace(decoder, cross_part=False)),
+        apart: replace(base, decoder=replace(decoder, cross_part=False)),
         "softmin": replace(base, decoder=replace(decoder, aggregation="softmin")),
         "without L_inter": replace(base, losses=replace(losses, inter=0.0)),
-        "with 2 octaves (not in the paper)": replace(base, decoder=replace(decoder, octaves=2)),
-        "transformer": replace(base, decoder=replace(decoder, architecture="transformer")),
+    }
+
+
+def variants(base: Config) -> dict[str, Config]:
+    """Of the paper's decoder; octaves are ours."""
+    return {
+        **switched(base, "PartSDF", "without cross-part layers"),
+        "with 2 octaves (not in the paper)": replace(base, decoder=replace(base.decoder, octaves=2)),
+        "transformer": replace(base, decoder=replace(base.decoder, architecture="transformer")),
     }
 
 
 def variants_of_ours(base: Config) -> dict[str, Config]:
-    """The same options, of the local decoder, and what it has besides."""
-    decoder, losses = base.decoder, base.losses
+    """Of the local decoder, and of what it has besides."""
+    held = replace(base.losses, inter=1.0, inter_over="held")
     return {
-        "local": base,
-        "one part": replace(base, one_part=True),
-        "without poses": replace(base, poses=False),
-        "without modulation": replace(base, decoder=replace(decoder, modulation=False)),
-        "parts that do not talk": replace(base, decoder=replace(decoder, cross_part=False)),
-        "softmin": replace(base, decoder=replace(decoder, aggregation="softmin")),
-        "without L_inter": replace(base, losses=replace(losses, inter=0.0)),
-        "L_inter over held points, weight 1": replace(
-            base, losses=replace(losses, inter=1.0, inter_over="held")
-        ),
-        "without octaves": replace(base, decoder=replace(decoder, octaves=0)),
+        **switched(base, "local", "parts that do not talk"),
+        "L_inter over held points, weight 1": replace(base, losses=held),
+        "without octaves": replace(base, decoder=replace(base.decoder, octaves=0)),
         "without balance": replace(base, training=replace(base.training, balance=0.0)),
     }
 

@@ -1,9 +1,8 @@
 """Shapes that the model has not seen: latents, and poses where they are unknown, that decode to them.
 
 With known parts every sample knows its nearest part, and poses start as they are given (section 4.1).
-Part-agnostic, a
-plain surface is all there is: latents and poses, rotations included, start from the training shape that fits
-best as it is, and all of them move (section 3.4).
+Part-agnostic, a plain surface is all there is: latents and poses, rotations included, start from the training
+shape that fits best as it is, and all of them move (section 3.4).
 """
 
 from __future__ import annotations
@@ -111,6 +110,7 @@ def reconstruct_unknown(
     return reconstruct_standing(model, target, [UPRIGHT], settings, seed, told, checkpoint)[0]
 
 
+@one_core_each()
 def reconstruct_standing(
     model: Model,
     target: Target,
@@ -126,7 +126,6 @@ def reconstruct_standing(
     return reconstruct_from(starts, settings, seed, told, checkpoint)
 
 
-@one_core_each()
 def reconstruct_from(
     starts: list[Start],
     settings: ReconstructionSettings,
@@ -166,14 +165,11 @@ def _found_by_part(
     latents = latents_by_part(model, start.poses, target, settings.starts)
     starts = [Start(replace(start, latents=one), UPRIGHT, target) for one in latents]
     scouts = _Scouts(starts if len(starts) > 1 else [], settings, seed, told, checkpoint)
-    tried = [one.shape for one in scouts.sent()] or [starts[0].shape]
-    if len(tried) > 1:
-        poses = PoseTensors(*(torch.stack(each) for each in zip(*(one.poses for one in tried), strict=True)))
-        found = torch.stack([one.latents for one in tried])
-        best = errors_by_part(model, found, poses, target).argmin(dim=0), torch.arange(len(model.parts))
-        start = replace(start, latents=found[best], poses=poses.map(lambda t: t[best]))
-    else:
-        start = tried[0]
+    tried = [one.shape for one in scouts.sent() or starts]
+    poses = PoseTensors(*(torch.stack(each) for each in zip(*(one.poses for one in tried), strict=True)))
+    found = torch.stack([one.latents for one in tried])
+    best = errors_by_part(model, found, poses, target).argmin(dim=0), torch.arange(len(model.parts))
+    start = replace(start, latents=found[best], poses=poses.map(lambda t: t[best]))
     return start if scouts.stopped else scouts.followed(Start(start, UPRIGHT, target)).shape
 
 

@@ -9,6 +9,7 @@ one wherever this brings the whole closer.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,6 @@ from torch import Tensor
 
 from partwright.assembly.similarity import quaternion_product
 from partwright.errors import ModelError, SettingError
-from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.encoder import Encoder, load_encoder
 from partwright.partsdf.losses import aggregate, clamped_error
 from partwright.partsdf.model import Model
@@ -57,7 +57,6 @@ class Start:
     encoded: bool = False
 
 
-@one_core_each()
 def find_starts(
     model: Model, target: Target, turns: list[Quaternion], settings: ReconstructionSettings
 ) -> list[Start]:
@@ -211,10 +210,7 @@ def errors_by_part(model: Model, latents: Tensor, poses: PoseTensors, target: Ta
     points, owner, known = target.points[rows], target.part[rows], target.sdf[rows]
     member = torch.nn.functional.one_hot(owner, len(model.parts)).float()
     errors = []
-    for first in range(0, len(latents), _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
-        placed = poses.map(lambda t, some=some: t[some])
-        each = model.condition(latents[some], placed)(local_points(points, placed))
+    for each in _decoded(model, latents, poses, points):
         own = each.gather(1, owner.expand(len(each), 1, -1)).squeeze(1)
         errors.append(clamped_error(own, known, model.config.losses) @ member)
     return torch.cat(errors)
@@ -228,12 +224,16 @@ def _rows(target: Target, count: int) -> Tensor:
 def errors_of(model: Model, latents: Tensor, poses: PoseTensors, target: Target, rows: Tensor) -> Tensor:
     """Mean error (S,) of the whole distance of shapes with latents (S, P, Z) and poses (S, P, ...), at the
     target's samples `rows`."""
-    points = target.points[rows]
     errors = []
-    for first in range(0, len(latents), _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
-        placed = poses.map(lambda t, some=some: t[some])
-        each = model.condition(latents[some], placed)(local_points(points, placed))
+    for each in _decoded(model, latents, poses, target.points[rows]):
         whole = aggregate(each, model.config.decoder)
         errors.append(target.error(whole, rows, model.config.losses).mean(dim=1))
     return torch.cat(errors)
+
+
+def _decoded(model: Model, latents: Tensor, poses: PoseTensors, points: Tensor) -> Iterator[Tensor]:
+    """Distances (B, P, N) at points (N, 3) of the parts of all shapes, a few shapes at a time."""
+    for first in range(0, len(latents), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        placed = poses.map(lambda t, some=some: t[some])
+        yield model.condition(latents[some], placed)(local_points(points, placed))
