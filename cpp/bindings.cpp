@@ -6,6 +6,7 @@
 
 #include <cstring>
 
+#include "beyond_planes.hpp"
 #include "evaluate.hpp"
 #include "hull.hpp"
 #include "morphology.hpp"
@@ -248,8 +249,8 @@ NB_MODULE(_kernel, m) {
   m.def("volumes_beyond", [](In<double> vertices, In<int64_t> faces, In<double> areas, In<double> normal, In<double> offsets) {
     auto out = array<double>({offsets.shape(0)});
     nb::gil_scoped_release release;
-    volumes_beyond(mesh_of(vertices, faces, faces), areas.data(), normal.data(), offsets.data(), int64_t(offsets.shape(0)),
-                   out.data());
+    volumes_beyond(vertices.data(), int64_t(vertices.shape(0)), faces.data(), areas.data(), int64_t(faces.shape(0)),
+                   normal.data(), offsets.data(), int64_t(offsets.shape(0)), out.data());
     return out;
   }, "vertices"_a, "faces"_a, "areas"_a, "normal"_a, "offsets"_a,
      "Volume (K,) of a solid beyond each of parallel planes.");

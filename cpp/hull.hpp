@@ -1,5 +1,5 @@
-// Convex hulls of points, and of what lies on either side of a plane; the volume of a solid beyond parallel planes.
-// meshing/hulls.py is the face of the first two, approximation/half_space.py of the third; tests have them in readable form.
+// Convex hulls of points, and of what lies on either side of a plane.
+// meshing/hulls.py is their face; tests have them in readable form.
 #pragma once
 
 #include <array>
@@ -29,9 +29,5 @@ struct Mesh {
 // For each plane (normal, offset) the volume of the hulls of the mesh's two sides together; infinite where one has no more than
 // what lies within `slack` of the plane.
 void split_hull_volumes(const Mesh& mesh, const double* planes, int64_t count, double slack, double* out);
-
-// For each of parallel planes the volume of the solid where normal . p > offset. areas: (F, 3) of the faces along each axis.
-void volumes_beyond(const Mesh& mesh, const double* areas, const double* normal, const double* offsets, int64_t count,
-                    double* out);
 
 }  // namespace partwright
