@@ -296,8 +296,7 @@ class ResidualFit:
     def mend(self, rows: Rows) -> None:
         def improved(better: Rows) -> None:
             self.best = better
-            reached, iou = score(self.samples, better), volume_iou(self.samples, better)
-            self.report_progress("mend", self.settings.rounds, len(better), reached, iou, MENDED)
+            self.report_progress("mend", self.settings.rounds, better, MENDED)
 
         with self.timed("mend"):
             self.best = Mending(self.samples, self.settings, self.locked, improved)(rows)
@@ -320,8 +319,7 @@ class ResidualFit:
             found = symmetries(shape, self.settings, self.samples.seed)
             self.leaves = repeat(self.samples, self.best, found, self.settings, self.locked)
             rows = expanded(self.leaves)
-        reached, iou = score(self.samples, rows), volume_iou(self.samples, rows)
-        self.report_progress("symmetry", self.settings.rounds, len(self.leaves), reached, iou, 1.0)
+        self.report_progress("symmetry", self.settings.rounds, rows, 1.0, len(self.leaves))
 
     def enforce_budget(self) -> None:
         """What an interruption or a fit without thinning left over the part budget goes, without refits."""
@@ -341,11 +339,10 @@ class ResidualFit:
             self.best, self.best_objective = rows, objective
         total = settings.rounds + settings.cycles
         done = min(1.0, (settings.rounds + round_ if stage == "thin" else round_) / total)
-        reached, iou = score(self.samples, rows), volume_iou(self.samples, rows)
         carved = self.rival is not None
         attempts = 1 + (self.may_carve or carved)
         fraction = (carved + done) / attempts * (MENDED if self.mending else 1.0)
-        self.report_progress(stage, round_, len(rows), reached, iou, fraction)
+        self.report_progress(stage, round_, rows, fraction)
         return progressed
 
     def sampled_strays(self, rows: Rows) -> bool:
@@ -370,8 +367,11 @@ class ResidualFit:
         return self.due(rows, volume_iou(self.samples, rows))
 
     def report_progress(
-        self, stage: str, round_: int, parts: int, reached: float, iou: float, fraction: float
+        self, stage: str, round_: int, rows: Rows, fraction: float, parts: int | None = None
     ) -> None:
+        """parts: if not all rows are."""
+        parts = len(rows) if parts is None else parts
+        reached, iou = score(self.samples, rows), volume_iou(self.samples, rows)
         entry: dict[str, float | str] = {"stage": stage, "round": round_, "parts": parts}
         self.history.append(entry | {"score": reached, "iou": iou})
         if self.report is not None:

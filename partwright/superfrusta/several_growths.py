@@ -12,7 +12,7 @@ from time import perf_counter
 from partwright.errors import CancelledError
 from partwright.methods import Checkpoint, Outcome, Progress
 from partwright.superfrusta.mending import Mending
-from partwright.superfrusta.objective import score, volume_iou
+from partwright.superfrusta.objective import volume_iou
 from partwright.superfrusta.recombining import recombined
 from partwright.superfrusta.resfit import MENDED, ResidualFit
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
@@ -117,9 +117,7 @@ class SeveralGrowths:
         return Mending(search.samples, search.settings, search.locked, self.tell)(rows)
 
     def tell(self, rows: Rows) -> None:
-        search = self.search
-        reached, iou = score(search.samples, rows), volume_iou(search.samples, rows)
-        search.report_progress("recombine", search.settings.rounds, len(rows), reached, iou, MENDED)
+        self.search.report_progress("recombine", self.search.settings.rounds, rows, MENDED)
 
     def keep(self, rows: Rows) -> None:
         search = self.search
