@@ -105,7 +105,7 @@ def decomposed(name: str, path: Path) -> Row:
         own += solid.volume()
         missing += (solid - union).volume()
         extra += (union - solid).volume()
-        deviation = max(deviation, largest_deviation(solid, union))
+        deviation = max(deviation, largest_deviation(solid, union).length)
         bodies[link.name] = with_natives(link, solid), with_natives(link, union)
     for link in (link for link in open_robot(path).links if link.natives and link.name not in bodies):
         bodies[link.name] = with_natives(link), with_natives(link)

@@ -52,14 +52,15 @@ def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
     """
     pieces = _cut_up(solid, limits)
     pieces += _far_off(solid, pieces, limits.deviation)
-    pieces = joined(pieces, solid.volume(), limits)
     least = _SLIVER * solid.volume()
+    bridged = sum(body.extra for body in _components(solid, least))
+    pieces = joined(pieces, solid.volume(), bridged, limits)
 
     @cache
     def cut(piece: Piece) -> list[Piece]:
         return _best_cut(piece, least)
 
-    return exchanged(spent(pieces, solid.volume(), limits, cut), limits, cut)
+    return exchanged(spent(pieces, bridged, limits, cut), limits, cut)
 
 
 def simplified(solid: Manifold, deviation: float) -> Manifold:

@@ -14,15 +14,17 @@ import numpy as np
 from partwright.approximation.convex_piece import Limits, Piece
 from partwright.meshing.hulls import hull_volume
 
-_SAVED = 5e-4  # of the volume: what one piece more has to save where the limits ask for none
-_MANY, _SAVED_BY_MANY = 32, 2e-3  # beyond so many pieces each has to save more, whatever the deviation is
+_SAVED = 1.6e-3  # of what the hulls of whole bodies would add: what one piece more has to save
+_MANY = 24  # beyond so many pieces each has to, whatever the deviation is
 _ROOM = 0.05  # of both: how far apart the boxes of two may lie that are joined
 _EXCHANGES = 24  # pieces that are tried to be cut once there are as many as may be
 
 
-def joined(pieces: Sequence[Piece], volume: float, limits: Limits) -> list[Piece]:
+def joined(pieces: Sequence[Piece], volume: float, bridged: float, limits: Limits) -> list[Piece]:
     """Pieces joined in pairs, the cheapest pair first, as long as the limits are kept or there are too
-    many."""
+    many.
+
+    volume: of the solid. bridged: what the hulls of its whole bodies would add, which is what pieces save."""
     alive = dict(enumerate(pieces))
     total = sum(piece.extra for piece in pieces)
     heap: list[tuple[float, int, int]] = []
@@ -40,7 +42,7 @@ def joined(pieces: Sequence[Piece], volume: float, limits: Limits) -> list[Piece
         cost, i, j = heapq.heappop(heap)
         if i not in alive or j not in alive:
             continue
-        dear = limits.worth is not None and len(alive) > _MANY and cost < _SAVED_BY_MANY * volume
+        dear = limits.worth is not None and len(alive) > _MANY and cost < _price(bridged, len(alive))
         forced = dear or len(alive) > limits.most
         both = _both(alive[i], alive[j])
         if not forced:
@@ -58,7 +60,7 @@ def joined(pieces: Sequence[Piece], volume: float, limits: Limits) -> list[Piece
 
 
 def spent(
-    pieces: Sequence[Piece], volume: float, limits: Limits, cut: Callable[[Piece], list[Piece]]
+    pieces: Sequence[Piece], bridged: float, limits: Limits, cut: Callable[[Piece], list[Piece]]
 ) -> list[Piece]:
     """More pieces, as many as may be: those that add most are cut as long as that is worth it."""
     pieces = list(pieces)
@@ -67,8 +69,7 @@ def spent(
     kept: set[Piece] = set()
     while len(pieces) < limits.most:
         total = sum(piece.extra for piece in pieces)
-        price = (_SAVED if len(pieces) < _MANY else _SAVED_BY_MANY) * volume
-        least = max(limits.worth * total / len(pieces), price)
+        least = max(limits.worth * total / len(pieces), _price(bridged, len(pieces)))
         left = [piece for piece in pieces if piece not in kept and piece.extra > least]
         if not left:
             break
@@ -108,6 +109,12 @@ def exchanged(pieces: Sequence[Piece], limits: Limits, cut: Callable[[Piece], li
             continue
         pieces = [*(piece for piece in left if piece not in cheapest), _both(*cheapest)]
     return pieces
+
+
+def _price(bridged: float, pieces: int) -> float:
+    """Volume that one piece more has to save. Beyond many each costs more than the one before it: engines try
+    every piece of one body with those of another."""
+    return _SAVED * bridged * max(1.0, pieces / _MANY)
 
 
 def _both(a: Piece, b: Piece) -> Piece:

@@ -48,9 +48,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--extra",
         metavar="SHARE",
         type=share,
-        default=0.08,
         help="volume that a link's shapes may add before it is cut further, as far as --max-parts allows "
-        "(default: 8%%)",
+        "(default: 8%%, and less where a few shapes more save much)",
     )
     option(
         "--kinds",

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 HULL = "hull"
 _SHARE, _LEAST_SHARE = 0.02, 0.003  # of the longest sides of link and robot: the tolerance that none gave
+_EXTRA = 0.08  # of its volume: what the hulls of a link may add
 _WORTH = 0.7  # two chords for one save three quarters
 _FINER = 1  # times a link's tolerance is halved where it overlaps a neighbour more than its mesh did
 _MORE_OVERLAP = 1e-3  # of the smaller link's volume
@@ -58,8 +59,8 @@ class CollideOptions:
     """Native solids that may be used, and "hull" for convex meshes; all that the format has if empty."""
     spheres: int | None = None
     """Spheres a link at most, that are found beside the shapes for all that collides; none if not given."""
-    extra: float = 0.08
-    """Volume that convex pieces may add, over the link's, before it is cut further."""
+    extra: float | None = None
+    """Volume that convex pieces may add, over the link's, before it is cut further; 0.08 if not given."""
 
     def __post_init__(self) -> None:
         if self.enclose and self.inside:
@@ -70,7 +71,7 @@ class CollideOptions:
             isinstance(self.spheres, bool) or not 1 <= self.spheres <= _MOST_SPHERES
         ):
             raise SettingError(f"spheres: expected a number from 1 to {_MOST_SPHERES}, got {self.spheres!r}")
-        if not 0 < self.extra < np.inf:
+        if not 0 < self.most_extra < np.inf:
             raise SettingError(f"extra: expected a share of the volume such as 0.08, got {self.extra!r}")
         self.length(1.0, 1.0)
 
@@ -79,9 +80,20 @@ class CollideOptions:
         return "around" if self.enclose else "within" if self.inside else "nearest"
 
     @property
+    def most_extra(self) -> float:
+        return _EXTRA if self.extra is None else self.extra
+
+    @property
     def worth(self) -> float | None:
-        """What a shape more has to save, of the mean of what they add, where no tolerance tells how many."""
-        return _WORTH if self.mode == "nearest" and self.tolerance is None else None
+        """What a shape more has to save, of the mean of what they add, where neither a tolerance nor the
+        volume that hulls may add tells how many."""
+        told = self.tolerance is not None or (self.extra is not None and self.hulls)
+        return _WORTH if self.mode == "nearest" and not told else None
+
+    @property
+    def hulls(self) -> bool:
+        """Whether convex meshes may be used."""
+        return not self.kinds or HULL in self.kinds
 
     def length(self, size: float, whole: float) -> float:
         """The tolerance of a link of this longest side, of a robot of that, in metres.
@@ -158,7 +170,7 @@ def collide(
             kinds,
             hulls,
             options.max_parts,
-            options.extra,
+            options.most_extra,
             options.mode,
             options.worth,
         )
@@ -299,7 +311,7 @@ def _measured(
         volume=own,
         missing=max(own - common, 0.0) / own,
         extra=max(union.volume() - common, 0.0) / own,
-        deviation=largest_deviation(target.solid, union),
+        farthest=largest_deviation(target.solid, union),
         tolerance=wishes.tolerance,
         sticking_out=sticking_out(shapes, target) if wishes.mode == "around" else None,
         notes=tuple(dict.fromkeys((*before.notes, *target.notes))),

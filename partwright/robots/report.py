@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from partwright import __version__
+from partwright.robots.solids import Deviation
 from partwright.robots.spheres import LinkSpheres, sphere_warnings
 
 
@@ -16,8 +17,9 @@ class LinkReport:
     """One link. Lengths are in metres, as robots are.
 
     shapes: how many of each kind. stands_for: which meshes. missing, extra: volume that the shapes lack and
-    add, over that of the meshes. deviation: how far the surface of either reaches beyond the other.
-    sticking_out: how far the meshes reach beyond the shapes, by fresh points; None where they may.
+    add, over that of the meshes. farthest: where the surface of either reaches farthest beyond the other, in
+    the link's frame. sticking_out: how far the meshes reach beyond the shapes, by fresh points; None where
+    they may.
     """
 
     link: str
@@ -27,10 +29,14 @@ class LinkReport:
     volume: float
     missing: float
     extra: float
-    deviation: float
+    farthest: Deviation
     tolerance: float
     sticking_out: float | None
     notes: tuple[str, ...]
+
+    @property
+    def deviation(self) -> float:
+        return self.farthest.length
 
     @property
     def count(self) -> int:
@@ -46,6 +52,7 @@ class LinkReport:
             "volume_missing_ratio": _short(self.missing),
             "volume_extra_ratio": _short(self.extra),
             "max_deviation": _short(self.deviation),
+            "max_deviation_at": [_short(value) for value in self.farthest.at],
             "tolerance": _short(self.tolerance),
         }
         if self.sticking_out is not None:
@@ -84,9 +91,12 @@ def warnings(links: Sequence[LinkReport]) -> list[str]:
     for link in links:
         if link.deviation > link.tolerance:
             nearer = "more shapes (--max-parts)" if "hull" in link.shapes else "hulls (--kinds)"
+            place = ", ".join(f"{value:.3f}" for value in link.farthest.at)
+            wrong = "lack" if link.farthest.missing else "add"
             result.append(
-                f"link {link.link!r}: the shapes are {1000 * link.deviation:.1f} mm off somewhere, and "
-                f"{1000 * link.tolerance:.1f} mm were asked for; {nearer} would be nearer"
+                f"link {link.link!r}: the shapes are {1000 * link.deviation:.1f} mm off at ({place}) m of "
+                f"the link, where they {wrong} something, and {1000 * link.tolerance:.1f} mm were asked for; "
+                f"{nearer} would be nearer"
             )
         if link.sticking_out:
             result.append(

@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from partwright.fields import Field
 
 NATIVE_FOR = 0.03  # of its volume, or `extra`: by how much a native solid may be worse than the hull it saves
-_NATIVE_PIECE = 3e-3  # of the link's volume: the same for one of several, which are as near as this
+_NATIVE_PIECE = 5e-4  # of the link's volume: the same for one of several, which are as near as this
 _SAVED = 2e-3  # of the link's volume: what each native solid more has to save where there are no hulls
 _LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners, or add for fewer faces
-_LOST, _MOST_LOST = 3e-5, 0.01  # of the link's volume, and of its own: what a hull of fewer corners may lack
+_LOST, _MOST_LOST = 1e-5, 0.01  # of the link's volume, and of its own: what a hull of fewer corners may lack
 _FLAWS = 1e-3  # of its volume: what a hull may add to a convex link
 _ROUNDING = 1e-9  # of its volume: what a hull adds to a link without a dent
 _CORNERS = 1024  # of a convex link's exact hull

@@ -183,19 +183,33 @@ def _manifold(vertices: np.ndarray, faces: np.ndarray) -> Manifold | None:
     return solid if solid.status() == Error.NoError and solid.volume() > 0 else None
 
 
-def largest_deviation(a: Manifold, b: Manifold) -> float:
-    """How far the surface of either of two solids reaches beyond the other, as a length, by points about an
-    eightieth of the size apart."""
-    size = float(np.ptp(np.reshape(a.bounding_box(), (2, 3)), axis=0).max())
-    return max(_beyond(a - b, b, size), _beyond(b - a, a, size))
+@dataclass(frozen=True)
+class Deviation:
+    """How far the surface of either of two solids reaches beyond the other, as a length, at most; at: (3,)
+    where that is; missing: whether the second one lacks something there, or adds it."""
+
+    length: float
+    at: tuple[float, float, float]
+    missing: bool
 
 
-def _beyond(left: Manifold, solid: Manifold, size: float) -> float:
+def largest_deviation(solid: Manifold, shapes: Manifold) -> Deviation:
+    """By points about an eightieth of the size apart."""
+    size = float(np.ptp(np.reshape(solid.bounding_box(), (2, 3)), axis=0).max())
+    lacks, where_it_lacks = _beyond(solid - shapes, shapes, size)
+    adds, where_it_adds = _beyond(shapes - solid, solid, size)
+    missing = lacks > adds
+    x, y, z = (where_it_lacks if missing else where_it_adds).tolist()
+    return Deviation(max(lacks, adds), (x, y, z), missing)
+
+
+def _beyond(left: Manifold, solid: Manifold, size: float) -> tuple[float, np.ndarray]:
     """left: what is not in the solid; what of its surface is the solid's own is at no distance from it."""
     if left.is_empty():
-        return 0.0
+        return 0.0, np.zeros(3)
     points = surface_of(left.refine_to_length(size / 80))[0]
     vertices, faces = surface_of(solid)
     middle = vertices.mean(axis=0)
     there = MeshDistance((vertices - middle) / size, faces, faces, True)
-    return float(there.unsigned((points - middle) / size).max(initial=0.0)) * size
+    away = there.unsigned((points - middle) / size)
+    return float(away.max()) * size, points[away.argmax()]

@@ -72,7 +72,44 @@ def test_native_solids_alone_are_not_stacked_thinner_and_thinner(tmp_path: Path)
     assert few.deviation > few.tolerance
     (warning,) = [line for line in warnings([few]) if few.link in line]
     assert "hulls (--kinds) would be nearer" in warning
-    assert f"{1000 * few.deviation:.1f} mm off" in warning
+    assert f"{1000 * few.deviation:.1f} mm off at (" in warning
+
+
+def test_a_warning_says_where_a_link_is_farthest_off(tmp_path: Path) -> None:
+    """One hull closes a cup: in the middle of its mouth the hull is as far off as the wall."""
+    path = urdf(tmp_path)
+    cup = trimesh.boolean.difference(
+        [
+            trimesh.creation.cylinder(0.5, 1.0, sections=32),
+            trimesh.creation.cylinder(0.4, 1.0, sections=32).apply_translation((0, 0, 0.2)),
+        ]
+    )
+    cup.apply_translation((2, 0, 7)).export(tmp_path / "meshes" / "rod.stl")
+    result = collide(path, CollideOptions(max_parts=1))
+    link = next(link for link in result.links if link.link == "arm")
+    assert link.count == 1
+    assert not link.farthest.missing
+    away = cup.nearest.on_surface([link.farthest.at])[1][0]
+    assert abs(away - link.deviation) < 2e-3
+    assert link.deviation > 0.3
+    (warning,) = [line for line in warnings([link]) if "mm off at (" in line]
+    assert "where they add something" in warning
+    assert link.to_dict()["max_deviation_at"] == pytest.approx(link.farthest.at, abs=1e-5)
+
+
+def test_volume_that_was_asked_for_is_kept_however_many_shapes_it_takes(tmp_path: Path) -> None:
+    """By default many shapes are made only where each saves enough; a stated --extra goes on."""
+    path = urdf(tmp_path)
+    thin = trimesh.creation.annulus(0.48, 0.5, 0.2, sections=128)
+    thin.apply_translation((0, 0, 5)).export(tmp_path / "meshes" / "rod.stl")
+    counts, errors = [], []
+    for extra in (None, 0.02):
+        result = collide(path, CollideOptions(max_parts=96, extra=extra))
+        link = next(link for link in result.links if link.link == "arm")
+        counts.append(link.count)
+        errors.append(link.missing + link.extra)
+    assert counts[0] <= 48 < counts[1]
+    assert errors[1] < min(errors[0], 0.02)
 
 
 def test_a_tighter_tolerance_comes_nearer_with_more_shapes(tmp_path: Path) -> None:
