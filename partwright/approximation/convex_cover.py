@@ -66,10 +66,15 @@ def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
 def simplified(solid: Manifold, deviation: float) -> Manifold:
     """With fewer triangles, for a search that allows this deviation (a length), as far as that leaves its
     volume alone: walls may be thinner than what is allowed. As fine as few triangles allow: what is cut off
-    here, no hull has again."""
+    here, no hull has again. A body that would vanish stays as it is."""
+    from manifold3d import Manifold, OpType
+
     own, by, found = solid.volume(), _COARSE * deviation, solid
+    bodies = solid.decompose()
     for _ in range(_TRIES):
         simple = solid.simplify(by)
+        if lost := [body for body in bodies if len(bodies) > 1 and body.simplify(by).is_empty()]:
+            simple = Manifold.batch_boolean([simple, *lost], OpType.Add)
         if found is not solid and simple.num_tri() > _CHEAP:
             break
         if abs(simple.volume() - own) <= _CHANGED * own:

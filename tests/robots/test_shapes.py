@@ -97,6 +97,17 @@ def test_a_warning_says_where_a_link_is_farthest_off(tmp_path: Path) -> None:
     assert link.to_dict()["max_deviation_at"] == pytest.approx(link.farthest.at, abs=1e-5)
 
 
+def test_a_speck_far_from_all_else_is_not_lost(tmp_path: Path) -> None:
+    """It is finer than what the search for cuts rounds off, and all that there is at its place."""
+    path = urdf(tmp_path)
+    balls = [trimesh.creation.icosphere(6, 0.3).apply_translation((x, 0, 0)) for x in (-0.2, 0.2)]
+    speck = trimesh.creation.box((1e-5, 2e-4, 2e-4)).apply_translation((0.9, 0.1, 0.0))
+    both = trimesh.util.concatenate([trimesh.boolean.union(balls), speck])
+    both.apply_translation((0, 0, 5)).export(tmp_path / "meshes" / "rod.stl")
+    link = next(link for link in collide(path).links if link.link == "arm")
+    assert link.deviation <= link.tolerance
+
+
 def test_volume_that_was_asked_for_is_kept_however_many_shapes_it_takes(tmp_path: Path) -> None:
     """By default many shapes are made only where each saves enough; a stated --extra goes on."""
     path = urdf(tmp_path)
