@@ -100,9 +100,9 @@ def far_places(shape: Solid, other: Solid) -> list[Place]:
     return sorted(found, key=lambda place: -place.off)
 
 
-def reach(shape: Solid, other: Solid, box: Floats) -> float:
-    """How far the surfaces are apart in a box (2, 3), unit lengths; 0 where that is not far."""
-    return float(_apart(shape, other, box)[2].max(initial=0.0))
+def reach(shape: Solid, other: Solid, box: Floats, least: float = _REGION * FAR) -> float:
+    """How far the surfaces are apart in a box (2, 3), unit lengths; 0 where that is less than `least`."""
+    return float(_apart(shape, other, box, least)[2].max(initial=0.0))
 
 
 def loose_places(shape: Solid, other: Solid) -> list[Place]:
@@ -125,16 +125,16 @@ def loose_places(shape: Solid, other: Solid) -> list[Place]:
 
 
 def _apart(
-    shape: Solid, other: Solid, box: Floats | None = None
+    shape: Solid, other: Solid, box: Floats | None = None, least: float = _REGION * FAR
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
-    """Points (N, 3) of both surfaces that are far from the other, their feet (N, 3) there, how far (N,), and
-    whether the other body lacks something there (N,)."""
+    """Points (N, 3) of both surfaces that are at least so far from the other, their feet (N, 3) there, how far
+    (N,), and whether the other body lacks something there (N,)."""
     found: list[Floats] = []
     lacks: list[NDArray[np.bool_]] = []
     for one, across, here in ((shape, other, True), (other, shape, False)):
         points = one.points(box)
         off = across.surface.unsigned(points)
-        far = np.flatnonzero(off > _REGION * FAR)
+        far = np.flatnonzero(off > least)
         far = far[~buried(one.sign, points[far])]
         points = points[far]
         outside = across.sign(points) > 0

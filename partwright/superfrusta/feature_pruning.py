@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from partwright.meshing.manifolds import surface_of
 from partwright.superfrusta.feature_mending import FAR
-from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers, within_box
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
@@ -28,13 +28,13 @@ def pruned(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
     """
     if len(tree.features) < 2:
         return tree
-    masks = [_mask(feature, search.points) for feature in tree.features]
+    masks = [mask_of(feature, search.points) for feature in tree.features]
     kept = list(range(len(tree.features)))
     needed: set[int] = set()
-    score = search.score_of(_fold(tree, masks, kept))
+    score = search.score_of(fold_of_masks(tree, masks, kept))
     while True:
         tried = [i for i in kept[1:] if i not in needed and tree.features[i].sides]
-        scores = {i: search.score_of(_fold(tree, masks, [k for k in kept if k != i])) for i in tried}
+        scores = {i: search.score_of(fold_of_masks(tree, masks, [k for k in kept if k != i])) for i in tried}
         gains = {i: scores[i] - score + search.price(tree.features[i].sides) for i in tried}
         vain = max(gains, key=gains.__getitem__, default=None)
         if vain is None or gains[vain] <= 0:
@@ -69,7 +69,7 @@ def _in_boxes(
 ) -> NDArray[np.float32]:
     if boxes is None:
         return points
-    within = [((points > low - _FURTHER) & (points < high + _FURTHER)).all(axis=1) for low, high in boxes]
+    within = [within_box(points, low - _FURTHER, high + _FURTHER) for low, high in boxes]
     return points[np.any(within, axis=0)]
 
 
@@ -77,12 +77,12 @@ def _only(tree: FeatureTree, kept: list[int]) -> FeatureTree:
     return replace(tree, features=[tree.features[k] for k in kept], steps=())
 
 
-def _mask(feature: Feature, points: NDArray[np.float32]) -> NDArray[np.bool_]:
+def mask_of(feature: Feature, points: NDArray[np.float32]) -> NDArray[np.bool_]:
     """(N,) whether points (N, 3) lie within a feature, its copies and its image."""
     return np.any([covers(part, points) for part in feature.parts], axis=0)
 
 
-def _fold(tree: FeatureTree, masks: list[NDArray[np.bool_]], kept: list[int]) -> NDArray[np.bool_]:
+def fold_of_masks(tree: FeatureTree, masks: list[NDArray[np.bool_]], kept: list[int]) -> NDArray[np.bool_]:
     covered = np.zeros(len(masks[0]), bool)
     for k in kept:
         covered = covered | masks[k] if tree.features[k].added else covered & ~masks[k]

@@ -29,7 +29,7 @@ from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_mending import farthest, mended
 from partwright.superfrusta.feature_own_bodies import OwnBodies
 from partwright.superfrusta.feature_recasting import recast
-from partwright.superfrusta.feature_steps import FeatureTree, covers
+from partwright.superfrusta.feature_steps import FeatureTree, covers, within_box
 from partwright.superfrusta.feature_symmetry import symmetries
 from partwright.superfrusta.samples import FitSamples
 
@@ -223,7 +223,7 @@ class FeatureSearch:
             if piece.num_tri() > _COMPLEX:
                 continue
             low, high = np.reshape(piece.bounding_box(), (2, 3))
-            within = ((points > low) & (points < high)).all(axis=1)
+            within = within_box(points, low, high)
             if float((weight[within].sum(axis=0) / total).mean()) > _HOPELESS * self.alpha:
                 pieces.append((volume, piece if piece.num_tri() < _FINE else simplified(piece, _SKIN)))
         return [piece for _, piece in sorted(pieces, key=lambda p: -p[0])[:_PIECES]]

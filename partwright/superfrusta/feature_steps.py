@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from manifold3d import Manifold
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.assembly import Part, Similarity
@@ -136,9 +136,17 @@ def covers(part: Part, points: NDArray[np.float32]) -> NDArray[np.bool_]:
     """(N,) whether points (N, 3) lie within the part or one of its copies."""
     result = np.zeros(len(points), bool)
     for copy in part.copies:
-        low, high = copy.bounds()
-        near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
+        near = np.flatnonzero(within_box(points, *copy.bounds()))
         if len(near):
             local = (points[near] - copy.translation) @ rotation_matrix(copy.rotation)
             result[near] |= copy.field(local) < 0
     return result
+
+
+def within_box(points: NDArray[np.floating], low: ArrayLike, high: ArrayLike) -> NDArray[np.bool_]:
+    """(N,) whether points (N, 3) lie between two corners (3,): column by column, which is the faster way."""
+    within = np.ones(len(points), bool)
+    for values, least, most in zip(points.T, np.asarray(low), np.asarray(high), strict=True):
+        within &= values > least
+        within &= values < most
+    return within

@@ -19,6 +19,7 @@ from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_pruning import pruned
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
+from partwright.superfrusta.feature_thinning import thinned
 from partwright.superfrusta.flat_tree import flattened
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
@@ -78,9 +79,9 @@ class FeaturedFit:
         return None, False
 
     def mended(self, tree: FeatureTree) -> FeatureTree:
-        """The tree with freeform where it is far off; the one that comes as near as an IoU that is asked for
-        as it is."""
-        return tree if self._request.settings.min_iou is not None else self._with_freeform(tree)
+        """The tree with freeform where it is far off, without what then hardly shows; the one that comes as
+        near as an IoU that is asked for as it is."""
+        return tree if self._request.settings.min_iou is not None else self._thinned(self._with_freeform(tree))
 
     def mended_assembly(self, whole: Assembly) -> tuple[Assembly, float]:
         """Solids that were found by the search, with freeform where they are far off; itself where nothing is
@@ -91,8 +92,8 @@ class FeaturedFit:
         none = np.zeros(0, bool)
         leaves = flattened(in_unit_frame(self._request.shape, whole))
         tree = search.scored(FeatureTree([Feature(added, part, none, 0) for part, added in leaves]))
-        better = self._with_freeform(tree)
-        changed = len(better.features) > len(tree.features)
+        better = self._thinned(self._with_freeform(tree))
+        changed = len(better.features) != len(tree.features)
         return self.assembly(better) if changed else whole, better.off
 
     @cached_property
@@ -111,6 +112,9 @@ class FeaturedFit:
     def _with_freeform(self, tree: FeatureTree) -> FeatureTree:
         most = self._request.settings.max_parts
         return with_freeform(self._search, tree, self._assemblies.in_unit_frame, most)
+
+    def _thinned(self, tree: FeatureTree) -> FeatureTree:
+        return thinned(self._search, tree, self._assemblies.in_unit_frame)
 
     def _told(self, tree: FeatureTree) -> None:
         seen = self._seen

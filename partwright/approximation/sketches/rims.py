@@ -28,12 +28,14 @@ _STEPS = 12
 
 
 class Leaning(NamedTuple):
-    """Faces of a body that are neither flat nor upright: corners (F, 3, 3), areas (F,), and of their normals
-    the part upwards (F,)."""
+    """Faces of a body that are neither flat nor upright: corners (F, 3, 3), areas (F,), of their normals
+    the part upwards (F,), and the faces' boxes: lowest and highest corners (F, 3)."""
 
     corners: np.ndarray
     area: np.ndarray
     upwards: np.ndarray
+    lowest: np.ndarray
+    highest: np.ndarray
 
     @classmethod
     def of(cls, vertices: np.ndarray, faces: np.ndarray) -> Leaning:
@@ -42,31 +44,40 @@ class Leaning(NamedTuple):
         area = np.linalg.norm(normal, axis=1) / 2
         upwards = normal[:, 2] / np.maximum(2 * area, 1e-300)
         leans = (np.abs(upwards) > _LEANS[0]) & (np.abs(upwards) < _LEANS[1])
-        return cls(corners[leans], area[leans], upwards[leans])
+        corners = corners[leans]
+        first, second, third = corners[:, 0], corners[:, 1], corners[:, 2]
+        lowest = np.minimum(np.minimum(first, second), third)
+        highest = np.maximum(np.maximum(first, second), third)
+        return cls(corners, area[leans], upwards[leans], lowest, highest)
 
 
 def bottom_rim(faces: Leaning, profile: Profile, low: float) -> Rim:
     """Of a profile extruded from a height on, however far."""
-    return _rim(faces, faces.corners[..., 2] - low, -faces.upwards, profile)
+    near = (faces.lowest[:, 2] - low > -_OFF) & (faces.highest[:, 2] - low < _MOST)
+    return _rim(faces, near & (faces.upwards < 0), low, -1.0, profile)
 
 
 def top_rim(faces: Leaning, profile: Profile, high: float) -> Rim:
     """Of a profile extruded to a height, from wherever."""
-    return _rim(faces, high - faces.corners[..., 2], faces.upwards, profile)
+    near = (high - faces.highest[:, 2] > -_OFF) & (high - faces.lowest[:, 2] < _MOST)
+    return _rim(faces, near & (faces.upwards > 0), high, 1.0, profile)
 
 
-def _rim(faces: Leaning, off: np.ndarray, facing: np.ndarray, profile: Profile) -> Rim:
-    """off: (F, 3) how far below the end the corners are. facing: (F,) the normals' part beyond the end."""
+def _rim(faces: Leaning, near: np.ndarray, end: float, upwards: float, profile: Profile) -> Rim:
+    """near: (F,) faces that face beyond the end, and lie near it. end: its height. upwards: 1 where what is
+    beyond it is above, else -1."""
     low, high = profile.bounds()
-    own = (facing > 0) & (off.min(axis=1) > -_OFF) & (off.max(axis=1) < _MOST)
-    around = faces.corners[own][..., :2]
-    own[own] = ((around > low - _OFF) & (around < high + _OFF)).all(axis=(1, 2))
+    least, most = low - _OFF, high + _OFF
+    lowest, highest = faces.lowest, faces.highest
+    near = near & (lowest[:, 0] > least[0]) & (highest[:, 0] < most[0])
+    own = np.flatnonzero(near & (lowest[:, 1] > least[1]) & (highest[:, 1] < most[1]))
     lengths = np.array([_perimeter(loop) for loop in profile.sides])
     area = faces.area[own]
     if area.sum() < _COVERED * _LEAST * lengths.sum():
         return SHARP
-    off, facing = np.maximum(off[own], 0), facing[own]
-    flat = faces.corners[own][..., :2].reshape(-1, 2)
+    corners, facing = faces.corners[own], upwards * faces.upwards[own]
+    off = np.maximum(upwards * (end - corners[..., 2]), 0)
+    flat = corners[..., :2].reshape(-1, 2)
     deep = -profile_distance(profile, flat).reshape(-1, 3)
     # Of a circle that touches both, through a point; of a chamfer's end points it is the chamfer.
     depth = np.maximum(deep, 0) + off + np.sqrt(2 * np.maximum(deep, 0) * off)

@@ -1,0 +1,64 @@
+"""When a tree is mended, what explains little goes if the surface hardly moves without it, and only then."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import partwright as pw
+from partwright.assembly import Assembly, Part
+from partwright.fields import Box, Cylinder
+from partwright.meshing import mesh_assembly
+from partwright.superfrusta.feature_assembly import FeatureAssembly
+from partwright.superfrusta.feature_search import FeatureSearch
+from partwright.superfrusta.feature_steps import Feature, FeatureTree
+from partwright.superfrusta.feature_thinning import SEEN, thinned
+from partwright.superfrusta.samples import FitSamples
+from partwright.superfrusta.solids import Settings
+
+# In the unit frame: centred, the longest side 1.8.
+PLATE = Part(Box((1.8, 1.0, 0.3)))
+POST = Part(Box((0.2, 0.2, 0.8)), (-0.7, 0.0, 0.0))  # keeps the middle of the box where it is
+BASE = [(PLATE, True), (POST, True)]
+
+
+def left(features: list[tuple[Part, bool]], shape: Assembly, share: float) -> list[Part]:
+    """What is left of features of a shape where the last explains so many prices."""
+    settings = Settings.for_quality("draft")
+    loaded = pw.load_shape(mesh_assembly(shape))
+    samples = FitSamples.of(loaded, settings)
+
+    def tree(search: FeatureSearch, some: list[tuple[Part, bool]]) -> FeatureTree:
+        none = np.zeros(0, bool)
+        return search.scored(FeatureTree([Feature(added, part, none, 4) for part, added in some]))
+
+    any_price = FeatureSearch(loaded, samples, settings.alpha)
+    gain = tree(any_price, features).score - tree(any_price, features[:-1]).score
+    assert gain > 0
+    search = FeatureSearch(loaded, samples, gain / share)
+    given = tree(search, features)
+    result = thinned(search, given, FeatureAssembly(loaded).in_unit_frame)
+    assert result.score == pytest.approx(search.scored(result).score)
+    assert result.price == pytest.approx(search.scored(result).price)
+    return [feature.part for feature in result.features]
+
+
+@pytest.mark.parametrize("proud", [0.6, 1.4])
+def test_a_collar_stays_if_it_shows(proud: float) -> None:
+    """It explains as much, 1.5 prices; only how far it stands out tells them apart."""
+    collar = Part(Cylinder(0.3, 0.1), (0.3, 0.0, 0.1 + proud * SEEN))
+    kept = left([*BASE, (collar, True)], Assembly((PLATE, POST, collar)), 1.5)
+    assert kept == [PLATE, POST, *([collar] if proud > 1 else [])]
+
+
+def test_a_keyway_stays_and_so_does_what_explains_much() -> None:
+    keyway = Part(Box((0.7, 0.08, 0.08)), (0.3, 0.0, 0.15))
+    whole = Assembly((Assembly((PLATE, POST)), keyway), "difference")
+    assert left([*BASE, (keyway, False)], whole, 1.5) == [PLATE, POST, keyway]
+    low = Part(Box((1.0, 1.0, 0.1)), (0.4, 0.0, 0.1 + 0.6 * SEEN))
+    assert left([*BASE, (low, True)], Assembly((PLATE, POST, low)), 2.5) == [PLATE, POST, low]
+
+
+def test_of_two_that_stand_for_one_another_one_goes() -> None:
+    boss, again = Part(Cylinder(0.2, 0.6), (0.3, 0.0, 0.2)), Part(Cylinder(0.2, 0.6), (0.303, 0.0, 0.2))
+    assert len(left([*BASE, (again, True), (boss, True)], Assembly((PLATE, POST, boss)), 1.0)) == 3
