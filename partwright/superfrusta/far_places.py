@@ -127,8 +127,8 @@ def loose_places(shape: Solid, other: Solid) -> list[Place]:
 def _apart(
     shape: Solid, other: Solid, box: Floats | None = None, least: float = _REGION * FAR
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
-    """Points (N, 3) of both surfaces that are at least so far from the other, their feet (N, 3) there, how far
-    (N,), and whether the other body lacks something there (N,)."""
+    """Points (N, 3) of both surfaces that are further from the other than `least`, their feet (N, 3) there,
+    how far (N,), and whether the other body lacks something there (N,)."""
     found: list[Floats] = []
     lacks: list[NDArray[np.bool_]] = []
     for one, across, here in ((shape, other, True), (other, shape, False)):

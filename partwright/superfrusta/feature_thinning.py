@@ -1,8 +1,8 @@
 """Features that nobody would miss: when a tree is mended, what explains little goes where the surface hardly
 moves without it.
 
-A price alone cannot tell: a collar that is low explains as little as a chip that is deep and narrow. So how far
-the surfaces are apart around a feature is measured, both ways, with it and without.
+A price alone cannot tell: a collar that is low explains as little as a chip that is deep and narrow. So how
+far the surfaces are apart around a feature is measured, both ways, with it and without.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from manifold3d import Manifold
-from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
 from partwright.meshing.csg import solid_of
@@ -27,14 +26,12 @@ if TYPE_CHECKING:
 SEEN = 0.018
 """Unit lengths: 1 % of the longest side, by which the surface may move where a feature goes."""
 _LITTLE = 2.0  # prices of a feature, that what goes explains at most
-_AROUND = 2 * SEEN  # unit lengths around a feature that are looked at; twice as far is what is measured against
+_AROUND = 2 * SEEN  # unit lengths around a feature that are looked at; others matter twice as far
 _FURTHER = 4e-3  # unit lengths, by which what is further off already may be so still more
 _CHORD = 1e-3  # unit lengths
 
 
-def thinned(
-    search: FeatureSearch, tree: FeatureTree, made: Callable[[FeatureTree], Assembly]
-) -> FeatureTree:
+def thinned(search: FeatureSearch, tree: FeatureTree, made: Callable[[FeatureTree], Assembly]) -> FeatureTree:
     """The tree without features that hardly show, those that explain the least first; itself where what is
     made of it would then be far off, or fall apart.
 
@@ -73,9 +70,9 @@ def thinned(
         steps=(),
     )
     shape = Solid(search.body, search.samples.measure)
-    before, after = (Solid(solid_of(made(one), _CHORD), made(one).distance) for one in (tree, thinner))
-    off = max((place.off for place in far_places(shape, after)), default=0.0)
-    return thinner if off <= tree.off + _FURTHER and after.count <= before.count else tree
+    given, result = (Solid(solid_of(whole, _CHORD), whole.distance) for whole in map(made, (tree, thinner)))
+    off = max((place.off for place in far_places(shape, result)), default=0.0)
+    return thinner if off <= tree.off + _FURTHER and result.count <= given.count else tree
 
 
 class _Bodies:

@@ -81,7 +81,9 @@ class FeaturedFit:
     def mended(self, tree: FeatureTree) -> FeatureTree:
         """The tree with freeform where it is far off, without what then hardly shows; the one that comes as
         near as an IoU that is asked for as it is."""
-        return tree if self._request.settings.min_iou is not None else self._thinned(self._with_freeform(tree))
+        if self._request.settings.min_iou is not None:
+            return tree
+        return self._thinned(self._with_freeform(tree))
 
     def mended_assembly(self, whole: Assembly) -> tuple[Assembly, float]:
         """Solids that were found by the search, with freeform where they are far off; itself where nothing is

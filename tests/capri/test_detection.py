@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 import trimesh
 
+from partwright.assembly import Assembly, Part
 from partwright.capri import detection
 from partwright.capri import quadric_rows as rows
-from partwright.capri.candidates import CandidatePool, candidates, parting_planes
+from partwright.capri.candidates import CandidatePool, candidates, ending_planes, parting_planes
 from partwright.capri.oriented_points import OrientedPoints, sample_surface
 from partwright.capri.quadric_kinds import KINDS
+from partwright.fields import Cylinder, Revolution
+from partwright.fields.profile import Profile
+from partwright.meshing import mesh_assembly
 from partwright.shapes import load_shape
 from tests.capri.meshes import drilled_plate, tilted_rod
 
@@ -108,6 +112,29 @@ def test_an_arm_that_runs_into_an_eye_may_end_at_its_axis() -> None:
     found, _ = found_on(trimesh.boolean.union([arm, *eyes]))  # 1.8 long: in the unit frame already
     parting = {tuple(np.round(np.abs(row[3:7]), 3)) for row in parting_planes(found)}
     assert parting == {(1.0, 0.0, 0.0, 0.6)}
+
+
+def test_a_pipe_ends_where_it_goes_over_into_its_bend() -> None:
+    """No face shows that either; where flat faces end a hole, there is nothing to add."""
+    half = np.sqrt(0.5)
+    bend = Part(Revolution(Profile.circle(0.15, (0.5, 0.0)), 90.0))
+    pipes = (
+        Part(Cylinder(0.15, 0.8), (0.5, -0.4, 0.0), (half, half, 0.0, 0.0)),
+        Part(Cylinder(0.15, 0.8), (-0.4, 0.5, 0.0), (half, 0.0, half, 0.0)),
+    )
+    shape = load_shape(mesh_assembly(Assembly((bend, *pipes)), 128))
+    drawn = sample_surface(shape, 6000, 0)
+    found = [one for one in detection.detect(drawn, KINDS, 20, 0) if len(one.inliers) > 1500]
+    assert kinds(found) == ["cylinder"] * 2
+    box = [rows.plane(axis, float((drawn.points @ axis).max())) for axis in (*np.eye(3), *-np.eye(3))]
+    ends = ending_planes(found, box, drawn)
+    middle = shape.frame.to_unit(np.zeros((1, 3)))[0]
+    for axis in np.eye(3)[:2]:
+        along = [row for row in ends if abs(row[3:6] @ axis) > 0.99]
+        heights = [-row[6] * (row[3:6] @ axis) for row in along]
+        assert heights == [pytest.approx(middle @ axis, abs=0.09)]  # as wide as the pipe
+    found, drawn = found_on(drilled_plate())
+    assert ending_planes(found, [one.row for one in found], drawn) == []
 
 
 @pytest.mark.parametrize("up", [5, 6, 7])
