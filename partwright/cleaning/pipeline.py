@@ -104,7 +104,7 @@ def clean(
     Args:
         shape: what the assembly stands for, in the same units; the assembly's own surface if not given.
         tolerance: how much further from the shape the surface of any part may come to lie, on average, in
-            own units; half a thousandth of the longest side if not given.
+            own units; half a thousandth of the longest side, or the mesh's noise, if not given.
         cancel: asked before each change, from any thread.
         told: of each step as it begins, in a word.
 
@@ -202,8 +202,9 @@ def _longest(of: Assembly | Shape) -> float:
 def checked_tolerance(tolerance: float | None, of: Assembly | Shape) -> float:
     """The tolerance of cleaning against a shape, or an assembly by itself, in own units; the default if None.
 
-    Below the mesh's own noise nothing can be told, but the default is always allowed: it is a mean over many
-    samples.
+    The default is the mesh's own noise where that is more: what a scan measures to a fifth of a millimetre is
+    no nearer to 4.46 than to 4.5. Below the noise nothing can be told, but half a thousandth of the longest
+    side is always allowed: it is a mean over many samples.
 
     Raises:
         SettingError: it is no positive length, too large, or too small.
@@ -211,7 +212,8 @@ def checked_tolerance(tolerance: float | None, of: Assembly | Shape) -> float:
     longest = _longest(of)
     length = f" {of.unit}" if of.unit else ""
     if tolerance is None:
-        return TOLERANCE * longest
+        noise = roughness(of) / of.frame.scale if isinstance(of, Shape) else 0.0
+        return max(TOLERANCE * longest, noise)
     if not (math.isfinite(tolerance) and 0 < tolerance <= _COARSEST * longest):
         raise SettingError(
             f"clean tolerance {tolerance:g}: expected a length above 0 and at most "

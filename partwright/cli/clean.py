@@ -26,7 +26,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         metavar="X",
         type=float,
         help="how much further from the shape any part may come to lie, on average, in the assembly's units "
-        "(default: half a thousandth of the longest side)",
+        "(default: half a thousandth of the longest side, or the noise of the mesh)",
     )
     command.set_defaults(run="clean")
 

@@ -95,7 +95,7 @@ def _add_finish(group: Group) -> None:
         metavar="X",
         type=float,
         help="how much further from the shape cleaning may move any part, on average, in the shape's units "
-        "(default: half a thousandth of the longest side)",
+        "(default: half a thousandth of the longest side, or the noise of the mesh)",
     )
 
 

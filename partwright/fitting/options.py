@@ -100,7 +100,7 @@ class Clean:
 
     tolerance: float | None = None
     """How much further from the shape any part may come to lie by that, on average, in the shape's units;
-    None: half a thousandth of the longest side."""
+    None: half a thousandth of the longest side, or the mesh's noise where that is more."""
 
     @classmethod
     def of(cls, given: bool | Clean | None) -> Clean | None:
