@@ -1,13 +1,15 @@
-"""Parts of known features as STEP, beside what `detect_primitives` of build123d finds in the same meshes.
+"""Parts of known features as STEP, beside what `detect_primitives` of build123d and CADFit find in the same
+meshes.
 
     python benchmarks/rivals.py --count 8
+    python benchmarks/rivals.py --count 8 --cadfit CHECKOUT --cadfit-python PYTHON
 
 The parts are those of benchmarks/known_features.py, so the faces that were drawn are known: those of the
 STEP file of the drawn part. Ours is a fit of solids at draft quality as a STEP file. `detect_primitives`
 (Apache-2.0) takes a mesh as a solid of triangles and returns analytic faces, planes as rectangles and
 cylinders all around, and the triangles that it leaves; whether all of these sew to a closed, valid solid is
-asked of OpenCASCADE. CADFit is not measured: it is in no package registry, its licence is for research, and
-it needs a trained classifier that is not here.
+asked of OpenCASCADE. CADFit, of which nothing is here (benchmarks/cadfit.py), writes a program, and its solid
+is asked the same. Without a checkout its columns are left out.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from cadfit import Cadfit, cadfit
 from drawn_parts import drawn_part
 from fit import machine
 from step import faces_of
@@ -102,10 +105,14 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--count", type=int, default=8, help="parts, a quarter of each family")
+    parser.add_argument("--cadfit", type=Path, metavar="CHECKOUT", help="run it, too")
+    parser.add_argument("--cadfit-python", type=Path, default=Path(sys.executable), metavar="PYTHON")
+    parser.add_argument("--seconds", type=float, default=2400.0, help="that CADFit has for a part")
     parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results/rivals.md")
     options = parser.parse_args()
     lines: list[str] = []
     rows: list[tuple[int, Ours, Theirs]] = []
+    further: list[tuple[int, Cadfit]] = []
     for number in range(options.count):
         drawn = drawn_part(number)
         mesh = mesh_assembly(drawn.assembly, _SEGMENTS)
@@ -114,19 +121,29 @@ def main() -> int:
             pw.export(drawn.assembly, file)
             faces = sum(faces_of(file)[2].values())
             own, other = ours(mesh, Path(folder)), theirs(mesh, Path(folder))
+            if options.cadfit:
+                python = options.cadfit_python
+                third = cadfit(mesh, Path(folder), options.cadfit, python, options.seconds)
+                further.append((faces, third))
         rows.append((faces, own, other))
         cells = [f"{drawn.family} {number}", str(len(mesh.faces)), str(faces), str(own.faces)]
         cells += ["yes" if own.valid else "no", f"{own.iou:.4f}", f"{own.seconds:.0f}", str(other.faces)]
         cells += [f"{other.left} ({100 * other.left_area:.0f} %)", "yes" if other.solid else "no"]
-        lines.append(f"| {' | '.join([*cells, f'{other.seconds:.0f}'])} |")
+        cells += [f"{other.seconds:.0f}", *(further[-1][1].cells if options.cadfit else [])]
+        lines.append(f"| {' | '.join(cells)} |")
         print(lines[-1], flush=True)
-    write_bytes(options.output, table(rows, lines).encode())
+    write_bytes(options.output, table(rows, further, lines, options.seconds).encode())
     return 0
 
 
-def table(rows: Sequence[tuple[int, Ours, Theirs]], lines: Sequence[str]) -> str:
+def table(
+    rows: Sequence[tuple[int, Ours, Theirs]],
+    further: Sequence[tuple[int, Cadfit]],
+    lines: Sequence[str],
+    limit: float,
+) -> str:
     drawn, own, other = zip(*rows, strict=True)
-    count = len(rows)
+    count, cadfit_ran = len(rows), bool(further)
 
     def mean(values: Iterable[float]) -> float:
         return float(np.mean(list(values)))
@@ -145,13 +162,32 @@ def table(rows: Sequence[tuple[int, Ours, Theirs]], lines: Sequence[str]) -> str
         "it knows no form for stays triangles: where that is no solid, there is no IoU. On average faces",
         f"are off the drawn part's count by {off[0]:.0f} % and {off[1]:.0f} %, triangles left not counted;",
         f"CPU seconds are {mean(o.seconds for o in own):.0f} and {mean(o.seconds for o in other):.0f}.",
-        "CADFit (research licence) was not run: it is in no package registry.",
+        *told(further, limit),
         "",
         "| part | triangles | faces drawn | ours: faces | valid | IoU | CPU s | detect_primitives: faces "
-        "| triangles left (of the area) | solid | CPU s |",
-        "|---|---:|---:|---:|---|---:|---:|---:|---:|---|---:|",
+        "| triangles left (of the area) | solid | CPU s |"
+        + " CADFit: faces | valid | IoU | CPU s |"
+        * cadfit_ran,
+        "|---|---:|---:|---:|---|---:|---:|---:|---:|---|---:|" + "---:|---|---:|---:|" * cadfit_ran,
     ]
     return "\n".join([*head, *lines]) + "\n"
+
+
+def told(further: Sequence[tuple[int, Cadfit]], limit: float) -> list[str]:
+    """What is said of CADFit."""
+    if not further:
+        return ["CADFit was not run."]
+    made = [(faces, one) for faces, one in further if one.faces is not None and one.iou is not None]
+    lines = [
+        "CADFit (CC BY-NC 4.0: run, not copied; one process, its filter of loops off, as it is by default,",
+        f"{limit:.0f} s by the clock a part): {sum(one.valid for _, one in made)} of {len(further)} valid",
+    ]
+    if not made:
+        return [*lines[:-1], f"{lines[-1]}."]
+    off = 100 * np.mean([abs(one.faces / faces - 1) for faces, one in made if one.faces is not None])
+    iou = np.mean([one.iou for _, one in made if one.iou is not None])
+    seconds = np.mean([one.seconds for _, one in made])
+    return [*lines, f"solids; of those IoU {iou:.4f}, faces {off:.0f} % off, {seconds:.0f} CPU s."]
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from manifold3d import Manifold
+from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
 from partwright.meshing.csg import solid_of
@@ -29,18 +30,41 @@ _LITTLE = 2.0  # prices of a feature, that what goes explains at most
 _AROUND = 2 * SEEN  # unit lengths around a feature that are looked at; others matter twice as far
 _FURTHER = 4e-3  # unit lengths, by which what is further off already may be so still more
 _CHORD = 1e-3  # unit lengths
+_TRIES = 5  # times that what is made is looked at
 
 
 def thinned(search: FeatureSearch, tree: FeatureTree, made: Callable[[FeatureTree], Assembly]) -> FeatureTree:
-    """The tree without features that hardly show, those that explain the least first; itself where what is
-    made of it would then be far off, or fall apart.
+    """The tree without features that hardly show, those that explain the least first.
 
-    made: as of `with_freeform`. What is missed and what is too much are left as they were.
+    made: as of `with_freeform`. Where what is made of the tree would be further off than it is, features that
+    lie there stay, and so do some where it would fall apart. What is missed and what is too much are left as
+    they were.
     """
+    gone = _vain(search, tree)
+    if not gone:
+        return tree
+    shape = Solid(search.body, search.samples.measure)
+    bodies = _solid(made(tree)).count
+    for _ in range(_TRIES):
+        thinner = _without(search, tree, gone)
+        result = _solid(made(thinner))
+        off = [place for place in far_places(shape, result) if place.off > tree.off + _FURTHER]
+        if not off and result.count <= bodies:
+            return thinner
+        kept = {i for place in off for i in gone if _reaches(tree.features[i], place.box)}
+        kept = kept or {gone[-1]}
+        gone = [i for i in gone if i not in kept]
+        if not gone:
+            break
+    return tree
+
+
+def _vain(search: FeatureSearch, tree: FeatureTree) -> list[int]:
+    """Features that explain little and hardly show, in the order in which they go."""
     features = tree.features
     masks = [mask_of(feature, search.points) for feature in features]
     bodies = _Bodies(search, features)
-    kept = list(range(len(features)))
+    kept, gone = list(range(len(features))), list[int]()
     needed = {0}
 
     def loss(index: int) -> float:
@@ -51,28 +75,32 @@ def thinned(search: FeatureSearch, tree: FeatureTree, made: Callable[[FeatureTre
         losses = {i: loss(i) for i in kept if i not in needed}
         least = min(losses, key=losses.__getitem__, default=None)
         if least is None or losses[least] > _LITTLE * search.price(features[least].sides):
-            break
+            return gone
         left = [k for k in kept if k != least]
         before, after = (bodies.off(some, features[least]) for some in (kept, left))
         if after > max(SEEN, before + _FURTHER):
             needed.add(least)
         else:
             kept = left
-    if len(kept) == len(features):
-        return tree
-    gone = sum(search.price(features[k].sides) for k in range(len(features)) if k not in kept)
-    thinner = replace(
-        tree,
-        features=[features[k] for k in kept],
-        covered=fold_of_masks(tree, masks, kept),
-        score=score,
-        price=tree.price - gone,
-        steps=(),
-    )
-    shape = Solid(search.body, search.samples.measure)
-    given, result = (Solid(solid_of(whole, _CHORD), whole.distance) for whole in map(made, (tree, thinner)))
-    off = max((place.off for place in far_places(shape, result)), default=0.0)
-    return thinner if off <= tree.off + _FURTHER and result.count <= given.count else tree
+            gone.append(least)
+
+
+def _without(search: FeatureSearch, tree: FeatureTree, gone: Sequence[int]) -> FeatureTree:
+    features = [feature for i, feature in enumerate(tree.features) if i not in gone]
+    price = tree.price - sum(search.price(tree.features[i].sides) for i in gone)
+    thinner = replace(tree, features=features, price=price, steps=())
+    covered = thinner.at(search.points)
+    return replace(thinner, covered=covered, score=search.score_of(covered))
+
+
+def _reaches(feature: Feature, box: NDArray[np.float64]) -> bool:
+    """Whether a feature, or a copy of it, comes near to a box (2, 3)."""
+    ends = [copy.bounds() for part in feature.parts for copy in part.copies]
+    return any((low - _AROUND < box[1]).all() and (high + _AROUND > box[0]).all() for low, high in ends)
+
+
+def _solid(whole: Assembly) -> Solid:
+    return Solid(solid_of(whole, _CHORD), whole.distance)
 
 
 class _Bodies:

@@ -62,3 +62,11 @@ def test_a_keyway_stays_and_so_does_what_explains_much() -> None:
 def test_of_two_that_stand_for_one_another_one_goes() -> None:
     boss, again = Part(Cylinder(0.2, 0.6), (0.3, 0.0, 0.2)), Part(Cylinder(0.2, 0.6), (0.303, 0.0, 0.2))
     assert len(left([*BASE, (again, True), (boss, True)], Assembly((PLATE, POST, boss)), 1.0)) == 3
+
+
+def test_what_holds_a_body_together_stays() -> None:
+    """The slit that it bridges is narrower than what shows."""
+    halves = [Part(Box((0.895, 1.0, 0.3)), (x, 0.0, 0.0)) for x in (-0.4525, 0.4525)]
+    web = Part(Box((0.1, 0.3, 0.1)))
+    whole = Assembly((*halves, web))
+    assert left([(halves[0], True), (halves[1], True), (web, True)], whole, 1.5) == [*halves, web]
