@@ -8,8 +8,8 @@ pictures of the inputs and is one person's view. A fillet inside a corner is two
 corner, and the cylinder that is taken out of it again), a rounded corner outside at least one; a bend is no
 quadric, so it is cut into slices that a cylinder stands for.
 
-For the other parts each feature that `--method solids` finds counts as one convex. That is less than they
-need: an outline that is not convex is one feature and several convexes. Read from
+For the other parts each feature that `--method solids` finds counts as one convex. That is less than these
+features need, as an outline that is not convex is several convexes, but a person may draw fewer. Read from
 benchmarks/results/solids.csv and capri.csv, so that both are as measured.
 """
 
@@ -112,7 +112,7 @@ def table(searched: dict[str, float], excess: dict[str, float], features: dict[s
         f"- Ten parts by hand: {mean(hand.values()):.1f} on average; the search finds "
         f"{mean(searched[name] for name in hand):.1f} (repeats of one direction once).",
         f"- The other {len(others)} with one convex a feature that `--method solids` finds, which is less "
-        f"than they need: {mean(least[name] for name in others):.1f}; the search finds "
+        f"than these need: {mean(least[name] for name in others):.1f}; the search finds "
         f"{mean(searched[name] for name in others):.1f}.",
         f"- All {len(least)} so: {mean(least.values()):.1f}; the search finds {mean(searched.values()):.1f}.",
         "",
