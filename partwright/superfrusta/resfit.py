@@ -8,18 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
 from partwright.assembly import Assembly
-from partwright.errors import CancelledError
 from partwright.methods import Checkpoint, Outcome, Progress, timed
 from partwright.shapes import Shape
-from partwright.superfrusta.growing import carve, grow
-from partwright.superfrusta.hollows import with_hollows_filled
-from partwright.superfrusta.hull_start import convex_hull_start
+from partwright.superfrusta.carving import Carving
+from partwright.superfrusta.frontier import Frontier
+from partwright.superfrusta.growing import grow
 from partwright.superfrusta.mending import Mending
 from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
@@ -36,11 +35,8 @@ from partwright.superfrusta.symmetry import symmetries
 # In growth, parts need only pay this; the settings' alpha decides when the assembly is thinned out.
 GROWTH_ALPHA = 1e-3
 PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
-_OPENING = 4  # rounds
-_GOOD = 0.93  # of the objective at a usual price: what is worse is tried again with parts to subtract
-_WORTH_CUTS = 0.01  # of the objective that such an attempt must gain, for it is the harder to edit
-_BEHIND = 0.06  # of the objective: what is so far behind
-_ROUNDS_BEHIND = 6  # after so many rounds is given up
+_TRAILING = 0.03  # of the objective, at the same number of parts: what is so far behind is given up
+_HOPELESS = 0.06  # of the objective: what lacks more when it is grown gains too little by being thinned
 MENDED = 0.9  # of the work is done when mending begins
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
 
@@ -51,7 +47,8 @@ class ResidualFit:
     `locked` never change.
 
     report: told of each step. assembled: makes the assembly of rows. rival: the objective that an attempt to
-    carve must reach to be kept. furthest: that progress was told. unmended: the best before it was mended.
+    carve must reach to be kept. reached: what this attempt has by growth; reached_before: what those before
+    it had. furthest: that progress was told. unmended: the best before it was mended.
     """
 
     samples: FitSamples
@@ -63,6 +60,8 @@ class ResidualFit:
     best: Rows | None = None
     best_objective: float = -np.inf
     rival: float | None = None
+    reached: Frontier = field(default_factory=Frontier)
+    reached_before: Frontier = field(default_factory=Frontier)
     furthest: float = 0.0
     earlier: Rows | None = None
     unmended: Rows | None = None
@@ -70,6 +69,11 @@ class ResidualFit:
     history: list[dict[str, float | str]] = field(default_factory=list)
     curve: list[Step] = field(default_factory=list)
     leaves: list[RepeatedPart] = field(default_factory=list)
+
+    def another(self, settings: Settings, locked: int | None = None) -> ResidualFit:
+        """A search of its own, by the same samples, for a part of this one's work."""
+        locked = self.locked if locked is None else locked
+        return ResidualFit(self.samples, settings, locked=locked, seconds=self.seconds)
 
     def timed(self, stage: str) -> AbstractContextManager[None]:
         return timed(self.seconds, stage)
@@ -81,9 +85,8 @@ class ResidualFit:
     def grown(self, start: Rows = NOTHING) -> bool:
         """One growth, by parts to add and then to subtract, and mended; says whether what is kept of it
         converged."""
-        converged = self.attempt(start)
-        if self.best is not None and not len(start):
-            converged = self.carved() and converged
+        carving = Carving(self)
+        converged = carving.contest() if carving.allowed and not len(start) else self.attempt(start)
         if self.best is not None:
             self.unmended = self.best
             if self.mending:
@@ -109,99 +112,30 @@ class ResidualFit:
             return "budget_reached"
         return "converged" if converged else "budget_reached"
 
-    def attempt(self, start: Rows) -> bool:
-        """Grown and thinned out from the start, beside an earlier attempt; says whether growth converged."""
+    def attempt(self, start: Rows, first: int = 0) -> bool:
+        """Grown from the start, from round `first` on, and thinned out, beside an earlier attempt; says
+        whether growth converged."""
         if self.best is not None:
             self.earlier = self.best
             self.best, self.best_objective = None, -np.inf
+            self.reached_before.rounds += self.reached.rounds
+            self.reached = Frontier()
         if self.settings.subtract and not len(start) and self.rival is None:
-            start = self.opening()
-        rows, converged = self.growth(start)
-        if self.outdone(self.settings.rounds):
-            return converged
+            start = Carving(self).started()
+        rows, converged = self.growth(start, range(first, self.settings.rounds))
+        hopeless = self.rival is not None and self.best_objective < self.rival - _HOPELESS
+        if not hopeless and not self.trailing:
+            self.thin(rows)
+        return converged
+
+    def thin(self, rows: Rows) -> None:
+        """Thinned out as often as the settings say, and grown again in between."""
         for cycle in range(self.settings.cycles if self.best is not None else 0):
             rows = self.thinning(rows)
             if not self.keep(rows, "thin", cycle + 1) and cycle:
                 break
             if cycle + 1 < self.settings.cycles:
                 rows = self.regrowth(rows)
-        return converged
-
-    def opening(self) -> Rows:
-        """A few rounds from nothing and from bodies to carve from; whichever gets furthest."""
-        brief = replace(self.settings, rounds=min(_OPENING, self.settings.rounds))
-        tried: list[Rows] = []
-        for start in (NOTHING, convex_hull_start(self.samples, self.settings), self.hollowed(brief)):
-            if tried and not len(start):
-                continue
-            opening = ResidualFit(self.samples, brief, locked=self.locked, seconds=self.seconds)
-            try:
-                opening.growth(start)
-            except CancelledError:
-                found = tried if opening.best is None else [*tried, opening.best]
-                self.best = max(found, key=self.objective, default=self.best)
-                raise
-            self.samples = opening.samples
-            if opening.best is not None:
-                tried.append(opening.best)
-        return max(tried, key=self.objective) if tried else NOTHING
-
-    def hollowed(self, settings: Settings) -> Rows:
-        """The body that fits the shape with its hollows filled, and what is taken out of it; nothing where
-        there are none."""
-        filled = with_hollows_filled(self.samples)
-        if filled is None:
-            return NOTHING
-        plain = replace(settings, subtract=False, rounds=min(_OPENING, settings.rounds))
-        full = ResidualFit(filled, plain, seconds=self.seconds)
-        full.growth(NOTHING)
-        if full.best is None:
-            return NOTHING
-        body = full.thinning(full.best)
-        with self.timed("grow"):
-            cuts = carve(self.samples, body, settings, settings.regions)
-        return cuts.joined(body, 0)
-
-    @property
-    def may_carve(self) -> bool:
-        settings = self.settings
-        return settings.subtract is None and settings.carving and settings.rounds >= _ROUNDS_BEHIND
-
-    def carved(self) -> bool:
-        """Attempts with parts to subtract, where the shape may have holes or be hollow: from nothing, and
-        from the body that is hollowed out; says whether the growth of what is kept converged.
-
-        What they make of other shapes is worse or takes more parts, and is left as soon as that shows.
-        """
-        if not self.may_carve:
-            return True
-        settings, converged = self.settings, True
-        carving = replace(settings, subtract=True, regions=max(1, settings.regions - 2))
-        for hollow in (False, True):
-            assert self.best is not None
-            usual = self.best_objective + (settings.price - Settings().alpha) * len(self.best)
-            if usual > _GOOD:
-                break
-            start = self.hollowed(carving) if hollow else NOTHING
-            if len(start) or not hollow:
-                converged = self.carved_from(start, carving) and converged
-        return converged
-
-    def carved_from(self, start: Rows, carving: Settings) -> bool:
-        """One such attempt, kept if it is clearly better; says whether the growth of what is kept
-        converged."""
-        settings, self.settings = self.settings, carving
-        self.rival = self.best_objective + (0.0 if settings.subtract else _WORTH_CUTS)
-        whole, converged = self.best, True
-        try:
-            converged = self.attempt(start)
-        finally:
-            if self.best_objective < self.rival:
-                self.best = None
-            self.choose()
-            if self.best is whole:
-                self.settings = settings
-        return converged or self.best is whole
 
     def choose(self) -> None:
         """Goes back to the earlier attempts' best where this one's is no better."""
@@ -212,15 +146,17 @@ class ResidualFit:
         if latest is not None and self.better(latest):
             self.best, self.best_objective = latest, self.objective(latest)
 
-    def growth(self, rows: Rows) -> tuple[Rows, bool]:
-        """Rounds of growing until the objective saturates; returns the last rows and whether it did."""
+    def growth(self, rows: Rows, rounds: range | None = None) -> tuple[Rows, bool]:
+        """Rounds of growing until the objective saturates, all or these; returns the last rows and whether it
+        did."""
         settings = self.settings
-        if len(rows):
+        rounds = range(settings.rounds) if rounds is None else rounds
+        if len(rows) and self.best is None:
             with self.timed("optimise"):
                 rows = optimise(self.samples, rows, FINE, settings, self.locked)
             self.keep(rows, "start", 0)
         stale = 0
-        for round_ in range(settings.rounds):
+        for round_ in rounds:
             with self.timed("grow"):
                 most = settings.at_once(round_, settings.regions)
                 new = grow(self.samples, rows, settings, most)
@@ -232,16 +168,22 @@ class ResidualFit:
             with self.timed("prune"):
                 rows = prune(self.samples, rows, min(GROWTH_ALPHA, settings.price), self.locked)
             stale = 0 if self.keep(rows, "grow", round_ + 1) else stale + 1
-            if stale >= settings.patience or self.outdone(round_):
+            if stale >= settings.patience or self.trailing:
                 return rows, True
             if settings.min_iou is not None and volume_iou(self.samples, rows) > settings.min_iou + _SPARE:
                 return rows, True
         return rows, False
 
-    def outdone(self, round_: int) -> bool:
-        """Whether this attempt stays too far behind the other for more rounds to help."""
-        behind = self.rival is not None and self.best_objective < self.rival - _BEHIND
-        return behind and round_ + 1 >= _ROUNDS_BEHIND
+    @property
+    def trailing(self) -> bool:
+        """Whether this attempt is so far behind those before it that more rounds are no help."""
+        if self.best is None:
+            return False
+        return self.is_behind(self.reached_before.lead(len(self.best), self.best_objective))
+
+    @staticmethod
+    def is_behind(lead: float) -> bool:
+        return lead < -_TRAILING
 
     def thinning(self, rows: Rows) -> Rows:
         """Merges and removes parts while the objective, the part budget or the target asks for it."""
@@ -337,10 +279,12 @@ class ResidualFit:
         progressed = objective > self.best_objective + PROGRESS
         if self.better(rows):
             self.best, self.best_objective = rows, objective
+        if stage == "grow":
+            self.reached.add(len(rows), objective)
         total = settings.rounds + settings.cycles
         done = min(1.0, (settings.rounds + round_ if stage == "thin" else round_) / total)
         carved = self.rival is not None
-        attempts = 1 + (self.may_carve or carved)
+        attempts = 1 + (Carving(self).allowed or carved)
         fraction = (carved + done) / attempts * (MENDED if self.mending else 1.0)
         self.report_progress(stage, round_, rows, fraction)
         return progressed
@@ -350,10 +294,14 @@ class ResidualFit:
         samples = self.samples.with_stray_samples(rows)
         if samples is self.samples:
             return False
+        self.take_samples(samples)
+        return True
+
+    def take_samples(self, samples: FitSamples) -> None:
+        """Goes on with other samples, by which the best is scored anew."""
         self.samples = samples
         if self.best is not None:
             self.best_objective = self.objective(self.best)
-        return True
 
     def objective(self, rows: Rows, parts: int | None = None) -> float:
         """parts: to be paid for, if not all rows are."""

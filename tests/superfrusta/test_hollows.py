@@ -11,7 +11,8 @@ from partwright.errors import CancelledError
 from partwright.fields.columns import Column
 from partwright.methods import Run
 from partwright.shapes import load_shape
-from partwright.superfrusta import resfit
+from partwright.superfrusta import carving
+from partwright.superfrusta.carving import Carving
 from partwright.superfrusta.hollows import hollows, with_hollows_filled
 from partwright.superfrusta.objective import volume_iou
 from partwright.superfrusta.resfit import ResidualFit
@@ -79,7 +80,7 @@ def test_the_filled_tray_is_the_box_it_was_cut_from() -> None:
 @pytest.mark.parametrize(("mesh", "parts"), [(tray(), 3), (bend(), 4)], ids=["tray", "bend"])
 def test_a_hollow_body_is_a_body_and_what_is_taken_out(mesh: trimesh.Trimesh, parts: int) -> None:
     samples = of(mesh)
-    rows = ResidualFit(samples, SETTINGS).hollowed(SETTINGS)
+    rows = Carving(ResidualFit(samples, SETTINGS)).hollowed(SETTINGS)
     assert 1 <= len(rows) <= parts
     assert (rows[:, Column.SIGN] < 0).any() or len(rows) == 1  # or one with a hole of its own
     assert volume_iou(samples, rows) > 0.75
@@ -97,12 +98,12 @@ def test_an_interruption_while_the_body_is_sought_keeps_what_was_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     fit = ResidualFit(of(tray()), SETTINGS)
-    monkeypatch.setattr(resfit, "_GOOD", 2.0)
+    monkeypatch.setattr(carving, "_GOOD", 2.0)
 
     def cancelled(_: FitSamples) -> None:
         raise CancelledError("stop")
 
-    monkeypatch.setattr(resfit, "with_hollows_filled", cancelled)
+    monkeypatch.setattr(carving, "with_hollows_filled", cancelled)
     with pytest.raises(CancelledError):
         fit.run()
     assert fit.best is not None

@@ -12,7 +12,8 @@ from partwright.methods import Cancellation, FitRequest, Fitted, Progress, Run
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import iou
 from partwright.shapes import Shape, load_shape
-from partwright.superfrusta import Settings, resfit
+from partwright.superfrusta import Settings, carving
+from partwright.superfrusta.carving import Carving
 from partwright.superfrusta.fit import fit
 from partwright.superfrusta.flat_tree import flattened
 from partwright.superfrusta.outcome import Step, chosen
@@ -219,8 +220,8 @@ def test_an_attempt_to_carve_that_does_not_pay_changes_nothing(
     search = ResidualFit(samples, settings)
     search.attempt(NOTHING)
     best, objective = search.best, search.best_objective
-    monkeypatch.setattr(resfit, "_GOOD", 1.0)  # so that it is tried although the table is whole
-    assert search.carved()
+    monkeypatch.setattr(carving, "_GOOD", 1.0)  # so that it is tried although the table is whole
+    assert Carving(search).tried()
     assert search.rival is not None
     assert search.best is best
     assert (search.best_objective, search.settings) == (objective, settings)
@@ -232,7 +233,7 @@ def test_an_interruption_while_carving_keeps_what_was_there() -> None:
 
     def stop(step: Progress) -> None:
         seen.append(step.fraction)
-        if step.fraction > 0.5:
+        if step.fraction >= 0.5:  # the opening that subtracts is gone on with
             cancel.request()
 
     shape = load_shape(drilled_block())

@@ -1,0 +1,49 @@
+"""Growth that subtracts beside growth that adds: which of them is gone on with, and when."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from partwright.methods import Run
+from partwright.shapes import Shape, load_shape
+from partwright.superfrusta import Settings, carving
+from partwright.superfrusta.carving import Carving
+from partwright.superfrusta.objective import volume_iou
+from partwright.superfrusta.resfit import ResidualFit
+from partwright.superfrusta.samples import NOTHING, FitSamples
+from tests.superfrusta.meshes import drilled_block, table
+
+SETTINGS = Settings(near=8000, uniform=8000, resolution=64, mends=0, symmetry=False)
+
+
+def search_of(shape: Shape) -> ResidualFit:
+    return ResidualFit(FitSamples.of(shape, SETTINGS, Run(threads=1)), SETTINGS)
+
+
+def rounds_that_add(search: ResidualFit) -> int:
+    """Rounds of growth before an attempt that subtracts was gone on with, all of them where none was."""
+    stages = [step["stage"] for step in search.history]
+    return stages[: stages.index("start") if "start" in stages else None].count("grow")
+
+
+def test_what_leads_by_far_is_gone_on_with_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    leading, sceptical = search_of(load_shape(drilled_block())), search_of(load_shape(drilled_block()))
+    leading.run()
+    assert rounds_that_add(leading) == 2
+    assert leading.best is not None
+    assert volume_iou(leading.samples, leading.best) > 0.98
+    monkeypatch.setattr(carving, "_TELLING", 2.0)
+    sceptical.run()
+    assert rounds_that_add(sceptical) > 2
+
+
+def test_what_is_far_behind_with_as_many_parts_is_not_gone_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = search_of(load_shape(table()))
+    search.attempt(NOTHING)
+    monkeypatch.setattr(carving, "_GOOD", 2.0)  # so that it would be tried although the table is whole
+    cut = np.repeat(Carving(search).opened(), 2, axis=0)  # enough parts to tell
+    told = len(search.history)
+    search.reached.add(1, 2.0)
+    assert Carving(search).tried(cut)
+    assert len(search.history) == told
