@@ -35,10 +35,6 @@ void solve(const Square& l, const double* b, double* x) {
   }
 }
 
-// Of the loss: where a step gains less, a stage ends. At a tenth of it a fit takes a quarter longer, and explains no
-// more.
-constexpr double ENOUGH = 1e-3;
-
 // Diagonal damping that keeps parameters without influence in place.
 constexpr double FLOOR = 1e-3;
 
@@ -224,7 +220,7 @@ Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& fr
       }
       ++out.iterations;
       if (!accepted) break;
-      if (iteration + 1 == stage.iterations || gain < ENOUGH) {
+      if (iteration + 1 == stage.iterations || gain < 1e-4) {
         system.loss *= 1 - gain;
         break;
       }

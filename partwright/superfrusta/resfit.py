@@ -35,7 +35,7 @@ from partwright.superfrusta.symmetry import symmetries
 # In growth, parts need only pay this; the settings' alpha decides when the assembly is thinned out.
 GROWTH_ALPHA = 1e-3
 PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
-_TRAILING = 0.03  # of the objective, at the same number of parts: what is so far behind is given up
+_TRAILING = 0.05  # of the objective, at the same number of parts: what is so far behind is given up
 _HOPELESS = 0.06  # of the objective: what lacks more when it is grown gains too little by being thinned
 MENDED = 0.9  # of the work is done when mending begins
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
