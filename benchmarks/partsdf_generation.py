@@ -82,7 +82,8 @@ def generation(arguments: argparse.Namespace) -> None:
         "training shapes do and both are there. New: the median of the mean difference of clamped distances "
         "to the nearest training shape, x1e4, and the least. Training shapes are drawn once each, as far as "
         "they go; nearest: the training shape that is "
-        "nearest to each held-out one, so that one may come several times.", "",
+        "nearest to each held-out one, so that one may come several times; decoded: "
+        "what the model has for them.", "",
         command_line(), "",
         "| | MMD-CD x1e4 | COV-CD % | 1-NNA % | by part: MMD x1e4 | COV % | touch % | new, median | least | "
         "failed | s a sample |",
@@ -100,6 +101,7 @@ def generation(arguments: argparse.Namespace) -> None:
         shapes = [training[i] for i in rows]
         say(row(label, shapes, held, Distances.of(shapes, real), [], 0, 0.0))
     for label, make in (
+        ("training shapes, decoded", lambda: [NeuralShape.trained(model, model.shapes[i]) for i in drawn]),
         ("Gaussian", lambda: gaussian_samples(model, count, arguments.seed)),
         ("diffusion", lambda: load_generator(model).generate(count, arguments.seed)),
     ):

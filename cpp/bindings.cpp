@@ -1,5 +1,5 @@
 // The Python face of the kernel. Arguments are checked by its callers: fields/kernel.py, fields/profile_distance.py,
-// meshing/hulls.py, approximation/half_space.py.
+// meshing/hulls.py, approximation/half_space.py, partsdf/part_networks.py.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
@@ -12,6 +12,7 @@
 #include "morphology.hpp"
 #include "normal_equations.hpp"
 #include "optimise.hpp"
+#include "part_networks.hpp"
 #include "profile.hpp"
 
 namespace nb = nanobind;
@@ -50,6 +51,16 @@ std::vector<char> flags(const In<uint8_t>& a) { return std::vector<char>(a.data(
 Samples samples_of(const In<float>& points, const In<float>& distance, const In<float>& weight, const In<float>& background) {
   return {points.data(), distance.data(), weight.data(), background.size() ? background.data() : nullptr,
           int64_t(points.shape(0))};
+}
+
+Networks networks_of(const std::vector<In<float>>& weights, const std::vector<In<float>>& shifts) {
+  Networks networks{int64_t(weights.front().shape(0)), {int(weights.front().shape(1))}, {}, {}};
+  for (size_t l = 0; l < weights.size(); ++l) {
+    networks.widths.push_back(int(weights[l].shape(2)));
+    networks.weights.push_back(weights[l].data());
+    networks.shifts.push_back(shifts[l].data());
+  }
+  return networks;
 }
 
 std::vector<Stage> stages_of(const In<float>& a) {
@@ -254,4 +265,37 @@ NB_MODULE(_kernel, m) {
     return out;
   }, "vertices"_a, "faces"_a, "areas"_a, "normal"_a, "offsets"_a,
      "Volume (K,) of a solid beyond each of parallel planes.");
+
+  m.def("networks_distances", [](In<float> local, std::vector<In<float>> weights, std::vector<In<float>> shifts, In<float> scale,
+                                 In<float> room, In<float> unit, float reach, int octaves, int threads) {
+    auto out = array<float>({local.shape(0), local.shape(1)});
+    const Networks networks = networks_of(weights, shifts);
+    const Rooms rooms{scale.data(), room.data(), unit.data(), reach, octaves};
+    nb::gil_scoped_release release;
+    distances(networks, rooms, local.data(), int64_t(local.shape(1)), out.data(), threads);
+    return out;
+  }, "local"_a, "weights"_a, "shifts"_a, "scale"_a, "room"_a, "unit"_a, "reach"_a, "octaves"_a, "threads"_a,
+     "Distances (G, N) at local points (G, N, 3) of parts (G, 3): of their networks near their rooms, else of these.");
+
+  m.def("networks_gradients", [](In<float> local, std::vector<In<float>> weights, std::vector<In<float>> shifts, In<float> scale,
+                                 In<float> room, In<float> unit, float reach, int octaves, In<float> upstream, int threads) {
+    auto by_local = array<float>({local.shape(0), local.shape(1), 3}), by_scale = array<float>({local.shape(0), 3});
+    std::vector<Out<float>> by_weight, by_shift;
+    std::vector<float*> weight_places, shift_places;
+    for (size_t l = 0; l < weights.size(); ++l) {
+      by_weight.push_back(array<float>({weights[l].shape(0), weights[l].shape(1), weights[l].shape(2)}));
+      by_shift.push_back(array<float>({shifts[l].shape(0), shifts[l].shape(1)}));
+      weight_places.push_back(by_weight.back().data());
+      shift_places.push_back(by_shift.back().data());
+    }
+    {
+      const Networks networks = networks_of(weights, shifts);
+      const Rooms rooms{scale.data(), room.data(), unit.data(), reach, octaves};
+      nb::gil_scoped_release release;
+      distance_gradients(networks, rooms, local.data(), int64_t(local.shape(1)), upstream.data(), by_local.data(),
+                         by_scale.data(), weight_places, shift_places, threads);
+    }
+    return nb::make_tuple(by_local, by_scale, by_weight, by_shift);
+  }, "local"_a, "weights"_a, "shifts"_a, "scale"_a, "room"_a, "unit"_a, "reach"_a, "octaves"_a, "upstream"_a, "threads"_a,
+     "Derivatives of sum(upstream * distances) by local points, half-lengths, and each layer's weights and shifts.");
 }

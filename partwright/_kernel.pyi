@@ -76,3 +76,11 @@ def profile_gradients(
 def convex_hull(points: _D, plain: bool) -> tuple[_I, float]: ...
 def split_hull_volumes(vertices: _D, faces: _I, edges: _I, planes: _D, slack: float) -> _D: ...
 def volumes_beyond(vertices: _D, faces: _I, areas: _D, normal: _D, offsets: _D) -> _D: ...
+def networks_distances(
+    local: _F, weights: list[_F], shifts: list[_F], scale: _F, room: _F, unit: _F, reach: float, octaves: int,
+    threads: int,
+) -> _F: ...  # fmt: skip
+def networks_gradients(
+    local: _F, weights: list[_F], shifts: list[_F], scale: _F, room: _F, unit: _F, reach: float, octaves: int,
+    upstream: _F, threads: int,
+) -> tuple[_F, _F, list[_F], list[_F]]: ...  # fmt: skip

@@ -42,7 +42,9 @@ def is_joint(node: Node) -> TypeGuard[JointPart]:
 def _among(part: JointPart, parts: list[JointPart], shared: dict[Any, Any]) -> Part:
     back = part.pose.inverse()
     seen = [(other.field, back @ other.pose) for other in parts]
-    members = [Member(field, pose.translation, pose.rotation) for field, pose in seen]
+    members = tuple(Member(field, pose.translation, pose.rotation) for field, pose in seen)
+    if members == part.field.members:  # what it remembers of the shape still holds
+        return part
     return dataclasses.replace(part, field=part.field.among(members, shared))
 
 

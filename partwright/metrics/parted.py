@@ -34,10 +34,15 @@ def joint_owners(
     A point inside the whole belongs to the part whose surface is nearest, so parts need not be closed. Cells
     are as long as the box wants along each axis. Both (R, R, R).
     """
+    lower, size = joint_box(first, second)
+    return owners_in(first, lower, size, resolution), owners_in(second, lower, size, resolution)
+
+
+def joint_box(first: PartedSurface, second: PartedSurface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower corner (3,) and sides (3,) of the box around both."""
     corners = [np.asarray(s.vertices, dtype=np.float64)[np.unique(s.faces)] for s in (first, second)]
     both = np.concatenate(corners)
-    lower, size = both.min(axis=0), np.maximum(np.ptp(both, axis=0), np.finfo(np.float32).eps)
-    return owners_in(first, lower, size, resolution), owners_in(second, lower, size, resolution)
+    return both.min(axis=0), np.maximum(np.ptp(both, axis=0), np.finfo(np.float32).eps)
 
 
 def owners_in(
@@ -61,6 +66,28 @@ def owners_in(
     nearest, _ = MeshDistance(vertices, faces, faces, closed).nearest(places)
     owner[inside] = np.asarray(surface.label, dtype=np.int64)[nearest]
     return owner
+
+
+def undecided(
+    surface: PartedSurface, owner: NDArray[np.int64], lower: NDArray[np.float64], size: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(R, R, R): cells owned (R, R, R) by a part to which another part's surface is as near, to half a cell.
+
+    Where parts meet in an edge that is bent inwards, a leg under a seat say, all that lies behind the edge
+    (above the leg) is nearest to the edge itself, which is both parts'. Which of them owns it is chance.
+    """
+    vertices = np.asarray(surface.vertices, dtype=np.float64)
+    faces, label = np.asarray(surface.faces, dtype=np.int64), np.asarray(surface.label, dtype=np.int64)
+    tied = np.zeros(owner.shape, dtype=bool)
+    resolution, tolerance = owner.shape[0], 0.5 * float(size.max()) / owner.shape[0]
+    for part in np.setdiff1d(np.unique(owner), [OUTSIDE]):
+        mine = owner == part
+        places = lower + (np.argwhere(mine) + 0.5) * (size / resolution)
+        own, others = faces[label == part], faces[label != part]
+        if len(others):
+            near, far = (MeshDistance(vertices, f, f, closed=False).unsigned(places) for f in (own, others))
+            tied[mine] = far - near <= tolerance
+    return tied
 
 
 def whole_iou(first: NDArray[np.int64], second: NDArray[np.int64]) -> float:

@@ -8,6 +8,7 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.similarity import quaternion_product
 from partwright.errors import SettingError
 from partwright.partsdf.field import NeuralField
+from partwright.partsdf.meshing import Surfaces
 from partwright.partsdf.neural import NeuralShape
 from partwright.shapes import UnitFrame
 
@@ -52,6 +53,13 @@ def to_assembly(
     return Assembly(
         tuple(parts), unit=unit, up=up, metadata=metadata | ({"source": source} if source else {})
     )
+
+
+def remember_meshes(assembly: Assembly, surfaces: Surfaces) -> None:
+    """Of what `to_assembly` made: exports as fine as these mesh its parts no second time."""
+    first = assembly.parts[0].field if assembly.parts else None
+    if isinstance(first, NeuralField):
+        first.remember(surfaces)
 
 
 def from_assembly(assembly: Assembly) -> tuple[NeuralShape, UnitFrame, Quaternion]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -18,7 +18,7 @@ from partwright.errors import NoSurfaceError, ParameterError, SettingError
 from partwright.fields.base import LARGEST, number, scale_lengths, vector
 from partwright.fields.joint import JointField, Member
 from partwright.fields.operations import is_tensor
-from partwright.partsdf.meshing import mesh_shape, resolution_for_wall
+from partwright.partsdf.meshing import Surfaces, mesh_shape, resolution_for_wall
 from partwright.partsdf.model import Model, find_model
 from partwright.partsdf.neural import NeuralShape
 
@@ -33,7 +33,8 @@ _BOX_CELLS = 12
 _COARSE, _PREVIEWED = 64, 128  # cells along the whole shape of a mesh that is only looked at
 # Two frames are one if these places, unit lengths, are that near to one another in both.
 _MARKS, _SAME = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), 1e-3
-_FINER = 3  # times the cells along one part are those along the whole shape
+# Times the cells along one part are those along the whole shape: an export's 32 are the 128 of a whole.
+_FINER = 4
 
 
 @dataclass(frozen=True)
@@ -96,9 +97,16 @@ class NeuralField(JointField):
         return self.network.lipschitz
 
     @cached_property
-    def _shared(self) -> dict[object, tuple[str, dict[str, Any]]]:
-        """The members' meshes of a resolution, and in whose frame they are."""
+    def _shared(self) -> dict[Any, Any]:
+        """The members' meshes by cells along the unit frame, and in whose frame they are; "thinnest"."""
         return {}
+
+    @property
+    def _thinnest(self) -> float:
+        """The wall of the thinnest member, unit frame; looked for once."""
+        if "thinnest" not in self._shared:
+            self._shared["thinnest"] = self.shape.thinnest
+        return float(self._shared["thinnest"])
 
     @cached_property
     def wall(self) -> float:
@@ -106,28 +114,31 @@ class NeuralField(JointField):
 
     def surface(self, resolution: int) -> trimesh.Trimesh:
         """All members are meshed in one pass when the first is asked for, since each point that is decoded
-        tells of them all. The cells are those of the whole shape: three times as many along [-1, 1] as are
+        tells of them all. The cells are those of the whole shape: four times as many along [-1, 1] as are
         asked for along one part, or more where one is thin.
         """
-        return self._mesh(resolution, lambda walls: resolution_for_wall(walls, _FINER * resolution))
+        return self._mesh(resolution_for_wall(self._thinnest, _FINER * resolution))
 
     def preview(self) -> trimesh.Trimesh:
-        return self._mesh("preview", lambda walls: min(resolution_for_wall(walls, _COARSE), _PREVIEWED))
+        return self._mesh(min(resolution_for_wall(self._thinnest, _COARSE), _PREVIEWED))
 
     def whole(self, cell: float) -> trimesh.Trimesh | None:
         if self.network.config.decoder.aggregation != "min":  # a union is another shape than the model's
             return None
         shape = self.shape
-        cells = resolution_for_wall(float(shape.walls().min(initial=np.inf)), 2 * self.unit / cell)
+        cells = resolution_for_wall(self._thinnest, 2 * self.unit / cell)
         mesh = mesh_shape(shape, cells, parts=False).whole
         mesh.vertices = self.unit_frame(self.unit * mesh.vertices)
         return mesh
 
-    def _mesh(self, key: object, cells: Callable[[float], int]) -> trimesh.Trimesh:
-        """cells: along the unit frame, by the thinnest wall of the shape in its lengths."""
-        if key not in self._shared:
-            self._shared[key] = self.part, self._surfaces(cells)
-        maker, meshes = self._shared[key]
+    def _mesh(self, cells: int) -> trimesh.Trimesh:
+        """cells: along the unit frame."""
+        if cells not in self._shared:
+            try:
+                self.remember(mesh_shape(self.shape, cells))
+            except NoSurfaceError:
+                self._shared[cells] = self.part, {}
+        maker, meshes = self._shared[cells]
         if self.part not in meshes:
             raise NoSurfaceError(
                 f"the part {self.part} of {self.model} has no surface, or it is thinner than a cell"
@@ -138,16 +149,12 @@ class NeuralField(JointField):
             mesh.vertices = Similarity(1.0, seen.rotation, seen.translation)(mesh.vertices)
         return mesh
 
-    def _surfaces(self, cells: Callable[[float], int]) -> dict[str, trimesh.Trimesh]:
-        """The members' meshes in this part's own frame, without those that have none."""
-        try:
-            resolution = cells(float(self.shape.walls().min(initial=np.inf)))
-            meshes = mesh_shape(self.shape, resolution).parts
-        except NoSurfaceError:
-            return {}
+    def remember(self, surfaces: Surfaces) -> None:
+        """The members' meshes, unit frame, for `surface`, which makes them no second time."""
+        meshes = {name: mesh.copy() for name, mesh in surfaces.parts.items()}
         for mesh in meshes.values():
             mesh.vertices = self.unit_frame(self.unit * mesh.vertices)
-        return meshes
+        self._shared[surfaces.resolution] = self.part, meshes
 
     def among(self, members: Sequence[Member], shared: dict[Any, Any]) -> Self:
         told = dataclasses.replace(self, members=tuple(members))

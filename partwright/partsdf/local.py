@@ -20,6 +20,7 @@ from torch import Tensor, nn
 from partwright.partsdf.checkpointed_linear import working_type
 from partwright.partsdf.config import DecoderSettings
 from partwright.partsdf.decoder import Conditioned, positional_encoding
+from partwright.partsdf.part_networks import Rooms, distances
 from partwright.partsdf.poses import PoseTensors, rotation_matrices
 from partwright.partsdf.segmented_linear import filled_linear, filled_up, segmented_linear
 
@@ -124,7 +125,13 @@ class _Local:
     kind: torch.dtype
 
     def __call__(self, local: Tensor, filled: bool | None = None) -> Tensor:
-        """filled: whether segments are filled up to one length, as on a GPU; by the device if None."""
+        """filled: whether segments are filled up to one length, as on a GPU; if None, by the device, and by
+        the compiled kernel where it can be."""
+        if filled is None and self._by_kernel(local):
+            count = len(self.scale)
+            rooms = Rooms(self.room.repeat(count, 1), self.unit.repeat(count, 1), REACH, self.octaves)
+            found = distances(local.flatten(0, 1), self.scale.flatten(0, 1), self.layers, rooms)
+            return found.view(local.shape[:3])
         beyond = local.abs() - self.room[:, None]
         room = (beyond * self.scale.unsqueeze(-2)).amax(-1)  # the distance from it
         near = (room < REACH).flatten(0, 1)  # (B P, N)
@@ -143,6 +150,10 @@ class _Local:
         filled = y.is_cuda if filled is None else filled
         y = self._filled(y, counts) if filled else self._one_by_one(y, counts.cumsum(dim=0).tolist())
         return y.squeeze(1) * (lengths * unit).amin(dim=1)  # a small part's errors are small
+
+    def _by_kernel(self, x: Tensor) -> bool:
+        """Whether the kernel takes such numbers: in single precision on a CPU."""
+        return self.kind == x.dtype == torch.float32 and x.device.type == "cpu"
 
     def _one_by_one(self, y: Tensor, ends: list[int]) -> Tensor:
         for n, (weight, shift) in enumerate(self._typed(y.dtype)):

@@ -79,7 +79,7 @@ def mesh_shape(
         return np.concatenate([whole, each]) if parts else whole
 
     if resolution is None:
-        resolution = resolution_for_wall(float(shape.walls().min(initial=np.inf)), _DEFAULT_RESOLUTION)
+        resolution = resolution_for_wall(shape.thinnest, _DEFAULT_RESOLUTION)
     lattice = SparseLattice(
         distances,
         bounding_half_side(shape),
@@ -267,7 +267,7 @@ class SparseLattice:
 
     def _keys(self, cubes: np.ndarray) -> np.ndarray:
         """(C * 27,) one number a corner of cubes (C, 3)."""
-        return self._key((cubes[:, None] * FINEST + _LATTICE).reshape(-1, 3))
+        return (self._key(cubes * FINEST)[:, None] + self._key(_LATTICE)).ravel()  # keys are linear
 
     def _key(self, lattice: np.ndarray) -> np.ndarray:
         """(N,) of lattice coordinates (N, 3)."""

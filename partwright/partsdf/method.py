@@ -7,7 +7,7 @@ from typing import Any
 from partwright.assembly import Similarity
 from partwright.errors import SettingError
 from partwright.methods import Ability, Checkpoint, FitRequest, Fitted, Method, Progress, preset, timed
-from partwright.partsdf.assemblies import to_assembly
+from partwright.partsdf.assemblies import remember_meshes, to_assembly
 from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.familiarity import familiarity
 from partwright.partsdf.meshing import mesh_shape
@@ -88,7 +88,9 @@ class LearnedParts(Method[Settings]):
         with timed(seconds, "optimise"):
             found, turn = reconstruct_from(starts, settings, run.seed, told, checkpoint)
         with timed(seconds, "mesh"):
-            meshed = mesh_shape(found, settings.resolution, parts=False)
+            meshed = mesh_shape(found, settings.resolution)  # with the parts, which files ask for
+        assembly = to_assembly(found, shape.frame, shape.unit, shape.up, turn=turn)
+        remember_meshes(assembly, meshed)
         surface = meshed.whole
         surface.vertices = shape.frame.from_unit(Similarity(1.0, turn)(surface.vertices))
         known = familiarity(found, target.turned(turn))
@@ -103,7 +105,7 @@ class LearnedParts(Method[Settings]):
             "evaluations": {"meshing": meshed.evaluations, "dense grid": meshed.dense},
         }
         return Fitted(
-            to_assembly(found, shape.frame, shape.unit, shape.up, turn=turn),
+            assembly,
             "interrupted" if run.cancel.requested else "converged",
             seconds,
             history,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -13,13 +14,16 @@ from torch import Tensor
 from partwright.assembly.similarity import Similarity
 from partwright.errors import SettingError
 from partwright.partsdf.cores import one_core_each
+from partwright.partsdf.decoder import Conditioned
 from partwright.partsdf.losses import aggregate
 from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, local_points
 
 _WALL_PLACES, _CUBOID_MARGIN = 1000, 1.05  # where walls are looked for, in and around a part's cuboid
 _WALL_QUANTILE = 0.95  # of the depths inside, which is half a wall
-CHUNK = 1 << 11  # pairs of point and part that are decoded at once, so that they stay in the cache
+# Pairs of point and part that are decoded at once, so that they stay in the cache: by the compiled kernel,
+# and by PyTorch, which takes them layer by layer.
+CHUNK, _CHUNK_OF_LAYERS = 1 << 13, 1 << 11
 
 
 @dataclass(frozen=True)
@@ -67,16 +71,20 @@ class NeuralShape:
 
     def part_distances(self, points: np.ndarray) -> np.ndarray:
         """(Q, N) float32 of the Q parts that are there, at points (N, 3) of the unit frame, in one pass."""
-        size = max(256, CHUNK // self.model.asked)
+        size = CHUNK if self.model.asked == 1 else max(256, _CHUNK_OF_LAYERS // self.model.asked)
         chunks = torch.from_numpy(np.array(points, np.float32, order="C")).split(size)
-        with torch.no_grad():
-            conditioned = self.model.condition(self.latents[None], self.poses.map(lambda t: t[None]))
+        conditioned = self._conditioned
 
         @torch.no_grad()
         def decode(chunk: Tensor) -> Tensor:
             return conditioned(local_points(chunk, self.poses)[None])[0][self.present]
 
         return torch.cat(_side_by_side(decode, chunks), dim=1).numpy()
+
+    @cached_property
+    def _conditioned(self) -> Conditioned:
+        with torch.no_grad():
+            return self.model.condition(self.latents[None], self.poses.map(lambda t: t[None]))
 
     def walls(self) -> np.ndarray:
         """(Q,) about how thin each part that is there is, unit frame: twice a depth that few places inside
@@ -86,6 +94,11 @@ class NeuralShape:
         places = np.concatenate([self._places(name) for name in names] or [np.zeros((0, 3), np.float32)])
         depths = -self.part_distances(places).reshape(len(names), len(names), _WALL_PLACES)
         return np.array([_wall(depths[i, i]) for i in range(len(names))])
+
+    @cached_property
+    def thinnest(self) -> float:
+        """The least of `walls`; infinite where there is none."""
+        return float(self.walls().min(initial=np.inf))
 
     def wall(self, name: str) -> float:
         """About how thin one part is, as in `walls`."""

@@ -44,6 +44,7 @@ _JUDGES, _TURNS = 32, 2  # training shapes that turns are judged by, and how man
 _AT_ONCE = 16  # shapes that are decoded together
 _PART_SAMPLES = 2048  # of a target with known parts
 _OTHERS, _SAMPLES = 48, 512  # training shapes that parts are taken from, and samples they are judged at
+_FEW, _LIKELY = 4, 16  # of these every fourth tells which parts come into question at all
 
 
 @dataclass(frozen=True)
@@ -174,6 +175,8 @@ def exchanged_parts(shape: NeuralShape, target: Target, seed: int = 0) -> Neural
         poses = shape.poses.map(lambda t: t.repeat(2 * len(drawn), *[1] * t.ndim))
         for mine, theirs in zip(poses, model.poses, strict=True):
             mine[: len(drawn), part] = theirs[drawn, part]
+        likely = errors_of(model, latents, poses, target, rows[::_FEW]).argsort()[:_LIKELY]
+        latents, poses = latents[likely], poses.map(lambda t, likely=likely: t[likely])
         errors = errors_of(model, latents, poses, target, rows)
         least = int(errors.argmin())
         if errors[least] < best:

@@ -10,7 +10,15 @@ import trimesh
 
 from partwright.metrics import mean_scores, reconstruction_scores
 from partwright.metrics.image_consistency import image_consistency, views
-from partwright.metrics.parted import OUTSIDE, joint_owners, part_iou, whole_iou
+from partwright.metrics.parted import (
+    OUTSIDE,
+    joint_box,
+    joint_owners,
+    owners_in,
+    part_iou,
+    undecided,
+    whole_iou,
+)
 from partwright.metrics.reconstruction import worst_chamfer
 from partwright.render.raycast import Scene
 
@@ -39,7 +47,7 @@ def test_a_surface_agrees_with_itself() -> None:
         np.concatenate([left.label, right.label + 1]),
     )
     scores = reconstruction_scores(box, box)
-    assert (scores.iou, scores.part_iou, scores.failed) == (1, 1, 0)
+    assert (scores.iou, scores.part_iou, scores.decided_part_iou, scores.failed) == (1, 1, 1, 0)
     assert scores.image_consistency == pytest.approx(1, abs=1e-6)
     assert scores.chamfer == pytest.approx(scores.chamfer_floor, rel=0.05)
 
@@ -67,6 +75,33 @@ def test_a_part_that_only_one_has_counts_as_lost() -> None:
     one, other = joint_owners(first, replace(first, label=np.zeros_like(first.label)), 48)
     assert part_iou(one, other) == pytest.approx((0.5 + 0) / 2, abs=0.01)
     assert part_iou(np.full(8, OUTSIDE), np.full(8, OUTSIDE)) == 1
+
+
+def table(flip: bool) -> Surface:
+    """A plate on one thick leg; `flip` says whose faces come first, and are found where two are as near."""
+    plate = trimesh.creation.box(bounds=[(-0.9, -0.9, 0.0), (0.9, 0.9, 0.4)])
+    leg = trimesh.creation.box(bounds=[(-0.5, -0.5, -0.9), (0.5, 0.5, 0.2)])
+    mesh = trimesh.boolean.union([plate, leg])
+    label = (mesh.triangles_center[:, 2] < -1e-6).astype(int)
+    order = np.argsort(label if flip else -label, kind="stable")
+    return Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces)[order], label[order])
+
+
+def test_what_lies_behind_an_edge_of_two_parts_is_nobodys() -> None:
+    """Above the leg all is nearest to its rim, which is the plate's, too; elsewhere not."""
+    surface = table(flip=False)
+    lower, size = joint_box(surface, surface)
+    owner = owners_in(surface, lower, size, 40)
+    tied = undecided(surface, owner, lower, size)
+    x, y, z = (lower + (np.argwhere(np.ones(owner.shape)) + 0.5) * (size / 40)).T.reshape(3, *owner.shape)
+    column = (np.abs(x) < 0.42) & (np.abs(y) < 0.42) & (np.maximum(np.abs(x), np.abs(y)) > 0.3)
+    assert tied[column & (z > 0.03) & (z < 0.12)].all()
+    assert not tied[(np.abs(x) > 0.75) | (z < -0.3)].any()
+    other = owners_in(table(flip=True), lower, size, 40)
+    assert part_iou(owner[~tied], other[~tied]) == 1
+    assert (tied & (owner != OUTSIDE)).sum() == tied.sum() > 0
+    alone = replace(surface, label=np.zeros_like(surface.label))
+    assert not undecided(alone, owners_in(alone, lower, size, 40), lower, size).any()
 
 
 def test_open_surfaces_are_measured_by_winding_number() -> None:
@@ -103,6 +138,7 @@ def test_failures_are_the_worst_and_stay_in_the_mean() -> None:
     empty = reconstruction_scores(Surface(box.vertices, box.faces[:0], box.label[:0]), box)
     assert failed == empty
     assert (failed.iou, failed.image_consistency, failed.part_iou, failed.failed) == (0, 0, 0, 1)
+    assert failed.decided_part_iou == 0
     far = cuboid((0.8, 0.8, 0.8), (1, 1, 1))
     assert failed.chamfer > reconstruction_scores(far, box).chamfer
     good = reconstruction_scores(box, box)

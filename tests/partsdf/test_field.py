@@ -17,8 +17,9 @@ from partwright.assembly import Similarity
 from partwright.errors import AssemblyFileError, ModelError, NoSurfaceError
 from partwright.meshing import mesh_assembly, mesh_part
 from partwright.partsdf import model as models
-from partwright.partsdf.assemblies import from_assembly, to_assembly
+from partwright.partsdf.assemblies import from_assembly, remember_meshes, to_assembly
 from partwright.partsdf.field import NeuralField
+from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.shapes import UnitFrame
@@ -68,15 +69,40 @@ def test_all_parts_are_meshed_in_one_pass_each_in_its_own_frame(
     assert counts[1:] == [0] * (len(meshes) - 1)
     for part, mesh in zip(fresh.parts, meshes, strict=True):
         assert mesh.is_watertight
-        cell, vertices = 2 * part.field.unit / 72, np.asarray(mesh.vertices)
+        cell, vertices = 2 * part.field.unit / 96, np.asarray(mesh.vertices)
         within = (np.abs(FRAME.to_unit(vertices)) < 1).all(axis=1)  # the lattice's end cuts what goes on
         assert within.mean() > 0.3
         assert np.abs(part.distance(vertices[within])).max() < cell
     first = fresh.parts[0]
-    moved = fresh.replace_part(first.name, dataclasses.replace(first, blend=0.1))
+    blended = fresh.replace_part(first.name, dataclasses.replace(first, blend=0.1))
     asked.clear()
+    mesh_part(blended.parts[0], 24)
+    assert not asked  # the same shape
+    beside = dataclasses.replace(first, translation=(*first.translation[:2], first.translation[2] + 0.05))
+    moved = fresh.replace_part(first.name, beside)
     mesh_part(moved.parts[0], 24)
     assert sum(asked) > 1000  # another shape: nothing of the first is taken for it
+
+
+def test_files_take_the_meshes_that_came_with_the_whole(
+    lamp: NeuralShape, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assembly, surfaces = to_assembly(lamp, FRAME, unit="mm"), mesh_shape(lamp)
+    plain = export_counts(assembly, tmp_path / "plain.glb")
+    again = to_assembly(lamp, FRAME, unit="mm")
+    remember_meshes(again, surfaces)
+    renamed = dataclasses.replace(again, name="renamed", metadata={"source": "lamp"})
+    monkeypatch.setattr("partwright.partsdf.field.mesh_shape", None)
+    remembered = export_counts(renamed, tmp_path / "remembered.glb")
+    assert remembered == {name: len(mesh.faces) for name, mesh in surfaces.parts.items()}
+    assert remembered == pytest.approx(plain, rel=0.01)  # as fine as without
+
+
+def export_counts(assembly: pw.Assembly, file: Path) -> dict[str, int]:
+    """Triangles of each part in a GLB."""
+    pw.export(assembly, file)
+    scene = trimesh.load_scene(file)
+    return {name: len(scene.geometry[scene.graph[name][1]].faces) for name in scene.graph.nodes_geometry}
 
 
 def test_all_parts_are_decoded_in_one_pass(assembly: pw.Assembly, monkeypatch: pytest.MonkeyPatch) -> None:
