@@ -12,8 +12,9 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.targets import Target
 
 # Measured by benchmarks/partsdf_familiarity.py: shapes of a family that were held out come to 0.08 at most,
-# those of other families to 0.2 at least. Odd latents alone say little: many latents mean the same form.
-STRANGE = 0.12
+# those of other families to 0.24 at least. Odd latents alone say little, as many latents mean the same form:
+# they count at most half again.
+STRANGE, _MOST_ODD = 0.2, 1.5
 ODD = 1.5  # times the farthest training shape's distance from the mean latent: as far as held-out shapes' lie
 _SAMPLES = 8192
 
@@ -33,8 +34,8 @@ class Familiarity:
 
     @property
     def strangeness(self) -> float:
-        """The residual, as many times as the oddest part is odder than those of held-out shapes."""
-        return self.residual * max(1.0, max(self.latents.values(), default=0.0) / ODD)
+        """The residual, up to half again where the oddest part is odder than those of held-out shapes."""
+        return self.residual * min(_MOST_ODD, max(1.0, max(self.latents.values(), default=0.0) / ODD))
 
     def warnings(self) -> list[str]:
         """One line where the shape is none of the family, else nothing."""

@@ -44,25 +44,31 @@ class _Distances(torch.autograd.Function):
     def forward(ctx: Any, local: Tensor, scale: Tensor, rooms: Rooms, *layers: Tensor) -> Tensor:
         ctx.save_for_backward(local, scale, *layers)
         ctx.rooms = rooms
-        return torch.from_numpy(
-            _kernel.networks_distances(*_arguments(local, scale, rooms, layers), torch.get_num_threads())
-        )
+        return torch.from_numpy(_kernel.networks_distances(**_arguments(local, scale, rooms, layers)))
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, ...]:
         local, scale, *layers = ctx.saved_tensors
         by_local, by_scale, by_weight, by_shift = _kernel.networks_gradients(
-            *_arguments(local, scale, ctx.rooms, layers), _array(gradients[0]), torch.get_num_threads()
+            **_arguments(local, scale, ctx.rooms, layers), upstream=_array(gradients[0])
         )
         each = [torch.from_numpy(t) for pair in zip(by_weight, by_shift, strict=True) for t in pair]
         return torch.from_numpy(by_local), torch.from_numpy(by_scale), None, *each
 
 
-def _arguments(local: Tensor, scale: Tensor, rooms: Rooms, layers: Sequence[Tensor]) -> tuple[Any, ...]:
-    weights, shifts = [_array(t) for t in layers[::2]], [_array(t) for t in layers[1::2]]
-    places = (_array(t) for t in (scale, rooms.room, rooms.unit))
-    return (_array(local), weights, shifts, *places, rooms.reach, rooms.octaves)
+def _arguments(local: Tensor, scale: Tensor, rooms: Rooms, layers: Sequence[Tensor]) -> dict[str, Any]:
+    return {
+        "local": _array(local),
+        "weights": [_array(t) for t in layers[::2]],
+        "shifts": [_array(t) for t in layers[1::2]],
+        "scale": _array(scale),
+        "room": _array(rooms.room),
+        "unit": _array(rooms.unit),
+        "reach": rooms.reach,
+        "octaves": rooms.octaves,
+        "threads": torch.get_num_threads(),
+    }
 
 
 def _array(t: Tensor) -> np.ndarray:
