@@ -147,6 +147,8 @@ TABLES = (
     Table("textures.md", "textures.py", None, 0,
           "--shapes {data} --output benchmarks/results/textures.md", 30),
     Table("known_features.md", "known_features.py", "--count 4", 1, "--count 100", 15),
+    Table("convexes_by_hand.md", "convexes_by_hand.py", "", 0.1, "", 0.1, "solids.csv and capri.csv"),
+    Table("pretraining_cost.md", "pretraining_cost.py", "--steps 2", 1, "", 2),
     Table("rivals.md", "rivals.py", "--count 1", 1, "--count 8", 3),
     Table("round_trips.md", "round_trips.py", "", 3, "", 3, "the extra cad"),
     Table("fuzz.md", "fuzz.py", "--files 100 --commands 60", 2, "--files 500 --commands 500 --seed 0", 15),
