@@ -114,7 +114,7 @@ def covered(mesh: trimesh.Trimesh, kind: str, options: CollideOptions) -> Body:
     """The shapes of `partwright collide` for a link."""
     start = time.process_time()
     use = MeshUse(Path("mesh"), np.eye(4), mesh)
-    link = Link("mesh", np.eye(4), None, (use,))
+    link = Link("mesh", np.eye(4), (), (use,))
     target = Solids().target(link, link.collisions)
     tolerance = options.length(target.size, target.size)
     wishes = Wishes(

@@ -2,7 +2,8 @@
 
 A hull bridges what is concave, as the chord of a ring's segment its hole. Cut off to the right depth such a
 face adds half as much and lacks about as much: the sum of both is what counts. What another hull has anyway
-is neither added nor lost.
+is neither added nor lost. Nor does a cut take off what sticks out, a lug say, though that may be little
+volume: what it takes of the solid reaches no farther than half of what the hull bridges, or the tolerance.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ _CUTS = 16  # of a hull, at most
 _DEPTHS = 2.0 ** np.arange(-7, 1)  # of the deepest, that are tried
 _REFINED = 9  # depths tried between the neighbours of the best one
 _KEPT = 0.5  # of what only one hull has of the solid, at least
+_REACH = 0.5  # of the depth to which a hull bridges: how far beyond a cut the solid may reach
 _WORTH = 5e-4  # of that: what gains less stays
 _TILTS = (0.2, 0.1, 0.05, 0.025)  # radians, by which the best plane is turned
 _TURNS = np.arange(6) * (np.pi / 3)
@@ -41,7 +43,8 @@ _PROBES = 1000  # corners that tell how deep a hull bridges
 
 def balanced_hulls(pieces: Sequence[Piece], solid: Manifold, deepest: float) -> list[Manifold]:
     """The hulls of a solid's pieces, cut by planes where that adds less than it loses; to a depth of
-    `deepest`, a length, or as deep as the hull bridges."""
+    `deepest`, a length, or as deep as the hull bridges; that, or half of it, is also how far what they lose
+    may reach."""
     hulls = [piece.hull for piece in pieces]
     near = [
         [k for k, other in enumerate(pieces) if k != i and boxes_touch(other.box, one.box)]
@@ -71,10 +74,12 @@ def _balanced(hull: Manifold, alone: Manifold, extra: Manifold, deepest: float) 
         return hull
     directions = _directions(hull, extra)
     corners = surface_of(hull)[0]
-    deepest = max(deepest, _depth(hull, extra))
+    depth = _depth(hull, extra)
+    own_corners, reach = surface_of(alone - extra)[0], max(deepest, _REACH * depth)
+    deepest = max(deepest, depth)
     gains = np.full(len(directions), np.inf)
     for _ in range(_CUTS):
-        bodies = _Bodies(Surface.of(alone), Surface.of(extra), spare, corners, deepest)
+        bodies = _Bodies(Surface.of(alone), Surface.of(extra), spare, corners, deepest, own_corners, reach)
         fresh = np.zeros(len(directions), bool)
         while not fresh[best := int(gains.argmax())] and gains[best] > least:
             gains[best] = bodies.best(directions[best], least)[0]
@@ -91,13 +96,16 @@ def _balanced(hull: Manifold, alone: Manifold, extra: Manifold, deepest: float) 
 @dataclass(frozen=True)
 class _Bodies:
     """What a cut takes volume from, and how much of the solid's own it may take. corners (V, 3): of the hull
-    before any cut; deepest: how far below them a plane may lie."""
+    before any cut; deepest: how far below them a plane may lie. own (W, 3): of what only this hull has of the
+    solid; reach: how far below these."""
 
     alone: Surface
     extra: Surface
     spare: float
     corners: np.ndarray
     deepest: float
+    own: np.ndarray
+    reach: float
 
     def tilted(self, normal: np.ndarray) -> Plane:
         """The plane near to one of this normal (3,) that gains most, by steps that halve."""
@@ -116,10 +124,11 @@ class _Bodies:
         """What a cut gains at most, volume that is no longer added less what is lost, and the offset at which
         it does; looked for where it may be more than `least`."""
         top = float((self.corners @ normal).max())
-        most = float(self.extra.beyond(normal, np.array([top - self.deepest]))[0])
+        deepest = min(self.deepest, top - float((self.own @ normal).max(initial=-np.inf)) + self.reach)
+        most = float(self.extra.beyond(normal, np.array([top - deepest]))[0])
         if most <= least:
             return min(most, least), top
-        depths = self.deepest * _DEPTHS
+        depths = deepest * _DEPTHS
         gains = self.gains(normal, top - depths)
         at = int(gains.argmax())
         around = np.concatenate([[0.0], depths, depths[-1:]])[at : at + 3]

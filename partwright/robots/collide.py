@@ -186,7 +186,7 @@ def collide(
         unions = {link.name: _union(shapes[link.name]) for link in links}
         pairs_after = overlaps(_bodies(colliding, unions))
         near = too_near(pairs_before, pairs_after, volumes, _MORE_OVERLAP)
-        neighbours = {frozenset((link.name, link.parent)) for link in links}
+        neighbours = {frozenset((link.name, above)) for link in links for above in link.parents}
         todo = {name for pair in near if frozenset(pair) in neighbours for name in pair if name in shapes}
         if options.enclose:  # nothing is left to be finer by
             todo = {name for name in todo if len(shapes[name]) < options.max_parts}

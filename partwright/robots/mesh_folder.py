@@ -28,7 +28,7 @@ class MeshFolder(RobotFile):
         if not self._files:
             raise RobotError(f"{path}: no mesh is in this folder; expected {', '.join(SUFFIXES)}")
         self.links = [
-            Link(name, np.eye(4), None, (MeshUse(file, np.eye(4)),)) for name, file in self._files.items()
+            Link(name, np.eye(4), (), (MeshUse(file, np.eye(4)),)) for name, file in self._files.items()
         ]
 
     def replaced(self, shapes: Mapping[str, Sequence[Shape]]) -> Files:

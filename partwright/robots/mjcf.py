@@ -180,7 +180,7 @@ class Mjcf(RobotFile):
         return Link(
             name,
             pose,
-            parent,
+            () if parent is None else (parent,),
             tuple(self._use(name, geom) for geom in meshes if geom.collides),
             tuple(self._use(name, geom) for geom in meshes if not geom.collides),
             tuple(

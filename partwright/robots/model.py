@@ -33,14 +33,15 @@ class MeshUse:
 class Link:
     """A rigid body of a robot.
 
-    pose: (4, 4) link to world at rest, every joint at zero. parent: the link that its joint hangs on, if any.
-    collisions: meshes that collide, all of which are replaced. visuals: meshes that are seen. natives: solids
-    that collide already, in the link's frame; they stay.
+    pose: (4, 4) link to world at rest, every joint at zero. parents: the links that its joints hang on,
+    several where joints close a loop, which URDF cannot hold. collisions: meshes that collide, all of which
+    are replaced. visuals: meshes that are seen. natives: solids that collide already, in the link's frame;
+    they stay.
     """
 
     name: str
     pose: np.ndarray
-    parent: str | None
+    parents: tuple[str, ...]
     collisions: tuple[MeshUse, ...]
     visuals: tuple[MeshUse, ...] = ()
     natives: tuple[Part, ...] = ()

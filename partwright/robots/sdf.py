@@ -16,7 +16,15 @@ from partwright.errors import RobotError
 from partwright.export.rigid_body import numbers
 from partwright.export.urdf import roll_pitch_yaw
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
-from partwright.robots.model import Files, Link, MeshUse, RobotFile, Shape, frame, from_roll_pitch_yaw
+from partwright.robots.model import (
+    Files,
+    Link,
+    MeshUse,
+    RobotFile,
+    Shape,
+    frame,
+    from_roll_pitch_yaw,
+)
 from partwright.robots.native_solids import native_solids
 from partwright.robots.paths import Place, find, new_address, with_companions
 from partwright.robots.xml_files import parsed, serialised, stl, three
@@ -33,16 +41,14 @@ class Sdf(RobotFile):
         self._tree = parsed(path, "sdf")
         self._places: dict[str, Place] = {}
         self._links = dict(self._named(self._tree.getroot(), ""))
-        parents = {}
+        parents: dict[str, list[str]] = {name: [] for name in self._links}
         for joint in self._tree.getroot().iter("joint"):
-            child = _scoped(joint, joint.findtext("child", "").strip())
-            parent = _scoped(joint, joint.findtext("parent", "").strip())
-            if child in parents and child in self._links:
-                raise RobotError(
-                    f"{path}: link {child!r} hangs on two joints: {joint.get('name')!r} closes a loop"
-                )
-            parents[child] = parent if parent in self._links else None
-        self.links = [self._link(name, element, parents.get(name)) for name, element in self._links.items()]
+            child, parent = (_scoped(joint, joint.findtext(end, "").strip()) for end in ("child", "parent"))
+            if child in parents and parent in parents:
+                parents[child].append(parent)
+        self.links = [
+            self._link(name, element, tuple(parents[name])) for name, element in self._links.items()
+        ]
 
     def replaced(self, shapes: Mapping[str, Sequence[Shape]]) -> Files:
         files = Files()
@@ -71,7 +77,7 @@ class Sdf(RobotFile):
                 within = f"{scope}{child.get('name')}::" if element.tag in ("model", "world") else ""
                 yield from self._named(child, within)
 
-    def _link(self, name: str, element: Any, parent: str | None) -> Link:
+    def _link(self, name: str, element: Any, parents: tuple[str, ...]) -> Link:
         uses: dict[str, list[MeshUse]] = {"visual": [], "collision": []}
         natives: list[Part] = []
         for role, found in uses.items():
@@ -89,7 +95,7 @@ class Sdf(RobotFile):
         while above is not None and above.tag == "model":
             pose = _pose(above, self.path, name) @ pose
             above = above.getparent()
-        return Link(name, pose, parent, tuple(uses["collision"]), tuple(uses["visual"]), tuple(natives))
+        return Link(name, pose, parents, tuple(uses["collision"]), tuple(uses["visual"]), tuple(natives))
 
     def _use(self, mesh: Any, place: np.ndarray, link: str) -> MeshUse:
         address = mesh.findtext("uri", "").strip()

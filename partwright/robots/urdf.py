@@ -104,8 +104,8 @@ class Urdf(RobotFile):
                     natives += native_solids(
                         child, place, _read, self.kinds, f"link {name!r}: collision", self.path
                     )
-        parent = parents.get(name, (None,))[0]
-        return Link(name, pose, parent, tuple(uses["collision"]), tuple(uses["visual"]), tuple(natives))
+        above = (parents[name][0],) if name in parents else ()
+        return Link(name, pose, above, tuple(uses["collision"]), tuple(uses["visual"]), tuple(natives))
 
     def _use(self, mesh: Any, place: np.ndarray, link: str) -> MeshUse:
         address = mesh.get("filename") or ""

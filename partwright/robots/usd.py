@@ -42,10 +42,9 @@ class Usd(RobotFile):
             raise RobotError(f"{path}: none of its prims is a rigid body (PhysicsRigidBodyAPI)")
         self._paths = {_name(prim, bodies): str(prim.GetPath()) for prim in bodies}
         owner = {path: name for name, path in self._paths.items()}
-        parents = dict(_parents(stage, owner))
+        parents = _parents(stage, owner)
         self._replaced: dict[str, list[str]] = {}
-        self.links = [self._link(stage, name, parents.get(name), owner) for name in self._paths]
-        self._check_loops(parents)
+        self.links = [self._link(stage, name, tuple(parents.get(name, ())), owner) for name in self._paths]
 
     def replaced(self, shapes: Mapping[str, Sequence[Shape]]) -> Files:
         from pxr import UsdPhysics, UsdUtils
@@ -75,7 +74,7 @@ class Usd(RobotFile):
             files.copied[file.relative_to(home).as_posix()] = file
         return files
 
-    def _link(self, stage: Any, name: str, parent: str | None, owner: Mapping[str, str]) -> Link:
+    def _link(self, stage: Any, name: str, parents: tuple[str, ...], owner: Mapping[str, str]) -> Link:
         from pxr import UsdGeom, UsdPhysics
 
         prim = stage.GetPrimAtPath(self._paths[name])
@@ -94,7 +93,7 @@ class Usd(RobotFile):
                     visuals.append(use)
             elif enabled and (part := self._native(below, pose)) is not None:
                 natives.append(part)
-        return Link(name, pose, parent, tuple(collisions), tuple(visuals), tuple(natives))
+        return Link(name, pose, parents, tuple(collisions), tuple(visuals), tuple(natives))
 
     def _pose(self, prim: Any) -> np.ndarray:
         """(4, 4) of the link: where it is in metres, without its scale."""
@@ -148,15 +147,6 @@ class Usd(RobotFile):
             where = _free(stage, path.AppendChild(Tf.MakeValidIdentifier(shape.name)))
             define_collider(stage, where, shape.part, shape.mesh)
 
-    def _check_loops(self, parents: Mapping[str, str]) -> None:
-        for name in parents:
-            seen, at = {name}, parents[name]
-            while at in parents:
-                if at in seen:
-                    raise RobotError(f"{self.path}: the joints above link {name!r} are a loop")
-                seen.add(at)
-                at = parents[at]
-
 
 def _opened(path: Path) -> Any:
     try:
@@ -199,10 +189,11 @@ def _name(prim: Any, bodies: Sequence[Any]) -> str:
     return str(prim.GetName() if len(same) == 1 else prim.GetPath())
 
 
-def _parents(stage: Any, owner: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """Child and parent of each joint between two links."""
+def _parents(stage: Any, owner: Mapping[str, str]) -> dict[str, list[str]]:
+    """The links that each one hangs on, by the joints between two of them."""
     from pxr import UsdPhysics
 
+    found: dict[str, list[str]] = {}
     for prim in _all(stage):
         joint = UsdPhysics.Joint(prim)
         if not joint:
@@ -210,7 +201,8 @@ def _parents(stage: Any, owner: Mapping[str, str]) -> Iterator[tuple[str, str]]:
         ends = [rel.GetTargets() for rel in (joint.GetBody0Rel(), joint.GetBody1Rel())]
         names = [owner.get(str(end[0])) if end else None for end in ends]
         if names[0] and names[1]:
-            yield names[1], names[0]
+            found.setdefault(names[1], []).append(names[0])
+    return found
 
 
 def _triangles(prim: Any, path: Path) -> trimesh.Trimesh | None:

@@ -184,6 +184,19 @@ def test_a_notch_is_balanced_to_what_the_best_plane_leaves() -> None:
     assert apart(balanced) < 0.85 * apart(shape.hull())
 
 
+def test_what_sticks_out_is_not_cut_off_for_its_little_volume() -> None:
+    """A plate with a pin: what its hull adds is a pyramid, and cut off at the plate it would lose but the
+    pin. It loses no more of its length than half of the depth that the hull bridges, or than is allowed."""
+    shape = union([box(-2, -2, 0, 2, 2, 1), box(-0.1, -0.1, 1, 0.1, 0.1, 3)])
+    (cut,) = balanced_hulls([Piece(shape)], shape, 0.1)
+    foot, slope = np.array([0.1, 0.1, 1.0]), np.array([2.0, 0.0, 1.9]) / math.hypot(2.0, 1.9)
+    depth = float(slope @ (np.array([0.1, 0.1, 3.0]) - foot))
+    assert 3 - 0.5 * depth - 1e-6 <= cut.bounding_box()[5] < 2.9
+    assert cut.volume() < 0.7 * shape.hull().volume()
+    (allowed,) = balanced_hulls([Piece(shape)], shape, 2.0)
+    assert allowed.bounding_box()[5] == pytest.approx(1.0)
+
+
 def test_what_another_hull_has_is_not_lost() -> None:
     """Two halves of an L whose hulls overlap: each may leave to the other what both have."""
     shape = union([box(0, 0, 0, 3, 1, 1), box(0, 0, 0, 1, 3, 1)])

@@ -69,7 +69,7 @@ def test_poses_scales_and_nested_models(tmp_path: Path) -> None:
     robot = open_robot(model(tmp_path))
     base, finger = robot.links
     assert finger.name == "gripper::finger"
-    assert finger.parent == "base"
+    assert finger.parents == ("base",)
     assert np.allclose(finger.pose[:3, 3], (0, 0, 2))
     assert np.allclose(finger.pose[:3, :3] @ (0, 0, 1), (1, 0, 0))
     corners = np.concatenate(
@@ -89,6 +89,18 @@ def test_hulls_lie_in_the_model_s_own_folder_by_its_address(tmp_path: Path) -> N
     assert (tmp_path / "out" / "my_robot" / "collision" / "base_collision_1.stl").exists()
     again = open_robot(tmp_path / "out" / "pair.sdf")
     assert [len(link.collisions) for link in again.links] == [2, 1]
+
+
+def test_a_loop_of_joints_stays(tmp_path: Path) -> None:
+    """As a rod beside a leg closes it: SDFormat has such joints, and links have poses of their own."""
+    back = '<joint name="rod" type="ball"><parent>gripper::finger</parent><child>base</child></joint>'
+    path = model(tmp_path)
+    path.write_text(SDF.replace("  </model>\n</sdf>", f"  {back}</model>\n</sdf>"))
+    result = collide(path)
+    assert [link.parents for link in result.robot.links] == [("gripper::finger",), ("base",)]
+    save(result, tmp_path / "out")
+    root = etree.parse(tmp_path / "out" / "pair.sdf").getroot()
+    assert [joint.get("name") for joint in root.iter("joint")] == ["grip", "rod"]
 
 
 @pytest.mark.parametrize(

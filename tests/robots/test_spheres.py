@@ -155,7 +155,7 @@ def test_native_solids_beside_meshes_are_filled_too(tmp_path: Path) -> None:
 )
 def test_native_solids_are_contained(field: Box | Sphere | Cylinder | Capsule) -> None:
     part = Part(field, (1, 2, 3), (0.6, 0.8, 0, 0))
-    found = spheres_for(Link("a", np.eye(4), None, (), (), (part,)), None, 10, "around")
+    found = spheres_for(Link("a", np.eye(4), (), (), (), (part,)), None, 10, "around")
     rng = np.random.default_rng(0)
     local = rng.uniform(-1.6, 1.6, (200_000, 3)).astype(np.float32)
     within = local[
