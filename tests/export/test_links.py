@@ -64,7 +64,7 @@ def test_two_nodes_are_two_sdf_links_with_a_joint(tmp_path: Path) -> None:
     export(chest(), path, free_joint=True)
     robot = open_robot(path)
     body, lid = robot.links
-    assert (body.parent, lid.parent) == (None, "body")
+    assert (body.parents, lid.parents) == ((), ("body",))
     assert np.allclose(lid.pose[:3, 3], (-0.05, 0, 0.02))
     assert [part.field for part in body.natives] == [Box((0.1, 0.06, 0.04)), Sphere(0.005)]
     assert np.allclose(lid.natives[0].translation, (0.05, 0, 0.002))
