@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import chain, groupby, takewhile
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -18,6 +19,7 @@ from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.errors import ParameterError
 from partwright.fields import kernel, smooth_difference, smooth_intersection, smooth_union
 from partwright.fields.operations import is_tensor
+from partwright.fields.swept import Swept
 
 if TYPE_CHECKING:
     from partwright.assembly.joint import JointPart
@@ -28,6 +30,7 @@ _KERNEL = "kernel"
 # Longest sides, and up to here coordinates, that float32 holds as well as those of a unit frame.
 _ALIKE = (0.9, 3.6)
 _ROUNDING = 1e-14  # of the place: what is smaller has no size
+_ROOM = 1e-5  # unit lengths, for the rounding of boxes and distances
 _FOLD = {"union": smooth_union, "intersection": smooth_intersection, "difference": smooth_difference}
 
 
@@ -112,10 +115,46 @@ def _evaluate(node: Node, points: np.ndarray) -> np.ndarray:
     """(N,) float32 by the kernel; the leaves that begin a union are folded in a single call."""
     children = node.operands
     lead = _leading_leaves(children) if node.operation == "union" else []
-    values = _children(children[len(lead) :], points)
-    if lead:
-        values = chain([(kernel.evaluate(rows(lead), points), 0.0)], values)
-    return _folded(node.operation, values)
+    known: list[tuple[np.ndarray, float]] = [(kernel.evaluate(rows(lead), points), 0.0)] if lead else []
+    rest = children[len(lead) :]
+    boxed = [(i > 0 or bool(lead)) and _ends_in_a_box(node.operation, child) for i, child in enumerate(rest)]
+    for ends, group in groupby(zip(boxed, rest, strict=True), itemgetter(0)):
+        nodes = tuple(child for _, child in group)
+        if ends:
+            result, _ = known[0]
+            for part in cast("tuple[Part, ...]", nodes):
+                result = _folded_near(node.operation, result, part, points)
+        else:
+            result = _folded(node.operation, chain(known, _children(nodes, points)))
+        known = [(result, 0.0)]
+    return np.asarray(known[0][0])
+
+
+def _ends_in_a_box(operation: Operation, node: Node) -> bool:
+    """Whether a child leaves the result as it is wherever the box around it is far enough away: solids of a
+    profile are nowhere nearer than their boxes, and take long enough for that to pay."""
+    return operation != "intersection" and node.is_part and isinstance(node.field, Swept)
+
+
+def _folded_near(operation: Operation, result: np.ndarray, part: Part, points: np.ndarray) -> np.ndarray:
+    """`_folded` of a result (N,) and a part with its copies, which is asked only where it can change it."""
+    room = (result if operation == "union" else -result) + np.float32(part.blend + _ROOM)
+    square, (low, high) = np.zeros(len(points), np.float32), part.bounds().astype(np.float32)
+    for values, least, most in zip(points.T, low, high, strict=True):
+        off = np.maximum(least - values, values - most)
+        np.maximum(off, 0.0, out=off)
+        square += off * off
+    near = np.flatnonzero((square <= 0) | ((room > 0) & (square < room * room)))
+    changed = result.copy()
+    changed[near] = _FOLD[operation](result[near], _alone(part, points[near]), part.blend)
+    return changed
+
+
+def _alone(node: Node, points: np.ndarray) -> np.ndarray:
+    """(N,) of a child for itself, with its copies."""
+    if node.is_part and not node.instances:
+        return np.asarray(_posed(node, points))
+    return _evaluate(node, points)
 
 
 def _reference(node: Node, points: Any) -> Any:
@@ -183,7 +222,4 @@ def _children(children: tuple[Node, ...], points: np.ndarray) -> Iterator[tuple[
             yield from _joint(cast("list[JointPart]", list(group)), points)
         else:
             for node in group:
-                if node.is_part and not node.instances:
-                    yield _posed(node, points), node.blend
-                else:
-                    yield _evaluate(node, points), node.blend
+                yield _alone(node, points), node.blend

@@ -73,6 +73,10 @@ class _Common(ABC):
 
     def bounds(self) -> np.ndarray:
         """(2, 3) lowest and highest corner, float64."""
+        return self._box.copy()
+
+    @cached_property
+    def _box(self) -> np.ndarray:
         return bounding_box(self)  # type: ignore[arg-type]
 
     @cached_property

@@ -25,10 +25,16 @@ def overlap(assembly: Assembly, resolution: int = RESOLUTION) -> float:
     """
     added = in_own_frame(Assembly(tuple(added_parts(assembly))))
 
-    def each(points: np.ndarray) -> np.ndarray:
-        if all(isinstance(piece, Part) for piece in added.children):
-            return added.part_distances(points)
-        return np.stack([piece.distance(points) for piece in added.children])
+    def count(points: np.ndarray) -> np.ndarray:
+        """(N,) in how many pieces points (N, 3) lie."""
+        if all(isinstance(piece, Part) and piece.field.superfrustum() for piece in added.children):
+            return (added.part_distances(points) < 0).sum(axis=0)
+        result = np.zeros(len(points), np.int64)
+        for piece in added.children:
+            low, high = piece.bounds()
+            near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+            result[near] += piece.distance(points[near]) < 0
+        return result
 
     # As a union without blends: the distances of thousands of parts to all points would fill the memory.
     union = Assembly(tuple(replace(piece, blend=0.0) for piece in added.children))
@@ -37,10 +43,7 @@ def overlap(assembly: Assembly, resolution: int = RESOLUTION) -> float:
     if not len(centres):
         return 0.0
     at_once = max(1, _AT_ONCE // max(1, len(added.children)))
-    twice = sum(
-        int(((each(centres[i : i + at_once]) < 0).sum(axis=0) >= 2).sum())
-        for i in range(0, len(centres), at_once)
-    )
+    twice = sum(int((count(centres[i : i + at_once]) >= 2).sum()) for i in range(0, len(centres), at_once))
     return twice / len(centres)
 
 

@@ -20,7 +20,7 @@ _BLOCK = 2
 _FEW_OPEN = 20  # triangles to an open edge, from which the open edges count as few
 _LATTICE = 0.02  # spacing of the sign lattice, unit frame
 _SLACK = 1.0001  # on squared bounds, for their rounding to single precision
-_MANY = 2000  # points from which the lattice pays
+_MANY = 2000  # points from which the lattice pays; once it is made, it serves fewer too
 _WITHIN = 1e-3  # barycentric margin for "within a triangle"
 
 
@@ -114,7 +114,7 @@ class MeshDistance:
     def signed_nearest(self, points: NDArray[Any]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Distance (N,) to the nearest triangle at points (N, 3), negative inside; and that triangle (N,)."""
         triangle, distance = self.nearest(points)
-        if len(points) >= _MANY:
+        if len(points) >= _MANY or "_lattice" in vars(self):
             inside = self._inside_by_lattice(points, distance, triangle)
         else:
             inside = self.inside(points)

@@ -76,10 +76,13 @@ SWEPT = st.builds(
     Part,
     st.one_of(
         st.builds(lambda w, h: Extrusion(Profile.rectangle(w, 1.0, 0.2), h), LENGTH, LENGTH),
+        st.builds(lambda w, a: Extrusion(Profile.regular(5, 0.5 + w), 0.4, a), LENGTH, st.floats(1.0, 15.0)),
+        st.builds(lambda w: Extrusion(Profile.rectangle(1.0, w), w, 0.0, 0.1 * w, 0.0, 0.0, 0.2 * w), LENGTH),
         st.builds(lambda r, a: Revolution(Profile.circle(0.4, (0.5 + r, 0.1)), a), LENGTH, ANGLE),
     ),
     VECTOR,
     ROTATION,
     st.floats(0.0, 0.2),
     NAME,
+    instances=st.just(()) | st.lists(MOVES, max_size=2).map(tuple),
 )

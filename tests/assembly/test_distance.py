@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.tree import Operation
 from partwright.errors import ParameterError
-from partwright.fields import Box, Sphere
+from partwright.fields import Box, Extrusion, Profile, Sphere
 from partwright.fields.operations import smooth_union
-from tests.assembly.strategies import ASSEMBLIES, SIMILARITIES
+from partwright.fields.swept import Swept
+from tests.assembly.strategies import ASSEMBLIES, PARTS, SIMILARITIES, SWEPT
 
 POINTS = np.random.default_rng(0).uniform(-2, 2, (400, 3))
 
@@ -52,6 +55,31 @@ def test_kernel_and_reference_agree(assembly: Assembly) -> None:
     reference = assembly.distance(torch.tensor(POINTS, dtype=torch.float64)).numpy()
     size = np.ptp(assembly.bounds(), axis=0).max()
     assert np.abs(assembly.distance(POINTS) - reference).max() < 2e-5 * max(size, 4.0)
+
+
+@settings(max_examples=80)
+@given(st.lists(SWEPT | PARTS, min_size=2, max_size=5), st.sampled_from(["union", "difference"]))
+def test_boxes_that_are_far_away_change_nothing(parts: list[Part], operation: Operation) -> None:
+    """A solid of a profile is asked only near its box, and the result is the reference."""
+    assembly = Assembly(tuple(parts), operation)
+    reference = assembly.distance(torch.tensor(POINTS, dtype=torch.float64)).numpy()
+    assert np.abs(assembly.distance(POINTS) - reference).max() < 1e-4
+
+
+def test_a_solid_of_a_profile_is_not_asked_where_it_is_far_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    call = Swept.__call__
+
+    def counted(self: Swept, points: np.ndarray) -> np.ndarray:
+        asked.append(len(points))
+        return call(self, points)
+
+    monkeypatch.setattr(Swept, "__call__", counted)
+    plate = Part(Extrusion(Profile.rectangle(0.2, 0.2), 0.2), (1.5, 0.0, 0.0))
+    (Part(Sphere(1.0)) | plate).distance(POINTS)
+    (Part(Sphere(1.0)) - plate).distance(POINTS)
+    assert 0 < asked[0] < len(POINTS) / 2
+    assert asked[1] < len(POINTS) / 20
 
 
 def test_an_assembly_of_unit_size_answers_as_it_does_elsewhere() -> None:

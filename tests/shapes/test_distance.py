@@ -29,8 +29,9 @@ def test_unit_distance_of_a_box_is_exact(brick):
     np.testing.assert_allclose(brick.unit_distance(points), box_distance(points, HALF), atol=1e-6)
     assert brick.unit_distance(points).dtype == np.float32
     np.testing.assert_array_equal(brick.unit_unsigned(points), np.abs(brick.unit_distance(points)))
-    few = brick.unit_distance(points[:50])  # the path without the lattice of signs
+    few = load_shape(box(2 * HALF * 10, (5, -7, 100))).unit_distance(points[:50])  # without lattice of signs
     np.testing.assert_array_equal(few, brick.unit_distance(points)[:50])
+    np.testing.assert_array_equal(few, brick.unit_distance(points[:50]))
 
 
 def test_signed_distance_is_in_own_units(brick):
