@@ -16,10 +16,11 @@ from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Node
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.fields import Field, normal_form
-from partwright.meshing.manifolds import as_mesh, simplified
+from partwright.meshing.manifolds import simplified, surface_of
 from partwright.meshing.named_solids import is_named, named_solid
 from partwright.meshing.quadric_solids import half_space, quadric_solid
 from partwright.meshing.small_components import components
+from partwright.meshing.welding import welded
 
 if TYPE_CHECKING:
     import trimesh
@@ -64,7 +65,9 @@ def mesh_csg(node: Node, tolerance: float | None = None) -> trimesh.Trimesh:
         NoSurfaceError: nothing is left, or the solid does not end.
         ParameterError: a leaf is neither a quadric nor a named solid, or is blended, or there are too many.
     """
-    return as_mesh(solid_of(node, tolerance))
+    import trimesh
+
+    return trimesh.Trimesh(*welded(*surface_of(solid_of(node, tolerance))), process=False)
 
 
 def solid_of(node: Node, tolerance: float | None = None) -> Manifold:
