@@ -14,11 +14,10 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
-from partwright.assembly import Assembly, Similarity
-from partwright.assembly.distance import unit_similarity
+from partwright.assembly import Assembly
 from partwright.cleaning.acceptance import AcceptanceTest
+from partwright.cleaning.agreement import Agreement, VolumeSamples
 from partwright.cleaning.deviation_samples import DeviationSamples, State
 from partwright.cleaning.feature_cleaning import cleaned_features, same_numbers
 from partwright.cleaning.feature_relations import FeatureNumber, feature_numbers, feature_relations
@@ -31,9 +30,8 @@ from partwright.cleaning.snapping import snapped
 from partwright.cleaning.solid_kinds import plainer
 from partwright.errors import SettingError
 from partwright.fields import Swept
-from partwright.meshing import mesh_assembly, occupancy_grid
+from partwright.meshing import mesh_assembly
 from partwright.methods import Cancellation
-from partwright.metrics.iou import RESOLUTION, iou
 from partwright.shapes import Shape
 from partwright.tolerances.noise import roughness
 
@@ -42,21 +40,6 @@ _POINTS = 8000
 _MESHED = 128  # cells along the longest side
 _COARSEST = 0.05  # of the longest side
 _FINEST = 1e-5
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """How well an assembly agrees with what it stands for."""
-
-    iou: float
-    """With the shape, or with the given assembly where there is no shape."""
-    mean_deviation: float
-    """Over points of both surfaces, own units."""
-    parts: int
-    """Leaves."""
-
-    def to_dict(self) -> dict[str, float]:
-        return {"iou": self.iou, "mean_deviation": self.mean_deviation, "parts": self.parts}
 
 
 @dataclass(frozen=True)
@@ -72,7 +55,7 @@ class Cleaned:
     before: Agreement
     """Of the given assembly."""
     after: Agreement
-    """Of the cleaned one, at the very samples and cells of `before`."""
+    """Of the cleaned one, at the very samples of `before`."""
     changed: bool
     """Whether anything but rounding differs."""
     numbers: tuple[FeatureNumber, ...] = ()
@@ -137,12 +120,14 @@ def clean(
     changed = not unchanged(model, made, grid)
     result = made if changed else assembly
     told("measuring")
-    if shape is None:
-        occupied = occupancy_grid(assembly.transformed(samples.frame).distance, RESOLUTION)
-    else:
-        occupied = shape.unit_occupancy(RESOLUTION)
-    before = _agreement(assembly, samples, occupied)
-    after = _agreement(result, samples, occupied) if changed else before
+    volume = VolumeSamples.of(target)
+
+    def agreement(whole: Assembly) -> Agreement:
+        off = samples.mean_deviation(whole.transformed(samples.frame))
+        return Agreement(volume.iou(whole), off, len(whole))
+
+    before = agreement(assembly)
+    after = agreement(result) if changed else before
     return Cleaned(result, relations(result, frames, grid), tolerance, before, after, changed)
 
 
@@ -164,19 +149,15 @@ def _with_features(
     made = cleaned_features(assembly, tolerance, grid, cancel)
     told("measuring")
     if shape is None:
-        frame = unit_similarity(assembly)
         surface = mesh_assembly(assembly, _MESHED)
         points = np.asarray(trimesh.sample.sample_surface(surface, _POINTS, seed=0)[0])
-        occupied = occupancy_grid(assembly.transformed(frame).distance, RESOLUTION)
     else:
-        x, y, z = (-shape.frame.scale * np.array(shape.frame.centre)).tolist()
-        frame = Similarity(shape.frame.scale, translation=(x, y, z))
         points = shape.frame.from_unit(shape.unit_surface(_POINTS, 0).points)
-        occupied = shape.unit_occupancy(RESOLUTION)
+    volume = VolumeSamples.of(target)
 
     def agreement(whole: Assembly) -> Agreement:
         off = float(np.abs(whole.distance(points)).mean())
-        return Agreement(iou(whole.transformed(frame).distance, occupied), off, len(whole))
+        return Agreement(volume.iou(whole), off, len(whole))
 
     before, after = agreement(assembly), agreement(made)
     changed = (
@@ -232,9 +213,3 @@ def checked_tolerance(tolerance: float | None, of: Assembly | Shape) -> float:
                 f"give at least {min(noise, TOLERANCE * longest):.3g}{length}"
             )
     return tolerance
-
-
-def _agreement(assembly: Assembly, samples: DeviationSamples, occupied: NDArray[np.bool_]) -> Agreement:
-    """occupied: (R, R, R) cells of the unit frame that should be inside."""
-    local = assembly.transformed(samples.frame)
-    return Agreement(iou(local.distance, occupied), samples.mean_deviation(local), len(assembly))

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from partwright.atomic_io import report_path
+from partwright.cli.assembly_argument import add_assembly
 from partwright.cli.outputs import add_output, given
 
 
@@ -18,7 +19,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "the relations to FILE.report.json.",
     )
     option = command.add_argument
-    option("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    add_assembly(command)
     add_output(command, "FILE", "where to write", reads=_reads, writes=_writes)
     option("--shape", metavar="SHAPE", type=Path, help="what it stands for (default: its own surface)")
     option(

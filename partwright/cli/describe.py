@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+
+from partwright.cli.assembly_argument import add_assembly
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -13,6 +14,6 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description="Prints the tree of an assembly, a line a part: its kind, its numbers and its place. "
         "What is there several times is said once, with how often, and a last line counts.",
     )
-    command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    add_assembly(command)
     command.add_argument("--digits", metavar="N", type=int, default=4, help="of each number (default: 4)")
     command.set_defaults(run="describe")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.assembly_argument import add_assembly
 from partwright.cli.outputs import add_output
 
 
@@ -17,7 +18,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "change with it; each such change is said. `partwright describe` shows names and numbers.",
     )
     option = command.add_argument
-    option("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    add_assembly(command)
     option(
         "--set",
         metavar="PART.NUMBER=VALUE",

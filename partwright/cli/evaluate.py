@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.assembly_argument import add_assembly
+
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
@@ -12,7 +14,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="score an assembly against a shape",
         description="Scores an assembly against the shape it stands for.",
     )
-    command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    add_assembly(command)
     command.add_argument("shape", metavar="SHAPE", type=Path, help="the mesh or scene it was made from")
     command.add_argument("--json", action="store_true", help="print the scores as JSON")
     command.add_argument(

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from partwright.atomic_io import report_path
+from partwright.cli.assembly_argument import add_assembly
 from partwright.cli.outputs import add_output
 from partwright.export.formats import FORMATS
 
@@ -18,7 +19,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "STEP: where OpenCASCADE gets joints of parts wrong they are tried again in other ways, for about a "
         "minute at most; then flat facets stand for them, and FILE.report.json says so.",
     )
-    command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    add_assembly(command)
     add_output(command, "FILE", "where to write", reads=lambda a: [a.assembly], writes=_writes)
     option = command.add_argument_group("of some formats").add_argument
     option("--density", metavar="D", type=float, help="in kg/m3 (rigid bodies; default: water)")

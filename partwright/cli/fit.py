@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.assembly_argument import assembly_file
 from partwright.cli.lengths import length
 from partwright.cli.outputs import Group, add_output_folder
 
@@ -114,7 +115,9 @@ def _add_bounds(group: Group) -> None:
 
 
 def _add_start(group: Group) -> None:
-    group.add_argument("--start", metavar="ASSEMBLY", type=Path, help="refine and continue this assembly")
+    group.add_argument(
+        "--start", metavar="ASSEMBLY", type=assembly_file, help="refine and continue this assembly or fit"
+    )
     group.add_argument(
         "--lock", metavar="NAMES", help="parts of the start that stay as they are, separated by commas"
     )

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from partwright.cli.assembly_argument import add_assembly
 from partwright.cli.outputs import add_output
 
 # What `partwright.goals` writes; a test holds the two together, as that room takes long to import.
@@ -40,7 +40,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    add_assembly(command)
     add_output(
         command,
         "FOLDER",

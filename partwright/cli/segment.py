@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.assembly_argument import add_assembly
 from partwright.cli.outputs import add_output, given
 
 NODES, COLOURS, PROPERTY = "nodes", "colours", "face:"
@@ -18,7 +19,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "faces in a colour a part to FILE (.glb, .ply or .usd), and FILE.labels.json.",
     )
     command.add_argument("shape", metavar="SHAPE", type=Path, help="the mesh or scene to label")
-    command.add_argument("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    add_assembly(command)
     add_output(command, "FILE", "where to write", reads=_reads, writes=_writes)
     command.add_argument(
         "--within",

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from partwright.atomic_io import report_path
+from partwright.cli.assembly_argument import add_assembly
 from partwright.cli.outputs import add_output, given
 
 
@@ -21,7 +22,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "HTML (the latter without normals).",
     )
     option = command.add_argument
-    option("assembly", metavar="ASSEMBLY", type=Path, help="an assembly file (.json)")
+    add_assembly(command)
     option("shape", metavar="SHAPE", type=Path, help="a mesh with colours: GLB, glTF, OBJ, PLY or OFF")
     add_output(command, "FILE", "where to write", reads=_reads, writes=_writes)
     option("--size", metavar="N", type=int, default=128, help="texels a side (default: %(default)s)")
