@@ -7,22 +7,18 @@ face that moves goes with it, cuts that went through still do, and cuts of one f
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
 
+from partwright.assembly.following import followed as with_followers
 from partwright.assembly.motion import Motion
 from partwright.assembly.repeated_groups import alike_leaves
-from partwright.assembly.similarity import rotation_matrix
-from partwright.assembly.tree import Assembly, Node, Part
+from partwright.assembly.tree import Assembly, Part
 from partwright.errors import ParameterError
-
-_FLUSH = 2e-3  # of the assembly's longest side: faces that are nearer touch
-_ALONG = 1e-3  # radians: axes that differ by less are parallel
-_STRETCHED = ("cylinder", "tube", "extrusion", "capsule")
 
 
 @dataclass(frozen=True)
@@ -95,9 +91,8 @@ def _changed(
     made = dataclasses.replace(own, field=after.field, translation=(x, y, z))
     if after.rotation != before.rotation:  # of an image that begins where another ends
         made = dataclasses.replace(made, rotation=after.rotation)
-    moves = list(_moves(own, made))
     assembly = assembly.replace_part(name, made)
-    return assembly if number in ("x", "y", "z") else _follow(assembly, own, moves, told)
+    return assembly if number in ("x", "y", "z") else with_followers(assembly, own, made, told)
 
 
 def _split(assembly: Assembly, name: str) -> tuple[list[str], str]:
@@ -135,101 +130,3 @@ def _with_number(part: Part, number: str, value: float) -> Part:
         size["xyz".index(number[-1])] = value
         new = {"size": tuple(size)}
     return dataclasses.replace(part, field=dataclasses.replace(part.field, **new))  # type: ignore[type-var]
-
-
-@dataclass(frozen=True)
-class _Move:
-    """The two faces of a part along one of its axes: where they were, and where they are."""
-
-    axis: np.ndarray
-    before: tuple[float, float]
-    after: tuple[float, float]
-
-
-def _extent(part: Part, axis: np.ndarray) -> tuple[float, float]:
-    """From where to where the part, not its copies, reaches along a direction (3,)."""
-    local = np.stack([-axis, axis]) @ rotation_matrix(part.rotation)
-    low, high = part.field.support(local)
-    at = float(np.array(part.translation) @ axis)
-    return at - float(low), at + float(high)
-
-
-def _moves(before: Part, after: Part) -> Iterator[_Move]:
-    for axis in rotation_matrix(before.rotation).T:
-        old, new = _extent(before, axis), _extent(after, axis)
-        if old != new:
-            yield _Move(axis, old, new)
-
-
-def _follow(assembly: Assembly, part: Part, moves: list[_Move], told: list[str]) -> Assembly:
-    """What depended on the part's faces, moved with them."""
-    near = _FLUSH * float(np.ptp(assembly.bounds(), axis=0).max())
-
-    def visited(node: Node, cut: bool) -> Node:
-        """cut: whether the node is taken away from what holds the part."""
-        if isinstance(node, Part):
-            return node if node.name == part.name else _moved(node, part, moves, near, cut, told)
-        holds = any(leaf.name == part.name for leaf in node.children[0].parts)
-        if any(leaf.name == part.name for leaf in node.parts) or cut:
-            inner = node.operation == "difference" and holds
-            children = [visited(c, cut or (inner and i > 0)) for i, c in enumerate(node.children)]
-            return dataclasses.replace(node, children=tuple(children))
-        first = node.parts[0]
-        shift = sum((_shift(first, move, near) * move.axis for move in moves), np.zeros(3))
-        if not shift.any():
-            return node
-        told.append(f"{first.name} and what is cut from it moved with {part.name}, on whose face it stands")
-        return node.translated(shift.tolist())
-
-    result = visited(assembly, False)
-    assert isinstance(result, Assembly)
-    return result
-
-
-def _shift(other: Part, move: _Move, near: float) -> float:
-    """How far a part that stands on a face moves with it."""
-    low, high = _extent(other, move.axis)
-    if not np.isfinite([low, high]).all():
-        return 0.0
-    if abs(low - move.before[1]) <= near:
-        return move.after[1] - move.before[1]
-    return move.after[0] - move.before[0] if abs(high - move.before[0]) <= near else 0.0
-
-
-def _moved(other: Part, part: Part, moves: list[_Move], near: float, cut: bool, told: list[str]) -> Part:
-    for move in moves:
-        low, high = _extent(other, move.axis)
-        if not np.isfinite([low, high]).all():
-            continue
-        rise, fall = move.after[1] - move.before[1], move.after[0] - move.before[0]
-        below, above = low <= move.before[0] + near, high >= move.before[1] - near
-        if not cut:
-            shift = _shift(other, move, near)
-            if shift:
-                told.append(
-                    f"{other.name} moved by {shift:.6g} with the face of {part.name} that it stands on"
-                )
-                other = other.translated((shift * move.axis).tolist())
-        elif below and above:
-            longer = _stretched(other, move.axis, rise - fall)
-            if longer is not None:
-                told.append(f"{other.name} goes through {part.name} as before")
-                other = longer.translated(((rise + fall) / 2 * move.axis).tolist())
-        elif (above and low < move.before[1]) or (below and high > move.before[0]):
-            shift = rise if above else fall
-            told.append(f"{other.name} moved by {shift:.6g} with the face of {part.name}: its depth is kept")
-            other = other.translated((shift * move.axis).tolist())
-    return other
-
-
-def _stretched(part: Part, axis: np.ndarray, by: float) -> Part | None:
-    """Longer along the direction; None where no number of it is its length that way."""
-    local = np.abs(axis @ rotation_matrix(part.rotation))
-    k = int(local.argmax())
-    if local[k] < 1 - _ALONG:
-        return None
-    if part.field.kind == "box":
-        return _with_number(part, f"size.{'xyz'[k]}", numbers_of(part)[f"size.{'xyz'[k]}"] + by)
-    if k == 2 and part.field.kind in _STRETCHED:
-        return _with_number(part, "height", numbers_of(part)["height"] + by)
-    return None

@@ -56,6 +56,36 @@ def test_copies_change_together_and_patterns_name_several() -> None:
     assert numbers_of(bracket()["hole"])["diameter"] == 4
 
 
+def test_a_wider_hole_moves_nothing_that_ends_where_its_wall_does() -> None:
+    """A block far away ends at the same x as the hole: nothing stands on a round wall."""
+    block = Part(Box((4, 4, 6)), (11, -7, 8), name="block")  # to x = 13, as the hole from there on
+    edited = with_numbers(bracket() | block, {"hole.radius": 2.5})
+    assert edited.assembly["block"].translation == (11, -7, 8)
+    assert edited.followed == ()
+
+
+def test_what_is_as_high_but_beside_a_plate_stays() -> None:
+    aside = Part(Box((4, 4, 4)), (40, 0, 7), name="aside")  # from z = 5, as the plate's top
+    edited = with_numbers(bracket() | aside, {"base_plate.size.z": 9.0})
+    assert edited.assembly["aside"].translation == (40, 0, 7)
+    assert not any("aside" in sentence for sentence in edited.followed)
+
+
+def test_what_is_on_the_floor_of_a_pocket_goes_down_with_it() -> None:
+    """A stud that stands on it, and a hole that begins in it; the plate whose underside is as high stays."""
+    plate = Part(Box((40, 20, 10)), (0, 0, 5), name="plate")
+    pocket = Part(Box((20, 10, 6)), (0, 0, 9), name="pocket")  # from z = 6
+    hole = Part(Cylinder(1, 2), (5, 0, 5), name="hole")  # from 4 to 6
+    stud = Part(Cylinder(1, 3), (-5, 0, 7.5), name="stud")  # from 6
+    shelf = Part(Box((60, 4, 2)), (0, 20, 7), name="shelf")  # from 6, beside
+    before = Assembly((Assembly((plate, pocket, hole), "difference"), stud, shelf))
+    edited = with_numbers(before, {"pocket.size.z": 8.0})  # from 5
+    after = edited.assembly
+    assert [after[name].translation[2] for name in ("hole", "stud", "shelf", "plate")] == [4, 6.5, 7, 5]
+    assert len(edited.followed) == 2
+    assert mesh_assembly(after).body_count == mesh_assembly(before).body_count
+
+
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
