@@ -9,18 +9,26 @@ from partwright.shapes import Shape
 _POINTS = 30_000
 _PATCHES = 1_000
 _AROUND = 32  # samples of a patch: about 0.04 unit lengths wide
+_LOOKED = 96  # samples around its middle, among which those are that look the same way
+_ALIKE = 0.5  # cosine
 
 
 def roughness(shape: Shape) -> float:
     """Standard deviation of the surface off a quadric through its neighbourhood, in unit lengths.
 
-    The median over patches all over the surface: edges and corners, which are few, do not count as noise.
+    The median over patches all over the surface. A patch is of what looks the same way as its middle: the
+    other side of a thin wall is no noise, and neither is what lies beyond an edge.
     """
     from scipy.spatial import cKDTree
 
-    points = shape.unit_surface(_POINTS, seed=17).points.astype(np.float64)
-    centres = points[:: max(1, len(points) // _PATCHES)]
-    near = points[cKDTree(points).query(centres, _AROUND)[1]]
+    surface = shape.unit_surface(_POINTS, seed=17)
+    points, normals = surface.points.astype(np.float64), surface.normals
+    centres = np.arange(0, len(points), max(1, len(points) // _PATCHES))
+    found = cKDTree(points).query(points[centres], _LOOKED)[1]
+    alike = np.einsum("nki,ni->nk", normals[found], normals[centres]) > _ALIKE
+    first = np.argsort(~alike, axis=1, kind="stable")[:, :_AROUND]
+    whole = alike.sum(axis=1) >= _AROUND
+    near = points[np.take_along_axis(found, first, axis=1)[whole if whole.any() else slice(None)]]
     local = near - near.mean(axis=1, keepdims=True)
     axes = np.linalg.svd(local, full_matrices=False)[2]
     u, v, height = np.moveaxis(local @ axes.transpose(0, 2, 1), -1, 0)

@@ -53,6 +53,12 @@ def test_a_unit_needs_a_shape_that_has_one() -> None:
         DistanceBounds.of(pw.load_shape(boss()[0]), tolerance="1mm")
 
 
+def test_the_other_side_of_a_thin_wall_is_no_noise() -> None:
+    """Walls as thick as a patch is wide: 2 % of the length."""
+    tube = trimesh.creation.annulus(0.48, 0.5, 1.0, sections=96)
+    assert roughness(pw.load_shape(tube)) < 3e-4
+
+
 @pytest.mark.parametrize("sigma", [0.0, 0.002, 0.005])
 def test_roughness_is_the_noise_of_the_surface(sigma: float) -> None:
     ball = trimesh.creation.icosphere(5, 0.9)
