@@ -247,14 +247,14 @@ def kinds_of(robot: RobotFile, names: Sequence[str]) -> tuple[tuple[type[Field],
     Raises:
         SettingError: the format has no such kind.
     """
-    known = {kind.kind: kind for kind in robot.kinds}
+    if not names:
+        return tuple(robot.kinds), True
+    known = {kind.kind: kind for kind in (*robot.kinds, *robot.composed)}
     for name in names:
         if name not in known and name != HULL:
             raise SettingError(
                 f"kinds: {robot.path.suffix} has no {name!r}; expected some of {', '.join((*known, HULL))}"
             )
-    if not names:
-        return tuple(known.values()), True
     return tuple(kind for name, kind in known.items() if name in names), HULL in names
 
 
@@ -314,6 +314,7 @@ def _measured(
         farthest=largest_deviation(target.solid, union),
         tolerance=wishes.tolerance,
         sticking_out=sticking_out(shapes, target) if wishes.mode == "around" else None,
+        most=wishes.most,
         notes=tuple(dict.fromkeys((*before.notes, *target.notes))),
     )
 

@@ -78,6 +78,22 @@ def outer_hull(hull: Manifold, by: float, most: int, room: float, farthest: floa
     return result
 
 
+def without_twins(hull: Manifold, by: float) -> Manifold:
+    """The hull of some of its corners, no two nearer than a length: none of its own is farther from it than
+    that. Corners that files in single precision take for one would leave them open."""
+    from scipy.spatial import cKDTree
+
+    corners = surface_of(hull)[0]
+    pairs = cKDTree(corners).query_pairs(by, output_type="ndarray")
+    if not len(pairs):
+        return hull
+    kept = np.ones(len(corners), bool)
+    for one, other in sorted(map(tuple, pairs.tolist())):
+        if kept[one]:
+            kept[other] = False
+    return hull_of(corners[kept])
+
+
 def _within(planes: Sequence[_Planes], boxes: Sequence[np.ndarray], triangles: np.ndarray) -> np.ndarray:
     """(T,) whether one of the hulls contains the triangle."""
     within = np.zeros(len(triangles), bool)

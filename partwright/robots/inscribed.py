@@ -7,10 +7,12 @@ of those of what was found (after IRIS, Deits and Tedrake 2015; theirs is the la
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.meshing.hulls import hull_of
 from partwright.meshing.manifolds import surface_of
 from partwright.shapes import MeshDistance
 
@@ -23,9 +25,10 @@ _FACES = 64  # planes at most
 _ROUNDS = 4
 
 
-def inscribed(hull: Manifold, solid: Manifold) -> Manifold:
+def inscribed(hull: Manifold, solid: Manifold, about: Manifold | None = None) -> Manifold:
     """The hull, cut back until next to nothing of it is outside of the solid.
 
+    about: it is begun at the deepest point of this; of what hull and solid have in common if not given.
     Points on the surface of what is outside are kept out, so what lies between them may stay in by a hair.
     """
     outside, common = hull - solid, hull ^ solid
@@ -33,7 +36,7 @@ def inscribed(hull: Manifold, solid: Manifold) -> Manifold:
         return hull
     size = float(np.ptp(surface_of(hull)[0], axis=0).max())
     away = surface_of(outside.refine_to_length(_SPACING * size))[0]
-    best = _between(hull, away, deepest(common), hull, size)
+    best = _between(hull, away, deepest(about or common), hull, size)
     for _ in range(_ROUNDS):
         if best.is_empty():
             break
@@ -42,6 +45,36 @@ def inscribed(hull: Manifold, solid: Manifold) -> Manifold:
             break
         best = found
     return best
+
+
+def filled(hulls: Sequence[Manifold], solid: Manifold, most: int, least: float) -> list[Manifold]:
+    """Convex solids within a solid, and more of them in what they leave of it, the largest piece first.
+
+    most: of all. least: volume that each one more has to gain.
+    """
+    from manifold3d import Manifold, OpType
+
+    found = list(hulls)
+    waiting = (solid - Manifold.batch_boolean(found, OpType.Add)).decompose()
+    while waiting and len(found) < most:
+        piece = waiting.pop(max(range(len(waiting)), key=lambda i: waiting[i].volume()))
+        if piece.volume() < least:
+            break
+        made = inscribed(hull_of(surface_of(piece)[0]), solid, piece)
+        if (made ^ piece).volume() >= least:
+            found.append(made)
+            waiting += (piece - made).decompose()
+        else:
+            waiting += [part for half in _halves(piece) for part in half.decompose()]
+    return found
+
+
+def _halves(solid: Manifold) -> tuple[Manifold, Manifold]:
+    """On either side of the middle of its longest side."""
+    lower, upper = np.reshape(solid.bounding_box(), (2, 3))
+    axis = int((upper - lower).argmax())
+    normal = tuple(np.eye(3)[axis].tolist())
+    return solid.split_by_plane(normal, float(lower[axis] + upper[axis]) / 2)
 
 
 def _between(hull: Manifold, away: np.ndarray, seed: np.ndarray, like: Manifold, size: float) -> Manifold:

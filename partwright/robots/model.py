@@ -77,6 +77,8 @@ class RobotFile(ABC):
 
     kinds: ClassVar[tuple[type[Field], ...]]
     """Solids that the format has natively."""
+    composed: ClassVar[tuple[type[Field], ...]] = ()
+    """Those that it can say by several of its own: taken only where they are asked for by name."""
     path: Path
     links: Sequence[Link]
 

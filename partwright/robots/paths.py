@@ -11,7 +11,7 @@ from urllib.parse import unquote
 
 from partwright.errors import UnreadableFileError
 
-_ADDRESS = re.compile(r"(package|model)://([^/]+)/(.*)", re.DOTALL)
+_ADDRESS = re.compile(r"(package|model):///?([^/]+)/(.*)", re.DOTALL)  # a slash more is common
 _WITH_FOLDERS = ("ROS_PACKAGE_PATH", "GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
 _WITH_PREFIXES = ("AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH")  # packages lie in their share/
 
@@ -102,6 +102,17 @@ def with_companions(place: Place) -> dict[str, Path]:
         if file.is_file() and ".." not in PurePosixPath(name).parts and not PurePosixPath(name).is_absolute():
             result |= with_companions(Place(file, str(folder / name), ""))
     return result
+
+
+def carried(address: str, beside: Path, packages: Sequence[Path], copied: dict[str, Path]) -> str:
+    """The address in the new folder of a picture that a material refers to, which is added to what is copied;
+    one that is not there is left as it is, as viewers of robots go on without."""
+    try:
+        place = find(address, beside, packages, "")
+    except UnreadableFileError:
+        return address
+    copied.update(with_companions(place))
+    return place.address
 
 
 _MENTIONS = {

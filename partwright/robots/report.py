@@ -19,7 +19,7 @@ class LinkReport:
     shapes: how many of each kind. stands_for: which meshes. missing, extra: volume that the shapes lack and
     add, over that of the meshes. farthest: where the surface of either reaches farthest beyond the other, in
     the link's frame. sticking_out: how far the meshes reach beyond the shapes, by fresh points; None where
-    they may.
+    they may. most: shapes that it could have.
     """
 
     link: str
@@ -33,6 +33,7 @@ class LinkReport:
     tolerance: float
     sticking_out: float | None
     notes: tuple[str, ...]
+    most: int
 
     @property
     def deviation(self) -> float:
@@ -90,7 +91,10 @@ def warnings(links: Sequence[LinkReport]) -> list[str]:
     result = []
     for link in links:
         if link.deviation > link.tolerance:
-            nearer = "more shapes (--max-parts)" if "hull" in link.shapes else "hulls (--kinds)"
+            nearer = "hulls (--kinds)"
+            if "hull" in link.shapes:
+                full = link.count >= link.most
+                nearer = "more shapes (--max-parts)" if full else "a smaller --tolerance"
             place = ", ".join(f"{value:.3f}" for value in link.farthest.at)
             wrong = "lack" if link.farthest.missing else "add"
             result.append(

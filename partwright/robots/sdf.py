@@ -16,17 +16,10 @@ from partwright.errors import RobotError
 from partwright.export.rigid_body import numbers
 from partwright.export.urdf import roll_pitch_yaw
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
-from partwright.robots.model import (
-    Files,
-    Link,
-    MeshUse,
-    RobotFile,
-    Shape,
-    frame,
-    from_roll_pitch_yaw,
-)
+from partwright.robots.model import Files, Link, MeshUse, RobotFile, Shape
 from partwright.robots.native_solids import native_solids
-from partwright.robots.paths import Place, find, new_address, with_companions
+from partwright.robots.paths import Place, carried, find, new_address, with_companions
+from partwright.robots.sdf_frames import SdfFrames
 from partwright.robots.xml_files import parsed, serialised, stl, three
 
 
@@ -39,6 +32,7 @@ class Sdf(RobotFile):
         """Raises UnreadableFileError or RobotError, which name the link."""
         self.path, self.packages = path, packages
         self._tree = parsed(path, "sdf")
+        self._frames = SdfFrames(path)
         self._places: dict[str, Place] = {}
         self._links = dict(self._named(self._tree.getroot(), ""))
         parents: dict[str, list[str]] = {name: [] for name in self._links}
@@ -63,6 +57,10 @@ class Sdf(RobotFile):
                 uri.text = place.address
         for uri in tree.getroot().iterfind(".//mesh/uri[@new]"):
             del uri.attrib["new"]
+        for picture in tree.getroot().iterfind(".//material//*"):
+            if str(picture.tag).endswith("_map") and (picture.text or "").strip():
+                address = picture.text.strip()
+                picture.text = carried(address, self.path.parent, self.packages, files.copied)
         files.written[self.path.name] = serialised(tree)
         return files
 
@@ -82,7 +80,7 @@ class Sdf(RobotFile):
         natives: list[Part] = []
         for role, found in uses.items():
             for child in element.findall(role):
-                place = _pose(child, self.path, name)
+                place = self._frames.within(child, element)
                 mesh = child.find("geometry/mesh")
                 if mesh is not None:
                     found.append(self._use(mesh, place, name))
@@ -90,10 +88,10 @@ class Sdf(RobotFile):
                     natives += native_solids(
                         child, place, _read, self.kinds, f"link {name!r}: collision", self.path
                     )
-        pose = _pose(element, self.path, name)
+        pose = self._frames.placed(element)
         above = element.getparent()
         while above is not None and above.tag == "model":
-            pose = _pose(above, self.path, name) @ pose
+            pose = self._frames.placed(above) @ pose
             above = above.getparent()
         return Link(name, pose, parents, tuple(uses["collision"]), tuple(uses["visual"]), tuple(natives))
 
@@ -122,30 +120,6 @@ def _scoped(joint: Any, name: str) -> str:
     while above is not None and above.getparent() is not None and above.getparent().tag in ("model", "world"):
         scope, above = f"{above.get('name')}::{scope}", above.getparent()
     return scope + name
-
-
-def _pose(element: Any, path: Path, name: str) -> np.ndarray:
-    """(4, 4) of the element's own pose.
-
-    Raises:
-        RobotError: it is no six numbers, or relative to another frame, which only a simulator resolves.
-    """
-    pose = element.find("pose")
-    if pose is None or not (pose.text or "").strip():
-        return np.eye(4)
-    other = pose.get("relative_to") or pose.get("frame")
-    if other and other not in ("__model__", "world"):
-        raise RobotError(
-            f"{path}: {name!r}: its pose is relative to {other!r}; give it relative to its parent"
-        )
-    words = pose.text.split()
-    if len(words) != 6:
-        raise RobotError(f"{path}: {name!r}: pose: expected six numbers, got {pose.text.strip()!r}")
-    place = three(" ".join(words[:3]), path, f"{name!r}: pose")
-    angles = three(" ".join(words[3:]), path, f"{name!r}: pose")
-    if pose.get("degrees") in ("true", "1"):
-        angles = np.radians(angles).tolist()
-    return frame(from_roll_pitch_yaw(*angles), place)
 
 
 def _collision(shape: Shape, like: Place, old: Any, files: Files) -> Any:

@@ -21,8 +21,8 @@ from partwright.approximation.light_hull import light_hull, plain_hull
 from partwright.meshing.hulls import hull_of
 from partwright.meshing.manifolds import as_mesh
 from partwright.robots.containment import larger, shape_solid
-from partwright.robots.enclosing import containing, outer_hull
-from partwright.robots.inscribed import deepest, inscribed
+from partwright.robots.enclosing import containing, outer_hull, without_twins
+from partwright.robots.inscribed import deepest, filled, inscribed
 from partwright.robots.model import Shape
 from partwright.robots.solids import Target
 
@@ -42,9 +42,11 @@ _ROUNDING = 1e-9  # of its volume: what a hull adds to a link without a dent
 _CORNERS = 1024  # of a convex link's exact hull
 _FACES = 64  # of an enclosing hull, and more as long as a corner is out by a share of the tolerance
 _OUT = 0.9  # that share: a corner is a little farther from the hull than from its planes
-_ROOM = 1e-6  # of the size: by how much an enclosing shape is larger than it need be, for rounding
+_ROOM = 2e-6  # of the size: by how much an enclosing shape is larger than it need be, for rounding
+_TWINS = 0.5  # of that: corners nearer than this are one
 _POINTS = 50_000  # of the triangles, for the hulls of wrapped pieces
 _LEAST = 1e-3  # of a wrapped piece's volume: a hull of points below it is a sheet
+_FILLS = 2e-3  # of the link's volume: what each shape more within it has to gain
 _STEPS = 14  # of the bisection for shapes within
 
 
@@ -68,7 +70,7 @@ class Wishes:
 
 def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
     """The shapes, named NAME_1, NAME_2 ..., or NAME for one."""
-    if wishes.mode != "around" and (convex := _convex(target.solid, wishes)) is not None:
+    if wishes.mode != "around" and (convex := _convex(target, wishes)) is not None:
         return [dataclasses.replace(convex, name=name)]
     solid = simplified(target.wrap if wishes.mode == "around" else target.solid, wishes.tolerance)
     pieces = convex_cover(solid, Limits(wishes.tolerance, wishes.extra, wishes.most, wishes.worth))
@@ -80,6 +82,7 @@ def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
         hulls = balanced_hulls(pieces, solid, wishes.tolerance)
     else:
         hulls = [inscribed(piece.hull, target.solid) for piece in pieces]
+        hulls = filled(hulls, target.solid, wishes.most, _FILLS * target.solid.volume())
     chosen = [_chosen(hull, len(hulls) == 1, target, wishes) for hull in hulls]
     if wishes.mode == "within":
         chosen = [one for shape in chosen if (one := _within(shape, target)) is not None]
@@ -87,16 +90,22 @@ def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
     return [Shape(each, shape.part, shape.mesh) for each, shape in zip(names, chosen, strict=True)]
 
 
-def _convex(solid: Manifold, wishes: Wishes) -> Shape | None:
+def _convex(target: Target, wishes: Wishes) -> Shape | None:
     """A convex solid as a native one that is near, or its own hull, exact; None where it is not convex."""
-    whole = Piece(solid)
+    solid, whole = target.solid, Piece(target.solid)
     if not wishes.hulls or whole.extra > _FLAWS * solid.volume() or whole.hull.num_vert() > _CORNERS:
         return None
     dented = whole.extra > _ROUNDING * solid.volume()
     if dented and not whole.within(wishes.tolerance):
         return None
     near = _near(plain_hull(whole.hull), wishes, NATIVE_FOR)
-    return Shape("", near.part) if near is not None else Shape("", mesh=as_mesh(whole.hull))
+    shape = Shape("", near.part) if near is not None else Shape("", mesh=as_mesh(whole.hull))
+    if not dented or wishes.mode != "within":
+        return shape
+    # Dents of a face are shallow all over, and a little smaller is nearly all; a slot is deep.
+    ways = (shape, Shape("", mesh=as_mesh(inscribed(whole.hull, solid))))
+    found = [one for way in ways if (one := _within(way, target)) is not None]
+    return max(found, key=lambda one: float(shape_solid(one).volume()), default=None)
 
 
 def _near(hull: Manifold, wishes: Wishes, worse: float) -> ConvexFit | None:
@@ -114,7 +123,7 @@ def _enclosing(pieces: list[Piece], target: Target, wishes: Wishes) -> list[Mani
     hulls = _tight(pieces, target, fine) if target.loose else [piece.hull for piece in pieces]
 
     def plain(hull: Manifold) -> Manifold:
-        return outer_hull(hull, fine, _FACES, room, _OUT * wishes.tolerance)
+        return without_twins(outer_hull(hull, fine, _FACES, room, _OUT * wishes.tolerance), _TWINS * room)
 
     hulls = [plain(hull) for hull in hulls]
     more = containing(hulls, target.vertices[target.faces], fine)

@@ -17,7 +17,7 @@ from partwright.export.urdf import roll_pitch_yaw
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.robots.model import Files, Link, MeshUse, RobotFile, Shape, frame, from_roll_pitch_yaw
 from partwright.robots.native_solids import native_solids
-from partwright.robots.paths import Place, find, new_address, with_companions
+from partwright.robots.paths import Place, carried, find, new_address, with_companions
 from partwright.robots.xml_files import parsed, serialised, stl, three
 
 
@@ -25,6 +25,7 @@ class Urdf(RobotFile):
     """A URDF file. A capsule, which URDF lacks, is written as a cylinder and two spheres."""
 
     kinds: ClassVar[tuple[type[Field], ...]] = (Box, Cylinder, Sphere)
+    composed: ClassVar[tuple[type[Field], ...]] = (Capsule,)
 
     def __init__(self, path: Path, packages: Sequence[Path] = ()) -> None:
         """Raises UnreadableFileError or RobotError, which name the link."""
@@ -54,6 +55,9 @@ class Urdf(RobotFile):
             else:
                 for mesh in link.iterfind("collision/geometry/mesh"):
                     self._carry(mesh, files)
+        for texture in tree.getroot().iterfind(".//material/texture[@filename]"):
+            address = texture.get("filename")
+            texture.set("filename", carried(address, self.path.parent, self.packages, files.copied))
         files.written[self.path.name] = serialised(tree)
         return files
 

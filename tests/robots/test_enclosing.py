@@ -11,8 +11,8 @@ from manifold3d import Manifold, OpType
 
 from partwright.approximation.hull_faces import faces_of
 from partwright.meshing.manifolds import surface_of
-from partwright.robots import CollideOptions, collide
-from partwright.robots.enclosing import containing, outer_hull
+from partwright.robots import CollideOptions, collide, save
+from partwright.robots.enclosing import containing, outer_hull, without_twins
 from tests.robots.robots import urdf
 
 
@@ -69,6 +69,34 @@ def test_an_outer_hull_contains_with_few_faces() -> None:
     exact = outer_hull(turned, 0.1, 64, 1e-9)
     assert exact.volume() == pytest.approx(1.0, rel=1e-6)
     assert exact.num_vert() == 8
+
+
+def test_corners_next_to_each_other_are_one() -> None:
+    """As where many planes meet nearly in a point; what is left is off by no more than was said."""
+    near = 1e-7 * np.random.default_rng(3).normal(size=(8, 6, 3))
+    corners = (np.array(list(np.ndindex(2, 2, 2)))[:, None] + near).reshape(-1, 3)
+    hull = Manifold.hull_points(corners)
+    assert hull.num_vert() > 8
+    plain = without_twins(hull, 1e-6)
+    assert plain.num_vert() == 8
+    assert plain.volume() == pytest.approx(1.0, abs=1e-5)
+    assert without_twins(plain, 1e-6) is plain
+
+
+def test_enclosing_hulls_are_closed_in_files_of_single_precision(tmp_path: Path) -> None:
+    path = urdf(tmp_path / "in")
+    ball = trimesh.creation.icosphere(4, 0.02)
+    half = trimesh.creation.box((1, 1, 1), transform=trimesh.transformations.translation_matrix((0, 0, 0.5)))
+    bowl = trimesh.boolean.difference([ball, trimesh.creation.icosphere(4, 0.015), half])
+    bowl.export(tmp_path / "in" / "meshes" / "rod.stl")
+    options = CollideOptions(enclose=True, tolerance="0.4mm", kinds=("hull",))
+    save(collide(path, options), tmp_path / "out")
+    files = list((tmp_path / "out" / "collision").glob("arm*.stl"))
+    assert len(files) > 4
+    for file in files:
+        mesh = trimesh.load_mesh(file, process=False)
+        corners, faces = np.unique(mesh.vertices, axis=0, return_inverse=True)
+        assert trimesh.Trimesh(corners, faces.reshape(-1, 3), process=False).is_watertight, file.name
 
 
 def test_enclosing_adds_no_more_than_pieces_do(tmp_path: Path) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from manifold3d import Manifold
+from manifold3d import Manifold, OpType
 
-from partwright.robots.inscribed import inscribed
+from partwright.robots.inscribed import filled, inscribed
 
 
 def test_a_convex_solid_is_its_own() -> None:
@@ -27,3 +27,18 @@ def test_a_plate_with_a_hole_keeps_one_side_of_it() -> None:
     inner = inscribed(ring.hull(), ring)
     assert (inner - ring).volume() < 0.01 * inner.volume()
     assert inner.volume() > 0.6 * ring.volume()
+
+
+def test_what_one_convex_solid_leaves_is_filled_by_more() -> None:
+    """Three bars in a U: one hull within has one of them; together all of it, and nothing outside."""
+    bars = [((3, 1, 1), (0, 0, 0)), ((1, 3, 1), (0, 0, 0)), ((1, 3, 1), (2, 0, 0))]
+    whole = Manifold.batch_boolean([Manifold.cube(size).translate(at) for size, at in bars], OpType.Add)
+    first = inscribed(whole.hull(), whole)
+    found = filled([first], whole, 16, 0.05)
+    union = Manifold.batch_boolean(found, OpType.Add)
+    assert first.volume() < 0.6 * whole.volume()
+    assert union.volume() > 0.97 * whole.volume()
+    assert (union - whole).volume() < 1e-3 * whole.volume()
+    assert len(found) <= 8
+    assert len(filled([first], whole, 2, 0.01)) == 2
+    assert len(filled([first], whole, 8, whole.volume())) == 1

@@ -103,6 +103,54 @@ def test_a_loop_of_joints_stays(tmp_path: Path) -> None:
     assert [joint.get("name") for joint in root.iter("joint")] == ["grip", "rod"]
 
 
+FRAMES = """<sdf version="1.9"><world name="w"><model name="arm" placement_frame="foot">
+  <pose>0 0 5 0 0 0</pose>
+  <link name="base"><pose>1 0 0 0 0 0</pose></link>
+  <frame name="foot" attached_to="base"><pose>0 0 -1 0 0 0</pose></frame>
+  <joint name="hinge" type="revolute"><pose relative_to="base">0 0 2 0 0 1.5707963267948966</pose>
+    <parent>base</parent><child>upper</child></joint>
+  <link name="upper"><pose relative_to="hinge">3 0 0 0 0 0</pose>
+    <collision name="hit"><pose relative_to="hand::palm">0 0 0 0 0 0</pose>
+      <geometry><mesh><uri>meshes/ell.stl</uri></mesh></geometry></collision></link>
+  <model name="hand"><pose relative_to="upper">0 0 0.5 0 0 0</pose>
+    <link name="palm"><pose>0 0 0.5 0 0 0</pose></link></model>
+</model></world></sdf>
+"""
+
+
+def test_poses_relative_to_joints_and_frames_as_converters_from_urdf_write_them(tmp_path: Path) -> None:
+    path = model(tmp_path)
+    path.write_text(FRAMES)
+    robot = open_robot(path)
+    places = {link.name.split("::", 1)[1]: link for link in robot.links}
+    # the foot, one below the base, is at 5
+    assert np.allclose(places["base"].pose, [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 6], [0, 0, 0, 1]])
+    assert np.allclose(places["upper"].pose[:3, 3], (0, 3, 8))
+    assert np.allclose(places["upper"].pose[:3, 0], (0, 1, 0))
+    assert np.allclose(places["hand::palm"].pose[:3, 3], (0, 3, 9))
+    assert np.allclose(places["upper"].collisions[0].matrix[:3, 3], (0, 0, 1))
+    save(collide(robot, CollideOptions(kinds=("hull",))), tmp_path / "out")
+    written = etree.parse(tmp_path / "out" / "pair.sdf").getroot()
+    assert [pose.get("relative_to") for pose in written.iter("pose")] == [
+        *(None, None, None, "base", "hinge", "upper", None)
+    ]
+    path.write_text(FRAMES.replace('relative_to="base"', 'relative_to="upper"'))
+    with pytest.raises(RobotError, match="the pose of 'upper' is relative to itself"):
+        open_robot(path)
+
+
+def test_maps_of_materials_come_along(tmp_path: Path) -> None:
+    path = model(tmp_path)
+    (path.parent / "textures").mkdir()
+    (path.parent / "textures" / "skin.png").write_bytes(b"picture")
+    maps = "<albedo_map>textures/skin.png</albedo_map><normal_map>textures/none.png</normal_map>"
+    material = f"<material><pbr><metal>{maps}</metal></pbr></material></visual>"
+    path.write_text(SDF.replace("</visual>", material))
+    save(collide(path), tmp_path / "out")
+    assert (tmp_path / "out" / "textures" / "skin.png").read_bytes() == b"picture"
+    assert maps in (tmp_path / "out" / "pair.sdf").read_text()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "error", "words"),
     [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,32 @@ def test_shapes_inside_reach_nowhere_beyond_the_mesh(tmp_path: Path, kind: str) 
     report = next(link for link in result.links if link.link == "base")
     assert report.extra < 1e-6
     assert report.missing < (0.01 if kind in ("box", "hull") else 0.6)
+
+
+def test_inside_of_a_box_with_a_dent_that_hardly_counts(tmp_path: Path) -> None:
+    """Its hull is off by less than any tolerance, and yet outside of it."""
+    path = urdf(tmp_path)
+    box = trimesh.creation.box((1, 1, 1)).subdivide().subdivide()
+    top = np.flatnonzero(np.all(np.isclose(box.vertices, (0, 0, 0.5)), axis=1))
+    box.vertices[top, 2] -= 0.004
+    box.apply_translation((0, 0, 5)).export(tmp_path / "meshes" / "rod.stl")
+    result = collide(path, CollideOptions(inside=True, kinds=("hull",)))
+    (shape,) = result.shapes["arm"]
+    assert shape.mesh.vertices[:, 2].max() < 5.497
+    arm = next(link for link in result.links if link.link == "arm")
+    assert arm.extra < 1e-8
+    assert arm.missing < 0.02
+
+
+def test_a_warning_advises_what_would_help(tmp_path: Path) -> None:
+    """More shapes where they are used up, else a smaller tolerance."""
+    path = urdf(tmp_path)
+    link = collide(path, CollideOptions(max_parts=1, kinds=("hull",))).links[0]
+    assert link.count == link.most == 1
+    (warning,) = warnings([link])
+    assert warning.endswith("more shapes (--max-parts) would be nearer")
+    (warning,) = warnings([dataclasses.replace(link, most=48)])
+    assert warning.endswith("a smaller --tolerance would be nearer")
 
 
 def test_a_tolerance_tells_how_many_shapes_there_are() -> None:

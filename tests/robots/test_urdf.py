@@ -95,6 +95,8 @@ def test_package_paths_are_kept_and_found(tmp_path: Path) -> None:
     with pytest.raises(UnreadableFileError, match=r"link 'base': no package my_robot .*--packages"):
         open_robot(moved)
     assert len(open_robot(moved, [tmp_path / "ws"]).links) == 2
+    moved.write_text(moved.read_text().replace("package://", "package:///"))
+    assert len(open_robot(moved, [tmp_path / "ws"]).links) == 2
 
 
 def test_the_report_says_how_far_off_and_who_collides(tmp_path: Path) -> None:
@@ -115,6 +117,41 @@ def test_the_report_says_how_far_off_and_who_collides(tmp_path: Path) -> None:
     assert pair["links"] == ["base", "arm"]
     assert pair["before"] == pytest.approx(np.pi * 0.04 * 0.8 / 4, rel=0.02)
     assert arm["meshes"] == ["rod.stl"]
+
+
+def test_pictures_of_materials_come_along(tmp_path: Path) -> None:
+    """One that is there, one in a package, and one that is not, which stays as it was said."""
+    path = urdf(tmp_path / "ws" / "my_robot")
+    for name in ("skin.png", "grip.png"):
+        (path.parent / name).write_bytes(name.encode())
+    materials = "".join(
+        f'<material name="{i}"><texture filename="{address}"/></material>'
+        for i, address in enumerate(("skin.png", "package://my_robot/grip.png", "gone.png"))
+    )
+    changed(path, '<link name="base">', f'{materials}<link name="base">')
+    save(collide(path, CollideOptions(kinds=("box",), max_parts=1)), tmp_path / "out")
+    assert (tmp_path / "out" / "skin.png").read_bytes() == b"skin.png"
+    assert (tmp_path / "out" / "my_robot" / "grip.png").read_bytes() == b"grip.png"
+    assert materials in (tmp_path / "out" / "pair.urdf").read_text()
+
+
+def test_capsules_that_are_asked_for_are_said_by_what_urdf_has(tmp_path: Path) -> None:
+    """A cylinder and two spheres; without being asked for, a rod is one cylinder."""
+    path = urdf(tmp_path / "in")
+    rod = trimesh.creation.capsule(1.0, 0.2, count=[48, 48])  # its ends at -0.5 and 0.5
+    rod.export(tmp_path / "in" / "meshes" / "rod.stl")
+    result = collide(path, CollideOptions(kinds=("box", "capsule"), max_parts=4))
+    (capsule,) = result.shapes["arm"]
+    assert capsule.kind == "capsule"
+    save(result, tmp_path / "out")
+    link = etree.parse(tmp_path / "out" / "pair.urdf").getroot().findall("link")[1]
+    solids = [each.find("geometry")[0] for each in link.findall("collision")]
+    assert [each.tag for each in solids] == ["cylinder", "sphere", "sphere"]
+    assert float(solids[0].get("length")) == pytest.approx(1.0, rel=0.01)
+    assert [float(each.get("radius")) for each in solids] == pytest.approx([0.2] * 3, rel=0.01)
+    heights = [float(c.find("origin").get("xyz").split()[2]) for c in link.findall("collision")[1:]]
+    assert np.ptp(heights) == pytest.approx(1.0, rel=0.01)
+    assert "capsule" not in {shape.kind for shape in collide(path).shapes["arm"]}
 
 
 def changed(path: Path, old: str, new: str) -> Path:
