@@ -87,8 +87,9 @@ class Mjcf(RobotFile):
         self._documents: dict[str, Any] = {}  # path within the new folder -> tree
         self._read(path, path.name, 0)
         roots = [tree.getroot() for tree in self._documents.values()]
-        self._compiler = Compiler.of(e for root in roots for e in root.iter("compiler"))
-        tops = [e for root in roots for e in root.iter("default") if e.getparent().tag != "default"]
+        whole = list(self._all(roots[0]))
+        self._compiler = Compiler.of(e for e in whole if e.tag == "compiler")
+        tops = [e for e in whole if e.tag == "default" and e.getparent().tag != "default"]
         self._defaults = Defaults(tops)
         self._meshes = self._assets(roots)
         self._geoms: dict[str, list[_Geom]] = {}
@@ -137,6 +138,12 @@ class Mjcf(RobotFile):
                 yield from self._children(self._documents[child.get("file")].getroot())
             elif isinstance(child.tag, str):
                 yield child
+
+    def _all(self, element: Any) -> Iterator[Any]:
+        """All elements below one, in the order in which they are read: an include's where it stands."""
+        for child in self._children(element):
+            yield child
+            yield from self._all(child)
 
     def _body(
         self, body: Any, above: np.ndarray, parent: str | None, inherited: str | None, name: str

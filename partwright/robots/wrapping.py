@@ -93,7 +93,20 @@ def _wound(
     close = np.argwhere(near)
     place = np.stack([axis[close[:, k]] for k, axis in enumerate(ticks)], axis=-1)
     wound[tuple(close.T)] = surface.winding(place) - 0.5
-    return wound
+    return _bounded(wound, ticks, np.abs(vertices).max(axis=0) + cell)
+
+
+def _bounded(wound: np.ndarray, ticks: list[np.ndarray], half: np.ndarray) -> np.ndarray:
+    """Without the regions that go on beyond a box of these half sides (3,): they lie behind sheets that face
+    inwards, not in what the triangles go around."""
+    from scipy.ndimage import label
+
+    regions, _ = label(wound > 0)
+    beyond = np.zeros(wound.shape, bool)
+    for axis, (places, most) in enumerate(zip(ticks, half, strict=True)):
+        np.moveaxis(beyond, axis, 0)[np.abs(places) > most] = True
+    endless = np.unique(regions[beyond])
+    return np.where(np.isin(regions, endless[endless > 0]), -1.0, wound)
 
 
 def _level(values: np.ndarray, counts: np.ndarray, cell: float, frame: UnitFrame) -> Manifold | None:

@@ -133,3 +133,19 @@ def test_geoms_between_two_ends_are_where_mujoco_has_them(tmp_path: Path, kind: 
     axis = link.pose[:3, :3] @ rotation_matrix(part.rotation)[:, 2]
     assert abs(axis @ data.geom_xmat[0].reshape(3, 3)[:, 2]) == pytest.approx(1)
     assert np.allclose(geom_size(part.field), model.geom_size[0][: len(geom_size(part.field))])
+
+
+def test_the_last_word_of_a_compiler_counts_where_its_include_stands(tmp_path: Path) -> None:
+    """An included file that is read before the file's own compiler says nothing of folders any more."""
+    path = mjcf(tmp_path / "in")
+    (path.parent / "first.xml").write_text('<mujoco><compiler meshdir="elsewhere" angle="radian"/></mujoco>')
+    own = '<compiler angle="degree" meshdir="assets"/>'
+    assert own in path.read_text()
+    path.write_text(path.read_text().replace(own, f'<include file="first.xml"/>\n  {own}'))
+    bodies = mujoco.MjModel.from_xml_path(str(path)).nbody
+    result = collide(path, CollideOptions(kinds=("box",), max_parts=1))
+    save(result, tmp_path / "out")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / path.name))
+    assert model.nbody == bodies
+    base = next(link for link in result.robot.links if link.name == "base")
+    assert np.allclose(base.pose[:3, :2], [[0, -1], [1, 0], [0, 0]], atol=1e-12)  # 90 degrees

@@ -61,3 +61,17 @@ def test_an_open_skin_is_enclosed_by_one_shape_around_it(tmp_path: Path) -> None
     assert base.extra < 0.25
     assert base.deviation < 0.05
     assert len(base.notes) == 2
+
+
+def test_sheets_that_face_inwards_bound_nothing_beyond_them() -> None:
+    """Behind two of them, one upon the other, all space is as much inside as in a closed skin."""
+    corners = np.array([[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]], float)
+    turned_in = [[0, 2, 1], [0, 3, 2]]  # normals along -x
+    sheets = [trimesh.Trimesh(corners + (1 + 0.02 * i, -0.5, -0.5), turned_in) for i in range(2)]
+    whole = trimesh.util.concatenate([tube(1), *sheets])
+    inner, around = wrapped(whole.vertices, whole.faces)
+    lower, upper = np.reshape(around.bounding_box(), (2, 3))
+    thick = 1.3 * 1.5 / 96
+    assert (lower >= whole.bounds[0] - 2 * thick).all()
+    assert (upper <= whole.bounds[1] + 2 * thick).all()
+    assert inner.volume() == pytest.approx(TUBE, rel=0.25)
