@@ -67,7 +67,7 @@ def test_sheets_that_face_inwards_bound_nothing_beyond_them() -> None:
     """Behind two of them, one upon the other, all space is as much inside as in a closed skin."""
     corners = np.array([[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]], float)
     turned_in = [[0, 2, 1], [0, 3, 2]]  # normals along -x
-    sheets = [trimesh.Trimesh(corners + (1 + 0.02 * i, -0.5, -0.5), turned_in) for i in range(2)]
+    sheets = [trimesh.Trimesh(corners + np.array([1 + 0.02 * i, -0.5, -0.5]), turned_in) for i in range(2)]
     whole = trimesh.util.concatenate([tube(1), *sheets])
     inner, around = wrapped(whole.vertices, whole.faces)
     lower, upper = np.reshape(around.bounding_box(), (2, 3))
