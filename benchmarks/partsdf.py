@@ -6,6 +6,7 @@
     python benchmarks/partsdf.py images --family FOLDER --model MODEL [--shapes N] [--views N]
     python benchmarks/partsdf.py scans --family FOLDER --model MODEL [--shapes N] [--surface]
     python benchmarks/partsdf.py familiarity --families FOLDER [--shapes N] [--others N]
+    python benchmarks/partsdf.py shortlist --families FOLDER [--names A,B] [--shapes N]
     python benchmarks/partsdf.py real --shapes-from FOLDER
     python benchmarks/partsdf.py generate --family FOLDER --model MODEL [--held N] [--fresh N]
     python benchmarks/partsdf.py ablations --family FOLDER [--epochs N] [--width N] [--shapes N]
@@ -17,8 +18,9 @@
 `encode` has held-out shapes from points by the model's encoder, `images` from one render each by its image
 encoder, `scans` from few points, noise and missing halves, `generate` new ones against held-out ones.
 `real` finds real chairs and vehicles by models of made ones. `familiarity` shows every model that ships
-shapes of its own family and of the others': who is warned of. `decoders` trains the paper's and the local one
-for the same seconds. `ablations` trains every variant in --work, one after another. `training` tables
+shapes of its own family and of the others': who is warned of. `shortlist` says what it costs to judge
+most exchanged parts at few samples. `decoders` trains the paper's and the local one for the same
+seconds. `ablations` trains every variant in --work, one after another. `training` tables
 trainings in FOLDER/NAME, and keeps their logs. Trainings go on where they were stopped, and every shape's
 scores are kept in benchmarks/results/partsdf-*.csv and not measured again, so that each command can be
 stopped and go on.
@@ -42,6 +44,7 @@ from partsdf_images import imaging
 from partsdf_real import reality
 from partsdf_reconstruct import reconstruction, robots
 from partsdf_scans import scanning
+from partsdf_shortlist import shortlisting
 from partsdf_speed import speed
 from partsdf_trainings import trainings
 
@@ -106,6 +109,10 @@ def main() -> None:
     one.add_argument("--resolution", type=int, default=96, help="of the meshes")
     one.add_argument("--fresh", type=int, default=0, help="more held-out shapes, of another seed")
     one.add_argument("--seed", type=int, default=0)
+    one = command("shortlist", shortlisting)
+    one.add_argument("--families", type=Path, required=True, help="folder of prepared families")
+    one.add_argument("--names", default="cars,chairs,mixers,vehicles")
+    one.add_argument("--shapes", type=int, default=5, help="test shapes of each")
     one = measuring("robots", robots)
     one.add_argument("--parts", required=True, help="folder of arms, a folder of link meshes each")
     one.add_argument("--held", required=True, help="arms that are held out in turn, separated by commas")

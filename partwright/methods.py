@@ -224,6 +224,8 @@ class Fitted:
     """One line each, for people, of what may be wrong with it."""
     surface: trimesh.Trimesh | None = None
     """The assembly's surface in the shape's own units, where the method has made it anyway."""
+    of_points: bool = False
+    """It comes close to the points that the shape was given as, not to the surface laid through them."""
 
 
 class Method(ABC, Generic[Settings]):

@@ -48,6 +48,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option("--model", metavar="MODEL", action=_Name, help="the model, where it is not named before SHAPE")
     add_output_folder(command)
     option(
+        "--quality",
+        choices=("draft", "normal", "high"),
+        help="what iterations, points and starts are, where not given (default: normal)",
+    )
+    option(
         "--iterations",
         metavar="N",
         type=int,

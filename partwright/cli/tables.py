@@ -40,8 +40,17 @@ def finish_fit(result: Result, folder: Path) -> int:
 
 def print_result(result: Result, folder: Path) -> None:
     """The outcome of a fit: scores, time, and where the files are."""
-    table = _scores_table(result.shape.name, result.scores, result.shape.unit)
     length = f" {result.shape.unit}" if result.shape.unit else ""
+    if points := result.report.get("points"):
+        table = _table(result.shape.name, result.scores.parts)
+        for name, label in (
+            ("mean", "points off, mean"),
+            ("deviation_95", "95 %"),
+            ("max_deviation", "most"),
+        ):
+            table.add_row(label, f"{points[name]:.3g}{length}, {_percent(points[f'{name}_share'])}")
+    else:
+        table = _scores_table(result.shape.name, result.scores, result.shape.unit)
     for name, bound in result.report.get("bounds", {}).items():
         if isinstance(bound, dict):
             kept = "kept" if bound["kept"] else "missed"
@@ -87,12 +96,17 @@ def print_cleaned(cleaned: Cleaned, path: Path) -> None:
     )
 
 
-def _scores_table(name: str, scores: Scores, unit: str | None) -> Table:
+def _table(name: str, parts: int) -> Table:
     table = Table(title=escape(printable(name)), box=box.SIMPLE_HEAD, show_header=False, title_justify="left")
     table.add_column()
     table.add_column(justify="right")
+    table.add_row("parts", str(parts))
+    return table
+
+
+def _scores_table(name: str, scores: Scores, unit: str | None) -> Table:
+    table = _table(name, scores.parts)
     length = f" {unit}" if unit else ""
-    table.add_row("parts", str(scores.parts))
     table.add_row("IoU", f"{scores.iou:.4f}")
     table.add_row("bi-surface IoU", f"{scores.bi_surface_iou:.4f}")
     table.add_row("Chamfer x 1000", f"{1e3 * scores.chamfer:.3f} (floor {1e3 * scores.chamfer_floor:.3f})")

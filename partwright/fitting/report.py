@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from partwright import __version__
 from partwright.assembly import Assembly, Similarity
@@ -14,6 +16,7 @@ from partwright.errors import SettingError
 from partwright.fitting.structure_warnings import structure_warnings
 from partwright.methods import Fitted, Run
 from partwright.shapes import METRES, Shape
+from partwright.shapes.distance import MeshDistance
 from partwright.tolerances import Bounded, bounds_report, bounds_warnings
 
 if TYPE_CHECKING:
@@ -43,6 +46,7 @@ def report(
     cleaned: Cleaned | None,
 ) -> dict[str, Any]:
     """What report.json holds (docs/report.md). how: outcome, method and settings, as they are to stand."""
+    points = point_deviations(shape, surface) if any(one.of_points for one in fitted) else None
     told = {
         **how,
         "version": __version__,
@@ -56,7 +60,7 @@ def report(
         "scores": scores.to_dict(),
         "mass_properties": masses(surface, shape, None),
         "warnings": [
-            *warnings(shape, scores),
+            *(points_warnings(shape, points) if points else warnings(shape, scores, _more(how["settings"]))),
             *structure_warnings(shape, assembly, surface),
             *(bounds_warnings(enforced, shape) if enforced else []),
             *dict.fromkeys(line for one in fitted for line in one.warnings),
@@ -64,6 +68,8 @@ def report(
     }
     for name in dict.fromkeys(name for one in fitted for name in one.details):
         told[name] = [one.details[name] for one in fitted]
+    if points is not None:
+        told["points"] = asdict(points)
     if enforced is not None:
         told["bounds"] = bounds_report(enforced, shape, float(surface.volume))
     if fitted[0].curve:
@@ -117,17 +123,64 @@ def masses(surface: trimesh.Trimesh, shape: Shape, density: float | None) -> dic
     return fitted | ({"input": asked[0]} if asked else {})
 
 
-def warnings(shape: Shape, scores: Scores) -> list[str]:
+@dataclass(frozen=True)
+class PointDeviations:
+    """How far `count` given points lie from the fitted surface: mean, 95 % and largest, in own units and, as
+    `_share`, of the longest side."""
+
+    count: int
+    mean: float
+    deviation_95: float
+    max_deviation: float
+    mean_share: float
+    deviation_95_share: float
+    max_deviation_share: float
+
+
+def point_deviations(shape: Shape, surface: trimesh.Trimesh) -> PointDeviations:
+    """Of a shape that came as points, by a method that comes close to these themselves.
+
+    What its scores are against, a surface laid through the points, closes what a scan has not seen and chews
+    what it has seen with noise.
+    """
+    assert shape.points is not None
+    faces = np.asarray(surface.faces, dtype=np.int64)
+    exact = MeshDistance(np.asarray(surface.vertices, dtype=np.float64), faces, faces, closed=False)
+    off = exact.nearest(shape.points)[1].astype(np.float64)
+    numbers = (float(off.mean()), float(np.quantile(off, 0.95)), float(off.max()))
+    return PointDeviations(len(off), *numbers, *(number / _side(shape) for number in numbers))
+
+
+def points_warnings(shape: Shape, points: PointDeviations) -> list[str]:
+    """One line where the surface passes many of the points by; single ones may be strays."""
+    if points.deviation_95_share <= POOR_DEVIATION:
+        return []
+    unit = f" {shape.unit}" if shape.unit else ""
+    return [
+        f"the surface passes the points by: a twentieth of them lie {points.deviation_95:.3g}{unit} or more "
+        f"from it, {points.deviation_95_share:.0%} of the longest side; look at preview.png"
+    ]
+
+
+def _side(shape: Shape) -> float:
+    return float((shape.vertices.max(axis=0) - shape.vertices.min(axis=0)).max())
+
+
+def _more(settings: Mapping[str, Any]) -> str:
+    """What may bring a method with these settings closer."""
+    return "try --quality high or more parts" if "max_parts" in settings else "try --quality high"
+
+
+def warnings(shape: Shape, scores: Scores, more: str) -> list[str]:
+    """Of the fitted surface against the shape's. more: what to try where it is poor."""
     result = []
-    side = float((shape.vertices.max(axis=0) - shape.vertices.min(axis=0)).max())
-    if scores.iou < POOR_IOU or scores.max_deviation > POOR_DEVIATION * side:
+    if scores.iou < POOR_IOU or scores.max_deviation > POOR_DEVIATION * _side(shape):
         unit = f" {shape.unit}" if shape.unit else ""
         out = scores.max_protrusion >= scores.max_deviation
         how = "where it sticks out of the shape" if out else "where it does not reach the shape"
         result.append(
             f"the fit is poor in places: IoU {scores.iou:.3f}; it is furthest off, by "
-            f"{scores.max_deviation:.3g}{unit}, at the {scores.worst_place}, {how}; "
-            "try --quality high or more parts"
+            f"{scores.max_deviation:.3g}{unit}, at the {scores.worst_place}, {how}; {more}"
         )
     if shape.openings.share > MUCH_MISSING:
         result.append(_about_openings(shape))

@@ -111,6 +111,7 @@ class LearnedParts(Method[Settings]):
             history,
             details={"learned": learned},
             surface=surface,
+            of_points=target.low is not None,
             warnings=tuple(known.warnings()),
         )
 

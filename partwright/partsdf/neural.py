@@ -21,6 +21,8 @@ from partwright.partsdf.poses import PoseTensors, local_points
 
 _WALL_PLACES, _CUBOID_MARGIN = 1000, 1.05  # where walls are looked for, in and around a part's cuboid
 _WALL_QUANTILE = 0.95  # of the depths inside, which is half a wall
+# Times the median depth. A convex body's quantile is at most 3.06 times, as a ball's (Brunn, Minkowski).
+_UNEVEN = 3.3
 # Pairs of point and part that are decoded at once, so that they stay in the cache: by the compiled kernel,
 # and by PyTorch, which takes them layer by layer.
 CHUNK, _CHUNK_OF_LAYERS = 1 << 13, 1 << 11
@@ -88,7 +90,8 @@ class NeuralShape:
 
     def walls(self) -> np.ndarray:
         """(Q,) about how thin each part that is there is, unit frame: twice a depth that few places inside
-        exceed, and so at most about twice the depth at which training clamps. Infinite where no place inside
+        exceed, and so at most about twice the depth at which training clamps; where this is much more than
+        the depth of most, as in a tube with flanges, what most of it is thick. Infinite where no place inside
         is found."""
         names = self.names()
         places = np.concatenate([self._places(name) for name in names] or [np.zeros((0, 3), np.float32)])
@@ -124,7 +127,11 @@ class NeuralShape:
 def _wall(depth: np.ndarray) -> float:
     """Of the depths (W,) of one part at its places, positive inside."""
     inside = depth[depth > 0]
-    return float(2 * np.quantile(inside, _WALL_QUANTILE)) if len(inside) else np.inf
+    if not len(inside):
+        return np.inf
+    median, deep = np.quantile(inside, (0.5, _WALL_QUANTILE))
+    # A tube with thick flanges: most of it is a wall, half of whose inside lies in its outer quarters.
+    return float(4 * median if deep > _UNEVEN * median else 2 * deep)
 
 
 def _side_by_side(decode: Callable[[Tensor], Tensor], chunks: Sequence[Tensor]) -> list[Tensor]:

@@ -160,9 +160,12 @@ def nearest_trained(
 
 
 @torch.no_grad()
-def exchanged_parts(shape: NeuralShape, target: Target, seed: int = 0) -> NeuralShape:
+def exchanged_parts(shape: NeuralShape, target: Target, seed: int = 0, likely: int = _LIKELY) -> NeuralShape:
     """Each part by itself, the one that most samples are nearest to first, is exchanged for that of another
-    training shape, at that one's place, or at its own, where this brings the whole closer."""
+    training shape, at that one's place, or at its own, where this brings the whole closer.
+
+    likely: so many of the exchanges are judged at all samples, those that are best at every fourth.
+    """
     model = shape.model
     rows = _rows(target, _SAMPLES)
     drawn = torch.randperm(len(model.latents), generator=torch.Generator().manual_seed(seed))[:_OTHERS]
@@ -175,8 +178,8 @@ def exchanged_parts(shape: NeuralShape, target: Target, seed: int = 0) -> Neural
         poses = shape.poses.map(lambda t: t.repeat(2 * len(drawn), *[1] * t.ndim))
         for mine, theirs in zip(poses, model.poses, strict=True):
             mine[: len(drawn), part] = theirs[drawn, part]
-        likely = errors_of(model, latents, poses, target, rows[::_FEW]).argsort()[:_LIKELY]
-        latents, poses = latents[likely], poses.map(lambda t, likely=likely: t[likely])
+        kept = errors_of(model, latents, poses, target, rows[::_FEW]).argsort()[:likely]
+        latents, poses = latents[kept], poses.map(lambda t, kept=kept: t[kept])
         errors = errors_of(model, latents, poses, target, rows)
         least = int(errors.argmin())
         if errors[least] < best:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from partwright.shapes import Shape
 
 CAPTIONS = ("input", "parts", "surface", "error")
+_GRAINS, _GRAIN = 10_000, 0.005  # points that are drawn, about, and their half-width in longest sides
 _SIDE, _LEAST_SIDE = 400, 310  # pixels of a panel: as a square, and the least; the legend wants some
 
 
@@ -41,16 +42,17 @@ def preview(
 ) -> np.ndarray:
     """Draw input | parts | surface | error as one picture (H, W, 3) uint8, and write it as PNG to `path`.
 
-    The parts' panel colours every point by the part whose own surface is there. The error panel
-    colours the input by the assembly's signed distance there: red where the assembly covers the input's
-    surface, blue where it does not reach it, with a legend in the input's unit.
+    The input of a shape that came as points is these points. The parts' panel colours every point by the part
+    whose own surface is there. The error panel colours the input by the assembly's signed distance there: red
+    where the assembly covers the input's surface, blue where it does not reach it, with a legend in the
+    input's unit.
 
     surface: the assembly's mesh in the input's units, if it is known already. panel: width and height of each
     of the four in pixels; as the object is long and high if None.
     """
     surface = mesh_assembly(assembly) if surface is None else surface
     camera = camera or Camera(up=shape.up or "z", margin=0.1)
-    given, made = Scene(shape.vertices, shape.faces), Scene(surface.vertices, surface.faces)
+    given, made = Scene(*_as_given(shape)), Scene(surface.vertices, surface.faces)
     both = np.concatenate([given.vertices, made.vertices])
     width, height = panel or camera.framed(both, _SIDE, _LEAST_SIDE)
     view = camera.fitted(both, width, height)
@@ -75,3 +77,16 @@ def preview(
     if path is not None:
         write_png(path, page)
     return page
+
+
+def _as_given(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of the input's panel: of a shape that came as points a grain for each of them, not
+    the surface laid through them, which hides holes and noise."""
+    if shape.points is None:
+        return shape.vertices, shape.faces
+    points = shape.points[:: max(1, len(shape.points) // _GRAINS)]
+    size = _GRAIN * min(2, (_GRAINS / len(points)) ** 0.25) * float(np.ptp(points, axis=0).max())
+    corners = np.concatenate([np.eye(3), -np.eye(3)])
+    sides = np.array([(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)])
+    faces = sides + len(corners) * np.arange(len(points))[:, None, None]
+    return (points[:, None] + size * corners).reshape(-1, 3), faces.reshape(-1, 3)

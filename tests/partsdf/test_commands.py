@@ -96,6 +96,32 @@ def test_encoder_and_generator(
     assert main(["parts", "train-encoder", str(file), str(lamps.folder), "-o", "encoder.bin"]) == 2
 
 
+def test_points_are_told_of_and_shown_as_points(
+    file: Path, lamps: PreparedFamily, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A lamp with noise: what counts is how far its points are off, not a surface laid through them."""
+    known = lamps.load(lamps.split("test")[0])
+    mesh = trimesh.Trimesh(known.vertices, known.faces, process=False)
+    points = mesh.sample(3000, seed=1)
+    points += 0.01 * np.random.default_rng(0).standard_normal(points.shape)
+    trimesh.PointCloud(points).export("scan.ply")
+    quick = ["--quality", "draft", "--iterations", "60", "--resolution", "48", "--as-it-stands"]
+    assert main(["parts", "reconstruct", str(file), "scan.ply", "-o", "out", *quick]) == 0
+    said = capsys.readouterr()
+    assert "points off, mean" in said.out
+    assert "IoU" not in said.out
+    assert "poor in places" not in said.err
+    report = json.loads(Path("out/report.json").read_text())
+    assert report["settings"]["starts"] == 2  # of a draft
+    told = report["points"]
+    surface = trimesh.load("out/surface.ply")
+    off = np.abs(trimesh.proximity.closest_point(surface, points)[1])
+    assert told["count"] == len(points)
+    assert told["mean"] == pytest.approx(off.mean(), rel=1e-3)
+    assert told["max_deviation_share"] == pytest.approx(off.max() / np.ptp(points, axis=0).max(), rel=0.15)
+    assert told["mean_share"] < 0.03
+
+
 def test_reconstruct(
     file: Path, lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

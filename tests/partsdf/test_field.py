@@ -273,6 +273,26 @@ def test_walls_are_as_thin_as_the_parts_are(lamp: NeuralShape, monkeypatch: pyte
     assert [field.wall for field in fields] == pytest.approx([2 * plate, *(2 * b for b in balls)], rel=0.02)
 
 
+def test_a_wall_with_a_flange_is_as_thin_as_the_wall(
+    lamp: NeuralShape, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four thick corners are a quarter of the inside: by the deepest places the wall between them would be
+    meshed with holes."""
+    half = lamp.poses.scale.numpy()[0]
+    middle = lamp.poses.translation.numpy()[0]
+    thin = half[2] / 6
+
+    def flanged(shape: NeuralShape, points: np.ndarray) -> np.ndarray:
+        away = np.abs(points - middle)
+        wall = away[:, 2] - thin
+        corner = np.maximum(0.8 * half[0] - away[:, 0], 0.8 * half[1] - away[:, 1])
+        flange = np.maximum(away[:, 2] - half[2], corner)
+        return np.tile(np.minimum(wall, flange), (3, 1))
+
+    monkeypatch.setattr(NeuralShape, "part_distances", flanged)
+    assert lamp.walls()[0] == pytest.approx(2 * thin, rel=0.35)
+
+
 def test_a_part_that_is_nowhere_has_no_wall_and_no_surface(
     lamp: NeuralShape, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -22,6 +22,7 @@ from partwright.render.deviation_map import add_legend, deviation_colours, round
 from partwright.render.part_colours import surface_parts
 from partwright.render.raycast import Scene, cast
 from partwright.render.shading import BACKGROUND
+from partwright.shapes import load_shape
 from partwright.shapes.corner_normals import corner_normals
 
 
@@ -247,7 +248,7 @@ def test_preview_colours_parts_and_errors(tmp_path) -> None:
     ball, block = Part(Sphere(0.5), (-0.6, 0.0, 0.0)), Part(Box((0.8, 0.8, 0.8)), (0.6, 0.0, 0.0))
     assembly = Assembly((ball, block))
     larger = mesh_assembly(Assembly((Part(Sphere(0.55), (-0.6, 0.0, 0.0)), block)), 48)
-    shape = SimpleNamespace(vertices=larger.vertices, faces=larger.faces, unit="mm", up="z")
+    shape = SimpleNamespace(vertices=larger.vertices, faces=larger.faces, points=None, unit="mm", up="z")
     target = tmp_path / "preview.png"
     page = preview(shape, assembly, path=target, title="two parts", panel=(160, 160))
     assert Image.open(target).size == (640, page.shape[0])
@@ -263,6 +264,17 @@ def test_preview_colours_parts_and_errors(tmp_path) -> None:
     assert missing[:, :80].sum() > 300
     assert missing[:, 85:].sum() < 0.05 * missing.sum()
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_the_input_that_came_as_points_is_drawn_as_points() -> None:
+    """A few hundred points of a ball: a surface laid through them would cover as much as the ball does."""
+    points = np.random.default_rng(0).standard_normal((300, 3))
+    shape = load_shape(points / np.linalg.norm(points, axis=1)[:, None])
+    page = preview(shape, Assembly((Part(Sphere(1.0).superfrustum(), name="ball"),)), panel=(200, 200))
+    panels = [page[-200:, 200 * i : 200 * (i + 1)].astype(int) for i in range(2)]
+    drawn, ball = ((np.abs(panel - np.array(BACKGROUND)).max(axis=2) > 40).mean() for panel in panels)
+    assert ball > 0.45
+    assert 0.002 < drawn < 0.2
 
 
 def test_turntable_turns(tmp_path) -> None:

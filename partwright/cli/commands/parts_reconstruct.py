@@ -12,12 +12,12 @@ from partwright.errors import SettingError
 from partwright.fitting import fit
 from partwright.methods import Cancellation
 from partwright.partsdf.from_photo import reconstruct_photo
+from partwright.partsdf.method import METHOD
 from partwright.partsdf.model import load_model
-from partwright.partsdf.settings import Settings
 from partwright.shapes import PICTURE_SUFFIXES, load_shape
 
 _SEARCH = ("iterations", "points", "start")
-_OF_SHAPES = (*_SEARCH, "as_it_stands", "unit", "up", "seed")  # not of pictures
+_OF_SHAPES = ("quality", *_SEARCH, "as_it_stands", "unit", "up", "seed")  # not of pictures
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -25,9 +25,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise SettingError("which model's parts? Name it before the shape, or as --model: --model chairs")
     if arguments.shape.suffix.lower() in PICTURE_SUFFIXES:
         return _of_picture(arguments)
-    settings = Settings(
-        arguments.model,
-        arguments.resolution,
+    settings = METHOD.settings(
+        arguments.quality or "normal",
+        model=arguments.model,
+        resolution=arguments.resolution,
         turn=not arguments.as_it_stands,
         **{name: getattr(arguments, name) for name in _given(arguments, _SEARCH)},
     )
