@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 _COPY = 0.4  # of what the first gains, that a copy has to
 _AROUND = 5e-3  # unit lengths: from a part to points of the surface that are its own
 _EXACT = 1e-4  # unit lengths: moves whose means differ by less are as good
+_BY_CHANCE = 1.0  # roots of the number of samples, by which a copy may have fewer, and still be one
+_LEAST_COPY = 0.3
 _POINTS = 200
 _DIGITS = 9  # of shifts that are told apart
 _CHORD = 1e-3  # unit lengths: how far chords of a cut with moved sides may be off
@@ -37,9 +40,11 @@ def with_copies(
     within = search.mask(chosen) > 0
     covered = tree.covered | within if added else tree.covered & ~within
     reached = search.score_of(covered)
-    least = _COPY * (reached - tree.score)
     wrong = search.inside & ~tree.covered if added else ~search.inside & tree.covered
-    few, hits = search.points[wrong], _COPY * float(within[wrong].sum())
+    count_of_hits = float(within[wrong].sum())
+    share = max(_COPY - _BY_CHANCE / math.sqrt(max(count_of_hits, 1.0)), _LEAST_COPY)
+    least = share * (reached - tree.score)
+    few, hits = search.points[wrong], share * count_of_hits
     left = ~within[wrong]
 
     def joined(copy: Part, hit: NDArray[np.bool_], count: int = 1) -> bool:

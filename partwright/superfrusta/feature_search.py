@@ -20,7 +20,7 @@ from partwright.approximation.sketches.bodies import bodies
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames, long_axis
-from partwright.fields import Swept
+from partwright.fields import Revolution, Swept
 from partwright.meshing.manifolds import simplified
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
@@ -36,6 +36,7 @@ from partwright.superfrusta.samples import FitSamples
 _FREE_SIDES = 4
 _SIDE_PRICE = 1 / 25  # of a feature's
 _LEAST_PIECE = 2e-5  # of the volume
+_SAME_PIECE = 0.01  # of a piece's volume, that one of the same form may be off
 _THIN = 2.5e-3  # unit lengths: twice the volume over the area of a skin between a wall and its chords
 _PIECES = 10  # of what is missed, and of what is too much, that are looked at in one step
 _BASES = 4
@@ -55,6 +56,7 @@ _ALIKE = 0.6  # IoU of a piece and what is drawn along it where no face says so
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
+_NEARLY_WHOLE = 300.0  # degrees
 _POOR = 0.95  # R below which a shape is also built up of bodies of its own, which then have to reach it
 
 
@@ -103,7 +105,9 @@ class FeatureSearch:
         best: FeatureTree | None = None
         others = [candidate for candidate in own if not candidate.cuts]
         for index in order:
-            if best is not None and (gains[index] < _RIVAL * gains[order[0]] or best.score > _PERFECT):
+            if best is not None and gains[index] < _RIVAL * gains[order[0]]:
+                break
+            if best is not None and best.score > _PERFECT and not _is_nearly_whole(own[index]):
                 break
             tree = self.grown(self.extended(empty, own[index], True), others, best)
             if best is None or tree.objective > best.objective:
@@ -218,15 +222,21 @@ class FeatureSearch:
         """Connected pieces that may pay and are no skin, the largest first. wrong: the samples in them."""
         points, weight = self.points[wrong], self.weights[wrong]
         total = self.weights[self.inside].sum(axis=0)
-        pieces = []
-        for volume, piece in bodies(residual, _LEAST_PIECE * self.volume, _THIN):
-            if piece.num_tri() > _COMPLEX:
-                continue
-            low, high = np.reshape(piece.bounding_box(), (2, 3))
-            within = within_box(points, low, high)
-            if float((weight[within].sum(axis=0) / total).mean()) > _HOPELESS * self.alpha:
-                pieces.append((volume, piece if piece.num_tri() < _FINE else simplified(piece, _SKIN)))
-        return [piece for _, piece in sorted(pieces, key=lambda p: -p[0])[:_PIECES]]
+        found = [
+            (volume, piece)
+            for volume, piece in bodies(residual, _LEAST_PIECE * self.volume, _THIN)
+            if piece.num_tri() <= _COMPLEX
+        ]
+
+        def pays(piece: Manifold) -> bool:
+            within = within_box(points, *np.reshape(piece.bounding_box(), (2, 3)))
+            return float((weight[within].sum(axis=0) / total).mean()) > _HOPELESS * self.alpha
+
+        paying = np.array([volume for volume, piece in found if pays(piece)])
+        # One of a row may have few samples by chance: it is a copy of what pays.
+        pieces = [one for one in found if (np.abs(paying - one[0]) <= _SAME_PIECE * one[0]).any()]
+        largest = [piece for _, piece in sorted(pieces, key=lambda one: -one[0])[:_PIECES]]
+        return [piece if piece.num_tri() < _FINE else simplified(piece, _SKIN) for piece in largest]
 
     def candidates_of(self, piece: Manifold) -> list[Candidate]:
         low, high = np.reshape(piece.bounding_box(), (2, 3))
@@ -305,11 +315,27 @@ def _stands_for(candidate: Candidate, piece: Manifold) -> bool:
 
 
 def _bases(own: Sequence[Candidate], gains: NDArray[np.float64]) -> list[int]:
-    """The most promising, and the best of another kind: a gear may be an outline, or a disc with gaps."""
-    order = np.argsort(-gains).tolist()
+    """The most promising, and the best of another kind: a gear may be an outline, or a disc with gaps. Before
+    what is turned almost all the way, what is turned all around."""
+    every = np.argsort(-gains).tolist()
+    order = [index for index in every if not own[index].usual] or every
     kinds = {own[index].part.field.kind for index in order[:_BASES]}
     other = next((index for index in order if own[index].part.field.kind not in kinds), None)
-    return order[:_BASES] if other is None else [*order[: _BASES - 1], other]
+    bases = order[:_BASES] if other is None else [*order[: _BASES - 1], other]
+    if not _is_nearly_whole(own[bases[0]]):
+        return bases
+    whole = [index for index in every if _is_whole(own[index])][:1]
+    return [*whole, *(index for index in bases if index not in whole)]
+
+
+def _is_whole(candidate: Candidate) -> bool:
+    return isinstance(candidate.part.field, Revolution) and candidate.part.field.full
+
+
+def _is_nearly_whole(candidate: Candidate) -> bool:
+    """Whether it is turned almost all the way: a keyway looks like that at first, as a gap in a clip does."""
+    field = candidate.part.field
+    return isinstance(field, Revolution) and _NEARLY_WHOLE <= field.angle < 360.0
 
 
 def _various(rivals: Sequence[tuple[float, Candidate, bool]]) -> list[tuple[float, Candidate, bool]]:

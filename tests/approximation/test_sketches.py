@@ -261,6 +261,17 @@ def test_ends_in_the_open_go_on() -> None:
     assert stood.field.height == pytest.approx(0.3 + BEYOND)
 
 
+def test_a_post_that_is_hollow_goes_on_in_the_floor_it_stands_on() -> None:
+    post = Part(Tube(0.1, 0.03, 0.4), (0, 0, 0.2))
+
+    def floor(points: np.ndarray) -> np.ndarray:
+        return np.asarray(points[:, 2])
+
+    longer = with_open_ends(post, True, floor)
+    low, high = longer.bounds()
+    assert (low[2], high[2]) == pytest.approx((-BEYOND, 0.4))
+
+
 def test_nothing_has_no_candidates() -> None:
     assert candidates(Manifold(), [np.eye(3)], holes=True) == []
 
@@ -275,6 +286,44 @@ def test_a_bend_is_turned_as_far_as_it_goes() -> None:
     assert ((best.part.distance(points) < 0) == (bend.distance(points) < 0)).mean() > 0.999
     inner, outer = best.bodies
     assert inner.volume() < body.volume() < outer.volume()
+
+
+def test_a_bend_ends_where_straight_rods_begin() -> None:
+    """It goes over into them without an edge, and no face looks along its axis but between two facets."""
+    ring = CrossSection.circle(6, 48).translate((20, 0)).revolve(96, 180).rotate((90, 0, 0))
+    legs = Manifold.cylinder(40, 6, circular_segments=48) + Manifold.cylinder(
+        60, 6, circular_segments=48
+    ).translate((40, 0, -20))
+    flange = Manifold.cylinder(4, 14, circular_segments=48)
+    body = (ring.translate((20, 0, 40)) + legs + flange).scale((0.02, 0.02, 0.02))
+    mesh = body.to_mesh64()
+    found = frames(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
+    assert any(np.abs(frame[:, 2]) @ (0, 1, 0) > 1 - 1e-9 for frame in found)
+    bends = [
+        one.part.field
+        for one in candidates(body, found, holes=True)
+        if isinstance(one.part.field, Revolution) and len(one.part.field.profile.corners) == 2
+    ]
+    assert 180.0 in [pytest.approx(bend.angle, abs=0.1) for bend in bends if not bend.full]
+
+
+def test_a_hub_with_ribs_a_keyway_and_bolt_holes_is_turned_all_around() -> None:
+    """They leave little that all half sections have; what most have is the hub without them."""
+    hub = Manifold.cylinder(8, 40, circular_segments=64) + Manifold.cylinder(40, 18, circular_segments=64)
+    rib = CrossSection([[(16, 8), (38, 8), (16, 32)]]).extrude(6).translate((0, 0, -3)).rotate((90, 0, 0))
+    for k in range(3):
+        hub = hub + rib.rotate((0, 0, 120 * k))
+    hub = hub - Manifold.cylinder(50, 10, circular_segments=64).translate((0, 0, -5))
+    for k in range(6):
+        angle = math.radians(60 * k + 30)
+        hole = Manifold.cylinder(20, 3.3, circular_segments=64)
+        hub = hub - hole.translate((32 * math.cos(angle), 32 * math.sin(angle), -5))
+    hub = hub - Manifold.cube((4, 8, 60), center=True).translate((0, 10, 20))
+    own = candidates(hub.scale((0.0225,) * 3), [np.eye(3)], holes=True)
+    usual = [one for one in own if one.usual]
+    plain = Profile.polygon([(10, 0), (40, 0), (40, 8), (18, 8), (18, 40), (10, 40)])
+    assert [one.part.field.full for one in usual if isinstance(one.part.field, Revolution)] == [True]
+    assert usual[0].part.field.profile.area == pytest.approx(plain.area * 0.0225**2, rel=0.01)
 
 
 def test_a_rod_ends_where_it_bends_though_faces_of_other_parts_lie_across_it() -> None:

@@ -21,7 +21,8 @@ class Candidate:
 
     make: the body, further out by a length where its walls are not the mesh's own. sides: of its profile.
     volume, rims: tell candidates apart. cuts: parts that are cut from it and belong to it, holes with sharp
-    edges in a body with round ones; only a tree's first part may have such.
+    edges in a body with round ones; only a tree's first part may have such. usual: whether it is turned from
+    what most half sections have in common, and not all, nor any.
     """
 
     part: Part
@@ -30,6 +31,7 @@ class Candidate:
     volume: float
     rims: tuple[Rim, ...] = ()
     cuts: tuple[Part, ...] = ()
+    usual: bool = False
 
     @cached_property
     def bodies(self) -> tuple[Manifold, Manifold]:

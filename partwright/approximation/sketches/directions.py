@@ -14,6 +14,7 @@ _MOST = 4
 _CELL = 0.02
 _SQUARE = 1e-3  # cosine of directions that are square
 _BESIDE, _SAME_AS = math.cos(math.radians(8)), math.cos(math.radians(0.1))
+_EQUAL = 0.01  # of the weight of one of two that weigh the same
 _ELONGATED = 2.0  # times as long as it is wide
 _SMOOTH = (math.radians(1.0), math.radians(40))  # turns from face to face on a round wall
 
@@ -88,7 +89,24 @@ def _clusters(votes: np.ndarray, weights: np.ndarray, least: float) -> list[np.n
         heavy = weights[near] >= 0.2 * weights[near].max()
         mean = (signed[heavy] * weights[near][heavy, None]).sum(axis=0)
         found.append((total, _snapped(mean / np.linalg.norm(mean))))
-    return [direction for _, direction in sorted(found, key=lambda f: -f[0])]
+    return [direction for _, direction in _between_equals(sorted(found, key=lambda f: -f[0]))]
+
+
+def _between_equals(found: list[tuple[float, np.ndarray]]) -> list[tuple[float, np.ndarray]]:
+    """With what lies between two that are near and weigh the same in place of the first, and without the
+    second: about the axis of a bend, facets lean as much to one side as to the other."""
+    result: list[tuple[float, np.ndarray]] = []
+    left = list(found)
+    while left:
+        weight, direction = left.pop(0)
+        for k, (other_weight, other) in enumerate(left):
+            if float(direction @ other) > _BESIDE and other_weight > (1 - _EQUAL) * weight:
+                mean = direction + other
+                direction = _snapped(mean / np.linalg.norm(mean))
+                del left[k]
+                break
+        result.append((weight, direction))
+    return result
 
 
 def _with_square(found: list[np.ndarray]) -> list[np.ndarray]:

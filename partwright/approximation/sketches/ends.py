@@ -10,12 +10,13 @@ import numpy as np
 
 from partwright.assembly import Part
 from partwright.assembly.similarity import rotation_matrix
-from partwright.fields import Box, Cylinder, Extrusion, Field
+from partwright.fields import Box, Cylinder, Extrusion, Field, Tube
 
 BEYOND = 0.03
 """Unit lengths: how far an open end goes on."""
 STEPS = (0.004, 0.012, 0.02, BEYOND + 0.004)
 """Unit lengths beyond an end, where it has to be open."""
+_LONG = Box, Cylinder, Tube, Extrusion
 _LATTICE = 24
 _FEW = 16
 _EDGE = 0.004  # unit lengths: so near to its edge an end is not looked at
@@ -26,10 +27,10 @@ def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.
 
     So no skin is left over a hole and no slit under a boss, whatever moves a little. distance: (N,) of the
     shape at points (N, 3), unit lengths like the part, negative inside. Only ends along
-    z of a box, a cylinder or an extrusion without taper; all copies have to agree.
+    z of a box, a cylinder, a tube or an extrusion without taper; all copies have to agree.
     """
     field = part.field
-    if not isinstance(field, Box | Cylinder | Extrusion) or (isinstance(field, Extrusion) and field.taper):
+    if not isinstance(field, _LONG) or (isinstance(field, Extrusion) and field.taper):
         return part
     low, high = field.bounds()
     flat = _interior(field, low, high)
@@ -67,7 +68,7 @@ def _interior(field: Field, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return within if len(within) else flat[deep < 0]
 
 
-def _longer(field: Box | Cylinder | Extrusion, more: float) -> Field:
+def _longer(field: Box | Cylinder | Tube | Extrusion, more: float) -> Field:
     if isinstance(field, Box):
         x, y, z = field.size
         return Box((x, y, z + more))

@@ -20,9 +20,9 @@ def moves_between(
 ) -> Iterator[Similarity]:
     """For each piece that is like the one that `body` stands for, the moves that may take that to it: along a
     line, or about an axis through the middle of the whole."""
-    own = min(pieces, key=lambda piece: _apart(body, piece), default=None)
-    if own is None:
+    if body.is_empty() or not pieces:
         return
+    own = min(pieces, key=lambda piece: _apart(body, piece))
     centre, volume, sides = _middle(own), own.volume(), _sides(own)
     about = _middle(whole)
     for other in pieces[:_MOST]:
@@ -43,9 +43,9 @@ def moves_between(
 def planes_between(body: Manifold, pieces: Sequence[Manifold]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Normals (3,) and points (3,) of the planes midway between the piece that `body` stands for and those
     that are as large."""
-    own = min(pieces, key=lambda piece: _apart(body, piece), default=None)
-    if own is None:
+    if body.is_empty() or not pieces:
         return
+    own = min(pieces, key=lambda piece: _apart(body, piece))
     centre, volume = _middle(own), own.volume()
     for other in pieces[:_MOST]:
         way = _middle(other) - centre

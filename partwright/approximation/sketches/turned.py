@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from partwright.errors import ParameterError
 from partwright.fields.profile import Corner, Profile
 
 _PLANES = 4  # through an axis, for what goes all around
+_USUAL = 6  # of their eight halves, that have what is usual
 _HALVES = 32  # half-planes at which partial turns are looked for
 _FEWEST = 3  # of them, that a partial turn goes through
 _BISECTIONS = 7  # of the angle between two, for where it ends
@@ -31,6 +32,9 @@ _EVEN = 0.98  # of what any half section has, that all of them have
 _WAVES = 4e-3  # unit lengths: waves of a mean half section, of which there are nine
 _SNAP = 0.012
 _DOMED = 3e-3  # unit lengths that an arc may move to become part of a sphere
+_GRADUAL = 3.0  # times what is told apart, that a piece is off at most a little past a smooth end
+_DRAWN = math.radians(15)  # the steps in which bends are drawn
+_ABOUT = math.radians(4)  # how well smooth ends are told
 _OFFSET = 0.0137  # radians: no plane along faces
 
 
@@ -78,10 +82,16 @@ def turned(view: View, centre: np.ndarray) -> Iterator[Candidate]:
     whole, shared = CrossSection(), halves[0]
     for half in halves:
         whole, shared = whole + half, shared ^ half
+    middle = sorted(halves, key=lambda half: half.area())[len(halves) // 2]
     if shared.area() <= _ROUND * whole.area():
+        usual = _in_many(halves, _USUAL)  # without ribs, and with what a keyway and bolt holes take
+        if usual.area() > _ROUND * middle.area():
+            for region in usual.decompose():
+                if region.area() > 0.05 * usual.area():
+                    for one in _revolved(axis, region, 0.0, 2 * math.pi):
+                        yield replace(one, usual=True)
         yield from _partly(axis)
         return
-    middle = sorted(halves, key=lambda half: half.area())[len(halves) // 2]
     solid = _solid_at_the_axis(whole)
     found = [middle, whole, shared]
     further = [_mean(axis)] if shared.area() < _EVEN * whole.area() else []
@@ -98,6 +108,16 @@ def turned(view: View, centre: np.ndarray) -> Iterator[Candidate]:
         for region in half.decompose():
             if region.area() > 0.05 * half.area():
                 yield from _revolved(axis, region, 0.0, 2 * math.pi)
+
+
+def _in_many(halves: Sequence[CrossSection], least: int) -> CrossSection:
+    """What at least so many of half sections have."""
+    covered = [CrossSection() for _ in range(least)]  # by one or more of those so far, by two or more, ...
+    for half in halves:
+        for k in range(least - 1, 0, -1):
+            covered[k] = covered[k] + (covered[k - 1] ^ half)
+        covered[0] = covered[0] + half
+    return covered[-1]
 
 
 def _mean(axis: Axis) -> CrossSection:
@@ -171,20 +191,33 @@ def _partly(axis: Axis) -> Iterator[Candidate]:
             yield from _revolved(axis, piece, begin, end - begin)
 
 
-def _within(piece: CrossSection, half: CrossSection) -> bool:
-    return bool((piece - half).area() < 2 * _SAME * piece.area())
+def _within(piece: CrossSection, half: CrossSection, same: float = 2 * _SAME) -> bool:
+    return bool((piece - half).area() < same * piece.area())
 
 
 def _end(axis: Axis, piece: CrossSection, turn: float, step: float) -> float:
-    """The angle between `turn`, where the piece is, and one step on, where it is not, at which it ends."""
-    near, far = 0.0, 1.0
-    for _ in range(_BISECTIONS):
-        middle = (near + far) / 2
-        if _within(piece, axis.halves(turn + middle * step)[0]):
-            near = middle
-        else:
-            far = middle
-    found = turn + (near + far) / 2 * step
+    """The angle between `turn`, where the piece is, and one step on, where it is not, at which it ends.
+
+    A bend that goes over into a straight rod does so with the square of the angle: where it is off by a
+    quarter of what is told apart, it is half as far past its end.
+    """
+
+    def last(start: float, stop: float, same: float) -> float:
+        near, far = start, stop
+        for _ in range(_BISECTIONS):
+            middle = (near + far) / 2
+            if _within(piece, axis.halves(middle)[0], same):
+                near = middle
+            else:
+                far = middle
+        return (near + far) / 2
+
+    found = last(turn, turn + step, 2 * _SAME)
+    if _within(piece, axis.halves(found + step / 8)[0], _GRADUAL * 2 * _SAME):
+        earlier = last(found - 2 * step, found, _SAME / 2)
+        smooth = 2 * earlier - found
+        drawn = _DRAWN * round(smooth / _DRAWN)
+        return drawn if abs(drawn - smooth) < _ABOUT else smooth
     whole = math.radians(round(math.degrees(found)))  # from the axis of the frame along which other parts lie
     return whole if abs(whole - found) < abs(step) * 2.0**-_BISECTIONS else found
 
