@@ -135,6 +135,19 @@ def test_a_fit_says_how_it_is_turned_and_what_is_no_such_shape(model: Model, tmp
     assert np.mean(fitted.assembly["ball"].bounds(), axis=0)[1] > 0.35
 
 
+def test_points_of_something_else_are_told_of_by_far_smaller_errors(model: Model) -> None:
+    """Points do not tell inside from outside, so what is left over says less, and counts sooner."""
+    shape = NeuralShape.trained(model, "lamp0")
+    ring = trimesh.creation.torus(0.7, 0.15).sample(2000, seed=0)
+    target = Target.of_points(ring, count=8000)
+    (line,) = familiarity(shape, target).warnings()
+    assert "no shape of the family that lamps knows, or points with too much noise" in line
+    told = Familiarity("lamps", 0.007, {"plate": 1.4}, of_points=True)
+    assert told.warnings() == []
+    assert replace(told, residual=0.03).warnings()
+    assert replace(told, residual=0.03, of_points=False).warnings() == []
+
+
 def test_oddness_is_one_at_the_farthest_training_shape(model: Model) -> None:
     worst = [
         max(oddness(model, part, latent) for latent in model.latents[model.present[:, part], part])
