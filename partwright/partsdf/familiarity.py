@@ -15,9 +15,9 @@ from partwright.partsdf.targets import Target
 # those of other families to 0.24 at least. Odd latents alone say little, as many latents mean the same form:
 # they count at most half again.
 STRANGE, _MOST_ODD = 0.2, 1.5
-# Of points, which do not tell inside from outside, errors are far smaller: a new car, chair and mixer came to
-# 0.007 at most from 2,048 and from 30,000 points; with noise of 1 % of the diagonal, by halves, or by the model
-# of another family, to 0.03 at least (with oddness) where what came out was bad.
+# Of points, which do not tell inside from outside, errors are far smaller: a new car, chair and mixer came
+# to 0.007 at most from 2,048 and from 30,000 points; with noise of 1 % of the diagonal, by halves, or by
+# the model of another family, to 0.03 at least (with oddness) where what came out was bad.
 STRANGE_POINTS = 0.02
 ODD = 1.5  # times the farthest training shape's distance from the mean latent: as far as held-out shapes' lie
 _SAMPLES = 8192
