@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 BEHIND = 0.03
 """Of the objective, by which a tree is well behind another."""
-_FEW = 4.0  # prices of a plain feature, of which none is left to save
+_FEW, _CHEAP = 2, 4.0  # features, and prices of plain ones, of which none is left to save
 _BLANKS = 2
 _PATIENT = 6  # steps after which a tree may be well behind
 
@@ -26,7 +26,7 @@ _PATIENT = 6  # steps after which a tree may be well behind
 def cut_from_blanks(search: FeatureSearch, best: FeatureTree, others: Sequence[Candidate]) -> FeatureTree:
     """The best tree, or one that is cut from a silhouette, no further off, and worth more when both are
     mended, with no more freeform. others: candidates of the whole."""
-    if best.price <= _FEW * search.alpha:
+    if len(best.features) <= _FEW or best.price <= _CHEAP * search.alpha:
         return best
     known = {candidate.key for candidate in others}
     blanks = [blank for blank in silhouettes(search.body, search.frames) if blank.key not in known]
