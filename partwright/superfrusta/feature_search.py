@@ -103,7 +103,7 @@ class FeatureSearch:
         gains = self.gains(empty, own, True)
         order = _bases(own, gains)
         best: FeatureTree | None = None
-        others = [candidate for candidate in own if not candidate.cuts]
+        others = [candidate for candidate in own if not (candidate.cuts or candidate.usual)]
         for index in order:
             if best is not None and gains[index] < _RIVAL * gains[order[0]]:
                 break
@@ -246,10 +246,11 @@ class FeatureSearch:
                 return []
             own, along = self._own_frames(piece)
             slanted = candidates(piece, along, holes=True)
-            self._of_piece[key] = [
+            found = [
                 *candidates(piece, [*self.frames, *own], holes=True),
                 *(candidate for candidate in slanted if _stands_for(candidate, piece)),
             ]
+            self._of_piece[key] = [candidate for candidate in found if not candidate.usual]
         return self._of_piece[key]
 
     def _own_frames(self, piece: Manifold) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
