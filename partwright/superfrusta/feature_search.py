@@ -20,10 +20,11 @@ from partwright.approximation.sketches.bodies import bodies
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames, long_axis
-from partwright.fields import Revolution, Swept
+from partwright.fields import Swept
 from partwright.meshing.manifolds import simplified
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
+from partwright.superfrusta.feature_bases import bases, is_nearly_whole, various
 from partwright.superfrusta.feature_blanks import BEHIND, cut_from_blanks
 from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_mending import farthest, mended
@@ -39,7 +40,6 @@ _LEAST_PIECE = 2e-5  # of the volume
 _SAME_PIECE = 0.01  # of a piece's volume, that one of the same form may be off
 _THIN = 2.5e-3  # unit lengths: twice the volume over the area of a skin between a wall and its chords
 _PIECES = 10  # of what is missed, and of what is too much, that are looked at in one step
-_BASES = 4
 _RIVAL = 0.55  # of the best base's objective, that another has to have
 _PATIENT = 3  # steps after which a tree may be well behind
 _COMPLEX = 20_000  # triangles of a piece that is no feature
@@ -48,15 +48,14 @@ _FOR_MENDING = 10
 _MOST_LOOKED = 150  # pieces whose candidates are made: a part of hundreds is no part that was drawn
 _PERFECT = 0.985  # R from which on no other base is tried
 _TIE = 3e-4, 30_000  # of the objective, with so many samples: of what is as good, the plainest is taken
-_LOOKED, _OF_A_KIND = 40, 2  # candidates, by what they gain alone
-_RIVALS, _SHARE = 8, 0.25  # candidates that are tried with their copies, and their gain over the best's alone
+_LOOKED = 40  # candidates, by what they gain alone
+_SHARE = 0.25  # of what the best candidate gains alone, that another that is tried with its copies gains
 _BATCH = 64
 _OWN, _ASKEW = 2, 0.9995  # directions of a piece, and the cosine to others that a new one has at most
 _ALIKE = 0.6  # IoU of a piece and what is drawn along it where no face says so
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
-_NEARLY_WHOLE = 300.0  # degrees
 _POOR = 0.95  # R below which a shape is also built up of bodies of its own, which then have to reach it
 
 
@@ -101,13 +100,13 @@ class FeatureSearch:
             return None
         empty = self.empty
         gains = self.gains(empty, own, True)
-        order = _bases(own, gains)
+        order = bases(own, gains)
         best: FeatureTree | None = None
         others = [candidate for candidate in own if not (candidate.cuts or candidate.usual)]
         for index in order:
             if best is not None and gains[index] < _RIVAL * gains[order[0]]:
                 break
-            if best is not None and best.score > _PERFECT and not _is_nearly_whole(own[index]):
+            if best is not None and best.score > _PERFECT and not is_nearly_whole(own[index]):
                 break
             tree = self.grown(self.extended(empty, own[index], True), others, best)
             if best is None or tree.objective > best.objective:
@@ -198,7 +197,7 @@ class FeatureSearch:
         rivals.sort(key=lambda rival: -rival[0])
         steps = [
             with_copies(self, tree, chosen, added, missed if added else excess)
-            for gain, chosen, added in _various(rivals)
+            for gain, chosen, added in various(rivals)
             if gain > max(0.0, _SHARE * rivals[0][0])
         ]
         least = max((step.objective for step in steps), default=0.0) - self.tie
@@ -313,42 +312,6 @@ def _stands_for(candidate: Candidate, piece: Manifold) -> bool:
     body = candidate.make(0.0)
     both = float((body ^ piece).volume())
     return both > _ALIKE * (float(body.volume()) + float(piece.volume()) - both)
-
-
-def _bases(own: Sequence[Candidate], gains: NDArray[np.float64]) -> list[int]:
-    """The most promising, and the best of another kind: a gear may be an outline, or a disc with gaps. Before
-    what is turned almost all the way, what is turned all around."""
-    every = np.argsort(-gains).tolist()
-    order = [index for index in every if not own[index].usual] or every
-    kinds = {own[index].part.field.kind for index in order[:_BASES]}
-    other = next((index for index in order if own[index].part.field.kind not in kinds), None)
-    bases = order[:_BASES] if other is None else [*order[: _BASES - 1], other]
-    if not _is_nearly_whole(own[bases[0]]):
-        return bases
-    whole = [index for index in every if _is_whole(own[index])][:1]
-    return [*whole, *(index for index in bases if index not in whole)]
-
-
-def _is_whole(candidate: Candidate) -> bool:
-    return isinstance(candidate.part.field, Revolution) and candidate.part.field.full
-
-
-def _is_nearly_whole(candidate: Candidate) -> bool:
-    """Whether it is turned almost all the way: a keyway looks like that at first, as a gap in a clip does."""
-    field = candidate.part.field
-    return isinstance(field, Revolution) and _NEARLY_WHOLE <= field.angle < 360.0
-
-
-def _various(rivals: Sequence[tuple[float, Candidate, bool]]) -> list[tuple[float, Candidate, bool]]:
-    """The first, few of a kind: what is small, but there more often, is tried beside what is large."""
-    kept: list[tuple[float, Candidate, bool]] = []
-    counts: dict[tuple[str, int, bool], int] = {}
-    for gain, chosen, added in rivals:
-        kind = chosen.part.field.kind, chosen.sides, added
-        counts[kind] = counts.get(kind, 0) + 1
-        if counts[kind] <= _OF_A_KIND and len(kept) < _RIVALS:
-            kept.append((gain, chosen, added))
-    return kept
 
 
 def _weights(samples: FitSamples) -> NDArray[np.float64]:
