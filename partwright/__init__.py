@@ -34,7 +34,7 @@ _PUBLIC = {
     "Part": "partwright.assembly",
     "Assembly": "partwright.assembly",
     "load_assembly": "partwright.assembly",
-    "with_numbers": "partwright.assembly.numbers",
+    "with_numbers": "partwright.assembly.editing",
     "evaluate": "partwright.metrics",
     "clean": "partwright.cleaning",
     "optimise": "partwright.goals",

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from partwright.assembly.numbers import numbers_of, with_number
 from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Assembly, Node, Part
 
@@ -169,12 +170,10 @@ def _stretched(part: Part, axis: np.ndarray, by: float) -> Part | None:
     k = int(local.argmax())
     if local[k] < 1 - _ALONG:
         return None
-    field = part.field
-    if field.kind == "box":
-        size = list(field.size)  # type: ignore[attr-defined]
-        size[k] += by
-        return dataclasses.replace(part, field=dataclasses.replace(field, size=tuple(size)))  # type: ignore[type-var]
-    if k == 2 and field.kind in _STRETCHED:
-        height = field.height + by  # type: ignore[attr-defined]
-        return dataclasses.replace(part, field=dataclasses.replace(field, height=height))  # type: ignore[type-var]
-    return None
+    if part.field.kind == "box":
+        number = f"size.{'xyz'[k]}"
+    elif k == 2 and part.field.kind in _STRETCHED:
+        number = "height"
+    else:
+        return None
+    return with_number(part, number, numbers_of(part)[number] + by)

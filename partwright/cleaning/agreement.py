@@ -44,10 +44,7 @@ class VolumeSamples:
 
     @classmethod
     def of(cls, target: Assembly | Shape) -> Self:
-        if isinstance(target, Shape):
-            lower, upper = target.vertices.min(axis=0), target.vertices.max(axis=0)
-        else:
-            lower, upper = target.bounds()
+        lower, upper = target.bounds()
         room = _ROOM * float((upper - lower).max())
         points = _a_place_a_cell(lower - room, upper + room)
         distance = target.signed_distance(points) if isinstance(target, Shape) else target.distance(points)

@@ -174,10 +174,7 @@ def _nobody(_: str) -> None:
 
 
 def _longest(of: Assembly | Shape) -> float:
-    lower, upper = (
-        (of.vertices.min(axis=0), of.vertices.max(axis=0)) if isinstance(of, Shape) else of.bounds()
-    )
-    return float((upper - lower).max())
+    return float(np.ptp(of.bounds(), axis=0).max())
 
 
 def checked_tolerance(tolerance: float | None, of: Assembly | Shape) -> float:

@@ -163,7 +163,7 @@ def points_warnings(shape: Shape, points: PointDeviations) -> list[str]:
 
 
 def _side(shape: Shape) -> float:
-    return float((shape.vertices.max(axis=0) - shape.vertices.min(axis=0)).max())
+    return float(np.ptp(shape.bounds(), axis=0).max())
 
 
 def _more(settings: Mapping[str, Any]) -> str:

@@ -122,6 +122,10 @@ class Shape:
             unit_volume = float(np.count_nonzero(self.unit_occupancy(128))) * (2 / 128) ** 3
         return unit_volume / self.frame.scale**3
 
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) lowest and highest corner of the outer surface, own units."""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
     def split_nodes(self) -> list[Shape]:
         """Each node as a shape of its own, named after the node, with this shape's unit and up axis.
 

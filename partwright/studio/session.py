@@ -9,8 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from partwright.assembly import Assembly
 from partwright.assembly.file_text import to_text
 from partwright.assembly.files import from_text
@@ -64,10 +62,6 @@ class Session:
     def state(self, note: str = "") -> messages.State:
         past, future = self.journal.steps()
         shape = self.shape
-        box = np.ptp(shape.vertices, axis=0) if shape else None
-        corners = (
-            [shape.vertices.min(axis=0), shape.vertices.max(axis=0)] if shape and box is not None else []
-        )
         return messages.State(
             revision=self.journal.revision,
             text=self.journal.short,
@@ -78,7 +72,7 @@ class Session:
             saved=self.journal.text == self.journal.saved,
             input=(shape.file or shape.name) if shape else "",
             coloured=self.colours is not None,
-            box=[float(v) for corner in corners for v in corner],
+            box=shape.bounds().ravel().tolist() if shape else [],
             unit=(shape.unit if shape else None) or "",
             up=(shape.up if shape else None) or "",
             methods=[*(name for name in METHODS if name != "parts"), *learned.methods()],

@@ -15,6 +15,7 @@ from partwright.fields import Box, Extrusion, Profile, Sphere
 from partwright.fields.operations import smooth_union
 from partwright.fields.swept import Swept
 from tests.assembly.strategies import ASSEMBLIES, PARTS, SIMILARITIES, SWEPT
+from tests.counting import points_asked
 
 POINTS = np.random.default_rng(0).uniform(-2, 2, (400, 3))
 
@@ -67,14 +68,7 @@ def test_boxes_that_are_far_away_change_nothing(parts: list[Part], operation: Op
 
 
 def test_a_solid_of_a_profile_is_not_asked_where_it_is_far_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = []
-    call = Swept.__call__
-
-    def counted(self: Swept, points: np.ndarray) -> np.ndarray:
-        asked.append(len(points))
-        return call(self, points)
-
-    monkeypatch.setattr(Swept, "__call__", counted)
+    asked = points_asked(monkeypatch, Swept, "__call__")
     plate = Part(Extrusion(Profile.rectangle(0.2, 0.2), 0.2), (1.5, 0.0, 0.0))
     (Part(Sphere(1.0)) | plate).distance(POINTS)
     (Part(Sphere(1.0)) - plate).distance(POINTS)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from partwright.assembly import Assembly, Part, Similarity, copies_of, line, load_assembly, mirrored, ring
+from partwright.assembly.editing import with_numbers
 from partwright.assembly.motion import Motion
-from partwright.assembly.numbers import with_numbers
 from partwright.assembly.repeated_groups import alike_leaves, move_between, parts_once, repeats
 from partwright.cli.main import main
 from partwright.errors import ParameterError

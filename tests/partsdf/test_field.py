@@ -23,6 +23,7 @@ from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.shapes import UnitFrame
+from tests.counting import points_asked
 from tests.partsdf.lamps import distances
 
 FRAME = UnitFrame((10.0, 20.0, 30.0), 0.5)
@@ -52,14 +53,7 @@ def test_all_parts_are_meshed_in_one_pass_each_in_its_own_frame(
     lamp: NeuralShape, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fresh = to_assembly(lamp, FRAME, unit="mm", source="lamp1")
-    asked = []
-    decode = NeuralShape.part_distances
-
-    def counted(shape: NeuralShape, points: np.ndarray) -> np.ndarray:
-        asked.append(len(points))
-        return decode(shape, points)
-
-    monkeypatch.setattr(NeuralShape, "part_distances", counted)
+    asked = points_asked(monkeypatch, NeuralShape, "part_distances")
     meshes, counts = [], []
     for part in fresh.parts:
         asked.clear()
@@ -106,15 +100,8 @@ def export_counts(assembly: pw.Assembly, file: Path) -> dict[str, int]:
 
 
 def test_all_parts_are_decoded_in_one_pass(assembly: pw.Assembly, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = []
-    decode = NeuralShape.part_distances
     assembly.distance(np.zeros((1, 3)))  # its bounds are known then
-
-    def counted(shape: NeuralShape, points: np.ndarray) -> np.ndarray:
-        asked.append(len(points))
-        return decode(shape, points)
-
-    monkeypatch.setattr(NeuralShape, "part_distances", counted)
+    asked = points_asked(monkeypatch, NeuralShape, "part_distances")
     assembly.distance(FRAME.from_unit(POINTS))
     assert asked == [len(POINTS)]
 
@@ -310,14 +297,7 @@ def test_the_whole_is_meshed_by_its_model_at_few_points(
     from partwright.meshing import assemblies
 
     turn = Similarity(2.0, (math.cos(0.4), 0.0, math.sin(0.4), 0.0), (1.0, -2.0, 5.0))
-    asked = []
-    decode = NeuralShape.part_distances
-
-    def counted(shape: NeuralShape, points: np.ndarray) -> np.ndarray:
-        asked.append(len(points))
-        return decode(shape, points)
-
-    monkeypatch.setattr(NeuralShape, "part_distances", counted)
+    asked = points_asked(monkeypatch, NeuralShape, "part_distances")
     for one in (assembly, assembly.without("knob").transformed(turn)):
         one.bounds()
         asked.clear()

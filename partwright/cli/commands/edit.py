@@ -6,7 +6,7 @@ import argparse
 import re
 
 from partwright.assembly import load_assembly
-from partwright.assembly.numbers import with_numbers
+from partwright.assembly.editing import with_numbers
 from partwright.errors import ParameterError, UnitError, UnsupportedFormatError
 from partwright.shapes import METRES, canonical_unit
 

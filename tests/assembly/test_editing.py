@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from partwright.assembly import Assembly, Part, Similarity, load_assembly
-from partwright.assembly.numbers import numbers_of, with_numbers
+from partwright.assembly.editing import with_numbers
+from partwright.assembly.numbers import numbers_of
 from partwright.cli.main import main
 from partwright.errors import ParameterError
 from partwright.fields import Box, Cylinder
