@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -23,14 +23,17 @@ def grown_profile(profile: Profile, by: float, still: Collection[int] = ()) -> P
     Raises:
         ParameterError: a side vanishes, or sides cross.
     """
-    loops, at = [], 0
-    for sides in profile.sides:
-        depths = [0.0 if at + i in still else -by for i in range(len(sides))]
-        loops.append(_grown_loop(sides, depths))
-        at += len(sides)
+    count = sum(len(sides) for sides in profile.sides)
+    return with_moved_sides(profile, [0.0 if i in still else by for i in range(count)])
+
+
+def with_moved_sides(profile: Profile, by: Sequence[float]) -> Profile:
+    """`grown_profile` with a length for each side, counted over all loops."""
+    outwards = iter(by)
+    loops = [_grown_loop(sides, [-next(outwards) for _ in sides]) for sides in profile.sides]
     result = Profile(loops[0], tuple(loops[1:]))
     if any(loop_area(a) * loop_area(b) <= 0 for a, b in zip(loops, profile.loops, strict=True)):
-        raise ParameterError(f"profile: nothing is left of a loop {-by:.6g} further inside")
+        raise ParameterError(f"profile: nothing is left of a loop {-min(by):.6g} further inside")
     return result
 
 

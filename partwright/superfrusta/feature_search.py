@@ -195,10 +195,18 @@ class FeatureSearch:
                 gains = self.gains(tree, pool, added)
                 rivals += [(float(gains[i]), pool[i], added) for i in np.argsort(-gains)[:_LOOKED]]
         rivals.sort(key=lambda rival: -rival[0])
+
+        def may_pay(gain: float, chosen: Candidate, added: bool) -> bool:
+            if rivals[0][0] > 0:
+                return gain > _SHARE * rivals[0][0]
+            # Nothing pays alone: four small holes may do so together.
+            price, like_it = self.price(chosen.sides), self._alike(chosen, missed if added else excess)
+            return (gain + price) * like_it > price
+
         steps = [
             with_copies(self, tree, chosen, added, missed if added else excess)
             for gain, chosen, added in various(rivals)
-            if gain > max(0.0, _SHARE * rivals[0][0])
+            if may_pay(gain, chosen, added)
         ]
         least = max((step.objective for step in steps), default=0.0) - self.tie
         good = [step for step in steps if step.objective >= least]
@@ -206,6 +214,14 @@ class FeatureSearch:
             good, key=lambda step: (step.chosen.sides, isinstance(step.part.field, Swept)), default=None
         )
         return joined_by(self, tree, plain) if plain is not None else None
+
+    def _alike(self, chosen: Candidate, pieces: Sequence[Manifold]) -> int:
+        """How many pieces are of the form of the one that a candidate stands for; 0 where it is of none."""
+        own = next((p for p in pieces if any(c is chosen for c in self.candidates_of(p))), None)
+        if own is None:
+            return 0
+        volume = own.volume()
+        return sum(abs(piece.volume() - volume) <= _SAME_PIECE * volume for piece in pieces)
 
     def extended(
         self, tree: FeatureTree, chosen: Candidate, added: bool, pieces: Sequence[Manifold] = ()
@@ -227,13 +243,15 @@ class FeatureSearch:
             if piece.num_tri() <= _COMPLEX
         ]
 
-        def pays(piece: Manifold) -> bool:
+        def worth(piece: Manifold) -> float:
             within = within_box(points, *np.reshape(piece.bounding_box(), (2, 3)))
-            return float((weight[within].sum(axis=0) / total).mean()) > _HOPELESS * self.alpha
+            return float((weight[within].sum(axis=0) / total).mean())
 
-        paying = np.array([volume for volume, piece in found if pays(piece)])
-        # One of a row may have few samples by chance: it is a copy of what pays.
-        pieces = [one for one in found if (np.abs(paying - one[0]) <= _SAME_PIECE * one[0]).any()]
+        volumes = np.array([volume for volume, _ in found])
+        # Pieces of one form may be a feature and its copies, and pay together.
+        alike = np.abs(volumes - volumes[:, None]) <= _SAME_PIECE * volumes[:, None]
+        pays = alike @ np.array([worth(piece) for _, piece in found]) > _HOPELESS * self.alpha
+        pieces = [one for one, good in zip(found, pays, strict=True) if good]
         largest = [piece for _, piece in sorted(pieces, key=lambda one: -one[0])[:_PIECES]]
         return [piece if piece.num_tri() < _FINE else simplified(piece, _SKIN) for piece in largest]
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import partwright as pw
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.fields import Box, Cylinder, Extrusion, Field, Profile, Tube
+from partwright.fields import Box, Cylinder, Extrusion, Field, Profile, Revolution, Tube
 from partwright.meshing import mesh_assembly
 from partwright.superfrusta.feature_assembly import FeatureAssembly
 from partwright.superfrusta.feature_search import FeatureSearch
@@ -22,8 +24,8 @@ def at(field: Field, *places: tuple[float, float, float]) -> Part:
     return Part(field, places[0], instances=moves)
 
 
-def found(drawn: Assembly) -> tuple[FeatureTree, FeatureSearch]:
-    settings = Settings.for_quality("draft")
+def found(drawn: Assembly, quality: str = "draft") -> tuple[FeatureTree, FeatureSearch]:
+    settings = Settings.for_quality(quality)
     shape = pw.load_shape(mesh_assembly(drawn), unit="mm")
     search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
     tree = search.run()
@@ -71,3 +73,30 @@ def test_a_box_that_is_hollowed_is_a_box_and_its_hollow() -> None:
     assert (False, "box", 8) in kinds(tree)
     assert len(tree.features) == 5
     assert tree.price < 5.5 * search.alpha
+
+
+def test_small_holes_that_pay_only_together_are_found() -> None:
+    """Four in the base of a heat sink: each is an eighth of a percent of it."""
+    fins = at(Box((1.6, 40, 18)), *((-27.5 + 5.5 * i, 0, 13) for i in range(11)))
+    holes = at(Cylinder(1.6, 8), *((x, y, 2) for x in (-24.75, 24.75) for y in (-14, 14)))
+    drawn = Assembly((Assembly((Part(Box((60, 40, 4)), (0, 0, 2)), fins)), holes), "difference")
+    tree, _ = found(drawn, "normal")
+    assert kinds(tree)[-1] == (False, "cylinder", 4)
+    assert len(tree.features) == 2
+    assert tree.score > 0.998
+
+
+def test_a_hinge_is_an_outline_with_gaps_and_countersunk_holes() -> None:
+    """The gaps run along the barrel's own wall, and leave no skin of it."""
+    turn = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+    whole = Assembly((Part(Box((60, 32, 3)), (0, 1, 1.5)), Part(Cylinder(4, 60), (0, 17, 4), turn)))
+    sunk = Revolution(Profile([(0, -1), (2, -1), (2, 1), (4, 3), (4, 3.5), (0, 3.5)]))
+    cuts = (
+        Part(Cylinder(2, 62), (0, 17, 4), turn),
+        at(Box((12.4, 12, 20)), (-12, 19, 4), (12, 19, 4)),
+        at(sunk, *((float(x), float(y), 0.0) for x in (-22, 0, 22) for y in (-6, 8))),
+    )
+    tree, _ = found(Assembly((whole, *cuts), "difference"))
+    assert tree.off == 0.0
+    assert len(tree.features) == 3
+    assert [kind[1:] for kind in kinds(tree)][:2] == [("extrusion", 1), ("extrusion", 2)]

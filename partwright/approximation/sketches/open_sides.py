@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from partwright.approximation.sketches.ends import BEYOND
 from partwright.approximation.sketches.open_turns import (
     beside,
     in_the_air,
+    room,
     with_grown_sides,
     with_open_turns,
 )
@@ -42,26 +42,25 @@ def with_open_sides(part: Part, distance: Callable[[np.ndarray], np.ndarray]) ->
         return part
     levels = np.linspace(-0.48, 0.48, _UP) * height
 
-    def is_open(side: Side) -> bool:
-        flat = beside(side)
+    def is_open(side: Side, reach: float) -> bool:
+        flat = beside(side, reach)
         local = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in levels])
         return in_the_air(local, part, distance)
 
     sides = profile.sides[0]
-    open_ = [is_open(side) for side in sides]
-    if not any(open_):
+    reach = {side: room(side, is_open) for side in sides}
+    if not any(reach.values()):
         return part
-    if isinstance(field, Extrusion) and any(o and side.bulge for o, side in zip(open_, sides, strict=True)):
-        which = {side for o, side in zip(open_, sides, strict=True) if o}
-        grown = with_grown_sides(part, field, which.__contains__, distance)
+    if isinstance(field, Extrusion) and any(reach[side] for side in sides if side.bulge):
+        grown = with_grown_sides(part, field, lambda side: reach.get(side, 0.0), distance)
         if grown is not part:
             return centred(grown)
-        open_ = [o and not side.bulge for o, side in zip(open_, sides, strict=True)]
-        if not any(open_):
-            return part
+    by = [0.0 if side.bulge else reach[side] for side in sides]
+    if not any(by):
+        return part
     corners = [np.array(corner) for corner in profile.outline]
     try:
-        moved = Profile(_moved(corners, open_), profile.holes)
+        moved = Profile(_moved(corners, by), profile.holes)
     except ParameterError:
         return part
     if isinstance(field, Box):
@@ -93,37 +92,37 @@ def _outwards(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     return np.array([y, -x])
 
 
-def _moved(corners: list[np.ndarray], open_: list[bool]) -> tuple[Corner, ...]:
-    """Each open side further out: along its neighbours where they are lines, else with a step."""
+def _moved(corners: list[np.ndarray], by: list[float]) -> tuple[Corner, ...]:
+    """Each side further out by a length: along its neighbours where they are lines, else with a step."""
     count = len(corners)
     result: list[Corner] = []
     for i, corner in enumerate(corners):
         before, after = i - 1, i
         point, bulge = corner[:2], float(corner[2])
-        if not open_[before] and not open_[after]:
+        if not by[before] and not by[after]:
             result.append((float(point[0]), float(point[1]), bulge))
             continue
         normals = {
-            k: _outwards(corners[k][:2], corners[(k + 1) % count][:2]) for k in (before, after) if open_[k]
+            k: _outwards(corners[k][:2], corners[(k + 1) % count][:2]) for k in (before, after) if by[k]
         }
         if len(normals) == 2:
             both = np.array([normals[before], normals[after]])
             if abs(np.linalg.det(both)) > _SLANT:
-                x, y = (point + np.linalg.solve(both, [BEYOND, BEYOND])).tolist()
+                x, y = (point + np.linalg.solve(both, [by[before], by[after]])).tolist()
                 result.append((x, y, bulge))
             else:
-                result += [(*_along(point, normals[k], BEYOND), 0.0) for k in (before, after)]
+                result += [(*_along(point, normals[k], by[k]), 0.0) for k in (before, after)]
             continue
-        (side, normal), other = next(iter(normals.items())), before if open_[after] else after
+        (side, normal), other = next(iter(normals.items())), before if by[after] else after
         way = corners[(other + 1) % count][:2] - corners[other][:2]
         way = way / np.linalg.norm(way)
         lean = float(way @ normal)
         if not corners[other][2] and abs(lean) > _SLANT:
-            result.append((*_along(point, way, BEYOND / lean), bulge))
+            result.append((*_along(point, way, by[side] / lean), bulge))
         elif side == after:
-            result += [(float(point[0]), float(point[1]), 0.0), (*_along(point, normal, BEYOND), bulge)]
+            result += [(float(point[0]), float(point[1]), 0.0), (*_along(point, normal, by[side]), bulge)]
         else:
-            result += [(*_along(point, normal, BEYOND), 0.0), (float(point[0]), float(point[1]), bulge)]
+            result += [(*_along(point, normal, by[side]), 0.0), (float(point[0]), float(point[1]), bulge)]
     return tuple(result)
 
 

@@ -14,11 +14,13 @@ from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import ParameterError
 from partwright.fields import Extrusion, Revolution
 from partwright.fields.profile import Side
-from partwright.fields.profile_growth import grown_profile
+from partwright.fields.profile_growth import with_moved_sides
 
 _ALONG, _AROUND = 9, 12  # points along a side, and angles, that are looked at
 _INSET = 0.04  # of a side's length, and of the angle, at their ends
 _POINTS = 4000  # in what the cut takes more, which have to be air
+_REACHES = (BEYOND, BEYOND / 4)  # how far a side goes out: as far as there is room
+_SHARES = (1.0, 1 / 4, 1 / 16)  # of that, where all of it would make a side vanish or cross others
 _BURR = 1e-3  # unit lengths: how deep within the shape these may seem to lie
 
 
@@ -30,36 +32,45 @@ def with_open_turns(part: Part, field: Revolution, distance: Callable[[np.ndarra
     share = np.linspace(_INSET, 1 - _INSET, _AROUND)
     turns = math.radians(field.angle) * share[:, None]
 
-    def is_open(side: Side) -> bool:
+    def is_open(side: Side, reach: float) -> bool:
         if side.centre is None and side.start[0] == side.end[0] == 0:  # the axis
             return False
-        x, z = beside(side).T
+        x, z = beside(side, reach).T
         around = [np.cos(turns) * x, np.sin(turns) * x, np.broadcast_to(z, (_AROUND, len(z)))]
         return in_the_air(np.stack(around, axis=-1).reshape(-1, 3), part, distance)
 
-    return with_grown_sides(part, field, is_open, distance)
+    return with_grown_sides(part, field, lambda side: room(side, is_open), distance)
+
+
+def room(side: Side, is_open: Callable[[Side, float], bool]) -> float:
+    """How far a side may go out, unit lengths; 0 where it may not. is_open: whether there is nothing behind
+    it up to a length."""
+    return next((reach for reach in _REACHES if is_open(side, reach)), 0.0)
 
 
 def with_grown_sides(
     part: Part,
     field: Extrusion | Revolution,
-    is_open: Callable[[Side], bool],
+    reach: Callable[[Side], float],
     distance: Callable[[np.ndarray], np.ndarray],
 ) -> Part:
-    """The part with the open sides of its profile further out, arcs about their centres; as it is where that
-    would take more than air."""
-    sides = [side for loop in field.profile.sides for side in loop]
-    still = [i for i, side in enumerate(sides) if not is_open(side)]
-    if len(still) == len(sides):
+    """The part with the sides of its profile as far out as each may go, arcs about their centres; as it is
+    where that would take more than air."""
+    by = [reach(side) for loop in field.profile.sides for side in loop]
+    if not any(by):
         return part
-    try:
-        grown = dataclasses.replace(field, profile=grown_profile(field.profile, BEYOND, still))
-    except ParameterError:  # its sides would cross, or its rims have no room
-        return part
-    low, high = grown.bounds()
-    points = np.random.default_rng(0).uniform(low, high, (_POINTS, 3))
-    more = points[(grown(points) < 0) & (field(points) >= 0)]
-    return dataclasses.replace(part, field=grown) if in_the_air(more, part, distance, _BURR) else part
+    for share in _SHARES:
+        try:
+            profile = with_moved_sides(field.profile, [share * each for each in by])
+            grown = dataclasses.replace(field, profile=profile)
+        except ParameterError:  # its sides would cross, or its rims have no room
+            continue
+        low, high = grown.bounds()
+        points = np.random.default_rng(0).uniform(low, high, (_POINTS, 3))
+        more = points[(grown(points) < 0) & (field(points) >= 0)]
+        if in_the_air(more, part, distance, _BURR):
+            return dataclasses.replace(part, field=grown)
+    return part
 
 
 def in_the_air(
@@ -73,8 +84,8 @@ def in_the_air(
     )
 
 
-def beside(side: Side) -> np.ndarray:
-    """(N, 2) points to the right of a line or an arc, where the solid is not."""
+def beside(side: Side, reach: float) -> np.ndarray:
+    """(N, 2) points to the right of a line or an arc, where the solid is not, up to a length."""
     share = np.linspace(_INSET, 1 - _INSET, _ALONG)[:, None]
     start = np.array(side.start)
     if side.centre is None:
@@ -85,4 +96,4 @@ def beside(side: Side) -> np.ndarray:
         turn = math.atan2(spoke[1], spoke[0]) + share * side.sweep
         round_ = np.hstack([np.cos(turn), np.sin(turn)])
         on, outwards = side.centre + side.radius * round_, math.copysign(1.0, side.sweep) * round_
-    return np.concatenate([on + step * outwards for step in STEPS])
+    return np.concatenate([on + reach / BEYOND * step * outwards for step in STEPS])
