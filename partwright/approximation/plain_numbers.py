@@ -11,11 +11,13 @@ import numpy as np
 from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import ParameterError
-from partwright.fields import Field, Solid, Swept
+from partwright.fields import Field, Revolution, Solid, Swept
 from partwright.fields.profile import Loop, Profile
 
 _ANGLES = ("taper", "angle")
+_ROUND = ("cylinder", "cone", "frustum", "sphere", "capsule", "tube", "torus", "hollow_frustum")
 _ALONG = 1e-9  # of a cosine
+_RING = 1e-6  # radians
 
 
 def plain(value: float, within: float) -> float:
@@ -42,9 +44,37 @@ def with_plain_numbers(part: Part, within: float) -> Part:
         field = _plain_field(part.field, within)
     except ParameterError:
         field = part.field
-    moves = tuple(plain_move(move, within) for move in part.instances)
+    moves = tuple(plain_move(move, within) for move in _shifts_where_round(part))
     plain_part = dataclasses.replace(part, field=field, translation=(x, y, z), instances=moves)
     return _between_plain_ends(part, plain_part, within)
+
+
+def _shifts_where_round(part: Part) -> tuple[Similarity, ...]:
+    """The moves to its copies, of what is round about its own axis as shifts where that keeps its direction:
+    then a turn only says where it goes. A ring of turns stays one."""
+    if not _is_round(part.field) or _is_ring(part.instances):
+        return part.instances
+    axis = rotation_matrix(part.rotation)[:, 2]
+    return tuple(_as_shift(move, part, axis) for move in part.instances)
+
+
+def _as_shift(move: Similarity, part: Part, axis: np.ndarray) -> Similarity:
+    if move.turned(axis) @ axis < 1 - _ALONG:
+        return move
+    x, y, z = (move(np.array(part.translation)) - part.translation).tolist()
+    return Similarity(translation=(x, y, z))
+
+
+def _is_round(field: Field) -> bool:
+    return field.kind in _ROUND or (isinstance(field, Revolution) and field.full)
+
+
+def _is_ring(moves: tuple[Similarity, ...]) -> bool:
+    """Whether they are turns by all multiples of a whole turn's part, and a third of one at most."""
+    count = len(moves) + 1
+    turns = sorted(2 * math.acos(min(1.0, abs(move.rotation[0]))) for move in moves)
+    whole = sorted(min(k, count - k) * 2 * math.pi / count for k in range(1, count))
+    return count > 2 and np.allclose(turns, whole, atol=_RING)
 
 
 def _between_plain_ends(given: Part, part: Part, within: float) -> Part:

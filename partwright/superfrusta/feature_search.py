@@ -56,6 +56,7 @@ _ALIKE = 0.6  # IoU of a piece and what is drawn along it where no face says so
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
+_SHARE_OF_A_PATTERN = 0.4  # of that, that each of its copies can gain at most
 _POOR = 0.95  # R below which a shape is also built up of bodies of its own, which then have to reach it
 
 
@@ -119,7 +120,7 @@ class FeatureSearch:
 
     def ended(self, tree: FeatureTree, others: Sequence[Candidate]) -> FeatureTree:
         """A tree that has grown, recast and mended."""
-        whole = mended(self, recast(self, tree, others))
+        whole = mended(self, recast(self, self.with_patterns(tree), others))
         return replace(whole, off=farthest(self, whole))
 
     @property
@@ -165,6 +166,15 @@ class FeatureSearch:
                 break
         return tree
 
+    def with_patterns(self, tree: FeatureTree) -> FeatureTree:
+        """With what pays by its copies only, such as four small holes."""
+        while len(tree.features) < self.most:
+            step = self.step(tree, (), patterns=True)
+            if step is None:
+                break
+            tree = step
+        return tree
+
     @staticmethod
     def _behind(tree: FeatureTree, best: FeatureTree) -> bool:
         count = len(tree.steps) - 1
@@ -177,12 +187,15 @@ class FeatureSearch:
         own: Sequence[Candidate],
         only_own: bool = False,
         banned: tuple[float, ...] | None = None,
+        patterns: bool = False,
     ) -> FeatureTree | None:
-        """The tree and what raises R most beyond its price, but for the candidate of one key."""
+        """The tree and what raises R most beyond its price, but for the candidate of one key.
+
+        patterns: also what does so with its copies only."""
         if self.checkpoint is not None:
             self.checkpoint()
-        missed = self._pieces(tree.missed, self.inside & ~tree.covered)
-        excess = self._pieces(tree.excess, ~self.inside & tree.covered)
+        missed = self._pieces(tree.missed, self.inside & ~tree.covered, patterns)
+        excess = self._pieces(tree.excess, ~self.inside & tree.covered, patterns)
         adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
         if only_own:
             adding = [c for c in adding if c in self._own_bodies]
@@ -197,9 +210,8 @@ class FeatureSearch:
         rivals.sort(key=lambda rival: -rival[0])
 
         def may_pay(gain: float, chosen: Candidate, added: bool) -> bool:
-            if rivals[0][0] > 0:
-                return gain > _SHARE * rivals[0][0]
-            # Nothing pays alone: four small holes may do so together.
+            if not patterns:
+                return gain > max(0.0, _SHARE * rivals[0][0])
             price, like_it = self.price(chosen.sides), self._alike(chosen, missed if added else excess)
             return (gain + price) * like_it > price
 
@@ -233,8 +245,9 @@ class FeatureSearch:
         """Of a feature whose profile has so many sides, with all its copies."""
         return self.alpha * (1 + _SIDE_PRICE * max(0, sides - _FREE_SIDES))
 
-    def _pieces(self, residual: Manifold, wrong: NDArray[np.bool_]) -> list[Manifold]:
-        """Connected pieces that may pay and are no skin, the largest first. wrong: the samples in them."""
+    def _pieces(self, residual: Manifold, wrong: NDArray[np.bool_], patterns: bool) -> list[Manifold]:
+        """Connected pieces that may pay and are no skin, the largest first. wrong: the samples in them.
+        patterns: may pay by a share, where others of their form do so, too."""
         points, weight = self.points[wrong], self.weights[wrong]
         total = self.weights[self.inside].sum(axis=0)
         found = [
@@ -242,16 +255,15 @@ class FeatureSearch:
             for volume, piece in bodies(residual, _LEAST_PIECE * self.volume, _THIN)
             if piece.num_tri() <= _COMPLEX
         ]
+        least = _HOPELESS * self.alpha * (_SHARE_OF_A_PATTERN if patterns else 1.0)
 
-        def worth(piece: Manifold) -> float:
+        def pays(piece: Manifold) -> bool:
             within = within_box(points, *np.reshape(piece.bounding_box(), (2, 3)))
-            return float((weight[within].sum(axis=0) / total).mean())
+            return float((weight[within].sum(axis=0) / total).mean()) > least
 
-        volumes = np.array([volume for volume, _ in found])
-        # Pieces of one form may be a feature and its copies, and pay together.
-        alike = np.abs(volumes - volumes[:, None]) <= _SAME_PIECE * volumes[:, None]
-        pays = alike @ np.array([worth(piece) for _, piece in found]) > _HOPELESS * self.alpha
-        pieces = [one for one, good in zip(found, pays, strict=True) if good]
+        paying = np.array([volume for volume, piece in found if pays(piece)])
+        # One of a row may have few samples by chance: it is a copy of what pays.
+        pieces = [one for one in found if (np.abs(paying - one[0]) <= _SAME_PIECE * one[0]).any()]
         largest = [piece for _, piece in sorted(pieces, key=lambda one: -one[0])[:_PIECES]]
         return [piece if piece.num_tri() < _FINE else simplified(piece, _SKIN) for piece in largest]
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
 
 from partwright.approximation.plain_numbers import plain, with_plain_numbers
 from partwright.assembly import Part, Similarity
-from partwright.fields import Box, Cylinder, Extrusion
+from partwright.fields import Box, Cone, Cylinder, Extrusion, Revolution
 from partwright.fields.profile import Profile, circle
 
 
@@ -42,6 +43,33 @@ def test_lengths_corners_and_places_are_plain_and_turns_stay() -> None:
     assert (part.translation, part.rotation) == ((1.0, 2.0, 0.0), turn)
     assert part.instances == (Similarity(translation=(20, 0, 0)), moves[1])
     assert with_plain_numbers(Part(Box((1.0001, 2, 3))), 1e-3).field == Box((1, 2, 3))
+
+
+def about(degrees: float) -> Similarity:
+    return Similarity.turn((0, 0, 1), math.radians(degrees))
+
+
+def test_copies_of_what_is_round_are_shifts_to_plain_places() -> None:
+    """At the corners of a rectangle, to which turns about its middle take the first of them."""
+    sunk = Revolution(Profile([(0, -1), (2, -1), (4, 1), (0, 1)]))
+    corner = math.degrees(math.atan2(8, 22))
+    moves = tuple(about(angle + 3e-6) for angle in (180 - 2 * corner, 180, -2 * corner))
+    for field in (sunk, Cylinder(2.0, 3.0)):
+        plain_part = with_plain_numbers(Part(field, (22.0, 8.0, 1.0), instances=moves), 1e-3)
+        assert all(move.rotation == (1.0, 0.0, 0.0, 0.0) for move in plain_part.instances)
+        places = [copy.translation for copy in plain_part.copies]
+        assert places == [(22, 8, 1), (-22, 8, 1), (-22, -8, 1), (22, -8, 1)]
+
+
+def test_turns_that_mean_more_than_a_place_stay() -> None:
+    ring = tuple(about(120 * k) for k in (1, 2))
+    hole = Part(Cylinder(2.0, 3.0), (9.0, 0.0, 0.0), instances=ring)
+    assert with_plain_numbers(hole, 1e-3).instances == ring
+    square = dataclasses.replace(hole, field=Box((1.0, 2.0, 3.0)), instances=(about(40),))
+    assert with_plain_numbers(square, 1e-3).instances == (about(40),)
+    over = Similarity.turn((1, 0, 0), math.pi)  # a cone upside down
+    cone = Part(Cone(2.0, 3.0), (9.0, 4.0, 0.0), instances=(over,))
+    assert with_plain_numbers(cone, 1e-3).instances == (over,)
 
 
 def test_parts_that_meet_go_on_meeting() -> None:
