@@ -228,9 +228,12 @@ class FeatureSearch:
         return joined_by(self, tree, plain) if plain is not None else None
 
     def _alike(self, chosen: Candidate, pieces: Sequence[Manifold]) -> int:
-        """How many pieces are of the form of the one that a candidate stands for; 0 where it is of none."""
+        """How many pieces are of the form of the one that a candidate stands for; 0 where it is of none, or no
+        plain one: what chords leave of a bend, again and again, is no pattern that was drawn."""
+        if chosen.sides > _FREE_SIDES:
+            return 0
         own = next((p for p in pieces if any(c is chosen for c in self.candidates_of(p))), None)
-        if own is None:
+        if own is None or not _stands_for(chosen, own):
             return 0
         volume = own.volume()
         return sum(abs(piece.volume() - volume) <= _SAME_PIECE * volume for piece in pieces)
