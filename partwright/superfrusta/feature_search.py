@@ -228,8 +228,9 @@ class FeatureSearch:
         return joined_by(self, tree, plain) if plain is not None else None
 
     def _alike(self, chosen: Candidate, pieces: Sequence[Manifold]) -> int:
-        """How many pieces are of the form of the one that a candidate stands for; 0 where it is of none, or no
-        plain one: what chords leave of a bend, again and again, is no pattern that was drawn."""
+        """How many pieces are of the form of the one that a candidate stands for.
+
+        0 where it is of none, or no plain one: what chords leave of a bend is there often, but not drawn."""
         if chosen.sides > _FREE_SIDES:
             return 0
         own = next((p for p in pieces if any(c is chosen for c in self.candidates_of(p))), None)
