@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import struct
 import tempfile
@@ -102,8 +103,11 @@ def source_of_mesh(mesh: trimesh.Trimesh | tuple[Any, Any]) -> Source:
     return Source("mesh", (Piece("mesh", v, _valid(f, len(v), "the mesh")),))
 
 
-def load_scene(path: Path, suffix: str, colours: bool = False) -> trimesh.Scene:
-    """A mesh file as trimesh reads it; colours: with materials and their images.
+def load_scene(
+    path: Path, suffix: str, colours: bool = False, document: bytes | None = None
+) -> trimesh.Scene:
+    """A mesh file as trimesh reads it; colours: with materials and their images; document: what is read in
+    its place, beside the same files.
 
     Raises UnreadableFileError.
     """
@@ -122,7 +126,10 @@ def load_scene(path: Path, suffix: str, colours: bool = False) -> trimesh.Scene:
         options |= {"split_objects": not colours, "group_material": colours}
     try:
         with np.errstate(all="ignore"), _named_in_utf8(path) as readable:
-            scene = trimesh.load_scene(readable, **options)
+            if document is not None:
+                beside = trimesh.resolvers.FilePathResolver(str(path))
+                options |= {"file_type": suffix[1:], "resolver": beside}
+            scene = trimesh.load_scene(readable if document is None else io.BytesIO(document), **options)
     except _PARSER_ERRORS as error:
         raise UnreadableFileError(
             f"{path}: cannot be read as {suffix[1:].upper()} ({type(error).__name__}: {error}); the file is "

@@ -14,6 +14,7 @@ from partwright.errors import NoColoursError
 from partwright.shapes.corner_normals import corner_normals
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.loading import READ_BY_TRIMESH, load_scene
+from partwright.textures.gltf_placing import MaterialPlacing, Placing, Wrap, gltf_document
 from partwright.textures.images import check_images
 
 Floats = NDArray[np.float64]
@@ -22,12 +23,32 @@ _PLAIN = (204, 204, 204)  # of pieces without a colour beside others that have s
 
 
 @dataclass(frozen=True)
+class Picture:
+    """values (h, w, 3), and how it goes on beyond its border."""
+
+    values: NDArray[np.float32]
+    wrap: Wrap
+
+    def at(self, uv: Floats) -> Floats:
+        """Bilinear; uv (N, 2) from its lower left."""
+        height, width = self.values.shape[:2]
+        x, y = uv[:, 0] * width - 0.5, (1 - uv[:, 1]) * height - 0.5
+        x0, y0 = np.floor(x), np.floor(y)
+        fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+        left, right = (_texel(x0 + d, width, self.wrap[0]) for d in (0, 1))
+        top, bottom = (_texel(y0 + d, height, self.wrap[1]) for d in (0, 1))
+        upper = (1 - fx) * self.values[top, left] + fx * self.values[top, right]
+        lower = (1 - fx) * self.values[bottom, left] + fx * self.values[bottom, right]
+        return np.asarray((1 - fy) * upper + fy * lower)
+
+
+@dataclass(frozen=True)
 class Colours:
     """A surface with colours: vertices (V, 3) and faces (F, 3) in the file's own units and place.
 
     corners (F, 3, 3): colours of the faces' corners, 0 to 1, linear light, which multiply those of the
     image. image (F,): which of `images` (h, w, 3 float, linear light) is on a face, -1 for none; uv
-    (F, 3, 2): where, from its lower left, repeated beyond 0 to 1.
+    (F, 3, 2): where, from its lower left.
     """
 
     vertices: Floats
@@ -35,12 +56,14 @@ class Colours:
     corners: NDArray[np.float32]
     image: NDArray[np.int64]
     uv: NDArray[np.float32]
-    images: tuple[NDArray[np.float32], ...]
+    images: tuple[Picture, ...]
     normals: NDArray[np.float32]
     """(F, 3, 3): of the faces' corners, those of the file or else smooth ones between creases."""
     relief: NDArray[np.int64]
     """(F,): which of `reliefs` bends the normals of a face, -1 for none."""
-    reliefs: tuple[NDArray[np.float32], ...]
+    relief_uv: NDArray[np.float32]
+    """(F, 3, 2): where on that, as `uv`."""
+    reliefs: tuple[Picture, ...]
     """Normal maps (h, w, 3): across, up and away from the face, -1 to 1."""
 
     @cached_property
@@ -71,23 +94,23 @@ class Colours:
         uv = np.einsum("nc,ncd->nd", weights, self.uv[face].astype(np.float64))
         for i, image in enumerate(self.images):
             mine = np.flatnonzero(self.image[face] == i)
-            result[mine] *= _read(image, uv[mine])
+            result[mine] *= image.at(uv[mine])
         return 255 * to_srgb(result)
 
     def normals_on_faces(self, face: NDArray[np.int64], weights: Floats) -> Floats:
         """Unit normals (N, 3) on faces (N,) at barycentric weights (N, 3), with what normal maps say."""
         result = _unit(np.einsum("nc,ncd->nd", weights, self.normals[face].astype(np.float64)))
-        uv = np.einsum("nc,ncd->nd", weights, self.uv[face].astype(np.float64))
+        uv = np.einsum("nc,ncd->nd", weights, self.relief_uv[face].astype(np.float64))
         for i, image in enumerate(self.reliefs):
             mine = np.flatnonzero(self.relief[face] == i)
-            bent = _read(image, uv[mine])
+            bent = image.at(uv[mine])
             across, up = self._tangents(face[mine], result[mine])
             result[mine] = _unit(bent[:, :1] * across + bent[:, 1:2] * up + bent[:, 2:] * result[mine])
         return result
 
     def _tangents(self, face: NDArray[np.int64], normals: Floats) -> tuple[Floats, Floats]:
         """Directions (N, 3) across and up an image on faces (N,), at right angles to normals (N, 3)."""
-        corners, uv = self.vertices[self.faces[face]], self.uv[face].astype(np.float64)
+        corners, uv = self.vertices[self.faces[face]], self.relief_uv[face].astype(np.float64)
         (e, f), (g, h) = ((one[:, 1] - one[:, 0], one[:, 2] - one[:, 0]) for one in (corners, uv))
         turned = np.where(g[:, 0] * h[:, 1] - h[:, 0] * g[:, 1] < 0, -1.0, 1.0)[:, None]
         across = turned * (h[:, 1:] * e - g[:, 1:] * f)
@@ -108,18 +131,20 @@ def load_colours(path: str | Path) -> Colours:
     if path.suffix.lower() not in READ_BY_TRIMESH:
         raise NoColoursError(f"{path.name}: colours are read from {', '.join(READ_BY_TRIMESH)}")
     check_images(path)
-    scene = load_scene(path, path.suffix.lower(), colours=True)
-    images: list[NDArray[np.float32]] = []
-    reliefs: list[NDArray[np.float32]] = []
+    is_gltf = path.suffix.lower() in (".glb", ".gltf")
+    document, placings = (is_gltf and gltf_document(path)) or (None, [])
+    scene = load_scene(path, path.suffix.lower(), colours=True, document=document)
+    images: list[Picture] = []
+    reliefs: list[Picture] = []
     pieces: list[tuple[Any, ...]] = []
     found, total = False, 0
-    is_gltf = path.suffix.lower() in (".glb", ".gltf")
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]
         mesh = scene.geometry[name]
         if not len(getattr(mesh, "faces", ())):
             continue
-        corners, uv, image = _look(mesh, is_gltf)
+        placing = _placing(mesh, placings)
+        corners, uv, image = _look(mesh, is_gltf, placing.colours)
         found = found or corners is not None or image is not None
         index = -1
         if image is not None:
@@ -130,17 +155,17 @@ def load_colours(path: str | Path) -> Colours:
         white = np.ones((count, 3, 3))
         colour = corners if corners is not None else white if image is not None else plain
         vertices = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-        relief, bends = _relief(mesh), -1
+        relief, relief_uv, bends = _relief(mesh, placing.normals), uv, -1
         if relief is not None:
-            bends, uv = len(reliefs), np.asarray(mesh.visual.uv, np.float64)[mesh.faces]
-            reliefs.append(relief)
+            bends, relief_uv = len(reliefs), relief[1]
+            reliefs.append(relief[0])
         normals = _normals(mesh, np.asarray(matrix, np.float64))
         own = (vertices, np.asarray(mesh.faces) + total, colour, np.full(count, index), uv)
-        pieces.append((*own, normals, np.full(count, bends)))
+        pieces.append((*own, normals, np.full(count, bends), relief_uv))
         total += len(vertices)
     if not found:
         raise NoColoursError(f"{path.name}: has no colours: neither of vertices or faces nor of materials")
-    places, triangles, shades, which, where, normals, bend = (
+    places, triangles, shades, which, where, normals, bend, bend_at = (
         np.concatenate(one) for one in zip(*pieces, strict=True)
     )
     return Colours(
@@ -152,6 +177,7 @@ def load_colours(path: str | Path) -> Colours:
         tuple(images),
         normals.astype(np.float32),
         bend.astype(np.int64),
+        bend_at.astype(np.float32),
         tuple(reliefs),
     )
 
@@ -167,7 +193,13 @@ def to_srgb(linear: NDArray[Any]) -> Floats:
     return np.where(cut <= 0.0031308, 12.92 * cut, 1.055 * cut ** (1 / 2.4) - 0.055)
 
 
-def _look(mesh: Any, is_gltf: bool) -> tuple[Floats | None, Floats, NDArray[np.float32] | None]:
+def _placing(mesh: Any, placings: list[MaterialPlacing]) -> MaterialPlacing:
+    """What its material does, if it has one."""
+    name = str(getattr(getattr(mesh.visual, "material", None), "name", ""))
+    return placings[int(name)] if name.isdigit() and int(name) < len(placings) else MaterialPlacing()
+
+
+def _look(mesh: Any, is_gltf: bool, placing: Placing) -> tuple[Floats | None, Floats, Picture | None]:
     """Colours of corners (F, 3, 3), linear light, or None; uv (F, 3, 2); the image, or None."""
     faces = np.asarray(mesh.faces)
     uv = np.zeros((len(faces), 3, 2))
@@ -189,13 +221,13 @@ def _look(mesh: Any, is_gltf: bool) -> tuple[Floats | None, Floats, NDArray[np.f
         if each is not None and is_gltf:  # which multiplies the material's
             shares = np.asarray(each, np.float64)[:, :3] / (255 if np.asarray(each).dtype.kind in "iu" else 1)
             colour = shares[faces] * (1.0 if colour is None else colour)
-        if image is None or visual.uv is None:
+        own = placing.of(mesh)
+        if image is None or own is None:
             return colour, uv, None
-        uv = np.asarray(visual.uv, np.float64)[faces]
         pixels = np.asarray(image.convert("RGB"))
         if not is_gltf:
             colour = None  # an image takes the place of the diffuse colour
-        return colour, uv, to_linear(pixels / 255).astype(np.float32)
+        return colour, own[faces], Picture(to_linear(pixels / 255).astype(np.float32), placing.wrap)
     if visual.kind == "vertex":
         each = np.asarray(visual.vertex_colors)[:, :3][faces] / 255
     elif visual.kind == "face":
@@ -205,12 +237,14 @@ def _look(mesh: Any, is_gltf: bool) -> tuple[Floats | None, Floats, NDArray[np.f
     return (each if is_gltf else to_linear(each)), uv, None
 
 
-def _relief(mesh: Any) -> NDArray[np.float32] | None:
-    """The normal map of its material."""
+def _relief(mesh: Any, placing: Placing) -> tuple[Picture, Floats] | None:
+    """The normal map of its material, and where its faces (F, 3, 2) lie on that."""
     image = getattr(getattr(mesh.visual, "material", None), "normalTexture", None)
-    if image is None or mesh.visual.uv is None:
+    uv = None if image is None else placing.of(mesh)
+    if image is None or uv is None:
         return None
-    return (np.asarray(image.convert("RGB")) / 127.5 - 1).astype(np.float32)
+    values = (np.asarray(image.convert("RGB")) / 127.5 - 1) * (placing.strength, placing.strength, 1)
+    return Picture(values.astype(np.float32), placing.wrap), uv[mesh.faces]
 
 
 def _normals(mesh: Any, matrix: Floats) -> Floats:
@@ -230,17 +264,14 @@ def _unit(vectors: Floats) -> Floats:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-20)
 
 
-def _read(image: NDArray[np.float32], uv: Floats) -> Floats:
-    """Bilinear, repeated beyond the image; uv (N, 2) from its lower left."""
-    height, width = image.shape[:2]
-    x, y = uv[:, 0] * width - 0.5, (1 - uv[:, 1]) * height - 0.5
-    x0, y0 = np.floor(x), np.floor(y)
-    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
-    left, right = (np.mod(x0 + d, width).astype(int) for d in (0, 1))
-    top, bottom = (np.mod(y0 + d, height).astype(int) for d in (0, 1))
-    upper = (1 - fx) * image[top, left] + fx * image[top, right]
-    lower = (1 - fx) * image[bottom, left] + fx * image[bottom, right]
-    return np.asarray((1 - fy) * upper + fy * lower)
+def _texel(index: Floats, count: int, wrap: str) -> NDArray[np.int64]:
+    """Which of `count` texels in a row is at each index, within the row or not."""
+    if wrap == "clamp":
+        return np.clip(index, 0, count - 1).astype(np.int64)
+    if wrap == "mirror":
+        there = np.mod(index, 2 * count).astype(np.int64)
+        return np.minimum(there, 2 * count - 1 - there)
+    return np.mod(index, count).astype(np.int64)
 
 
 def barycentric(corners: Floats, points: Floats) -> Floats:

@@ -21,6 +21,7 @@ LARGEST = 1 << 27  # pixels: 11,000 x 11,000
 _MTLLIB = re.compile(rb"(?m)^[ \t]*mtllib[ \t]+(.+?)[ \t]*\r?$")
 _MAP = re.compile(rb"(?m)^[ \t]*map_Kd[ \t]+(.+?)[ \t]*\r?$")
 _BIN = 0x004E4942
+_OTHER_FORMS = ("EXT_texture_webp", "KHR_texture_basisu")  # extensions that name a picture
 
 
 def check_images(path: Path) -> None:
@@ -118,7 +119,9 @@ def _used(tree: dict[str, Any]) -> set[int]:
         colour = material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
         for index in (colour.get("index"), material.get("normalTexture", {}).get("index")):
             if isinstance(index, int) and 0 <= index < len(textures):
-                source = textures[index].get("source")
+                texture = textures[index]
+                ways = [texture.get("extensions", {}).get(name, {}) for name in _OTHER_FORMS]
+                source = next((one["source"] for one in [*ways, texture] if "source" in one), None)
                 if isinstance(source, int):
                     used.add(source)
     return used
