@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -17,14 +17,17 @@ _APART = (".obj", ".glb")  # that keep objects with names
 
 
 class MeshFolder(RobotFile):
-    """Meshes in one folder, in metres, each in its own frame. Pieces are hulls: a mesh holds nothing else."""
+    """Meshes of a folder and the folders in it, in metres, each in its own frame, named by its path there.
+
+    Pieces are hulls: a mesh holds nothing else.
+    """
 
     kinds: ClassVar[tuple[type[Field], ...]] = ()
 
     def __init__(self, path: Path, packages: Sequence[Path] = ()) -> None:
-        """Raises RobotError where no mesh is in it, or two have the same name."""
+        """Raises RobotError where no mesh is in it."""
         self.path, self.packages = path.resolve(), packages
-        self._files = {file.name: file for file in mesh_files(path)}
+        self._files = dict(sorted(_meshes(path)))
         if not self._files:
             raise RobotError(f"{path}: no mesh is in this folder; expected {', '.join(SUFFIXES)}")
         self.links = [
@@ -39,9 +42,13 @@ class MeshFolder(RobotFile):
         return files
 
 
-def mesh_files(folder: Path) -> list[Path]:
-    """The meshes that lie in the folder itself."""
-    return sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
+def _meshes(folder: Path) -> Iterator[tuple[str, Path]]:
+    """All meshes, and where they lie in the folder; what is hidden is left out."""
+    for file in folder.rglob("*"):
+        within = file.relative_to(folder)
+        hidden = any(part.startswith(".") for part in within.parts)
+        if file.suffix.lower() in SUFFIXES and file.is_file() and not hidden:
+            yield within.as_posix(), file
 
 
 def _exported(shapes: Sequence[Shape], suffix: str) -> bytes:
