@@ -27,6 +27,7 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import POSE, PartVectors
 from partwright.partsdf.poses import PoseTensors
+from partwright.partsdf.seeds import mixed
 
 KIND = "generator"
 _WAVES = 16  # by which a network sees the time
@@ -243,6 +244,6 @@ def _noise(count: int, seed: int, size: tuple[int, ...]) -> Tensor:
     """(count, *size), of which each row depends on the seed and its own number alone."""
     rows = []
     for i in range(count):
-        generator = torch.Generator().manual_seed((seed << 20) + i)
+        generator = torch.Generator().manual_seed(mixed(seed >> 12, (seed << 20) + i))
         rows.append(torch.randn(size, generator=generator))
     return torch.stack(rows)

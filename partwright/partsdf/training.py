@@ -38,6 +38,7 @@ from partwright.partsdf.local import LocalDecoder
 from partwright.partsdf.logs import Log
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.poses import PoseTensors, identity
+from partwright.partsdf.seeds import mixed
 from partwright.partsdf.validation import Validation
 
 MODEL, CHECKPOINT = "model.safetensors", "checkpoint.safetensors"
@@ -166,7 +167,7 @@ class Trainer:
     def step(self) -> None:
         """One step of the optimiser, the one that comes next."""
         batch = self._batch()
-        self.generator.manual_seed((self.settings.seed << 32) + self.state.step)
+        self.generator.manual_seed(mixed(self.settings.seed, self.state.step))
         drawn = self.samples.draw(batch, self.settings.points, self.generator, self.settings.balance)
         # Every process draws for the whole batch, so that their number changes nothing.
         mine = slice(self.fabric.global_rank, None, self.fabric.world_size)
@@ -192,7 +193,7 @@ class Trainer:
 
     def _batch(self) -> Tensor:
         """The step's shapes (B,), over all processes: an epoch goes through all in an order of its own."""
-        order = torch.Generator().manual_seed((self.settings.seed << 32) + self.epoch)
+        order = torch.Generator().manual_seed(mixed(self.settings.seed, self.epoch))
         shuffled = torch.randperm(len(self.samples), generator=order)
         place = self.state.step % self.steps
         return shuffled[place * self.settings.batch :][: self.settings.batch].to(self.fabric.device)
