@@ -220,8 +220,9 @@ class FeatureSearch:
             for gain, chosen, added in various(rivals)
             if may_pay(gain, chosen, added)
         ]
-        least = max((step.objective for step in steps), default=0.0) - self.tie
-        good = [step for step in steps if step.objective >= least]
+        paying = [step for step in steps if step.objective > tree.objective]
+        least = max((step.objective for step in paying), default=0.0) - self.tie
+        good = [step for step in paying if step.objective >= least]
         plain = min(
             good, key=lambda step: (step.chosen.sides, isinstance(step.part.field, Swept)), default=None
         )

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 
+import pytest
+
 import partwright as pw
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Field, Profile, Revolution, Tube
 from partwright.meshing import mesh_assembly
+from partwright.superfrusta import feature_search
 from partwright.superfrusta.feature_assembly import FeatureAssembly
+from partwright.superfrusta.feature_copying import with_copies
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import FeatureTree
 from partwright.superfrusta.samples import FitSamples
@@ -75,15 +79,20 @@ def test_a_box_that_is_hollowed_is_a_box_and_its_hollow() -> None:
     assert tree.price < 5.5 * search.alpha
 
 
-def test_small_holes_that_pay_only_together_are_found() -> None:
+def test_small_holes_that_pay_only_together_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Four in the base of a heat sink: each is an eighth of a percent of it."""
     fins = at(Box((1.6, 40, 18)), *((-27.5 + 5.5 * i, 0, 13) for i in range(11)))
     holes = at(Cylinder(1.6, 8), *((x, y, 2) for x in (-24.75, 24.75) for y in (-14, 14)))
     drawn = Assembly((Assembly((Part(Box((60, 40, 4)), (0, 0, 2)), fins)), holes), "difference")
-    tree, _ = found(drawn, "normal")
+    tree, search = found(drawn, "normal")
     assert kinds(tree)[-1] == (False, "cylinder", 4)
     assert len(tree.features) == 2
     assert tree.score > 0.998
+    plain = search.extended(search.empty, tree.steps[0].chosen, True)
+    assert len(search.with_patterns(plain).features) == 2
+    monkeypatch.setattr(feature_search, "with_copies", lambda *asked: with_copies(*asked[:4]))
+    search.turns, search.mirrors = [], []
+    assert search.with_patterns(plain) is plain  # where no copies are found, one alone does not pay
 
 
 def test_a_hinge_is_an_outline_with_gaps_and_countersunk_holes() -> None:
