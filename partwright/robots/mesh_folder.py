@@ -43,11 +43,18 @@ class MeshFolder(RobotFile):
 
 
 def _meshes(folder: Path) -> Iterator[tuple[str, Path]]:
-    """All meshes, and where they lie in the folder; what is hidden is left out."""
+    """All meshes, and where they lie in the folder; left out is what is hidden, and what was made of the
+    folder before, and written into it."""
+    made = {report.parent for report in folder.rglob(f"{folder.resolve().name}.report.json")} - {folder}
     for file in folder.rglob("*"):
         within = file.relative_to(folder)
         hidden = any(part.startswith(".") for part in within.parts)
-        if file.suffix.lower() in SUFFIXES and file.is_file() and not hidden:
+        if (
+            file.suffix.lower() in SUFFIXES
+            and file.is_file()
+            and not hidden
+            and made.isdisjoint(file.parents)
+        ):
             yield within.as_posix(), file
 
 

@@ -28,6 +28,13 @@ def test_meshes_of_folders_within_it_come_along_where_they_lie(tmp_path: Path) -
     assert not (tmp_path / "out" / ".cache").exists()
 
 
+def test_what_was_made_of_a_folder_and_lies_in_it_is_not_taken_for_more_of_it(tmp_path: Path) -> None:
+    trimesh.creation.box((1.0, 2.0, 3.0)).export(tmp_path / "base.stl")
+    save(collide(tmp_path, CollideOptions(max_parts=1)), tmp_path / "hulls")
+    assert (tmp_path / "hulls" / "base.stl").is_file()
+    assert [link.name for link in open_robot(tmp_path).links] == ["base.stl"]
+
+
 def test_a_folder_without_meshes_is_none(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("none")
     with pytest.raises(RobotError, match="no mesh is in this folder"):
