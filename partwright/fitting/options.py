@@ -49,7 +49,8 @@ class Start:
     def check_size(self, shape: Shape) -> None:
         """Raise SettingError where a locked part is so large or so far from the shape that no numbers hold
         both, as where the two are in other units."""
-        side, middle = float(np.ptp(shape.bounds(), axis=0).max()), shape.bounds().mean(axis=0)
+        corners = shape.bounds()
+        side, middle = float(np.ptp(corners, axis=0).max()), corners.mean(axis=0)
         for part in self.assembly.parts:
             box = part.bounds()
             ends = np.abs(np.asarray(box) - middle).max() / side

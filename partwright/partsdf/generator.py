@@ -244,6 +244,7 @@ def _noise(count: int, seed: int, size: tuple[int, ...]) -> Tensor:
     """(count, *size), of which each row depends on the seed and its own number alone."""
     rows = []
     for i in range(count):
+        # The 32 bits of seeds below 4096 are taken as they are, so that their samples stay what they were.
         generator = torch.Generator().manual_seed(mixed(seed >> 12, (seed << 20) + i))
         rows.append(torch.randn(size, generator=generator))
     return torch.stack(rows)
