@@ -58,7 +58,7 @@ def test_the_list_of_tables_names_scripts_and_options_that_are_there() -> None:
 
 def test_a_quality_is_told_beside_the_first() -> None:
     sys.path.insert(0, str(FOLDER))
-    module = import_module("fit")
+    module = import_module("fit_page")
     sys.path.remove(str(FOLDER))
 
     def runs(quality: str, *seen: tuple[float, float, float]) -> list:
@@ -78,7 +78,7 @@ def test_a_quality_is_told_beside_the_first() -> None:
 
 def test_how_far_seeds_are_apart_is_told() -> None:
     sys.path.insert(0, str(FOLDER))
-    module = import_module("fit")
+    module = import_module("fit_page")
     sys.path.remove(str(FOLDER))
 
     def runs(name: str, *seen: tuple[float, float]) -> list:
