@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
+ANALYTIC = {"Plane", "Cylinder", "Cone", "Sphere", "Torus"}
+
 
 def read_back(path: Path) -> tuple[float, Counter[str]]:
     """Volume in cubic millimetres and the kinds of faces, by OpenCASCADE's plain reader."""

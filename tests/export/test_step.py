@@ -22,12 +22,10 @@ from partwright.errors import (
 from partwright.export import export
 from partwright.fields import Box, Cylinder, Field, Sphere, SuperFrustum, Tube
 from partwright.shapes import load_shape
-from tests.export.step_faces import read_back
+from tests.export.step_faces import ANALYTIC, read_back
 from tests.export.trees import SOLIDS, TURNED, flange, lone
 
 pytest.importorskip("OCP.STEPCAFControl", reason="OpenCASCADE is missing: pip install 'partwright[cad]'")
-
-ANALYTIC = {"Plane", "Cylinder", "Cone", "Sphere", "Torus"}
 
 
 def counted_volume(field: Field) -> float:

@@ -19,12 +19,10 @@ from partwright.export import brep_booleans, brep_tree, export, step
 from partwright.fields import Box, Cylinder, Extrusion, Revolution, Sphere, Tube
 from partwright.fields.profile import Profile
 from partwright.meshing import mesh_csg, mesh_part
-from tests.export.step_faces import read_back
+from tests.export.step_faces import ANALYTIC, read_back
 from tests.export.trees import lone
 
 pytest.importorskip("OCP.STEPCAFControl", reason="OpenCASCADE is missing: pip install 'partwright[cad]'")
-
-ANALYTIC = {"Plane", "Cylinder", "Cone", "Sphere", "Torus"}
 
 
 @pytest.mark.parametrize(
