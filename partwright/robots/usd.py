@@ -44,6 +44,7 @@ class Usd(RobotFile):
         owner = {path: name for name, path in self._paths.items()}
         parents = _parents(stage, owner)
         self._replaced: dict[str, list[str]] = {}
+        self._kept: dict[str, list[str]] = {}
         self.links = [self._link(stage, name, tuple(parents.get(name, ())), owner) for name in self._paths]
 
     def replaced(self, shapes: Mapping[str, Sequence[Shape]]) -> Files:
@@ -55,7 +56,12 @@ class Usd(RobotFile):
             for path in self._replaced[name]:
                 prim = _editable(stage, path)
                 UsdPhysics.CollisionAPI(prim).CreateCollisionEnabledAttr(False)
-            self._add(stage, stage.GetPrimAtPath(self._paths[name]), made)
+            for path in self._kept[name]:
+                UsdPhysics.CollisionAPI.Apply(_editable(stage, path))
+            link = _editable(stage, self._paths[name])
+            if link.IsInstance():  # which takes no children of its own
+                link.SetInstanceable(False)
+            self._add(stage, link, made)
         files = Files()
         with tempfile.TemporaryDirectory() as folder:
             whole = Path(folder) / self.path.name
@@ -80,19 +86,23 @@ class Usd(RobotFile):
         prim = stage.GetPrimAtPath(self._paths[name])
         pose = self._pose(prim)
         collisions, visuals, natives = [], [], []
-        self._replaced[name] = []
+        replaced, lent = [], []
         for below in _below(prim, owner):
-            collides = below.HasAPI(UsdPhysics.CollisionAPI)
-            enabled = collides and UsdPhysics.CollisionAPI(below).GetCollisionEnabledAttr().Get() is not False
+            said = _colliders(below, prim)
+            enabled = said and UsdPhysics.CollisionAPI(said[0]).GetCollisionEnabledAttr().Get() is not False
             if below.IsA(UsdGeom.Mesh):
                 use = self._use(below, pose)
                 if use is not None and enabled:
                     collisions.append(use)
-                    self._replaced[name].append(str(below.GetPath()))
-                elif use is not None and not collides:
+                    replaced += [str(one.GetPath()) for one in said]
+                elif use is not None and not said:
                     visuals.append(use)
             elif enabled and (part := self._native(below, pose)) is not None:
                 natives.append(part)
+                if said[0] != below:
+                    lent.append((str(said[0].GetPath()), str(below.GetPath())))
+        self._replaced[name] = list(dict.fromkeys(replaced))
+        self._kept[name] = [path for above, path in lent if above in replaced]
         return Link(name, pose, parents, tuple(collisions), tuple(visuals), tuple(natives))
 
     def _pose(self, prim: Any) -> np.ndarray:
@@ -181,6 +191,19 @@ def _below(prim: Any, owner: Mapping[str, str]) -> Iterator[Any]:
             walk.PruneChildren()
         else:
             yield below
+
+
+def _colliders(prim: Any, link: Any) -> list[Any]:
+    """What says that a prim of a link collides, the nearest first: itself, and groups above it, as meshes
+    that are merged or instanced have it."""
+    from pxr import UsdGeom, UsdPhysics
+
+    found = [prim] if prim.HasAPI(UsdPhysics.CollisionAPI) else []
+    while prim != link:
+        prim = prim.GetParent()
+        if prim.HasAPI(UsdPhysics.CollisionAPI) and not prim.IsA(UsdGeom.Gprim):
+            found.append(prim)
+    return found
 
 
 def _name(prim: Any, bodies: Sequence[Any]) -> str:

@@ -119,6 +119,60 @@ def test_the_robot_has_native_colliders_and_is_else_the_same(tmp_path: Path) -> 
     assert not any(link.collisions for link in again.links)
 
 
+@pytest.mark.parametrize("own", [False, True])
+def test_a_group_that_collides_makes_what_is_below_it_collide(tmp_path: Path, own: bool) -> None:
+    """As meshes that are merged, or drawn in as instances, have it; own: the mesh itself has it, too."""
+    from pxr import Usd, UsdGeom, UsdPhysics
+
+    path = robot(tmp_path / "in")
+    stage = Usd.Stage.Open(str(path))
+    group = UsdGeom.Xform.Define(stage, "/pair/arm/group")
+    stage.GetPrimAtPath("/pair/arm/shape").SetActive(False)
+    UsdPhysics.CollisionAPI.Apply(group.GetPrim())
+    cube = UsdGeom.Cube.Define(stage, "/pair/arm/group/cube")
+    cube.CreateSizeAttr(10)
+    inner = UsdGeom.Xform.Define(stage, "/pair/arm/group/shape").GetPrim()
+    inner.GetReferences().AddReference("arm.usda")
+    inner.SetInstanceable(True)
+    add_mesh(stage, "/pair/arm/seen", trimesh.creation.icosphere(radius=30))
+    stage.Save()
+    if not own:
+        layer = Usd.Stage.Open(str(path.parent / "arm.usda"))
+        layer.GetPrimAtPath("/shape/hit").RemoveAPI(UsdPhysics.CollisionAPI)
+        layer.Save()
+    arm = open_robot(path).links[1]
+    assert (len(arm.collisions), len(arm.visuals), len(arm.natives)) == (1, 1, 1)
+    save(collide(path), tmp_path / "out")
+    made = Usd.Stage.Open(str(tmp_path / "out" / "pair.usda"))
+    asked = UsdPhysics.CollisionAPI(made.GetPrimAtPath("/pair/arm/group")).GetCollisionEnabledAttr()
+    assert asked.Get() is False
+    assert made.GetPrimAtPath("/pair/arm/group/shape").IsInstance() is not own
+    again = open_robot(tmp_path / "out" / "pair.usda").links[1]
+    assert (len(again.collisions), len(again.visuals), len(again.natives)) == (0, 1, 3)
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_a_link_that_is_an_instance_gets_colliders(tmp_path: Path, own: bool) -> None:
+    """own: its mesh collides by itself, not as part of the link."""
+    from pxr import Usd, UsdPhysics
+
+    path = robot(tmp_path / "in")
+    stage = Usd.Stage.Open(str(path))
+    arm = stage.GetPrimAtPath("/pair/arm")
+    stage.RemovePrim("/pair/arm/shape")
+    arm.GetReferences().AddReference("arm.usda")
+    arm.SetInstanceable(True)
+    if not own:
+        UsdPhysics.CollisionAPI.Apply(arm)
+        layer = Usd.Stage.Open(str(path.parent / "arm.usda"))
+        layer.GetPrimAtPath("/shape/hit").RemoveAPI(UsdPhysics.CollisionAPI)
+        layer.Save()
+    stage.Save()
+    save(collide(path), tmp_path / "out")
+    again = open_robot(tmp_path / "out" / "pair.usda")
+    assert [(len(link.collisions), len(link.natives)) for link in again.links] == [(0, 3), (0, 2)]
+
+
 def test_a_loop_of_joints_stays(tmp_path: Path) -> None:
     from pxr import Usd, UsdPhysics
 
