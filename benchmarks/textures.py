@@ -92,7 +92,7 @@ def write_pictures(shapes: Path, quality: str, size: int, path: Path) -> None:
     for name, edit in ((NAMES[0], _bent), (NAMES[2], _squared)):
         shape, colours, _, baked, _ = fitted(shapes / name, quality, size)
         view = around(shape.vertices, shape.up)[0]
-        pixel, face, weights, _ = seen(Scene(colours.vertices, colours.faces), view)
+        pixel, face, weights, _ = seen(Scene(colours.vertices, colours.faces), view, colours)
         row = [picture(pixel, colours.on_faces(face, weights))]
         row += [picture_of(one, view) for one in (baked, edit(baked))]
         rows.append(np.concatenate([one.reshape(SIDE, SIDE, 3) for one in row], axis=1))
@@ -146,7 +146,7 @@ def measured(path: Path, name: str, quality: str, size: int) -> list[str]:
         exported[kind] = glb, Scene(glb.vertices, glb.faces)
     scores: dict[str, list[tuple[float, float]]] = {}
     for view in around(shape.vertices, shape.up):
-        pixel, face, weights, _ = seen(truth, view)
+        pixel, face, weights, _ = seen(truth, view, colours)
         want = picture(pixel, colours.on_faces(face, weights))
         own, _, _, places = seen(parts, view)
         found = {"maps": (own, map_colours(baked, places))}

@@ -14,8 +14,10 @@ from partwright.errors import NoColoursError
 from partwright.shapes.corner_normals import corner_normals
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.loading import READ_BY_TRIMESH, load_scene
+from partwright.textures.cut_outs import cut_out
 from partwright.textures.gltf_placing import MaterialPlacing, Placing, Wrap, gltf_document
 from partwright.textures.images import check_images
+from partwright.textures.texels import nearest_known
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +26,7 @@ _PLAIN = (204, 204, 204)  # of pieces without a colour beside others that have s
 
 @dataclass(frozen=True)
 class Picture:
-    """values (h, w, 3), and how it goes on beyond its border."""
+    """values (h, w, 3), or 4 with how opaque it is, and how it goes on beyond its border."""
 
     values: NDArray[np.float32]
     wrap: Wrap
@@ -65,6 +67,10 @@ class Colours:
     """(F, 3, 2): where on that, as `uv`."""
     reliefs: tuple[Picture, ...]
     """Normal maps (h, w, 3): across, up and away from the face, -1 to 1."""
+    opacity: NDArray[np.float32]
+    """(F, 3): of the faces' corners, 0 to 1, which multiplies that of the image."""
+    least: NDArray[np.float32]
+    """(F,): what is less opaque is not shown; 0 of faces that are shown whole."""
 
     @cached_property
     def _frame(self) -> tuple[Floats, float]:
@@ -94,8 +100,24 @@ class Colours:
         uv = np.einsum("nc,ncd->nd", weights, self.uv[face].astype(np.float64))
         for i, image in enumerate(self.images):
             mine = np.flatnonzero(self.image[face] == i)
-            result[mine] *= image.at(uv[mine])
+            result[mine] *= image.at(uv[mine])[:, :3]
         return 255 * to_srgb(result)
+
+    def shown(self, face: NDArray[np.int64], weights: Floats) -> NDArray[np.bool_]:
+        """Whether there is something to be seen (N,) on faces (N,) at barycentric weights (N, 3)."""
+        result = np.ones(len(face), bool)
+        cut = np.flatnonzero(self.least[face] > 0)
+        if not len(cut):
+            return result
+        face, weights = face[cut], weights[cut]
+        opaque = np.einsum("nc,nc->n", weights, self.opacity[face].astype(np.float64))
+        uv = np.einsum("nc,ncd->nd", weights, self.uv[face].astype(np.float64))
+        for i, image in enumerate(self.images):
+            mine = np.flatnonzero(self.image[face] == i)
+            if image.values.shape[2] == 4:
+                opaque[mine] *= image.at(uv[mine])[:, 3]
+        result[cut] = opaque >= self.least[face]
+        return result
 
     def normals_on_faces(self, face: NDArray[np.int64], weights: Floats) -> Floats:
         """Unit normals (N, 3) on faces (N,) at barycentric weights (N, 3), with what normal maps say."""
@@ -145,6 +167,7 @@ def load_colours(path: str | Path) -> Colours:
             continue
         placing = _placing(mesh, placings)
         corners, uv, image = _look(mesh, is_gltf, placing.colours)
+        limit, share = cut_out(mesh) if is_gltf else (0.0, np.ones(3))
         found = found or corners is not None or image is not None
         index = -1
         if image is not None:
@@ -161,11 +184,12 @@ def load_colours(path: str | Path) -> Colours:
             reliefs.append(relief[0])
         normals = _normals(mesh, np.asarray(matrix, np.float64))
         own = (vertices, np.asarray(mesh.faces) + total, colour, np.full(count, index), uv)
-        pieces.append((*own, normals, np.full(count, bends), relief_uv))
+        opaque = np.broadcast_to(share, (count, 3)), np.full(count, limit)
+        pieces.append((*own, normals, np.full(count, bends), relief_uv, *opaque))
         total += len(vertices)
     if not found:
         raise NoColoursError(f"{path.name}: has no colours: neither of vertices or faces nor of materials")
-    places, triangles, shades, which, where, normals, bend, bend_at = (
+    places, triangles, shades, which, where, normals, bend, bend_at, opacity, least = (
         np.concatenate(one) for one in zip(*pieces, strict=True)
     )
     return Colours(
@@ -179,6 +203,8 @@ def load_colours(path: str | Path) -> Colours:
         bend.astype(np.int64),
         bend_at.astype(np.float32),
         tuple(reliefs),
+        opacity.astype(np.float32),
+        least.astype(np.float32),
     )
 
 
@@ -224,10 +250,14 @@ def _look(mesh: Any, is_gltf: bool, placing: Placing) -> tuple[Floats | None, Fl
         own = placing.of(mesh)
         if image is None or own is None:
             return colour, uv, None
-        pixels = np.asarray(image.convert("RGB"))
+        least = cut_out(mesh)[0] if is_gltf else 0.0
+        pixels = np.asarray(image.convert("RGBA" if least > 0 else "RGB")) / 255
+        pixels[..., :3] = to_linear(pixels[..., :3])
+        if least > 0:  # the colours of what is cut out would mix with those beside it
+            pixels[..., :3] = nearest_known(pixels[..., :3], pixels[..., 3] >= least)
         if not is_gltf:
             colour = None  # an image takes the place of the diffuse colour
-        return colour, own[faces], Picture(to_linear(pixels / 255).astype(np.float32), placing.wrap)
+        return colour, own[faces], Picture(pixels.astype(np.float32), placing.wrap)
     if visual.kind == "vertex":
         each = np.asarray(visual.vertex_colors)[:, :3][faces] / 255
     elif visual.kind == "face":

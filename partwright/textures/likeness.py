@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from partwright.assembly import Assembly
 from partwright.textures.colours import Colours
 from partwright.textures.coordinates import frames, of_nearest_copy
+from partwright.textures.cut_outs import all_three, first_shown
 from partwright.textures.maps import RELIEF, part_map
 
 if TYPE_CHECKING:
@@ -37,14 +38,20 @@ def around(vertices: Floats, up: str | None) -> list[View]:
     return [camera.fitted(vertices, SIDE, SIDE) for camera in cameras]
 
 
-def seen(scene: Scene, view: View) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats, Floats]:
-    """Pixels (N,) that meet the scene, faces (N,), barycentric weights (N, 3) and places (N, 3)."""
+def seen(
+    scene: Scene, view: View, colours: Colours | None = None
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats, Floats]:
+    """Pixels (N,) that meet the scene, faces (N,), barycentric weights (N, 3) and places (N, 3); colours: of
+    the scene's surface, whose cut-outs are no surface."""
     rays = view.rays(SIDE, SIDE)
-    face, distance, uv = scene.first_hit(np.broadcast_to(view.eye, rays.shape), rays)
+    eyes = np.broadcast_to(view.eye, rays.shape)
+    if colours is not None:
+        face, distance, weights = first_shown(scene, colours, eyes, rays)
+    else:
+        found, distance, uv = scene.first_hit(eyes, rays)
+        face, weights = found.astype(np.int64), all_three(uv)
     pixel = np.flatnonzero(face >= 0)
-    u, v = uv[pixel].T
-    weights = np.stack([1 - u - v, u, v], axis=1)
-    return pixel, face[pixel].astype(np.int64), weights, view.eye + distance[pixel, None] * rays[pixel]
+    return pixel, face[pixel], weights[pixel], view.eye + distance[pixel, None] * rays[pixel]
 
 
 def picture(pixel: NDArray[np.int64], colours: Floats) -> Floats:
@@ -122,7 +129,7 @@ def likeness(
     truth = Scene(colours.vertices, colours.faces)
     scores = []
     for view in around(colours.vertices, assemblies[0].up):
-        pixel, face, weights, _ = seen(truth, view)
+        pixel, face, weights, _ = seen(truth, view, colours)
         own, mine, shares, places = seen(parts, view)
         if lit:
             normals = colours.normals_on_faces(face, weights)

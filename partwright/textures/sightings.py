@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from partwright.assembly import Assembly
 from partwright.shapes.sampling import sample_triangles
 from partwright.textures.colours import Colours, barycentric
+from partwright.textures.cut_outs import all_three, first_shown
 
 if TYPE_CHECKING:
     from partwright.render.camera import Camera
@@ -69,7 +70,10 @@ def sightings(assembly: Assembly, colours: Colours, size: int, seed: int, views:
     points, face = sample_triangles(vertices, faces, count, seed)
     for start in range(0, count, _AT_ONCE):
         some, on_face = points[start : start + _AT_ONCE], face[start : start + _AT_ONCE]
-        yield at(some, (on_face, barycentric(vertices[faces[on_face]], some)), colours.nearest(some), _UNSEEN)
+        its = colours.nearest(some)
+        kept = colours.shown(*its)
+        some, on_face, its = some[kept], on_face[kept], (its[0][kept], its[1][kept])
+        yield at(some, (on_face, barycentric(vertices[faces[on_face]], some)), its, _UNSEEN)
     reach = _APART * there.size
     for i in range(_VIEWS + _HELD if views else 0):
         held = i >= _VIEWS
@@ -78,12 +82,12 @@ def sightings(assembly: Assembly, colours: Colours, size: int, seed: int, views:
         rays = view.rays(_SIDE, _SIDE)
         eyes = np.broadcast_to(view.eye, rays.shape)
         mine, distance, weights = here.first_hit(eyes, rays)
-        struck, far, others = there.first_hit(eyes, rays)
+        struck, far, others = first_shown(there, colours, eyes, rays)
         with np.errstate(invalid="ignore"):  # inf - inf, of rays that miss both
             met = np.flatnonzero(np.abs(distance - far) * np.linalg.norm(rays, axis=1) < reach)
-        on = mine[met].astype(np.int64), _all_three(weights[met])
-        its = struck[met].astype(np.int64), _all_three(others[met])
-        yield at(view.eye + distance[met, None] * rays[met], on, its, 1.0, held)
+        on = mine[met].astype(np.int64), all_three(weights[met])
+        seen = struck[met], others[met]
+        yield at(view.eye + distance[met, None] * rays[met], on, seen, 1.0, held)
 
 
 def _camera(i: int, count: int, start: float) -> Camera:
@@ -92,11 +96,6 @@ def _camera(i: int, count: int, start: float) -> Camera:
 
     azimuth = start + i * math.pi * (3 - math.sqrt(5))
     return Camera(math.degrees(azimuth), math.degrees(math.asin(1 - (2 * i + 1) / count)))
-
-
-def _all_three(uv: Floats) -> Floats:
-    """Barycentric weights (N, 3) by the last two."""
-    return np.column_stack([1 - uv.sum(axis=1), uv])
 
 
 def _unit(vectors: Floats) -> Floats:

@@ -106,16 +106,20 @@ def read(image: NDArray[np.uint8], place: Floats, side: NDArray[np.bool_]) -> Fl
 
 def filled(values: Floats, known: NDArray[np.bool_], sides: int) -> Floats:
     """Texels that nothing was seen of take the values of the nearest one; of a whole side, of the first."""
-    from scipy.ndimage import distance_transform_edt
-
     size = values.shape[0]
     result = values.copy()
     for side in range(sides):
         own = slice(side * size, (side + 1) * size)
         there = known[:, own]
-        if not there.any():
-            result[:, own] = result[:, :size]
-        elif not there.all():
-            rows, columns = distance_transform_edt(~there, return_distances=False, return_indices=True)
-            result[:, own] = result[:, own][rows, columns]
+        result[:, own] = nearest_known(result[:, own], there) if there.any() else result[:, :size]
     return result
+
+
+def nearest_known(values: Floats, known: NDArray[np.bool_]) -> Floats:
+    """Values (h, w, C) of which those that are not known (h, w) are as the nearest one that is."""
+    from scipy.ndimage import distance_transform_edt
+
+    if known.all() or not known.any():
+        return values
+    rows, columns = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    return np.asarray(values[rows, columns])
