@@ -1,4 +1,4 @@
-"""Rigid bodies in glTF: KHR_implicit_shapes and KHR_physics_rigid_bodies, as of their release candidates.
+"""Rigid bodies in glTF: KHR_implicit_shapes, a release candidate, and KHR_physics_rigid_bodies, a draft.
 
 Shapes stand along +Y in glTF, where those of assemblies stand along z. A cylinder has two radii there and a
 capsule, too: frusta, cones and round cones are native. A hull is a mesh of a node outside of the scene, which
@@ -46,7 +46,7 @@ def add_body(tree: dict[str, Any], name: str, body: Body, hulls: dict[str, str],
             form, turn = shape(geometry.part.field), geometry.part.rotation
             if form["type"] not in ("box", "sphere"):
                 turn = quaternion_product(turn, _Y_TO_Z)
-            w, x, y, z = turn
+            w, x, y, z = np.clip(turn, -1, 1).tolist()  # glTF takes no 1 + 2e-16
             made |= {"translation": list(geometry.part.translation), "rotation": [x, y, z, w]}
             if form not in shapes:
                 shapes.append(form)

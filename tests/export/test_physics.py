@@ -137,6 +137,15 @@ def khr_colliders(path: Path) -> list[trimesh.Trimesh]:
     return meshes
 
 
+def test_khr_turns_are_within_gltf_s_limits(tmp_path: Path) -> None:
+    """An upright cylinder is turned to Y and back: of a quaternion no number may exceed 1."""
+    export(Assembly((Part(Cylinder(1, 2), name="a"),), unit="m", up="z"), tmp_path / "a.glb", physics="khr")
+    turns = [node["rotation"] for node in document(tmp_path / "a.glb")["nodes"] if "rotation" in node]
+    assert len(turns) == 1
+    assert turns[0] == pytest.approx([0, 0, 0, 1])
+    assert np.abs(turns).max() <= 1
+
+
 def test_khr_is_what_the_extensions_ask_for(tmp_path: Path) -> None:
     path = tmp_path / "a.glb"
     export(varied(), path, physics="khr", free_joint=True, density=2700.0, resolution=24, tolerance=0.01)
