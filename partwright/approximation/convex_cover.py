@@ -24,7 +24,7 @@ from partwright.approximation.cutting_planes import (
     candidates,
     moved,
 )
-from partwright.approximation.hull_faces import faces_of
+from partwright.approximation.hull_faces import beyond_faces, faces_of
 from partwright.approximation.light_hull import plain_hull
 from partwright.approximation.piece_joining import exchanged, joined, spent
 from partwright.meshing.manifolds import surface_of
@@ -111,7 +111,7 @@ def _sticks_out(solid: Manifold, pieces: list[Piece], by: float) -> bool:
         normals, offsets = faces_of(plain_hull(piece.hull))
         lower, upper = piece.box
         near = ((corners >= lower - by) & (corners <= upper + by)).all(axis=1)
-        near[near] = (corners[near] @ normals.T - offsets).max(axis=1) <= by
+        near[near] = beyond_faces(corners[near], normals, offsets) <= by
         corners = corners[~near]
     return len(corners) > 0
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from partwright.approximation.ellipsoid import Ellipsoid
-from partwright.approximation.hull_faces import faces_of
+from partwright.approximation.hull_faces import beyond_faces, faces_of
 from partwright.assembly import Part, Similarity
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.manifolds import surface_of
@@ -78,7 +78,7 @@ class _Body:
         step = (upper - lower) / _CELLS
         axes = [low + h * (np.arange(_CELLS) + 0.5) for low, h in zip(lower, step, strict=True)]
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        distance = (points @ self.normals.T - self.offsets).max(axis=1)
+        distance = beyond_faces(points, self.normals, self.offsets)
         cell = float(step.min())
         return points, cell, np.clip(0.5 - distance / cell, 0, 1)
 

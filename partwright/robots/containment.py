@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.ellipsoid import Ellipsoid
-from partwright.approximation.hull_faces import faces_of
+from partwright.approximation.hull_faces import beyond_faces, faces_of
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.hulls import hull_of
@@ -44,8 +44,7 @@ def _left_out(shapes: Sequence[Shape], points: np.ndarray) -> np.ndarray:
 def outside_of(shape: Shape, points: np.ndarray) -> np.ndarray:
     """(N,) how far points are outside at most, in double precision; not positive inside."""
     if shape.part is None:
-        normals, offsets = shape_planes(shape)
-        return np.asarray((points @ normals.T - offsets).max(axis=1))
+        return beyond_faces(points, *shape_planes(shape))
     local = (points - shape.part.translation) @ rotation_matrix(shape.part.rotation)
     match shape.part.field:
         case Box(size=size):
