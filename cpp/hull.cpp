@@ -9,7 +9,7 @@ namespace partwright {
 namespace {
 
 constexpr int BITS = 38;              // of the grid along the longest side: differences of its points are exact
-constexpr double NEAR = 0x1p4;        // of the grid, 6e-8 of the size: points no farther out of the hull than this are let be
+constexpr double NEAR = 0x1p4;        // of the grid, 1e-10 of the size: points no farther out of the hull than this are let be
 constexpr double ROUNDING = 2e-15;    // of the sum of magnitudes: more than rounding can do to a determinant
 
 using Place = std::array<double, 3>;

@@ -23,7 +23,8 @@ from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.fields import Box, Field, Solid
 from partwright.meshing import mesh_part
-from partwright.meshing.manifolds import surface_of
+from partwright.meshing.hulls import file_hull
+from partwright.meshing.manifolds import as_mesh, surface_of
 from partwright.shapes import MeshDistance
 
 if TYPE_CHECKING:
@@ -147,8 +148,6 @@ def _covered(node: Node, kinds: Sequence[type[Field]], allowed: float) -> list[P
     Each is a native solid where that is as good as its hull, whose faces are moved to add as much as they
     lack. Found at a size of 1: engines' metres make micrometres of small assemblies.
     """
-    import trimesh
-
     lower, upper = node.bounds()
     middle, side = (lower + upper) / 2, float((upper - lower).max())
     if not side > 0 or not np.isfinite(side):
@@ -164,8 +163,8 @@ def _covered(node: Node, kinds: Sequence[type[Field]], allowed: float) -> list[P
         if fits:
             forms.append(fits[0].part.transformed(frame))
         else:
-            corners, faces = surface_of(light_hull(hull, _LIGHT * allowed / side)[0])
-            forms.append(trimesh.Trimesh(frame(corners), faces, process=False))
+            corners, _ = surface_of(light_hull(hull, _LIGHT * allowed / side)[0])
+            forms.append(as_mesh(file_hull(frame(corners))))
     return forms
 
 
@@ -244,5 +243,5 @@ def _hull(mesh: trimesh.Trimesh, node: Node) -> tuple[trimesh.Trimesh, float, fl
     hull = unit.convex_hull
     places = hull.subdivide_to_size(_SPACING).triangles_center * side + middle
     deviation = float(np.abs(node.distance(places)).max())
-    placed = trimesh.Trimesh(hull.vertices * side + middle, hull.faces, process=False)
+    placed = as_mesh(file_hull(np.asarray(hull.vertices) * side + middle))
     return placed, float(hull.volume / unit.volume - 1), deviation

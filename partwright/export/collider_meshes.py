@@ -10,8 +10,8 @@ from partwright.approximation.collision import Geometry
 from partwright.approximation.light_hull import light_hull
 from partwright.errors import NoSurfaceError
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
-from partwright.meshing.hulls import hull_of
-from partwright.meshing.manifolds import surface_of
+from partwright.meshing.hulls import file_hull, hull_of
+from partwright.meshing.manifolds import as_mesh, surface_of
 
 if TYPE_CHECKING:
     import trimesh
@@ -21,19 +21,22 @@ _SIDES = 24  # of what is round
 _LOST = 1e-4  # of its size: what a hull may lose for fewer corners
 
 
-def collider_mesh(geometry: Geometry) -> trimesh.Trimesh:
+def collider_mesh(geometry: Geometry, frame: np.ndarray | None = None) -> trimesh.Trimesh:
     """The convex mesh of a native solid, or of a hull with `MOST_CORNERS` at most, in its place.
+
+    frame: (4, 4), to where the file has it.
 
     Raises:
         NoSurfaceError: it is flat.
     """
     if geometry.part is None:
         assert geometry.mesh is not None
-        return _hull(np.asarray(geometry.mesh.vertices))
-    mesh = _solid(geometry.part.field)
-    pose = geometry.part.pose
-    mesh.vertices = pose(np.asarray(mesh.vertices))
-    return mesh
+        corners = _corners(np.asarray(geometry.mesh.vertices))
+    else:
+        corners = geometry.part.pose(np.asarray(_solid(geometry.part.field).vertices))
+    if frame is not None:
+        corners = corners @ frame[:3, :3].T + frame[:3, 3]
+    return as_mesh(file_hull(corners))
 
 
 def _solid(field: Field) -> trimesh.Trimesh:
@@ -52,16 +55,15 @@ def _solid(field: Field) -> trimesh.Trimesh:
     raise AssertionError(f"{field.kind} has no collider mesh")
 
 
-def _hull(places: np.ndarray) -> trimesh.Trimesh:
-    """At a size of 1: hulls of meshes in micrometres would lose their triangles in metres."""
-    import trimesh
-
+def _corners(places: np.ndarray) -> np.ndarray:
+    """(V, 3) of the hull. At a size of 1: hulls of meshes in micrometres would lose their triangles in
+    metres."""
     lower, upper = places.min(axis=0), places.max(axis=0)
     middle, side = (lower + upper) / 2, float((upper - lower).max())
     if not side > 0:
         raise NoSurfaceError("a collider has no size")
     whole = hull_of((places - middle) / side)
-    corners, faces = surface_of(light_hull(whole, _LOST, MOST_CORNERS)[0])
     if whole.volume() <= 0:
         raise NoSurfaceError("a collider is flat")
-    return trimesh.Trimesh(corners * side + middle, faces, process=False)
+    corners, _ = surface_of(light_hull(whole, _LOST, MOST_CORNERS)[0])
+    return corners * side + middle

@@ -84,8 +84,7 @@ def add_named_colliders(
     for (owner, geometry), name in zip(placed, names, strict=True):
         parent = scene.graph.transforms.parents[owner]
         world, _ = scene.graph.get(owner)
-        mesh = collider_mesh(geometry)
-        mesh.apply_transform(np.linalg.inv(world))
+        mesh = collider_mesh(geometry, np.linalg.inv(world))
         local = scene.graph.transforms.edge_data[(parent, owner)].get("matrix", np.eye(4))
         scene.add_geometry(mesh, name, name, parent, local)
 

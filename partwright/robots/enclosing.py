@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.approximation.hull_faces import faces_of
+from partwright.approximation.hull_faces import beyond_faces, faces_of
 from partwright.meshing.hulls import hull_of
 from partwright.meshing.manifolds import surface_of
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 _Planes = tuple[np.ndarray, np.ndarray]  # normals (F, 3) and offsets (F,)
 _FINEST = 4  # times `fine`: edges of pieces that join the nearest solid however far it is
+_ASKED = 32  # planes whose distances are measured at once
+_AROUND = np.array([way for way in np.ndindex(3, 3, 3) if way != (1, 1, 1)], float) - 1
 _MOST = 400_000  # pieces that are cut further; more join where they are
 
 
@@ -37,8 +39,7 @@ def containing(hulls: Sequence[Manifold], triangles: np.ndarray, fine: float) ->
     changed = np.zeros(len(hulls), bool)
     left = triangles
     while len(left := left[~_within(planes, boxes, left)]):
-        outside = np.stack([_beyond(each, left).max(axis=1) for each in planes])
-        owner, beyond = outside.argmin(axis=0), outside.min(axis=0)
+        owner, beyond = nearest_hulls(planes, left)
         edges = np.linalg.norm(left - np.roll(left, 1, axis=1), axis=2)
         small = (edges.max(axis=1) <= _FINEST * fine) | (len(left) > _MOST)
         joins = (beyond <= fine) | small
@@ -69,29 +70,39 @@ def outer_hull(hull: Manifold, by: float, most: int, room: float, farthest: floa
     result = Manifold.cube(tuple((upper - lower + 2 * size).tolist())).translate(
         tuple((lower - size).tolist())
     )  # so large that none of its own faces is left
+    excess = np.full(len(normals), np.inf)  # at most: what was cut off since is not counted
     for count in range(len(normals)):
-        excess = (surface_of(result)[0] @ normals.T - offsets).max(axis=0)
-        worst = int(excess.argmax())
+        corners, known = surface_of(result)[0], np.zeros(len(normals), bool)
+        while not known[worst := int(excess.argmax())]:
+            most_far = np.argpartition(-excess, min(_ASKED, len(excess) - 1))[:_ASKED]
+            excess[most_far] = (corners @ normals[most_far].T - offsets[most_far]).max(axis=0)
+            known[most_far] = True
         if excess[worst] <= by or (count >= most and excess[worst] <= farthest):
             break
         result = result.trim_by_plane(tuple((-normals[worst]).tolist()), -float(offsets[worst]))
     return result
 
 
-def without_twins(hull: Manifold, by: float) -> Manifold:
-    """The hull of some of its corners, no two nearer than a length: none of its own is farther from it than
-    that. Corners that files in single precision take for one would leave them open."""
-    from scipy.spatial import cKDTree
+def nearest_hulls(planes: Sequence[_Planes], triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(T,) the hull that each triangle is least outside of, and by how much; some planes of a hull tell
+    whether all of them need to be asked."""
+    least = np.stack([_beyond(_some(each), triangles).max(axis=1) for each in planes])
+    owner, beyond = least.argmin(axis=0), np.full(len(triangles), np.inf)
+    for turn in (True, False):
+        for i, each in enumerate(planes):
+            asked = np.flatnonzero(owner == i if turn else (least[i] < beyond))
+            found = _beyond(each, triangles[asked]).max(axis=1)
+            nearer = found < beyond[asked]
+            owner[asked[nearer]], beyond[asked[nearer]] = i, found[nearer]
+            least[i, asked] = np.inf
+    return owner, beyond
 
-    corners = surface_of(hull)[0]
-    pairs = cKDTree(corners).query_pairs(by, output_type="ndarray")
-    if not len(pairs):
-        return hull
-    kept = np.ones(len(corners), bool)
-    for one, other in sorted(map(tuple, pairs.tolist())):
-        if kept[one]:
-            kept[other] = False
-    return hull_of(corners[kept])
+
+def _some(planes: _Planes) -> _Planes:
+    """Those that face most into each direction of a lattice."""
+    normals, offsets = planes
+    chosen = np.unique((normals @ _AROUND.T).argmax(axis=0))
+    return normals[chosen], offsets[chosen]
 
 
 def _within(planes: Sequence[_Planes], boxes: Sequence[np.ndarray], triangles: np.ndarray) -> np.ndarray:
@@ -106,11 +117,7 @@ def _within(planes: Sequence[_Planes], boxes: Sequence[np.ndarray], triangles: n
 
 def _beyond(planes: _Planes, triangles: np.ndarray) -> np.ndarray:
     """(T, 3) how far each corner is outside of a hull; not positive inside."""
-    normals, offsets = planes
-    beyond = np.full(triangles.shape[:2], -np.inf)
-    for normal, offset in zip(normals, offsets, strict=True):
-        np.maximum(beyond, triangles @ normal - offset, out=beyond)
-    return beyond
+    return beyond_faces(triangles.reshape(-1, 3), *planes).reshape(-1, 3)
 
 
 def halves(triangles: np.ndarray, longest: np.ndarray) -> np.ndarray:

@@ -18,10 +18,10 @@ from partwright.approximation.convex_fit import ConvexFit, Mode, convex_fits
 from partwright.approximation.convex_piece import Limits, Piece
 from partwright.approximation.hull_faces import faces_of
 from partwright.approximation.light_hull import light_hull, plain_hull
-from partwright.meshing.hulls import hull_of
-from partwright.meshing.manifolds import as_mesh
+from partwright.meshing.hulls import file_grid, file_hull, hull_of
+from partwright.meshing.manifolds import as_mesh, surface_of
 from partwright.robots.containment import larger, shape_solid
-from partwright.robots.enclosing import containing, outer_hull, without_twins
+from partwright.robots.enclosing import containing, outer_hull
 from partwright.robots.inscribed import deepest, filled, inscribed
 from partwright.robots.model import Shape
 from partwright.robots.solids import Target
@@ -43,7 +43,7 @@ _CORNERS = 1024  # of a convex link's exact hull
 _FACES = 64  # of an enclosing hull, and more as long as a corner is out by a share of the tolerance
 _OUT = 0.9  # that share: a corner is a little farther from the hull than from its planes
 _ROOM = 2e-6  # of the size: by how much an enclosing shape is larger than it need be, for rounding
-_TWINS = 0.5  # of that: corners nearer than this are one
+_GRIDS = 2  # steps of the grid that files' hulls are moved to, likewise
 _POINTS = 50_000  # of the triangles, for the hulls of wrapped pieces
 _LEAST = 1e-3  # of a wrapped piece's volume: a hull of points below it is a sheet
 _FILLS = 2e-3  # of the link's volume: what each shape more within it has to gain
@@ -99,11 +99,11 @@ def _convex(target: Target, wishes: Wishes) -> Shape | None:
     if dented and not whole.within(wishes.tolerance):
         return None
     near = _near(plain_hull(whole.hull), wishes, NATIVE_FOR)
-    shape = Shape("", near.part) if near is not None else Shape("", mesh=as_mesh(whole.hull))
+    shape = Shape("", near.part) if near is not None else _hull(whole.hull)
     if not dented or wishes.mode != "within":
         return shape
     # Dents of a face are shallow all over, and a little smaller is nearly all; a slot is deep.
-    ways = (shape, Shape("", mesh=as_mesh(inscribed(whole.hull, solid))))
+    ways = (shape, _hull(inscribed(whole.hull, solid)))
     found = [one for way in ways if (one := _within(way, target)) is not None]
     return max(found, key=lambda one: float(shape_solid(one).volume()), default=None)
 
@@ -119,11 +119,11 @@ def _near(hull: Manifold, wishes: Wishes, worse: float) -> ConvexFit | None:
 def _enclosing(pieces: list[Piece], target: Target, wishes: Wishes) -> list[Manifold]:
     """Hulls of the pieces, of few faces, and of all triangles that stick out of them: these contain every
     triangle."""
-    fine, room = _LIGHT * wishes.tolerance, _ROOM * target.size
+    fine, room = _LIGHT * wishes.tolerance, _room(target)
     hulls = _tight(pieces, target, fine) if target.loose else [piece.hull for piece in pieces]
 
     def plain(hull: Manifold) -> Manifold:
-        return without_twins(outer_hull(hull, fine, _FACES, room, _OUT * wishes.tolerance), _TWINS * room)
+        return outer_hull(hull, fine, _FACES, room, _OUT * wishes.tolerance)
 
     hulls = [plain(hull) for hull in hulls]
     more = containing(hulls, target.vertices[target.faces], fine)
@@ -140,13 +140,21 @@ def _chosen(hull: Manifold, alone: bool, target: Target, wishes: Wishes) -> Shap
         hull = light_hull(hull, _LIGHT * wishes.tolerance, lost=min(_LOST * share, _MOST_LOST))[0]
     worse = NATIVE_FOR if alone else min(NATIVE_FOR, _NATIVE_PIECE * share)
     near = _near(hull, wishes, worse)
-    return _native(near.part, target, wishes) if near is not None else Shape("", mesh=as_mesh(hull))
+    return _native(near.part, target, wishes) if near is not None else _hull(hull)
 
 
 def _native(part: Part, target: Target, wishes: Wishes) -> Shape:
     if wishes.mode != "around":
         return Shape("", part)
-    return Shape("", dataclasses.replace(part, field=larger(part.field, _ROOM * target.size)))
+    return Shape("", dataclasses.replace(part, field=larger(part.field, _room(target))))
+
+
+def _room(target: Target) -> float:
+    return max(_ROOM * target.size, _GRIDS * file_grid(target.vertices))
+
+
+def _hull(hull: Manifold) -> Shape:
+    return Shape("", mesh=as_mesh(file_hull(surface_of(hull)[0])))
 
 
 def _tight(pieces: list[Piece], target: Target, fine: float) -> list[Manifold]:
@@ -224,6 +232,5 @@ def _scaled(shape: Shape, centre: np.ndarray, scale: float) -> Shape:
         part = shape.part.translated((-centre).tolist()).scaled(scale).translated(centre.tolist())
         return Shape(shape.name, part)
     assert shape.mesh is not None
-    mesh = shape.mesh.copy()
-    mesh.vertices = (mesh.vertices - centre) * scale + centre
-    return Shape(shape.name, mesh=mesh)
+    corners = (np.asarray(shape.mesh.vertices) - centre) * scale + centre
+    return Shape(shape.name, mesh=as_mesh(file_hull(corners)))

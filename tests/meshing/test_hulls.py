@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from manifold3d import Manifold
 from scipy.spatial import ConvexHull
 
-from partwright.meshing.hulls import hull_of, hull_volume, split_hull_volumes
+from partwright.meshing.hulls import file_hull, hull_of, hull_volume, split_hull_volumes
 from partwright.meshing.manifolds import surface_of
 
 
@@ -147,3 +150,40 @@ def test_hulls_of_both_sides_of_planes_are_those_of_what_is_cut() -> None:
     assert np.isinf(found[-3:-1]).all()
     above, below = solid.split_by_plane(tuple(normals[5]), float(planes[5, 3]))
     assert found[5] == pytest.approx(above.hull().volume() + below.hull().volume())
+
+
+def trimmed(seed: int) -> np.ndarray:
+    """Corners of a cube cut by 40 planes, small and away from the origin: many meet nearly in a point."""
+    random = np.random.default_rng(seed)
+    solid = Manifold.cube((2, 2, 2), True)
+    for normal in random.normal(size=(40, 3)):
+        solid = solid.trim_by_plane(tuple((normal / np.linalg.norm(normal)).tolist()), -0.8)
+    return 0.03 * surface_of(solid)[0] + [0.1, 0.2, 0.05]
+
+
+STORED = CLOUDS | {f"trimmed {seed}": trimmed(seed) for seed in range(4)}
+STORED["small drum"] = 0.02 * turned(rings()) + [0.3, 0.1, 0]
+STORED["eight clusters"] = (
+    np.array(list(np.ndindex(2, 2, 2)))[:, None] + 1e-7 * np.random.default_rng(3).normal(size=(8, 6, 3))
+).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("name", STORED)
+def test_hulls_for_files_are_closed_and_convex_when_read_back(name: str) -> None:
+    """From STL, which has single precision; some of these hulls come back concave if left to be rounded."""
+    points = STORED[name]
+    corners, faces = surface_of(file_hull(points))
+    data = trimesh.Trimesh(corners, faces, process=False).export(file_type="stl")
+    read = trimesh.load_mesh(io.BytesIO(data), file_type="stl")
+    assert read.is_watertight
+    assert read.is_convex
+    assert (np.unique(read.vertices, axis=0) == np.unique(corners, axis=0)).all()
+    size, reach = np.ptp(points, axis=0).max(), np.abs(points).max()
+    assert read.volume == pytest.approx(hull_volume(points), abs=6 * 1e-6 * reach * size**2)
+    hull = ConvexHull(points)
+    assert (corners @ hull.equations[:, :3].T + hull.equations[:, 3]).max() < 1e-6 * reach
+
+
+def test_hulls_for_files_need_no_more_corners_than_the_hull_has() -> None:
+    assert file_hull(turned(lattice(7))).num_vert() == 8
+    assert file_hull(STORED["eight clusters"]).num_vert() == 8

@@ -12,7 +12,7 @@ from manifold3d import Manifold, OpType
 from partwright.approximation.hull_faces import faces_of
 from partwright.meshing.manifolds import surface_of
 from partwright.robots import CollideOptions, collide, save
-from partwright.robots.enclosing import containing, outer_hull, without_twins
+from partwright.robots.enclosing import containing, nearest_hulls, outer_hull
 from tests.robots.robots import urdf
 
 
@@ -71,32 +71,38 @@ def test_an_outer_hull_contains_with_few_faces() -> None:
     assert exact.num_vert() == 8
 
 
-def test_corners_next_to_each_other_are_one() -> None:
-    """As where many planes meet nearly in a point; what is left is off by no more than was said."""
-    near = 1e-7 * np.random.default_rng(3).normal(size=(8, 6, 3))
-    corners = (np.array(list(np.ndindex(2, 2, 2)))[:, None] + near).reshape(-1, 3)
-    hull = Manifold.hull_points(corners)
-    assert hull.num_vert() > 8
-    plain = without_twins(hull, 1e-6)
-    assert plain.num_vert() == 8
-    assert plain.volume() == pytest.approx(1.0, abs=1e-5)
-    assert without_twins(plain, 1e-6) is plain
-
-
-def test_enclosing_hulls_are_closed_in_files_of_single_precision(tmp_path: Path) -> None:
+@pytest.mark.parametrize("enclose", [False, True])
+def test_hulls_are_closed_and_convex_in_files_of_single_precision(tmp_path: Path, enclose: bool) -> None:
     path = urdf(tmp_path / "in")
-    ball = trimesh.creation.icosphere(4, 0.02)
+    ball = trimesh.creation.icosphere(3, 0.02)
     half = trimesh.creation.box((1, 1, 1), transform=trimesh.transformations.translation_matrix((0, 0, 0.5)))
-    bowl = trimesh.boolean.difference([ball, trimesh.creation.icosphere(4, 0.015), half])
+    bowl = trimesh.boolean.difference([ball, trimesh.creation.icosphere(3, 0.015), half])
+    bowl.apply_transform(trimesh.transformations.rotation_matrix(0.7, (1, 2, 3), (0.1, 0.2, 0)))
     bowl.export(tmp_path / "in" / "meshes" / "rod.stl")
-    options = CollideOptions(enclose=True, tolerance="0.4mm", kinds=("hull",))
+    options = CollideOptions(enclose=enclose, tolerance="2mm", kinds=("hull",))
     save(collide(path, options), tmp_path / "out")
     files = list((tmp_path / "out" / "collision").glob("arm*.stl"))
     assert len(files) > 4
     for file in files:
         mesh = trimesh.load_mesh(file, process=False)
         corners, faces = np.unique(mesh.vertices, axis=0, return_inverse=True)
-        assert trimesh.Trimesh(corners, faces.reshape(-1, 3), process=False).is_watertight, file.name
+        read = trimesh.Trimesh(corners, faces.reshape(-1, 3), process=False)
+        assert read.is_watertight, file.name
+        assert read.is_convex, file.name
+
+
+def test_the_nearest_hull_is_the_one_that_all_planes_tell() -> None:
+    """Whether some planes already tell it or not."""
+    random = np.random.default_rng(0)
+    balls = [Manifold.sphere(0.5, 24).translate(tuple(random.uniform(-1, 1, 3))) for _ in range(5)]
+    planes = [*map(faces_of, balls), faces_of(Manifold.tetrahedron())]
+    triangles = random.uniform(-2, 2, (300, 1, 3)) + random.normal(0, 0.2, (300, 3, 3))
+    all_of_them = np.stack(
+        [(triangles @ normals.T - offsets).max(axis=2).max(axis=1) for normals, offsets in planes]
+    )
+    owner, beyond = nearest_hulls(planes, triangles)
+    assert (owner == all_of_them.argmin(axis=0)).all()
+    assert np.allclose(beyond, all_of_them.min(axis=0), atol=1e-12)
 
 
 def test_enclosing_adds_no_more_than_pieces_do(tmp_path: Path) -> None:
