@@ -174,5 +174,5 @@ class _Sums:
         values = np.column_stack([colours.at(points), np.tile((_SPAN, _SPAN, 2 * _SPAN), (len(points), 1))])
         self.texels.add(folded(towards), inner, values, np.ones(len(points)))
 
-    def _image(self, values: Floats, known: NDArray[np.bool_]) -> NDArray[np.uint8]:
-        return np.round(np.clip(filled(values, known, self.sides), 0, 255)).astype(np.uint8)
+    def _image(self, values: Floats, seen: Floats) -> NDArray[np.uint8]:
+        return np.round(np.clip(filled(values, seen, self.sides), 0, 255)).astype(np.uint8)

@@ -11,7 +11,9 @@ Floats = NDArray[np.float64]
 
 _STEPS = 40  # of conjugate gradients; they rarely need half
 _ENOUGH = 1e-3  # of the values' own unit: the step of a texel after which there is nothing left to gain
-_HELD = 0.005  # pull of a texel towards the mean of what was seen near it, in shares of what it has seen
+_HELD = 0.005  # pull of a texel towards the mean of what was seen near it, in shares of what it has seen, or
+# of what most have where that is more: at a border little is seen, and nothing else keeps a texel there
+_FIRM = 0.05  # of what most have seen: texels that saw less tell nothing of those around them
 
 
 class Texels:
@@ -46,20 +48,20 @@ class Texels:
         """Whether anything was seen."""
         return bool(self._matrix.nnz)
 
-    def means(self) -> tuple[Floats, NDArray[np.bool_]]:
-        """Of each texel the mean (size, sides * size, C) of what was seen around it, and whether any was."""
+    def means(self) -> tuple[Floats, Floats]:
+        """Of each texel the mean (size, sides * size, C) of what was seen around it, and how much was."""
         seen = np.asarray(self._matrix.sum(axis=1)).ravel()
         known = seen > 0
         values = np.zeros_like(self._right)
         values[known] = self._right[known] / seen[known, None]
-        return self._square(values), self._square(known)
+        return self._square(values), self._square(seen)
 
-    def solved(self) -> tuple[Floats, NDArray[np.bool_]]:
-        """Of each texel the values with which all that was seen is met best, and whether any was."""
-        values, known = self.means()
+    def solved(self) -> tuple[Floats, Floats]:
+        """Of each texel the values with which all that was seen is met best, and how much was."""
+        values, seen = self.means()
         flat = values.reshape(self._right.shape)
-        seen = np.asarray(self._matrix.sum(axis=1)).ravel()
-        hold = np.where(known.ravel(), _HELD * seen, 1.0)  # others stay as they are
+        pull = _HELD * np.maximum(seen.ravel(), _typical(seen))
+        hold = np.where(seen.ravel() > 0, pull, 1.0)  # others stay as they are
         scale = 1 / (self._matrix.diagonal() + hold)
 
         def residual(x: Floats) -> Floats:
@@ -79,7 +81,7 @@ class Texels:
             steered = scale[:, None] * left
             before, size = size, (left * steered).sum(axis=0)
             along = steered + size / np.maximum(before, 1e-300) * along
-        return self._square(x), known
+        return self._square(x), seen
 
     def _square(self, values: NDArray[Any]) -> NDArray[Any]:
         return values.reshape(self.size, self.sides * self.size, *values.shape[1:])
@@ -104,15 +106,23 @@ def read(image: NDArray[np.uint8], place: Floats, side: NDArray[np.bool_]) -> Fl
     return np.asarray((share[:, :, None] * image[texel[:, :, 1], column]).sum(axis=1))
 
 
-def filled(values: Floats, known: NDArray[np.bool_], sides: int) -> Floats:
-    """Texels that nothing was seen of take the values of the nearest one; of a whole side, of the first."""
+def filled(values: Floats, seen: Floats, sides: int) -> Floats:
+    """Texels that nothing was seen of take the values of the nearest one that saw enough; of a whole side, of
+    the first. seen (size, sides * size): how much each has."""
     size = values.shape[0]
+    firm = seen >= _FIRM * _typical(seen)
     result = values.copy()
     for side in range(sides):
         own = slice(side * size, (side + 1) * size)
-        there = known[:, own]
-        result[:, own] = nearest_known(result[:, own], there) if there.any() else result[:, :size]
+        known = seen[:, own] > 0
+        nearest = nearest_known(result[:, own], known & firm[:, own]) if known.any() else result[:, :size]
+        result[:, own] = np.where(known[..., None], result[:, own], nearest)
     return result
+
+
+def _typical(seen: Floats) -> float:
+    """What most texels that saw anything have seen; 0 where none has."""
+    return float(np.median(seen[seen > 0])) if (seen > 0).any() else 0.0
 
 
 def nearest_known(values: Floats, known: NDArray[np.bool_]) -> Floats:

@@ -52,8 +52,9 @@ def test_texels_are_found_again_from_what_is_read_between_them() -> None:
     for half in (slice(0, 7_000), slice(7_000, None)):  # in any number of pieces
         values = truth.at(field, points[half])
         texels.add(folded(towards[half]), inner[half], values, np.ones(len(values)))
-    solved, known = texels.solved()
+    solved, seen = texels.solved()
     means, _ = texels.means()
+    known = seen > 0
     assert known.mean() > 0.8
     wanted = truth.image.astype(float)
     assert np.median(np.abs(solved - wanted)[known]) < 1
@@ -64,11 +65,28 @@ def test_texels_that_nothing_reaches_are_as_their_neighbours() -> None:
     texels = Texels(8, 1, 1)
     place = np.array([[0.2, 0.2], [0.8, 0.8]])
     texels.add(place, np.zeros(2, bool), np.array([[10.0], [90.0]]), np.ones(2))
-    values, known = texels.solved()
-    whole = filled(values, known, 1)
-    assert not known.all()
+    values, seen = texels.solved()
+    whole = filled(values, seen, 1)
+    assert not (seen > 0).all()
     assert whole[0, 0, 0] == pytest.approx(10, abs=0.5)
     assert whole[-1, -1, 0] == pytest.approx(90, abs=0.5)
+
+
+def test_borders_of_what_is_seen_do_not_run_away() -> None:
+    """A bright disc, and beyond its edge a dark rim of which little is seen, as of another part's colour."""
+    rng = np.random.default_rng(2)
+    place = rng.random((20_000, 2))
+    radius = np.hypot(*(place - 0.5).T)
+    place, radius = place[radius < 0.3], radius[radius < 0.3]
+    values = np.where(radius < 0.27, 200.0, 40.0)[:, None] + rng.normal(0, 5, (len(place), 1))
+    texels = Texels(32, 1, 1)
+    texels.add(place, np.zeros(len(place), bool), values, np.where(radius < 0.27, 1.0, 1e-3))
+    solved, seen = texels.solved()
+    assert solved[seen > 0].min() > 20
+    assert solved[seen > 0].max() < 220
+    whole = filled(solved, seen, 1)
+    assert np.ptp(whole[seen == 0]) < 60
+    assert whole[seen == 0].min() > 150  # the rim tells nothing of what is around it
 
 
 def test_a_checkers_pictures_come_nearer_and_its_bytes_stay(tmp_path: Path) -> None:
