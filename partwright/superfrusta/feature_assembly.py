@@ -9,14 +9,13 @@ import numpy as np
 
 from partwright.approximation.part_roles import FREEFORM, with_role_names
 from partwright.approximation.plain_numbers import plain_move, with_plain_numbers
-from partwright.approximation.sketches.ends import with_open_ends
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.group_copies import in_runs
 from partwright.fields import Cylinder
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_groups import grouped
-from partwright.superfrusta.feature_steps import Feature, FeatureTree, image_of
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, with_open_ends_everywhere
 
 _PLAIN = 1e-4  # unit lengths: how far numbers are moved to become plain
 
@@ -81,14 +80,11 @@ class FeatureAssembly:
             part, holes = feature.part, ()  # cut by themselves they would open what is there before
         parts = [(part, feature.added), *((hole, False) for hole in holes)]
         for k, (one, added) in enumerate(parts):
-            longer = one if is_base and k == 0 else with_open_ends(one, added, self.distance)
-            if feature.image is not None and longer is not one:
-                image = with_open_ends(image_of(one, feature.image), added, self.distance)
-                if image.field.bounds()[1][2] != longer.field.bounds()[1][2]:
-                    longer = one  # which goes on in but one of both places
-            own = dataclasses.replace(feature, part=longer, added=added)
-            drilled = not added and isinstance(longer.field, Cylinder)
-            yield own, drilled and is_empty(longer, self.distance)
+            own = dataclasses.replace(feature, part=one, added=added)
+            if not (is_base and k == 0):
+                own = with_open_ends_everywhere(own, self.distance)
+            drilled = not added and isinstance(own.part.field, Cylinder)
+            yield own, drilled and is_empty(own.part, self.distance)
 
 
 def in_unit_frame(shape: Shape, whole: Assembly) -> Assembly:

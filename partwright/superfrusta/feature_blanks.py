@@ -4,7 +4,7 @@ than a section that the shape has, and in the end often more."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,18 +18,23 @@ if TYPE_CHECKING:
 
 BEHIND = 0.03
 """Of the objective, by which a tree is well behind another."""
-_FEW, _CHEAP = 2, 4.0  # features, and prices of plain ones, of which none is left to save
+_FEW, _CHEAP = 1, 2.2  # features, and prices of plain ones, of which none is left to save
 _BLANKS = 2
 _PATIENT = 6  # steps after which a tree may be well behind
 
 
-def cut_from_blanks(search: FeatureSearch, best: FeatureTree, others: Sequence[Candidate]) -> FeatureTree:
+def cut_from_blanks(
+    search: FeatureSearch,
+    best: FeatureTree,
+    others: Sequence[Candidate],
+    tried: Collection[tuple[float, ...]],
+) -> FeatureTree:
     """The best tree, or one that is cut from a silhouette, no further off, and worth more when both are
-    mended, with no more freeform. others: candidates of the whole."""
+    mended, with no more freeform. others: candidates of the whole. tried: keys of those that a tree has begun
+    with."""
     if len(best.features) <= _FEW or best.price <= _CHEAP * search.alpha:
         return best
-    known = {candidate.key for candidate in others}
-    blanks = [blank for blank in silhouettes(search.body, search.frames) if blank.key not in known]
+    blanks = [blank for blank in silhouettes(search.body, search.frames) if blank.key not in tried]
     gains = search.gains(search.empty, blanks, True) if blanks else np.zeros(0)
     found, whole, most = best, None, -math.inf
     for index in np.argsort(-gains)[:_BLANKS]:
@@ -41,12 +46,17 @@ def cut_from_blanks(search: FeatureSearch, best: FeatureTree, others: Sequence[C
         if tree.off > best.off:
             continue  # skins where a cut runs along the blank's own walls, say, which freeform does not mend
         whole = search.mend(best) if whole is None else whole
-        if tree.objective > max(worth(whole) + search.tie, most):
+        if tree.objective > max(_least(search, tree, whole), most):
             most = tree.objective
             rival = search.mend(tree)
-            if worth(rival) > worth(whole) + search.tie and _freeform(rival) <= _freeform(whole):
+            if worth(rival) > _least(search, rival, whole) and _freeform(rival) <= _freeform(whole):
                 found, whole = tree, rival
     return found
+
+
+def _least(search: FeatureSearch, tree: FeatureTree, whole: FeatureTree) -> float:
+    """What a tree has to be worth to be taken instead: of what is as good, the plainest is."""
+    return worth(whole) + (search.tie if tree.price >= whole.price else 0.0)
 
 
 def worth(tree: FeatureTree) -> float:

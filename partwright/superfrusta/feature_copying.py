@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.open_sides import with_open_sides
-from partwright.approximation.sketches.repeats import moves_between, planes_between
+from partwright.approximation.sketches.repeats import moves_between, planes_between, shifts_between
 from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
+from partwright.fields import Extrusion
 from partwright.meshing.csg import solid_of
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, Step, as_move, covers, image_of
 from partwright.superfrusta.feature_symmetry import reflected, reflection
@@ -34,9 +35,15 @@ _CHORD = 1e-3  # unit lengths: how far chords of a cut with moved sides may be o
 
 
 def with_copies(
-    search: FeatureSearch, tree: FeatureTree, chosen: Candidate, added: bool, pieces: Sequence[Manifold] = ()
+    search: FeatureSearch,
+    tree: FeatureTree,
+    chosen: Candidate,
+    added: bool,
+    pieces: Sequence[Manifold] = (),
+    others: Sequence[Candidate] = (),
 ) -> Step:
-    """The candidate with copies where the whole's symmetries or pieces that are alike have it again."""
+    """The candidate with copies where the whole's symmetries, pieces that are alike or other candidates have
+    it again."""
     within = search.mask(chosen) > 0
     covered = tree.covered | within if added else tree.covered & ~within
     reached = search.score_of(covered)
@@ -66,6 +73,7 @@ def with_copies(
         planes = [*search.mirrors, *(reflection(*plane) for plane in planes_between(inner, pieces))]
         moves = [*search.turns, *(move for plane in planes if (move := as_move(part, plane)) is not None)]
         moves += moves_between(inner, pieces, search.frames, search.body)
+        moves += shifts_between(chosen, others)
         moves += _shifts(part, search.turns, search.mirrors)
         found = ((move, copy := part.transformed(move), covers(copy, few)) for move in moves)
         may_pay = {move: (copy, hit) for move, copy, hit in found if float((hit & left).sum()) > hits}
@@ -124,11 +132,17 @@ def joined_by(search: FeatureSearch, tree: FeatureTree, step: Step) -> FeatureTr
         missed, excess = tree.missed + (inner ^ search.body), tree.excess - outer
     for body in (missed, excess):
         body.num_tri()  # now, and not with every later step again
-    feature = Feature(added, part, step.within, chosen.sides, image)
+    sides = chosen.sides - (_hole_corners(step.part) - _hole_corners(part))
+    feature = Feature(added, part, step.within, sides, image)
     cuts = (Feature(False, cut, step.within, 0) for cut in chosen.cuts)
-    price = tree.price + search.price(chosen.sides)
+    price = tree.price + search.price(sides)
     features, steps = [*tree.features, feature, *cuts], (*tree.steps, step)
     return FeatureTree(features, step.covered, missed, excess, step.score, price, steps)
+
+
+def _hole_corners(part: Part) -> int:
+    """Of the holes of a profile that is extruded."""
+    return sum(map(len, part.field.profile.holes)) if isinstance(part.field, Extrusion) else 0
 
 
 def without(search: FeatureSearch, tree: FeatureTree, dropped: Collection[int]) -> FeatureTree:

@@ -13,10 +13,10 @@ from manifold3d import Manifold
 
 from partwright.approximation.sketches.bodies import bodies
 from partwright.meshing.manifolds import surface_of
+from partwright.superfrusta.feature_steps import FeatureTree, with_open_ends_everywhere
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
-    from partwright.superfrusta.feature_steps import FeatureTree
 
 FAR = 0.054
 """Unit lengths: 3 % of the longest side, by which nothing may be off."""
@@ -59,10 +59,13 @@ def far_pieces(search: FeatureSearch, tree: FeatureTree) -> list[tuple[float, bo
 def farthest(search: FeatureSearch, tree: FeatureTree) -> float:
     """How far the farthest piece reaches, unit lengths; 0 where none is further than `FAR`.
 
-    Skins that a cut leaves of what it goes around are no pieces, and may be far off all the same.
+    Skins that a cut leaves of what it goes around are no pieces, and may be far off all the same; but over
+    holes none is left, as those go on where they end in the open.
     """
-    corners = surface_of(tree.body())[0].astype(np.float32)
-    skins = float(search.samples.measure(corners).max()) if len(corners) else 0.0
+    measure = search.samples.measure
+    features = [f if f.added else with_open_ends_everywhere(f, measure) for f in tree.features]
+    corners = surface_of(FeatureTree(features).body())[0].astype(np.float32)
+    skins = float(measure(corners).max()) if len(corners) else 0.0
     reaches = [reach for reach, _, _ in far_pieces(search, tree)]
     return max([*reaches, *([skins] if skins > FAR else [])], default=0.0)
 

@@ -26,6 +26,7 @@ from partwright.methods import Checkpoint
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_bases import bases, is_nearly_whole, various
 from partwright.superfrusta.feature_blanks import BEHIND, cut_from_blanks
+from partwright.superfrusta.feature_bores import bores
 from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_mending import farthest, mended
 from partwright.superfrusta.feature_own_bodies import OwnBodies
@@ -46,7 +47,7 @@ _COMPLEX = 20_000  # triangles of a piece that is no feature
 _MOST = 24
 _FOR_MENDING = 10
 _MOST_LOOKED = 150  # pieces whose candidates are made: a part of hundreds is no part that was drawn
-_PERFECT = 0.985  # R from which on no other base is tried
+_PERFECT, _PLAIN = 0.985, 6.0  # R, and prices of plain features, with which no other base is tried
 _TIE = 3e-4, 30_000  # of the objective, with so many samples: of what is as good, the plainest is taken
 _LOOKED = 40  # candidates, by what they gain alone
 _SHARE = 0.25  # of what the best candidate gains alone, that another that is tried with its copies gains
@@ -103,12 +104,14 @@ class FeatureSearch:
         gains = self.gains(empty, own, True)
         order = bases(own, gains)
         best: FeatureTree | None = None
+        tried: set[tuple[float, ...]] = set()
         others = [candidate for candidate in own if not (candidate.cuts or candidate.usual)]
         for index in order:
             if best is not None and gains[index] < _RIVAL * gains[order[0]]:
                 break
-            if best is not None and best.score > _PERFECT and not is_nearly_whole(own[index]):
+            if best is not None and self._is_done(best) and not is_nearly_whole(own[index]):
                 break
+            tried.add(own[index].key)
             tree = self.grown(self.extended(empty, own[index], True), others, best)
             if best is None or tree.objective > best.objective:
                 best = tree
@@ -116,7 +119,11 @@ class FeatureSearch:
             built = self._built_up(empty, own, others, gains)
             if built is not None and built.score >= _POOR and built.objective > best.objective:
                 best = built
-        return cut_from_blanks(self, self.ended(best, others), others) if best is not None else None
+        return cut_from_blanks(self, self.ended(best, others), others, tried) if best is not None else None
+
+    def _is_done(self, tree: FeatureTree) -> bool:
+        """Whether hardly anything is left that another base could do better, or more plainly."""
+        return tree.score > _PERFECT and tree.price <= _PLAIN * self.alpha
 
     def ended(self, tree: FeatureTree, others: Sequence[Candidate]) -> FeatureTree:
         """A tree that has grown, recast and mended."""
@@ -199,7 +206,7 @@ class FeatureSearch:
         adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
         if only_own:
             adding = [c for c in adding if c in self._own_bodies]
-        cutting = [c for piece in excess for c in self.candidates_of(piece)]
+        cutting = [*bores(tree.steps), *(c for piece in excess for c in self.candidates_of(piece))]
         if banned is not None:
             adding, cutting = ([c for c in pool if c.key != banned] for pool in (adding, cutting))
         rivals: list[tuple[float, Candidate, bool]] = []
@@ -216,7 +223,7 @@ class FeatureSearch:
             return (gain + price) * like_it > price
 
         steps = [
-            with_copies(self, tree, chosen, added, missed if added else excess)
+            with_copies(self, tree, chosen, added, *((missed, adding) if added else (excess, cutting)))
             for gain, chosen, added in various(rivals)
             if may_pay(gain, chosen, added)
         ]

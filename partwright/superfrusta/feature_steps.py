@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from manifold3d import Manifold
 from numpy.typing import ArrayLike, NDArray
 
 from partwright.approximation.sketches.candidate import Candidate
+from partwright.approximation.sketches.ends import with_open_ends
 from partwright.assembly import Part, Similarity
 from partwright.assembly.motion import Motion
 from partwright.assembly.similarity import rotation_matrix
@@ -114,6 +116,16 @@ class FeatureTree:
 def image_of(part: Part, move: Similarity) -> Part:
     """The part and its copies mirrored in the plane x = 0, then moved."""
     return Motion(move, True).of(part)
+
+
+def with_open_ends_everywhere(feature: Feature, distance: Callable[[np.ndarray], np.ndarray]) -> Feature:
+    """The feature, longer where its ends are open, as `with_open_ends`: in its mirror image, too."""
+    longer = with_open_ends(feature.part, feature.added, distance)
+    if feature.image is not None and longer is not feature.part:
+        image = with_open_ends(image_of(feature.part, feature.image), feature.added, distance)
+        if image.field.bounds()[1][2] != longer.field.bounds()[1][2]:
+            return feature  # it goes on in but one of both places
+    return replace(feature, part=longer)
 
 
 def as_move(part: Part, plane: Similarity) -> Similarity | None:

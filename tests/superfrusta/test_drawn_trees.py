@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 
 import pytest
+import trimesh
 
 import partwright as pw
+from partwright.approximation.sketches.candidates import candidates
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Field, Profile, Revolution, Tube
 from partwright.meshing import mesh_assembly
+from partwright.meshing.csg import mesh_csg
 from partwright.superfrusta import feature_search
 from partwright.superfrusta.feature_assembly import FeatureAssembly
 from partwright.superfrusta.feature_copying import with_copies
@@ -28,9 +31,9 @@ def at(field: Field, *places: tuple[float, float, float]) -> Part:
     return Part(field, places[0], instances=moves)
 
 
-def found(drawn: Assembly, quality: str = "draft") -> tuple[FeatureTree, FeatureSearch]:
+def found(drawn: Assembly | trimesh.Trimesh, quality: str = "draft") -> tuple[FeatureTree, FeatureSearch]:
     settings = Settings.for_quality(quality)
-    shape = pw.load_shape(mesh_assembly(drawn), unit="mm")
+    shape = pw.load_shape(mesh_assembly(drawn) if isinstance(drawn, Assembly) else drawn, unit="mm")
     search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
     tree = search.run()
     assert tree is not None
@@ -85,11 +88,16 @@ def test_small_holes_that_pay_only_together_are_found(monkeypatch: pytest.Monkey
     holes = at(Cylinder(1.6, 8), *((x, y, 2) for x in (-24.75, 24.75) for y in (-14, 14)))
     drawn = Assembly((Assembly((Part(Box((60, 40, 4)), (0, 0, 2)), fins)), holes), "difference")
     tree, search = found(drawn, "normal")
-    assert kinds(tree)[-1] == (False, "cylinder", 4)
-    assert len(tree.features) == 2
+    shape = pw.load_shape(mesh_assembly(drawn), unit="mm")
+    assert [
+        len(p.copies) for p in FeatureAssembly(shape).named(tree).parts if p.field.kind == "cylinder"
+    ] == [4]
+    assert len(tree.features) <= 3
     assert tree.score > 0.998
-    plain = search.extended(search.empty, tree.steps[0].chosen, True)
-    assert len(search.with_patterns(plain).features) == 2
+    own = candidates(search.body, search.frames, holes=True)
+    outline = own[int(search.gains(search.empty, own, True).argmax())]
+    plain = search.extended(search.empty, outline, True)
+    assert kinds(search.with_patterns(plain)) == [(True, "extrusion", 1), (False, "cylinder", 4)]
     monkeypatch.setattr(feature_search, "with_copies", lambda *asked: with_copies(*asked[:4]))
     search.turns, search.mirrors = [], []
     assert search.with_patterns(plain) is plain  # where no copies are found, one alone does not pay
@@ -109,3 +117,81 @@ def test_a_hinge_is_an_outline_with_gaps_and_countersunk_holes() -> None:
     assert tree.off == 0.0
     assert len(tree.features) == 3
     assert [kind[1:] for kind in kinds(tree)][:2] == [("extrusion", 1), ("extrusion", 2)]
+
+
+def test_a_chamfered_block_with_holes_into_a_gallery_is_a_block_and_its_holes() -> None:
+    """No section of it is the whole block: the gallery splits one in two, and the rim is at its top."""
+    block = Part(Extrusion(Profile.rectangle(60, 30), 25, top_chamfer=3))
+    gallery = Part(Cylinder(4, 50), (-7.5, 0, 0), (math.sqrt(0.5), 0, math.sqrt(0.5), 0))
+    holes = at(Cylinder(3, 14), *((x, 0.0, 7.0) for x in (-15, 0, 10)))
+    tree, _ = found(Assembly((block, gallery, holes), "difference"))
+    assert sorted(kinds(tree)) == [(False, "cylinder", 1), (False, "cylinder", 3), (True, "extrusion", 1)]
+    assert tree.features[0].part.field.rims[1].chamfer == pytest.approx(0.09, rel=0.02)
+    assert tree.off == 0
+    assert tree.score > 0.99
+
+
+def test_pipes_that_meet_are_pipes_and_their_bores() -> None:
+    """Where they meet no section is either; the bore of one is cut again, as the other reaches into it."""
+    across = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+    pipes = Assembly((Part(Cylinder(12, 80), (0, 0, 0), across), Part(Cylinder(12, 40), (0, 0, 20))))
+    flanges = (
+        at(Cylinder(22, 5), (0, 0, 37.5)),
+        Part(Cylinder(22, 5), (-37.5, 0, 0), across, instances=(Similarity(translation=(75, 0, 0)),)),
+    )
+    bores = Part(Cylinder(9, 82), (0, 0, 0), across), Part(Cylinder(9, 42), (0, 0, 21))
+    tree, _ = found(Assembly((Assembly((pipes, *flanges)), *bores), "difference"))
+    assert tree.score > 0.99
+    assert tree.off == 0
+    assert len(tree.features) <= 5
+    assert {field.kind for field in (f.part.field for f in tree.features)} <= {
+        "cylinder",
+        "tube",
+        "revolution",
+    }
+
+
+def test_a_lid_is_a_rounded_block_its_hollow_and_its_vents() -> None:
+    """Vents that are cut first are no islands of the hollow below them, posts are; arcs in many short chords
+    are arcs, so that vents are alike."""
+    arc = math.tan(math.pi / 8)
+
+    def rounded(x: float, y: float, r: float) -> Profile:
+        left = [(x, y - r, arc), (x - r, y, 0), (r - x, y, arc), (-x, y - r, 0)]
+        return Profile([*left, (-x, r - y, arc), (r - x, -y, 0), (x - r, -y, arc), (x, r - y, 0)])
+
+    vent = Profile([(1.25, -9, 0), (1.25, 9, 1), (-1.25, 9, 0), (-1.25, -9, 1)])
+    places = [(float(x), float(y)) for x in (-28, 28) for y in (-18, 18)]
+    block = Part(Extrusion(rounded(35, 25, 6), 10, top_fillet=2), (0, 0, 5))
+    hollow = Part(Extrusion(rounded(33, 23, 4), 8), (0, 0, 3))
+    shell = Assembly((block, hollow), "difference")
+    posts = at(Cylinder(4, 8), *((x, y, 4.0) for x, y in places))
+    cuts = (
+        at(Cylinder(1.6, 12), *((x, y, 5.0) for x, y in places)),
+        at(Extrusion(vent, 6), *((6.0 * k - 15, 0.0, 9.0) for k in range(6))),
+    )
+    tree, _ = found(mesh_csg(Assembly((Assembly((shell, posts)), *cuts), "difference"), 3e-3))
+    assert kinds(tree)[1:3] == [(False, "cylinder", 4), (False, "extrusion", 6)]
+    assert tree.features[0].part.field.rims[1].fillet > 0
+    assert len(tree.features) == 4
+    assert tree.off == 0
+
+
+def test_a_hexagonal_bar_is_extruded_along_itself() -> None:
+    """Its ends are too small to say which way that is: its sides do."""
+    bar = Part(Extrusion(Profile.regular(6, 3), 100))
+    tree, _ = found(Assembly((bar, Part(Cylinder(1, 8), (0, 0, 20), (math.sqrt(0.5), math.sqrt(0.5), 0, 0)))))
+    assert kinds(tree)[0] == (True, "extrusion", 1)
+    assert tree.features[0].sides == 6
+    assert tree.score > 0.99
+
+
+def test_a_slot_in_a_bent_plate_is_a_slot() -> None:
+    """And not the end of one of two plates."""
+    bent = Extrusion(Profile([(0, 0), (60, 0), (60, 4), (12, 4), (40, 70), (36, 72), (8, 4), (0, 4)]), 50)
+    slot = Profile([(15, -6, 0), (15, 6, 1), (-15, 6, 0), (-15, -6, 1)][::1])
+    upright = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
+    cut = Part(Extrusion(slot, 6), (35, 0, 2), (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)))
+    tree, _ = found(Assembly((Part(bent, (0, 0, 0), upright), cut), "difference"))
+    assert [added for added, _, _ in kinds(tree)] == [True, False]
+    assert tree.score > 0.99

@@ -8,13 +8,13 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from manifold3d import CrossSection, Manifold
+from manifold3d import CrossSection, JoinType, Manifold
 
 from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.candidate import Candidate, posed
 from partwright.approximation.sketches.holes import hole_parts
 from partwright.approximation.sketches.rims import SHARP, bottom_rim, limited, rimmed_body, top_rim
-from partwright.approximation.sketches.sections import Region, View, profile_of
+from partwright.approximation.sketches.sections import FINE, Region, View, profile_of
 from partwright.approximation.sketches.turned import turned
 from partwright.errors import ParameterError
 from partwright.fields.profile import Profile, circle_of
@@ -33,6 +33,7 @@ _MOST_SLABS = 10
 _LEAVES = 0.005  # of a round section, that lies outside where a rod ends in a bend
 _HALVINGS = 7  # of a slab, for the height at which it does
 _AT_LEVEL = 0.02  # unit lengths: where it does so near to a level it ends there
+_SLENDER = 2.0  # times as long as it is wide
 _ALL_RIM = 0.95  # of a slab's height
 
 
@@ -56,7 +57,11 @@ def silhouettes(body: Manifold, frames: Sequence[np.ndarray]) -> list[Candidate]
         view = View.along(body, frame)
         seen = view.silhouette
         if len(seen) == 1:
-            for one in _extruded(view, seen[0], view.levels[0], view.levels[-1], True):
+            low, high = view.levels[0], view.levels[-1]
+            for one in (
+                *_extruded(view, seen[0], low, high, True),
+                *_rounded(view, seen[0], [(low, high)], 0, 0, True),
+            ):
                 found.setdefault(one.key, one)
     return list(found.values())
 
@@ -83,35 +88,77 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
                     done.add(key)
                     yield from _extruded(view, region, slabs[a][0], slabs[b][1], holes)
                     yield from _rounded(view, region, slabs, a, b, holes)
-            if _is_round(region):
-                low, high = _reach(view, region, slabs, i)
-                if _is_straight(view, region, low, high):
-                    yield from _extruded(view, region, low, high, holes)
+            if _is_round(region) or _is_rod(region, *slabs[i]):
+                yield from _rods(view, region, slabs, i, (middles[i], middles[i]), holes)
+        for region, heights in _round_at_ends(view, *slabs[i]):
+            yield from _rods(view, region, slabs, i, heights, holes)
+    seen = view.silhouette
+    if len(seen) == 1 and _is_round(seen[0]):  # of what a drill leaves where it comes through a round wall
+        yield from _extruded(view, seen[0], slabs[0][0], slabs[-1][1], False)
 
 
-def _reach(view: View, region: Region, slabs: list[tuple[float, float]], i: int) -> tuple[float, float]:
-    """From where to where a region of a slab's middle goes on: a rod ends where it bends, not at a face."""
+def _rods(
+    view: View,
+    region: Region,
+    slabs: list[tuple[float, float]],
+    i: int,
+    heights: tuple[float, float],
+    holes: bool,
+) -> Iterator[Candidate]:
+    """A region of two heights within a slab, as far as it goes on by itself below the first and above the
+    second: a rod ends where it bends, not at a face."""
     middles = [(low + high) / 2 for low, high in slabs]
+    levels = [z for slab in slabs for z in slab]
+    below = [z for z in middles[: i + 1][::-1] if z < heights[0]]
+    above = [z for z in middles[i:] if z > heights[1]]
+    low = _end(view, region, heights[0], below, levels[0], levels)
+    high = _end(view, region, heights[1], above, levels[-1], levels)
+    if _is_straight(view, region, max(low, slabs[i][0]), min(high, slabs[i][1])):
+        yield from _extruded(view, region, low, high, holes)
 
-    def end(beyond: Sequence[float], last: float) -> float:
-        inside = middles[i]
-        for height in (*beyond, last + 0.02 * (middles[i] - last)):
-            if not _goes_on(region, view.regions(height), _LEAVES):
-                break
-            inside = height
+
+def _end(
+    view: View, region: Region, inside: float, beyond: Sequence[float], last: float, levels: Sequence[float]
+) -> float:
+    """To where a region goes on that is there at a height; beyond: heights further on, in order."""
+    for outside in (*beyond, last + 0.02 * (inside - last)):
+        if not _goes_on(region, view.regions(outside), _LEAVES):
+            break
+        inside = outside
+    else:
+        return last
+    for _ in range(_HALVINGS):
+        between = (inside + outside) / 2
+        if _goes_on(region, view.regions(between), _LEAVES):
+            inside = between
         else:
-            return last
-        outside = height
-        for _ in range(_HALVINGS):
-            between = (inside + outside) / 2
-            if _goes_on(region, view.regions(between), _LEAVES):
-                inside = between
-            else:
-                outside = between
-        level = min((z for slab in slabs for z in slab), key=lambda z: abs(z - inside))
-        return level if abs(level - inside) < _AT_LEVEL else inside
+            outside = between
+    level = min(levels, key=lambda z: abs(z - inside))
+    return level if abs(level - inside) < _AT_LEVEL else inside
 
-    return end(middles[:i][::-1], slabs[0][0]), end(middles[i + 1 :], slabs[-1][1])
+
+def _round_at_ends(view: View, low: float, high: float) -> Iterator[tuple[Region, tuple[float, float]]]:
+    """Round regions near the ends of a slab that its middle has but as part of others: of pipes that meet
+    there. And the first and the last height at which each is seen."""
+    first, last = (low + share * (high - low) for share in _ELSEWHERE)
+    middle = view.regions((low + high) / 2)[:_MOST_REGIONS]
+    below, above = (
+        [
+            region
+            for region in view.regions(height)[:_MOST_REGIONS]
+            if not any(_is_as_large(region, other) for other in middle) and _is_round(region)
+        ]
+        for height in (first, last)
+    )
+    for region in below:
+        again = next((one for one in above if _is_as_large(region, one) and _goes_on(region, [one])), None)
+        above = [one for one in above if one is not again]
+        yield region, (first, first if again is None else last)
+    yield from ((region, (last, last)) for region in above)
+
+
+def _is_as_large(one: Region, other: Region) -> bool:
+    return abs(one.area - other.area) < _SAME_AREA * other.area
 
 
 def _is_straight(view: View, region: Region, low: float, high: float) -> bool:
@@ -124,6 +171,12 @@ def _is_straight(view: View, region: Region, low: float, high: float) -> bool:
         for height in heights
         for other in view.regions(height)[:_MOST_REGIONS]
     )
+
+
+def _is_rod(region: Region, low: float, high: float) -> bool:
+    """Whether it is much longer than wide."""
+    left, bottom, right, top = region.section.bounds()
+    return bool(high - low > _SLENDER * max(right - left, top - bottom))
 
 
 def _is_round(region: Region) -> bool:
@@ -172,9 +225,13 @@ def extrusion(
     if profile is None or high - low < 1e-4:
         return None
     part = extruded_part(profile, frame, low, high)
+    is_round = circle_of(profile.outline) is not None
 
-    def make(_: float) -> Manifold:
-        return posed(Manifold.extrude(section, high - low).translate((0, 0, low)), frame)
+    def make(further: float) -> Manifold:
+        # Elsewhere along a round wall the chords may be others, and would leave a skin that joins pieces.
+        by = math.copysign(FINE, further) if is_round and further else 0.0
+        grown = section.offset(by, JoinType.Miter, 2.0) if by else section
+        return posed(Manifold.extrude(grown, high - low).translate((0, 0, low)), frame)
 
     return Candidate(part, make, len(profile.corners), section.area() * (high - low))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
 
 import numpy as np
 
@@ -15,6 +16,10 @@ _CELL = 0.02
 _SQUARE = 1e-3  # cosine of directions that are square
 _BESIDE, _SAME_AS = math.cos(math.radians(8)), math.cos(math.radians(0.1))
 _EQUAL = 0.01  # of the weight of one of two that weigh the same
+_FACING, _WAYS = 6, 3  # ways in which the most wall faces, and in how many of them that of a prism does
+_SLANTED = 0.3  # sine of the angle between two of them, at least
+_UPRIGHT = 0.01  # cosine
+_PRISM = 0.1  # of the area, that the walls of a prism have
 _ELONGATED = 2.0  # times as long as it is wide
 _SMOOTH = (math.radians(1.0), math.radians(40))  # turns from face to face on a round wall
 
@@ -33,7 +38,9 @@ def frames(vertices: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
     around, weight = _round_axes(faces, normal, area)
     votes = np.concatenate([normal[kept], around])
     weights = np.concatenate([area[kept], weight])
-    found = _clusters(votes, weights, _LEAST * float(area.sum()))[:_MOST]
+    clusters = _clusters(votes, weights, _LEAST * float(area.sum()))
+    clusters += _prism_axes([direction for _, direction in clusters], normal[kept], area[kept])
+    found = [direction for _, direction in sorted(clusters, key=lambda one: -one[0])[:_MOST]]
     found = _with_square(found) or list(np.eye(3))
     return [_frame(direction, found) for direction in found]
 
@@ -63,8 +70,32 @@ def _round_axes(faces: np.ndarray, normal: np.ndarray, area: np.ndarray) -> tupl
     return axis[round_] / sine[round_, None], ((area[one] + area[two]) / 4)[round_]
 
 
-def _clusters(votes: np.ndarray, weights: np.ndarray, least: float) -> list[np.ndarray]:
-    """Directions (3,), signs aside, that the most weight agrees on."""
+def _prism_axes(
+    known: list[np.ndarray], normal: np.ndarray, area: np.ndarray
+) -> list[tuple[float, np.ndarray]]:
+    """Directions along which flat walls lie that face three ways or more, and half the area of these: of a
+    hexagonal bar, whose ends are too small to tell. The first of the known ones are not among them."""
+    found: list[tuple[float, np.ndarray]] = []
+    for one, two in combinations(known[:_FACING], 2):
+        axis = np.cross(one, two)
+        sine = float(np.linalg.norm(axis))
+        if sine < _SLANTED:
+            continue
+        axis = _snapped(axis / sine)
+        if any(
+            abs(float(axis @ other)) > _SAME
+            for other in (*known[:_MOST], *(direction for _, direction in found))
+        ):
+            continue
+        walls = float(area[np.abs(normal @ axis) < _UPRIGHT].sum())
+        ways = sum(abs(float(axis @ other)) < _UPRIGHT for other in known)
+        if ways >= _WAYS and walls > _PRISM * float(area.sum()):
+            found.append((walls / 2, axis))
+    return found
+
+
+def _clusters(votes: np.ndarray, weights: np.ndarray, least: float) -> list[tuple[float, np.ndarray]]:
+    """Weights and directions (3,), signs aside, that the most weight agrees on."""
     largest = np.take_along_axis(votes, np.abs(votes).argmax(axis=1)[:, None], axis=1)
     cells, cell = np.unique(
         np.round(votes * np.sign(largest) / _CELL).astype(int), axis=0, return_inverse=True
@@ -89,7 +120,7 @@ def _clusters(votes: np.ndarray, weights: np.ndarray, least: float) -> list[np.n
         heavy = weights[near] >= 0.2 * weights[near].max()
         mean = (signed[heavy] * weights[near][heavy, None]).sum(axis=0)
         found.append((total, _snapped(mean / np.linalg.norm(mean))))
-    return [direction for _, direction in _between_equals(sorted(found, key=lambda f: -f[0]))]
+    return _between_equals(sorted(found, key=lambda f: -f[0]))
 
 
 def _between_equals(found: list[tuple[float, np.ndarray]]) -> list[tuple[float, np.ndarray]]:

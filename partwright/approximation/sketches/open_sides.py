@@ -7,6 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from partwright.approximation.profile_parts import extruded_part
+from partwright.approximation.sketches.holes import is_empty
 from partwright.approximation.sketches.open_turns import (
     beside,
     in_the_air,
@@ -18,18 +20,20 @@ from partwright.assembly import Part
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import ParameterError
 from partwright.fields import Box, Extrusion, Field, Revolution
-from partwright.fields.profile import Corner, Profile, Side
+from partwright.fields.profile import Corner, Loop, Profile, Side
 
 _UP = 5  # levels that are looked at
 _SLANT = 0.4  # sine of the least angle between a side and one that it is moved along
 
 
 def with_open_sides(part: Part, distance: Callable[[np.ndarray], np.ndarray]) -> Part:
-    """The cut with sides of its outline moved out where there is nothing behind them, for any copy.
+    """The cut with sides of its outline moved out where there is nothing behind them, for any copy, and
+    without holes that would leave nothing of the shape.
 
     distance: (N,) of the shape at points (N, 3), unit lengths like the part, negative inside. A box, an
     extrusion without taper, or a revolution; others stay as they are.
     """
+    part = _without_islands(part, distance)
     field = part.field
     if isinstance(field, Revolution):
         return with_open_turns(part, field, distance)
@@ -71,6 +75,31 @@ def with_open_sides(part: Part, distance: Callable[[np.ndarray], np.ndarray]) ->
         return centred(dataclasses.replace(part, field=dataclasses.replace(field, profile=moved)))
     except ParameterError:  # its rims have no room there
         return part
+
+
+def _without_islands(part: Part, distance: Callable[[np.ndarray], np.ndarray]) -> Part:
+    """The cut without those holes of its profile in which there is nothing of the shape: vents in the floor
+    of what is hollowed, cut before, would stay as skins."""
+    field = part.field
+    if not isinstance(field, Extrusion) or field.taper or not field.profile.holes:
+        return part
+
+    def is_island(loop: Loop) -> bool:
+        island = dataclasses.replace(part, field=Extrusion(Profile(loop), field.height))
+        return not is_empty(island, distance)
+
+    kept = tuple(loop for loop in field.profile.holes if is_island(loop))
+    if len(kept) == len(field.profile.holes):
+        return part
+    profile = Profile(field.profile.outline, kept)
+    if field.has_rims:
+        return dataclasses.replace(part, field=dataclasses.replace(field, profile=profile))
+    frame, half = rotation_matrix(part.rotation), field.height / 2
+    x, y, z = (frame.T @ np.array(part.translation)).tolist()
+    plain = extruded_part(profile.moved((x, y)), frame, z - half, z + half)
+    return dataclasses.replace(
+        part, field=plain.field, translation=plain.translation, rotation=plain.rotation
+    )
 
 
 def centred(part: Part) -> Part:

@@ -22,6 +22,7 @@ _STEEP = math.radians(50)
 _FEWEST = 3  # chords of an arc that is not entered along a tangent
 _CLOSED = 9  # chords of a full circle, at least
 _EVEN = 1.4  # times the second longest chord of an arc, that its longest may be
+_COLLINEAR = 1e-6  # unit lengths: how far a corner is off by rounding alone
 _SAME = 1e-9
 
 
@@ -36,11 +37,15 @@ def fitted_loop(points: np.ndarray, tolerance: float) -> Loop | None:
     round_ = _whole_circle(points, tolerance)
     if round_ is not None:
         return round_
-    # Collinear corners are where the triangles of a wall meet: they would hide that chords are even.
-    kept = _straightened(points, tolerance / 4)
-    points = points[kept] if len(kept) >= 3 else points
-    arcs = _arcs(points, tolerance)
-    return _joined(points, arcs, tolerance)
+    # Collinear corners are where the triangles of a wall meet: they would hide that chords are even. So do
+    # those that are left of a small arc in many chords where most of them count as collinear.
+    loops: list[Loop] = []
+    for collinear in (tolerance / 4, _COLLINEAR):
+        kept = _straightened(points, collinear)
+        some = points[kept] if len(kept) >= 3 else points
+        loop = _joined(some, _arcs(some, tolerance), tolerance)
+        loops += [loop] if loop is not None else []
+    return min(loops, key=len, default=None)
 
 
 def _distinct(points: np.ndarray, least: float) -> np.ndarray:

@@ -8,9 +8,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from manifold3d import Manifold
 
-from partwright.assembly import Similarity
+from partwright.approximation.sketches.candidate import Candidate
+from partwright.assembly import Part, Similarity
 
 _ALIKE = 0.15  # of the volume, that pieces may differ by; whether a copy fits is told by what it gains
+_SAME = 0.05  # of the volume, that candidates may differ by which are the same elsewhere
 _NEAR = 8e-3  # unit lengths: how far the move may miss the other piece's middle
 _MOST = 200
 
@@ -38,6 +40,21 @@ def moves_between(
             if move is not None and np.linalg.norm(move(centre) - target) < _NEAR * 2:
                 yield move
                 break
+
+
+def shifts_between(chosen: Candidate, others: Sequence[Candidate]) -> Iterator[Similarity]:
+    """Along which others are the same solid elsewhere, also where one piece holds several: holes that a skin
+    joins, or that meet."""
+    middle, size = _box(chosen.part)
+    for other in others[:_MOST]:
+        if other is chosen or (other.sides, other.part.field.kind) != (chosen.sides, chosen.part.field.kind):
+            continue
+        if abs(other.volume - chosen.volume) > _SAME * chosen.volume:
+            continue
+        there, its = _box(other.part)
+        if np.abs(its - size).max() < _NEAR and np.abs(there - middle).max() > _NEAR:
+            x, y, z = (there - middle).tolist()
+            yield Similarity(translation=(x, y, z))
 
 
 def planes_between(body: Manifold, pieces: Sequence[Manifold]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -71,6 +88,12 @@ def _turn(start: np.ndarray, end: np.ndarray, axis: np.ndarray, about: np.ndarra
 
 def _apart(one: Manifold, other: Manifold) -> float:
     return float(np.linalg.norm(_middle(one) - _middle(other))) + abs(one.volume() - other.volume())
+
+
+def _box(part: Part) -> tuple[np.ndarray, np.ndarray]:
+    """Middle and size (3,) of a part's box."""
+    low, high = part.bounds()
+    return (low + high) / 2, high - low
 
 
 def _middle(body: Manifold) -> np.ndarray:

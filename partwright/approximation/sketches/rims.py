@@ -137,16 +137,18 @@ def limited(rims: tuple[Rim, Rim], profile: Profile) -> tuple[Rim, Rim]:
 
 
 def rimmed_body(section: CrossSection, rims: tuple[Rim, Rim], height: float, outer: bool) -> Manifold:
-    """The section extruded from 0, its rims in steps outside or inside of them."""
+    """The section extruded from 0, its rims in steps outside or inside of them. Each goes on to the middle:
+    what only touches is not one body but for rounding."""
     bottom, top = rims
+    middle = (bottom.depth + height - top.depth) / 2
     slabs = []
     for rim, at_top in ((bottom, False), (top, True)):
         points = rim.steps(_STEPS) if rim.depth else []
         for (start, begin), (deep, end) in pairwise(points):
             inner = section.offset(-(start if outer else deep), JoinType.Round, 2.0, 0)
             if not inner.is_empty() and begin > end:
-                low = height - begin if at_top else end
-                slabs.append(Manifold.extrude(inner, begin - end).translate((0, 0, low)))
+                low, high = (middle, height - end) if at_top else (end, middle)
+                slabs.append(Manifold.extrude(inner, high - low).translate((0, 0, low)))
     wall = height - bottom.depth - top.depth
     if wall > 1e-6:
         slabs.append(Manifold.extrude(section, wall).translate((0, 0, bottom.depth)))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from manifold3d import CrossSection, FillRule, JoinType, Manifold
@@ -13,9 +14,9 @@ from scipy.spatial import cKDTree
 
 from partwright.approximation.profile_parts import revolved_part
 from partwright.approximation.sketches.candidate import Candidate, posed
-from partwright.approximation.sketches.sections import View, profile_of
+from partwright.approximation.sketches.sections import FINE, View, profile_of
 from partwright.errors import ParameterError
-from partwright.fields.profile import Corner, Profile
+from partwright.fields.profile import Corner, Loop, Profile
 
 _PLANES = 4  # through an axis, for what goes all around
 _USUAL = 6  # of their eight halves, that have what is usual
@@ -35,6 +36,7 @@ _DOMED = 3e-3  # unit lengths that an arc may move to become part of a sphere
 _GRADUAL = 3.0  # times what is told apart, that a piece is off at most a little past a smooth end
 _DRAWN = math.radians(15)  # the steps in which bends are drawn
 _ABOUT = math.radians(4)  # how well smooth ends are told
+_LONG = 20.0  # tolerances, that a line is long whose direction is told by them
 _OFFSET = 0.0137  # radians: no plane along faces
 
 
@@ -261,8 +263,9 @@ def _snapped(half: CrossSection, flat: np.ndarray, tree: cKDTree) -> CrossSectio
 
 
 def _off_axis(profile: Profile) -> Profile:
-    """Corners near the axis on it, and arcs that nearly meet it squarely about a centre on it."""
-    loops = [tuple((0.0 if x < 2e-3 else x, y, b) for x, y, b in loop) for loop in profile.loops]
+    """Corners near the axis on it, lines that are nearly along or across it so, and arcs that nearly meet it
+    squarely about a centre on it."""
+    loops = [_squared(tuple((0.0 if x < 2e-3 else x, y, b) for x, y, b in loop)) for loop in profile.loops]
     loops = [
         tuple(
             (x, y, _domed((x, y), then, b)) for (x, y, b), then in zip(loop, loop[1:] + loop[:1], strict=True)
@@ -270,6 +273,18 @@ def _off_axis(profile: Profile) -> Profile:
         for loop in loops
     ]
     return Profile(loops[0], tuple(loops[1:]))
+
+
+def _squared(loop: Loop) -> Loop:
+    """Lines along the axis and across it where they are so within the tolerance: a hole is no cone."""
+    corners = np.array(loop)
+    for i, j in pairwise([*range(len(loop)), 0]):
+        for axis in (0, 1):
+            start, end = corners[i, axis], corners[j, axis]
+            long = abs(corners[j, 1 - axis] - corners[i, 1 - axis]) > _LONG * FINE
+            if not corners[i, 2] and long and abs(end - start) < FINE:
+                corners[[i, j], axis] = 0.0 if axis == 0 and 0 in (start, end) else (start + end) / 2
+    return tuple((x, y, b) for x, y, b in corners.tolist())
 
 
 def _domed(start: tuple[float, float], then: Corner, bulge: float) -> float:
