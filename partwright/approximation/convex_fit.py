@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.approximation.hull_faces import beyond_faces, faces_of
+from partwright.approximation.largest_within import LARGEST, largest_within
 from partwright.assembly import Part, Similarity
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.manifolds import surface_of
@@ -193,6 +194,8 @@ def _volume_error(body: _Body, field: Field, pose: Similarity) -> float:
 
 def _candidates(body: _Body, kind: type[Field], mode: Mode) -> Iterator[tuple[Field, Similarity]]:
     maker = _AROUND[kind] if mode == "around" else _BY_MOMENTS[kind]
+    if mode == "within" and kind in LARGEST:
+        maker = partial(_largest, kind)
     if kind is Sphere or (kind is Ellipsoid and mode == "around"):
         yield maker(body, np.eye(3))
         return
@@ -315,6 +318,11 @@ def smallest_ball(points: np.ndarray, rounds: int = _ROUNDS) -> tuple[np.ndarray
         far = points[((points - centre) ** 2).sum(axis=1).argmax()]
         centre = centre + (far - centre) / (turn + 1)
     return centre, float(np.sqrt(((points - centre) ** 2).sum(axis=1).max()))
+
+
+def _largest(kind: type[Field], body: _Body, frame: np.ndarray) -> tuple[Field, Similarity]:
+    field, centre = largest_within(kind, frame, body.normals, body.offsets, body.centre)
+    return field, _placed(frame, centre)
 
 
 def _local_spread(body: _Body, frame: np.ndarray) -> np.ndarray:

@@ -22,7 +22,8 @@ from partwright.meshing.hulls import file_grid, file_hull, hull_of
 from partwright.meshing.manifolds import as_mesh, surface_of
 from partwright.robots.containment import larger, shape_solid
 from partwright.robots.enclosing import containing, outer_hull
-from partwright.robots.inscribed import deepest, filled, inscribed
+from partwright.robots.inscribed import filled, inscribed
+from partwright.robots.inside import largest_together, within
 from partwright.robots.model import Shape
 from partwright.robots.solids import Target
 
@@ -47,7 +48,7 @@ _GRIDS = 2  # steps of the grid that files' hulls are moved to, likewise
 _POINTS = 50_000  # of the triangles, for the hulls of wrapped pieces
 _LEAST = 1e-3  # of a wrapped piece's volume: a hull of points below it is a sheet
 _FILLS = 2e-3  # of the link's volume: what each shape more within it has to gain
-_STEPS = 14  # of the bisection for shapes within
+_CHOICE, _MOST_CHOICE = 4, 24  # pieces for each shape that may be within it, and in all, to choose from
 
 
 @dataclass(frozen=True)
@@ -72,22 +73,38 @@ def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
     """The shapes, named NAME_1, NAME_2 ..., or NAME for one."""
     if wishes.mode != "around" and (convex := _convex(target, wishes)) is not None:
         return [dataclasses.replace(convex, name=name)]
-    solid = simplified(target.wrap if wishes.mode == "around" else target.solid, wishes.tolerance)
-    pieces = convex_cover(solid, Limits(wishes.tolerance, wishes.extra, wishes.most, wishes.worth))
-    if not wishes.hulls:
-        pieces = _fit_for_natives(pieces, wishes)
-    if wishes.mode == "around":
-        hulls = _enclosing(pieces, target, wishes)
-    elif wishes.mode == "nearest":
-        hulls = balanced_hulls(pieces, solid, wishes.tolerance)
-    else:
-        hulls = [inscribed(piece.hull, target.solid) for piece in pieces]
-        hulls = filled(hulls, target.solid, wishes.most, _FILLS * target.solid.volume())
-    chosen = [_chosen(hull, len(hulls) == 1, target, wishes) for hull in hulls]
     if wishes.mode == "within":
-        chosen = [one for shape in chosen if (one := _within(shape, target)) is not None]
+        chosen = _inside(target, wishes)
+    else:
+        solid = simplified(target.wrap if wishes.mode == "around" else target.solid, wishes.tolerance)
+        pieces = _pieces(solid, wishes)
+        if wishes.mode == "around":
+            hulls = _enclosing(pieces, target, wishes)
+        else:
+            hulls = balanced_hulls(pieces, solid, wishes.tolerance)
+        chosen = [_chosen(hull, len(hulls) == 1, target, wishes) for hull in hulls]
     names = [name] if len(chosen) == 1 else [f"{name}_{i}" for i in range(1, len(chosen) + 1)]
     return [Shape(each, shape.part, shape.mesh) for each, shape in zip(names, chosen, strict=True)]
+
+
+def _pieces(solid: Manifold, wishes: Wishes) -> list[Piece]:
+    pieces = convex_cover(solid, Limits(wishes.tolerance, wishes.extra, wishes.most, wishes.worth))
+    return pieces if wishes.hulls else _fit_for_natives(pieces, wishes)
+
+
+def _inside(target: Target, wishes: Wishes) -> list[Shape]:
+    """Of as many pieces as may be, and of more where these are few, those that have most of the link
+    together: few pieces are large, but one that must not reach out of a bent piece loses most of it."""
+    solid = simplified(target.solid, wishes.tolerance)
+    counts = {wishes.most, max(wishes.most, min(_CHOICE * wishes.most, _MOST_CHOICE))}
+    found: list[Shape] = []
+    for count in sorted(counts):
+        pieces = _pieces(solid, dataclasses.replace(wishes, most=count))
+        hulls = [inscribed(piece.hull, target.solid) for piece in pieces]
+        hulls = filled(hulls, target.solid, count, _FILLS * target.solid.volume())
+        chosen = [_chosen(hull, len(hulls) == 1, target, wishes) for hull in hulls]
+        found += [one for shape in chosen if (one := within(shape, target))]
+    return largest_together(found, wishes.most)
 
 
 def _convex(target: Target, wishes: Wishes) -> Shape | None:
@@ -104,7 +121,7 @@ def _convex(target: Target, wishes: Wishes) -> Shape | None:
         return shape
     # Dents of a face are shallow all over, and a little smaller is nearly all; a slot is deep.
     ways = (shape, _hull(inscribed(whole.hull, solid)))
-    found = [one for way in ways if (one := _within(way, target)) is not None]
+    found = [one for way in ways if (one := within(way, target)) is not None]
     return max(found, key=lambda one: float(shape_solid(one).volume()), default=None)
 
 
@@ -199,38 +216,3 @@ def _fit_for_natives(pieces: list[Piece], wishes: Wishes) -> list[Piece]:
         else:
             waiting += best
     return done + [piece for piece, _ in waiting]
-
-
-def _within(shape: Shape, target: Target) -> Shape | None:
-    """The shape shrunk about its deepest point until nothing of it is outside of the target; None for a shape
-    of which nothing is inside."""
-    solid = shape_solid(shape)
-    common = solid ^ target.solid
-    if common.is_empty() or common.volume() <= 0:
-        return None
-    if _outside(solid, target) <= 0:
-        return shape
-    centre = deepest(common)
-    low, high = 0.0, 1.0
-    for _ in range(_STEPS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _outside(_about(solid, centre, middle), target) <= 0 else (low, middle)
-    return _scaled(shape, centre, low) if low > 0 else None
-
-
-def _outside(solid: Manifold, target: Target) -> float:
-    """Volume outside, less what is rounding."""
-    return float((solid - target.solid).volume()) - 1e-9 * float(solid.volume())
-
-
-def _about(solid: Manifold, centre: np.ndarray, scale: float) -> Manifold:
-    return solid.translate(tuple(-centre)).scale((scale,) * 3).translate(tuple(centre))
-
-
-def _scaled(shape: Shape, centre: np.ndarray, scale: float) -> Shape:
-    if shape.part is not None:
-        part = shape.part.translated((-centre).tolist()).scaled(scale).translated(centre.tolist())
-        return Shape(shape.name, part)
-    assert shape.mesh is not None
-    corners = (np.asarray(shape.mesh.vertices) - centre) * scale + centre
-    return Shape(shape.name, mesh=as_mesh(file_hull(corners)))
