@@ -327,3 +327,8 @@ def test_a_bore_through_two_walls_is_one_and_bolt_holes_are_copies() -> None:
     assert bolt.field.height == pytest.approx(0.1)
     blocked = (tree | Part(Box((0.1, 1.0, 1.0)))).distance
     assert [len(hole.copies) for hole in merged_holes(bores, blocked)] == [2]
+    pairs = [Part(Cylinder(0.05, 0.1), (x, y, 0.3), across) for x in (-0.4, 0.4) for y in (-0.3, 0.3)]
+    bolted = Assembly((walls, *pairs), "difference")
+    in_the_way = bolted | Part(Box((0.1, 0.5, 1.0)), (0, 0.25, 0))  # of one pair
+    assert [len(hole.copies) for hole in merged_holes(pairs, bolted.distance)] == [2]
+    assert [len(hole.copies) for hole in merged_holes(pairs, in_the_way.distance)] == [4]

@@ -80,7 +80,7 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
             while last + 1 < len(slabs) and _goes_on(region, view.regions(middles[last + 1])):
                 last += 1
             spans = {(first, last), (i, i)}
-            if _is_round(region) and all(_goes_on(o, [region]) for m in middles for o in view.regions(m)):
+            if region.is_round and all(_goes_on(o, [region]) for m in middles for o in view.regions(m)):
                 spans.add((0, len(slabs) - 1))  # the ends of a hole through a round wall are not flat
             for a, b in spans:
                 key = (a, b, round(region.area * 1e5))
@@ -88,12 +88,12 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
                     done.add(key)
                     yield from _extruded(view, region, slabs[a][0], slabs[b][1], holes)
                     yield from _rounded(view, region, slabs, a, b, holes)
-            if _is_round(region) or _is_rod(region, *slabs[i]):
+            if region.is_round or _is_rod(region, *slabs[i]):
                 yield from _rods(view, region, slabs, i, (middles[i], middles[i]), holes)
         for region, heights in _round_at_ends(view, *slabs[i]):
             yield from _rods(view, region, slabs, i, heights, holes)
     seen = view.silhouette
-    if len(seen) == 1 and _is_round(seen[0]):  # of what a drill leaves where it comes through a round wall
+    if len(seen) == 1 and seen[0].is_round:  # of what a drill leaves where it comes through a round wall
         yield from _extruded(view, seen[0], slabs[0][0], slabs[-1][1], False)
 
 
@@ -146,7 +146,7 @@ def _round_at_ends(view: View, low: float, high: float) -> Iterator[tuple[Region
         [
             region
             for region in view.regions(height)[:_MOST_REGIONS]
-            if not any(_is_as_large(region, other) for other in middle) and _is_round(region)
+            if not any(_is_as_large(region, other) for other in middle) and region.is_round
         ]
         for height in (first, last)
     )
@@ -165,9 +165,7 @@ def _is_straight(view: View, region: Region, low: float, high: float) -> bool:
     """Whether a round region is nowhere part of a wider round one, as in a cone."""
     heights = (low + share * (high - low) for share in _ELSEWHERE)
     return not any(
-        _is_round(other)
-        and other.area > (1 + _SAME_AREA) * region.area
-        and _goes_on(region, [other], _LEAVES)
+        other.is_round and other.area > (1 + _SAME_AREA) * region.area and _goes_on(region, [other], _LEAVES)
         for height in heights
         for other in view.regions(height)[:_MOST_REGIONS]
     )
@@ -177,10 +175,6 @@ def _is_rod(region: Region, low: float, high: float) -> bool:
     """Whether it is much longer than wide."""
     left, bottom, right, top = region.section.bounds()
     return bool(high - low > _SLENDER * max(right - left, top - bottom))
-
-
-def _is_round(region: Region) -> bool:
-    return region.profile is not None and circle_of(region.profile.outline) is not None
 
 
 def _regions(view: View, low: float, high: float) -> Iterator[Region]:

@@ -19,6 +19,7 @@ _SAME = 2e-3  # of its size, by which holes that are alike may differ
 _PARALLEL = 1e-12  # of a cosine
 _ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and heights of copies differ
 _LATTICE = 12  # points along a side of what is no round hole
+_APART = 0.75  # of the length from end to end, that holes on one axis have which are apart
 _BURR = 5e-3  # unit lengths: how deep within the shape a point of an empty hole may seem to lie
 
 
@@ -114,22 +115,22 @@ def merged_holes(holes: Sequence[Part], distance: Callable[[np.ndarray], np.ndar
     """Drilled holes: those on one axis of one radius as a single one, those of one size as copies of one.
 
     distance: (N,) of the shape at points (N, 3), unit lengths like the holes. Where the shape is solid
-    between two holes they stay two.
+    between two holes they stay two, and so do others that are copies of such: a pattern stays one.
     """
-    drilled: list[_Drilled] = []
+    drilled: list[tuple[_Drilled, list[Part]]] = []
     for hole in holes:
         for copy in hole.copies:
             one = _Drilled.of(copy)
-            for k, other in enumerate(drilled):
+            for k, (other, members) in enumerate(drilled):
                 both = other.joined(one)
                 if both is not None and (distance(both.points()) > -_BURR).all():
-                    drilled[k] = both
+                    drilled[k] = both, [*members, one.part()]
                     break
             else:
-                drilled.append(one)
+                drilled.append((one, [one.part()]))
+    alone = [members[0] for _, members in drilled if len(members) == 1]
     result: list[Part] = []
-    for one in drilled:
-        part = one.part()
+    for part in (part for whole, members in drilled for part in _of_pattern(whole.part(), members, alone)):
         same = next((k for k, other in enumerate(result) if _is_copy(other, part)), None)
         if same is None:
             result.append(part)
@@ -138,6 +139,19 @@ def merged_holes(holes: Sequence[Part], distance: Callable[[np.ndarray], np.ndar
             moves = (*result[same].instances, Similarity(translation=(x, y, z)))
             result[same] = dataclasses.replace(result[same], instances=moves)
     return result
+
+
+def _of_pattern(whole: Part, members: Sequence[Part], alone: Sequence[Part]) -> Sequence[Part]:
+    """The holes that lie on one axis, where they are apart and others are copies of one of them; else the
+    whole that they were joined to."""
+    solid = sum(_height(member) for member in members)
+    apart = len(members) > 1 and solid < _APART * _height(whole)
+    return members if apart and any(_is_copy(a, b) for a in members for b in alone) else [whole]
+
+
+def _height(hole: Part) -> float:
+    assert isinstance(hole.field, Cylinder)
+    return hole.field.height
 
 
 @dataclass(frozen=True)

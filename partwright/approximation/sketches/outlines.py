@@ -23,6 +23,7 @@ _FEWEST = 3  # chords of an arc that is not entered along a tangent
 _CLOSED = 9  # chords of a full circle, at least
 _EVEN = 1.4  # times the second longest chord of an arc, that its longest may be
 _COLLINEAR = 1e-6  # unit lengths: how far a corner is off by rounding alone
+_MANY = 2  # times as many corners as are drawn, from which on they may be of arcs
 _SAME = 1e-9
 
 
@@ -39,13 +40,24 @@ def fitted_loop(points: np.ndarray, tolerance: float) -> Loop | None:
         return round_
     # Collinear corners are where the triangles of a wall meet: they would hide that chords are even. So do
     # those that are left of a small arc in many chords where most of them count as collinear.
-    loops: list[Loop] = []
-    for collinear in (tolerance / 4, _COLLINEAR):
-        kept = _straightened(points, collinear)
-        some = points[kept] if len(kept) >= 3 else points
-        loop = _joined(some, _arcs(some, tolerance), tolerance)
-        loops += [loop] if loop is not None else []
-    return min(loops, key=len, default=None)
+    plain = _of_lines_and_arcs(points, tolerance / 4, tolerance)
+    if plain is not None and len(points) <= _MANY * len(plain):
+        return plain
+    loops = (plain, _of_lines_and_arcs(points, _COLLINEAR, tolerance))
+    return min((loop for loop in loops if loop is not None), key=len, default=None)
+
+
+def is_circle(points: np.ndarray, tolerance: float) -> bool:
+    """Whether `fitted_loop` makes a circle of a polygon (K, 2)."""
+    points = _distinct(np.asarray(points, dtype=np.float64), tolerance / 4)
+    return _whole_circle(points, tolerance) is not None
+
+
+def _of_lines_and_arcs(points: np.ndarray, collinear: float, tolerance: float) -> Loop | None:
+    """collinear: how far corners of a line may be off it that arcs do not have."""
+    kept = _straightened(points, collinear)
+    points = points[kept] if len(kept) >= 3 else points
+    return _joined(points, _arcs(points, tolerance), tolerance)
 
 
 def _distinct(points: np.ndarray, least: float) -> np.ndarray:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from manifold3d import CrossSection, FillRule, Manifold
 
-from partwright.approximation.sketches.outlines import fitted_loop
+from partwright.approximation.sketches.outlines import fitted_loop, is_circle
 from partwright.approximation.sketches.pinches import unpinched
 from partwright.approximation.sketches.rims import Leaning
 from partwright.approximation.sketches.slits import TOUCHING, touches_itself, without_slits
@@ -47,6 +47,11 @@ class Region:
     @cached_property
     def profile(self) -> Profile | None:
         return profile_of(self.section)
+
+    @cached_property
+    def is_round(self) -> bool:
+        """Whether its outline is a circle."""
+        return is_circle(np.asarray(max(self.section.to_polygons(), key=_loop_area)), FINE)
 
 
 @dataclass
