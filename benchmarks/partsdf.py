@@ -9,6 +9,7 @@
     python benchmarks/partsdf.py shortlist --families FOLDER [--names A,B] [--shapes N]
     python benchmarks/partsdf.py real --shapes-from FOLDER
     python benchmarks/partsdf.py generate --family FOLDER --model MODEL [--held N] [--fresh N]
+    python benchmarks/partsdf.py soundness [--names A,B] [--count N]
     python benchmarks/partsdf.py ablations --family FOLDER [--epochs N] [--width N] [--shapes N]
     python benchmarks/partsdf.py decoders --family FOLDER [--seconds S]
     python benchmarks/partsdf.py training --models FOLDER
@@ -17,6 +18,7 @@
 `reconstruct` with CONFIG also trains the same on all parts as one ("1P"), in --work, for a row of its own.
 `encode` has held-out shapes from points by the model's encoder, `images` from one render each by its image
 encoder, `scans` from few points, noise and missing halves, `generate` new ones against held-out ones.
+`soundness` says how many of these come apart, and what it costs to make them anew.
 `real` finds real chairs and vehicles by models of made ones. `familiarity` shows every model that ships
 shapes of its own family and of the others': who is warned of. `shortlist` says what it costs to judge
 most exchanged parts at few samples. `decoders` trains the paper's and the local one for the same
@@ -45,6 +47,7 @@ from partsdf_real import reality
 from partsdf_reconstruct import reconstruction, robots
 from partsdf_scans import scanning
 from partsdf_shortlist import shortlisting
+from partsdf_soundness import sounding
 from partsdf_speed import speed
 from partsdf_trainings import trainings
 
@@ -108,6 +111,10 @@ def main() -> None:
     one.add_argument("--held", type=int, default=10_000, help="at most so many test shapes")
     one.add_argument("--resolution", type=int, default=96, help="of the meshes")
     one.add_argument("--fresh", type=int, default=0, help="more held-out shapes, of another seed")
+    one.add_argument("--seed", type=int, default=0)
+    one = command("soundness", sounding)
+    one.add_argument("--names", default="cars,chairs,mixers,vehicles")
+    one.add_argument("--count", type=int, default=48, help="shapes of each kind")
     one.add_argument("--seed", type=int, default=0)
     one = command("shortlist", shortlisting)
     one.add_argument("--families", type=Path, required=True, help="folder of prepared families")

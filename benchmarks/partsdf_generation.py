@@ -176,11 +176,11 @@ def _cloud(vertices: np.ndarray, faces: np.ndarray, label: np.ndarray, parts: in
     each = []
     for p in range(parts):
         mine = triangles[label == p]
-        each.append(_points(corners, mine, PART_POINTS) if len(mine) else np.zeros((0, 3)))
-    return Cloud(_points(corners, triangles, POINTS), each)
+        each.append(points_on(corners, mine, PART_POINTS) if len(mine) else np.zeros((0, 3)))
+    return Cloud(points_on(corners, triangles, POINTS), each)
 
 
-def _points(corners: np.ndarray, triangles: np.ndarray, count: int) -> np.ndarray:
+def points_on(corners: np.ndarray, triangles: np.ndarray, count: int) -> np.ndarray:
     """In the order of a curve that fills space: neighbours asked for in turn are found faster.
 
     Each surface has random numbers of its own. By the same ones, made shapes, whose triangles are alike,

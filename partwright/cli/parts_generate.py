@@ -8,6 +8,7 @@ from pathlib import Path
 from partwright.cli.outputs import add_output, given
 
 CHANGE = 0.4  # of `--change`, where it is not given
+TRIES = 8  # of `--tries`: with half of the shapes unsound, one of 256 stays so
 
 _EPILOG = """\
 SHAPE is an assembly of neural parts (.json), or MODEL:NAME for a shape that the model was trained on, by name
@@ -20,7 +21,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "generate",
         help="make new shapes of a learned family",
         description="Makes poses and forms of all parts out of noise. Writes an assembly a sample, a contact "
-        "sheet (samples.png) and samples.json, which says how far each is from its nearest training shape.",
+        "sheet (samples.png) and samples.json, which says how far each is from its nearest training shape, "
+        "how often it was made, and what of it is still broken.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -32,6 +34,14 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )  # fmt: skip
     option("-n", "--count", metavar="N", type=int, default=8, help="samples (default: %(default)s)")
     option("--seed", metavar="S", type=int, default=0, help="of the noise (default: %(default)s)")
+    option(
+        "--tries",
+        metavar="N",
+        type=int,
+        default=TRIES,
+        help="a shape whose parts come apart is made anew, up to N tries in all; 1 takes all as they come "
+        "(default: %(default)s)",
+    )
     option("--keep", metavar="PARTS", help="these parts of --of stay: names, separated by commas")
     option("--of", metavar="SHAPE", help="the shape whose parts are kept")
     option("--poses", metavar="SHAPE", help="a shape whose parts' poses are kept, but none of their forms")

@@ -23,6 +23,7 @@ from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.reconstruction import reconstruct
+from partwright.partsdf.resampling import sound_samples
 from partwright.partsdf.settings import ReconstructionSettings, Settings
 from partwright.partsdf.training import train
 
@@ -47,6 +48,7 @@ __all__ = [
     "read_config",
     "reconstruct",
     "reconstruct_photo",
+    "sound_samples",
     "to_assembly",
     "train",
     "train_encoder",

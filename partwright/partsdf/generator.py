@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -107,6 +107,13 @@ def _last(width: int, outputs: int) -> nn.Module:
     return nn.Sequential(nn.LayerNorm(width), nn.Linear(width, outputs))
 
 
+class Draw(NamedTuple):
+    """Which noise a shape is made of: the `number`th of a seed, in its `attempt`th go at it, both from 0."""
+
+    number: int
+    attempt: int = 0
+
+
 @dataclass(frozen=True)
 class Generator:
     """Both networks, with the model whose parts they make."""
@@ -119,29 +126,32 @@ class Generator:
 
     def generate(
         self,
-        count: int,
+        count: int | Sequence[Draw],
         seed: int = 0,
         source: NeuralShape | None = None,
         keep: Sequence[str] = (),
         keep_layout: bool = False,
         change: float = 0.0,
     ) -> list[NeuralShape]:
-        """Shapes, each by its own noise: the first n of more are those of n.
+        """Shapes, each by its own noise: the first n of more are those of n. As they come:
+        `sound_samples` makes those anew whose parts come apart.
 
-        source: a shape whose parts `keep` stay as they are, or, with `keep_layout`, all of whose poses and no
-        latent; or, with `change`, above 0 and at most 1, which the samples are like: 1 leaves nothing of it.
+        count: how many, or which. source: a shape whose parts `keep` stay as they are, or, with
+        `keep_layout`, all of whose poses and no latent; or, with `change`, above 0 and at most 1, which the
+        samples are like: 1 leaves nothing of it.
 
         Raises:
             SettingError: none is asked for, nothing would be left to make, or the source is missing or of
                 another model.
         """
-        if count < 1:
+        draws = [Draw(number) for number in range(count)] if isinstance(count, int) else list(count)
+        if not draws:
             raise SettingError(f"{count} samples: expected 1 or more")
         kept = torch.zeros(len(self.model.parts), dtype=torch.bool)
         for name in keep:
             kept[self.model.index(name)] = True
         self._check(source, kept, keep_layout, change)
-        noise = _noise(count, seed, (len(kept), POSE + 1 + self.vectors.width))
+        noise = _noise(draws, seed, (len(kept), POSE + 1 + self.vectors.width))
         layout, latents = noise[..., : POSE + 1], noise[..., POSE + 1 :]
         if source is None:
             layout = denoised(self.layouts, layout)
@@ -159,7 +169,7 @@ class Generator:
             form = self.vectors.of_latents(source.latents).expand_as(latents)
             same = kept[:, None].expand_as(latents)
             latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents, form, same)
-        return [self._shape(layout[i], latents[i], source, kept, keep_layout) for i in range(count)]
+        return [self._shape(layout[i], latents[i], source, kept, keep_layout) for i in range(len(draws))]
 
     def layout_of(self, poses: PoseTensors, present: Tensor) -> Tensor:
         """(..., P, 13) of poses (..., P, ...) and presence (..., P)."""
@@ -240,11 +250,11 @@ def networks(model: Model, vectors: PartVectors, settings: GeneratorSettings) ->
     return {"layouts": Layouts(parts, settings), "forms": Forms(parts, vectors.width, settings)}
 
 
-def _noise(count: int, seed: int, size: tuple[int, ...]) -> Tensor:
-    """(count, *size), of which each row depends on the seed and its own number alone."""
+def _noise(draws: Sequence[Draw], seed: int, size: tuple[int, ...]) -> Tensor:
+    """(len(draws), *size), of which each row depends on the seed and its own draw alone."""
     rows = []
-    for i in range(count):
+    for number, attempt in draws:
         # The 32 bits of seeds below 4096 are taken as they are, so that their samples stay what they were.
-        generator = torch.Generator().manual_seed(mixed(seed >> 12, (seed << 20) + i))
-        rows.append(torch.randn(size, generator=generator))
+        bits = mixed(attempt, mixed(seed >> 12, (seed << 20) + number))
+        rows.append(torch.randn(size, generator=torch.Generator().manual_seed(bits)))
     return torch.stack(rows)

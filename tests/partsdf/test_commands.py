@@ -65,12 +65,16 @@ def test_encoder_and_generator(
         "lamps.generator.safetensors",
         "lamps.safetensors",
     ]
-    make = ["parts", "generate", "--model", str(file), "-o", "made"]
-    assert main([*make, "-n", "2", "--seed", "3", "--keep", "plate", "--of", f"{file}:lamp0"]) == 0
+    make = ["parts", "generate", "--model", str(file), "-o", "made", "--tries", "1"]
+    assert (
+        main([*make, "--tries", "2", "-n", "2", "--seed", "3", "--keep", "plate", "--of", f"{file}:lamp0"])
+        == 0
+    )
     assert "2 shapes of lamps's family: made; the least new differs by" in capsys.readouterr().out
     about = json.loads(Path("made/samples.json").read_text())
     assert [s["file"] for s in about["samples"]] == ["sample_00.json", "sample_01.json"]
     assert all(0 <= s["difference"] <= 0.1 and s["nearest"].startswith("lamp") for s in about["samples"])
+    assert all(s["tries"] == 2 or not s["faults"] for s in about["samples"])
     assert Image.open("made/samples.png").width == 480
     first = pw.load_assembly("made/sample_00.json")
     plate = NeuralShape.trained(pw.partsdf.load_model(file), "lamp0").poses.translation[0]
@@ -82,17 +86,20 @@ def test_encoder_and_generator(
     about = json.loads(Path("made/samples.json").read_text())
     assert about["like"] == {"shape": f"{file}:lamp0", "change": 0.1}
     assert about["samples"][0]["parts"] == ["plate", "ball", "knob"]
+    assert about["samples"][0]["tries"] == 1
     assert Image.open("made/samples.png").width == 480  # itself first
     assert main([*make, "--like", f"{file}:lamp0", "--change", "0"]) == 2
     assert main([*make, "--change", "0.2"]) == 2
     assert main([*make, "--keep", "plate"]) == 2
     assert main([*make, "--poses", f"{file}:0", "--keep", "plate", "--of", f"{file}:0"]) == 2
     assert main([*make, "-n", "0"]) == 2
+    assert main([*make, "--tries", "0"]) == 2
     said = capsys.readouterr().err
     assert "--keep PARTS and --of SHAPE go together" in said
     assert "give one of them" in said
     assert "--change is 0.0; expected above 0" in said
     assert "0 samples: expected 1 or more" in said
+    assert "tries: expected a whole number of at least 1, got 0" in said
     assert main(["parts", "train-encoder", str(file), str(lamps.folder), "-o", "encoder.bin"]) == 2
 
 

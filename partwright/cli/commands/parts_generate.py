@@ -6,6 +6,7 @@ import argparse
 import json
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from partwright.atomic_io import replacing_files
@@ -21,6 +22,7 @@ from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
 from partwright.partsdf.pictures import picture
+from partwright.partsdf.resampling import Sample, sound_samples
 from partwright.partsdf.sources import found_in, open_source
 from partwright.render import Camera, sheet, write_png
 from partwright.shapes import PICTURE_SUFFIXES, SUFFIXES
@@ -38,10 +40,11 @@ def run(arguments: argparse.Namespace) -> int:
     with Work("reading") as work:
         source, keep = _kept(arguments, model)
         work.stage("making")
-        samples = generator.generate(
-            arguments.count, arguments.seed, source, keep, keep_layout=arguments.poses is not None,
-            change=change,
+        made = sound_samples(
+            generator, arguments.count, arguments.seed, source, keep,
+            keep_layout=arguments.poses is not None, change=change, tries=arguments.tries, told=work.show,
         )  # fmt: skip
+        samples = [one.shape for one in made]
         work.stage("comparing")
         nearest = [nearest_training_shape(one) for one in samples]
         work.stage("drawing")
@@ -61,11 +64,13 @@ def run(arguments: argparse.Namespace) -> int:
             "samples": [
                 {
                     "file": sample_name(i, len(samples)),
-                    "parts": one.names(),
+                    "parts": one.shape.names(),
                     "nearest": name,
                     "difference": far,
+                    "tries": one.tries,
+                    "faults": one.soundness.faults(),
                 }
-                for i, (one, (name, far)) in enumerate(zip(samples, nearest, strict=True))
+                for i, (one, (name, far)) in enumerate(zip(made, nearest, strict=True))
             ],
         }
         with replacing_files(arguments.output, _STALE) as folder:
@@ -75,12 +80,28 @@ def run(arguments: argparse.Namespace) -> int:
                 )
             write_png(folder / "samples.png", sheet(pictures, captions, min(_COLUMNS, len(pictures))))
             (folder / "samples.json").write_text(json.dumps(about, indent=1))
+    warn(_broken(made))
+    again = sum(one.tries > 1 for one in made)
     least = min(far for _, far in nearest)
     say(
         f"{counted(len(samples), 'shape')} of {model.name}'s family: {arguments.output}; the least new "
         f"differs by {100 * least:.2f} hundredths of a unit length from one that was trained on"
+        + (f"; {again} of them made anew, as parts came apart" if again else "")
     )
     return 0
+
+
+def _broken(made: Sequence[Sample]) -> list[str]:
+    """One line where samples are still broken, else nothing."""
+    broken = [(i, one.soundness.faults()) for i, one in enumerate(made) if one.soundness.faults()]
+    if not broken:
+        return []
+    number, faults = broken[0]
+    tries = "try" if made[number].tries == 1 else "tries"
+    return [
+        f"{counted(len(broken), 'sample')} may be broken after {made[number].tries} {tries}: in {number}, "
+        f"{' and '.join(faults)}; look at samples.png"
+    ]
 
 
 def _resolution(shape: NeuralShape) -> int:

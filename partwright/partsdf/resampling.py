@@ -1,0 +1,68 @@
+"""New shapes that hang together: what a generator makes, and makes anew where parts came apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from partwright.methods import check_count
+from partwright.partsdf.generator import Draw, Generator
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.soundness import Judge, Soundness
+
+TRIES = 8  # with half of the shapes unsound, one of 256 stays so
+_CHANGES = (0.6, 0.7, 0.8, 0.9)  # of the first one, in the tries after it; then nothing of it is left
+ShareDone = Callable[[float], None]  # told how much is done, from 0 to 1, at most
+
+
+@dataclass(frozen=True)
+class Sample:
+    """shape: the first of its tries that is sound, else the least bad one; tries: how many were made."""
+
+    shape: NeuralShape
+    soundness: Soundness
+    tries: int
+
+
+def sound_samples(
+    generator: Generator,
+    count: int,
+    seed: int = 0,
+    source: NeuralShape | None = None,
+    keep: Sequence[str] = (),
+    keep_layout: bool = False,
+    change: float = 0.0,
+    tries: int = TRIES,
+    told: ShareDone | None = None,
+) -> list[Sample]:
+    """As `Generator.generate`, each made anew until it is sound, up to `tries` times in all.
+
+    What is sound at once is what `generate` makes. Else new noise takes over more of it with each try, then
+    all: replaced by anything, shapes that often come apart, as benches, would be rare.
+
+    Raises:
+        SettingError: no try is allowed; else as `Generator.generate`.
+    """
+    check_count("tries", tries, low=1)
+    judge = Judge(generator.model)
+    first = generator.generate(count, seed, source, keep, keep_layout, change)
+
+    def made(number: int, attempt: int) -> NeuralShape:
+        draw = [Draw(number, attempt)]
+        if source is None and attempt <= len(_CHANGES):
+            like, much = first[number], _CHANGES[attempt - 1]
+            return generator.generate(draw, seed, like, change=much)[0]
+        return generator.generate(draw, seed, source, keep, keep_layout, change)[0]
+
+    best: list[Sample] = []
+    for number, shape in enumerate(first):
+        sample = Sample(shape, judge(shape), 1)
+        while sample.soundness.faults() and sample.tries < tries:
+            shape = made(number, sample.tries)
+            new = Sample(shape, judge(shape), 0)
+            least = min(sample, new, key=lambda one: one.soundness.badness)
+            sample = replace(least, tries=sample.tries + 1)
+        best.append(sample)
+        if told is not None:
+            told(len(best) / count)
+    return best

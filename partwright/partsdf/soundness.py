@@ -1,0 +1,152 @@
+"""Whether a new shape hangs together as those of its family do: what an eye would call broken, measured.
+
+Three things are looked for: a part that is said to be there and has no surface; a piece of a part that is
+apart from all others; and two parts that lie to each other as in no training shape, as a leg that ends above
+its seat.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from scipy.sparse.csgraph import minimum_spanning_tree
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from partwright.errors import NoSurfaceError
+from partwright.partsdf.meshing import mesh_shape, resolution_for_wall
+from partwright.partsdf.model import Model
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.poses import PoseTensors, rotation_matrices
+
+if TYPE_CHECKING:
+    import trimesh
+
+# Measured by benchmarks/partsdf_soundness.py, and chosen by looking at pictures of 100 new shapes.
+GAP, OFFSET = 0.02, 0.03  # unit lengths
+_SLACK = 0.1  # of the training shapes' range, by which two parts may lie beyond it
+_PIECE = 0.01  # of its part's surface: what is less is a crumb of the mesh
+_COARSE, _FINE = 64, 112  # cells along the unit frame, by the thinnest wall
+_JUDGES = 8  # training shapes whose own gaps are looked at
+
+
+@dataclass(frozen=True)
+class Soundness:
+    """empty: parts without a surface. gap: the widest that is left when all pieces of parts are joined by the
+    narrowest, and the parts on its sides. allowed: a gap that is none for this family. offset: how far beyond
+    the training shapes' range two parts lie to each other, and these two. Unit lengths."""
+
+    empty: tuple[str, ...]
+    gap: float
+    gap_between: tuple[str, ...]
+    allowed: float
+    offset: float
+    offset_between: tuple[str, ...]
+
+    def faults(self) -> list[str]:
+        """What is broken, a few words each; nothing where it is sound."""
+        said = [f"{name} has no surface" for name in self.empty]
+        if self.gap > self.allowed:
+            said.append(f"{' and '.join(dict.fromkeys(self.gap_between))} are {self.gap:.2f} apart")
+        if self.offset > OFFSET:
+            first, second = self.offset_between
+            said.append(f"{first} and {second} lie as in no training shape, by {self.offset:.2f}")
+        return said
+
+    @property
+    def badness(self) -> float:
+        """By how much the worst of it exceeds what is allowed, 1 where it just does."""
+        return 2.0 * len(self.empty) + max(self.gap / self.allowed, self.offset / OFFSET)
+
+
+class Judge:
+    """Tells how sound shapes of one model are. Its training shapes are looked at once, if need be."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+
+    def __call__(self, shape: NeuralShape) -> Soundness:
+        """Of a shape in its family's frame, by a mesh of its parts, which takes a few tenths of a second."""
+        parts = _meshes(shape)
+        gap, between = widest_gap(parts)
+        allowed = GAP if gap <= GAP else max(GAP, self._own_gap)
+        empty = tuple(name for name in shape.names() if name not in parts)
+        return Soundness(empty, gap, between, allowed, *largest_offset(shape))
+
+    @cached_property
+    def _own_gap(self) -> float:
+        """The widest gap of a few training shapes: parts of some families are apart from one another."""
+        names = self.model.shapes
+        rows = np.unique(np.linspace(0, len(names) - 1, _JUDGES).round().astype(int)).tolist()
+        trained = [NeuralShape.trained(self.model, names[i]) for i in rows]
+        return max(widest_gap(_meshes(one))[0] for one in trained)
+
+
+def widest_gap(parts: dict[str, trimesh.Trimesh]) -> tuple[float, tuple[str, ...]]:
+    """The longest edge of the minimum spanning tree of all pieces of closed parts, each from the nearest
+    vertex of one to that of another, and the parts at its ends; 0 where there are fewer than two."""
+    pieces = [(name, points) for name, mesh in parts.items() for points in _pieces(mesh)]
+    if len(pieces) < 2:
+        return 0.0, ()
+    trees = [cKDTree(points) for _, points in pieces]
+    apart = np.zeros((len(pieces), len(pieces)))
+    for i, (_, points) in enumerate(pieces):
+        for j in range(i):  # 0 would be no edge to SciPy
+            apart[i, j] = max(float(trees[j].query(points)[0].min()), np.finfo(float).tiny)
+    joined = minimum_spanning_tree(apart).toarray()
+    i, j = np.unravel_index(joined.argmax(), joined.shape)
+    return float(joined[i, j]), (pieces[j][0], pieces[i][0])
+
+
+def largest_offset(shape: NeuralShape) -> tuple[float, tuple[str, ...]]:
+    """How far beyond the range of the training shapes the sides of two parts' boxes lie to each other, along
+    an axis of the family's frame, unit lengths; and these parts. At most 0 where all are within."""
+    model = shape.model
+    first, second = torch.triu_indices(len(model.parts), len(model.parts), 1)
+    there = (model.present[:, first] & model.present[:, second])[..., None]
+    known = _sides(model.poses, first, second)
+    low = torch.where(there, known, torch.inf).amin(dim=0)
+    high = torch.where(there, known, -torch.inf).amax(dim=0)
+    own = _sides(shape.poses.map(lambda t: t[None]), first, second)[0]
+    beyond = torch.maximum(low - own, own - high) - _SLACK * (high - low)
+    both = shape.present[first] & shape.present[second] & there.any(dim=0).squeeze(-1)
+    if not both.any():
+        return 0.0, ()
+    worst = beyond.amax(dim=-1).masked_fill(~both, -torch.inf)
+    pair = int(worst.argmax())
+    return float(worst[pair]), (model.parts[int(first[pair])], model.parts[int(second[pair])])
+
+
+def _sides(poses: PoseTensors, first: Tensor, second: Tensor) -> Tensor:
+    """(S, Q, 12) of poses (S, P, ...): by how much the low and high sides of the first parts' boxes (Q,) lie
+    beyond those of the second ones', along each axis."""
+    half = (rotation_matrices(poses.rotation).abs() @ poses.scale[..., None]).squeeze(-1)
+    sides = torch.stack([poses.translation - half, poses.translation + half], dim=-2)  # (S, P, 2, 3)
+    return (sides[:, first, :, None] - sides[:, second, None]).flatten(2)
+
+
+def _meshes(shape: NeuralShape) -> dict[str, trimesh.Trimesh]:
+    try:
+        return mesh_shape(shape, min(_FINE, resolution_for_wall(shape.thinnest, _COARSE))).parts
+    except NoSurfaceError:
+        return {}
+
+
+def _pieces(mesh: trimesh.Trimesh) -> list[np.ndarray]:
+    """Vertices (N, 3) of a mesh's connected pieces, without crumbs and the walls of cavities."""
+    import trimesh
+
+    corners, area = mesh.triangles, mesh.area_faces
+    volume = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    found = trimesh.graph.connected_components(
+        mesh.face_adjacency, nodes=np.arange(len(mesh.faces)), min_len=1
+    )
+    return [
+        mesh.vertices[np.unique(mesh.faces[faces])]
+        for faces in found
+        if volume[faces].sum() > 0 and area[faces].sum() >= _PIECE * area.sum()
+    ]
