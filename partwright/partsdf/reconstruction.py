@@ -18,10 +18,9 @@ from torch import Tensor
 from partwright.datasets.prepared import PreparedShape
 from partwright.errors import CancelledError, ModelError
 from partwright.methods import Cancellation, Checkpoint
-from partwright.partsdf.config import LossSettings
 from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.data import pose_tensors, present_parts
-from partwright.partsdf.losses import aggregate, intersection, latent_penalty, terms
+from partwright.partsdf.losses import aggregate, intersection, terms
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors
@@ -36,6 +35,7 @@ from partwright.partsdf.starts import (
     latents_by_part,
 )
 from partwright.partsdf.targets import Target
+from partwright.partsdf.unknowns import FamilyUnknowns, FreeUnknowns, Unknowns
 from partwright.shapes import Shape
 
 
@@ -265,23 +265,18 @@ def _optimised(
 ) -> tuple[NeuralShape, bool]:
     """Adam on the latents, and on the poses if they are to move; a cancellation keeps what was found. Also
     whether all iterations were done."""
-    losses = start.model.config.losses
-    latents = start.latents.clone().requires_grad_()
-    poses = start.poses.map(lambda t: t.clone().requires_grad_(move_poses))
-    # Half-lengths move by their logarithm: they stay positive, and long and short sides alike.
-    size = start.poses.scale.log().requires_grad_(move_poses)
-    groups = [{"params": [latents], "lr": settings.rate}]
-    if move_poses:
-        groups.append({"params": [poses.translation, poses.rotation, size], "lr": settings.pose_rate})
-    optimiser = torch.optim.Adam(groups)
+    unknowns: Unknowns = FreeUnknowns(start, move_poses)
+    if target.low is not None:
+        unknowns = FamilyUnknowns(start, move_poses, target.count)
+    optimiser = torch.optim.Adam(unknowns.groups(settings))
     generator = torch.Generator().manual_seed(seed)
     halves = target.halves()
 
     def found() -> NeuralShape:
-        final = PoseTensors(poses.translation, poses.rotation, size.exp()) if move_poses else start.poses
+        final = unknowns.poses()
         unit = final.rotation / final.rotation.norm(dim=-1, keepdim=True)
         placed = final._replace(rotation=unit).map(lambda t: t.detach().clone())
-        return replace(start, latents=latents.detach().clone(), poses=placed)
+        return replace(start, latents=unknowns.latents().detach().clone(), poses=placed)
 
     try:
         for i in range(settings.iterations):
@@ -289,10 +284,8 @@ def _optimised(
                 for group in optimiser.param_groups:
                     group["lr"] *= settings.decay
             moved = move_poses and i >= settings.pose_delay * settings.iterations
-            now = poses._replace(scale=size.exp()) if moved else start.poses
             rows = _drawn(halves, settings.points, generator)
-            late = 2 * i >= settings.iterations
-            loss = _loss(start, latents, now, target, rows, losses, late)
+            loss = _loss(start, unknowns, moved, target, rows, late=2 * i >= settings.iterations)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
@@ -306,27 +299,26 @@ def _optimised(
 
 
 def _loss(
-    shape: NeuralShape,
-    latents: Tensor,
-    poses: PoseTensors,
-    target: Target,
-    rows: Tensor,
-    losses: LossSettings,
-    late: bool,
+    shape: NeuralShape, unknowns: Unknowns, moved: bool, target: Target, rows: Tensor, late: bool
 ) -> Tensor:
-    """Eq. 6 at some samples; with known parts the whole shape's loss waits for the second half."""
-    each = shape.model.part_distances(latents, poses, target.points[rows])[None]
-    decoder = shape.model.config.decoder
+    """Eq. 6 at some samples; with known parts the whole shape's loss waits for the second half.
+
+    moved: whether poses move by now.
+    """
+    poses = unknowns.poses() if moved else shape.poses
+    each = shape.model.part_distances(unknowns.latents(), poses, target.points[rows])[None]
+    decoder, losses = shape.model.config.decoder, shape.model.config.losses
+    sdf = target.sdf[rows]
     if target.low is not None:
-        off = target.error(aggregate(each, decoder)[0], rows, losses).mean()
-        overlap = intersection(each, losses)
-        return losses.whole * off + losses.inter * overlap + latent_penalty(latents, losses, losses.ramp)
-    sdf = target.sdf[rows][None]
+        whole = aggregate(each, decoder)[0]
+        on_surface = float(whole.detach().abs()[sdf <= 0].mean())
+        error = losses.whole * target.error(whole, rows, losses).mean()
+        return error + losses.inter * intersection(each, losses) + unknowns.prior(on_surface, moved)
     known = target.part is not None
-    part = target.part[rows][None] if target.part is not None else torch.zeros_like(sdf).long()
-    found = terms(each, sdf, part, losses, decoder)
+    part = target.part[rows] if target.part is not None else torch.zeros_like(sdf).long()
+    found = terms(each, sdf[None], part[None], losses, decoder)
     weights = losses if late or not known else replace(losses, whole=0.0)
-    return found.total(weights, known) + latent_penalty(latents, losses, losses.ramp)
+    return found.total(weights, known) + unknowns.prior(0.0, moved)
 
 
 def _drawn(halves: tuple[Tensor, Tensor], count: int, generator: torch.Generator) -> Tensor:

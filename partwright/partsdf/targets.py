@@ -25,7 +25,7 @@ class Target:
     points on the surface (M, 3), which an encoder looks at.
 
     low: (N,) where nothing but points of the surface is known, not what is inside: sdf is then the distance
-    from them, and the surface is at least `low` and at most that far.
+    from them, and the surface is at least `low` and at most that far. count: then, of these points.
     """
 
     points: Tensor
@@ -33,6 +33,7 @@ class Target:
     part: Tensor | None = None
     surface: Tensor | None = None
     low: Tensor | None = None
+    count: int = 0
 
     @classmethod
     def of_shape(cls, shape: Shape, count: int = 40_000, seed: int = 0) -> Target:
@@ -59,7 +60,7 @@ class Target:
         samples, away, low = np.concatenate([on, near])[order], away[order], low[order]
         surface = points[rng.permutation(len(points))[:SURFACE]]
         known = (torch.from_numpy(a.astype(np.float32)) for a in (samples, away, surface, low))
-        return cls(next(known), next(known), surface=next(known), low=next(known))
+        return cls(next(known), next(known), surface=next(known), low=next(known), count=len(points))
 
     @classmethod
     def seen_in(cls, shape: Shape, seed: int = 0) -> Target:
@@ -71,14 +72,14 @@ class Target:
     def error(self, whole: Tensor, rows: Tensor, losses: LossSettings) -> Tensor:
         """(..., M) by how much distances (..., M) of a whole shape are off at samples `rows` (M,), clamped.
 
-        Of points without regard to the sign, and beyond what is known of them.
+        Of points without regard to the sign: known ones are on the surface, and around them it is at least
+        `low` away. That it is as near as the nearest of them the known ones say, too, and without its noise.
         """
         sdf = self.sdf[rows].expand_as(whole)
         if self.low is None:
             return clamped_error(whole, sdf, losses)
-        size, far = whole.abs(), sdf < losses.clamp
-        low = self.low[rows].clamp(max=losses.clamp)
-        return torch.relu(low - size) + torch.relu(size - sdf) * far
+        size = whole.abs()
+        return torch.relu(self.low[rows].clamp(max=losses.clamp) - size) + size * (sdf <= 0)
 
     def turned(self, turn: tuple[float, float, float, float]) -> Target:
         """The same shape in the frame that `turn`, a unit quaternion (w, x, y, z), leads to this one."""

@@ -1,0 +1,100 @@
+"""What a reconstruction moves: latents and poses as they are, or in the spread that the family has them in.
+
+A surface tells every number. Points tell it as far as noise and what is not seen leave it open, and there a
+surface of free numbers follows the noise. So where points are all that is known, numbers are moved along the
+principal directions of the training shapes' and drawn towards their means: to the most likely shape of the
+family, given the points, if errors of these are Laplacian and the family's numbers normal.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor
+
+from partwright.partsdf.losses import latent_penalty
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.part_vectors import PartVectors
+from partwright.partsdf.poses import PoseTensors
+from partwright.partsdf.settings import ReconstructionSettings
+
+# Steps in the family's spread, over those of the numbers themselves.
+_LATENTS_FASTER, _POSES_FASTER = 10.0, 25.0
+
+
+class Unknowns(Protocol):
+    """Latents (P, Z) and poses (P, ...) that an optimiser moves."""
+
+    def groups(self, settings: ReconstructionSettings) -> list[dict[str, Any]]:
+        """For an optimiser: which tensors, each at its rate."""
+
+    def latents(self) -> Tensor: ...
+
+    def poses(self) -> PoseTensors:
+        """With rotations of any length."""
+
+    def prior(self, off: float, moved: bool) -> Tensor:
+        """The loss of how unlikely they are. off: the mean error at points that are known to be on the
+        surface. moved: whether poses are among what moves by now."""
+
+
+class FreeUnknowns:
+    """Every number by itself; half-lengths by their logarithm: they stay positive, and long and short sides
+    alike."""
+
+    def __init__(self, start: NeuralShape, move_poses: bool) -> None:
+        self._start, self._move_poses = start, move_poses
+        self._latents = start.latents.clone().requires_grad_()
+        self._placed = start.poses.map(lambda t: t.clone().requires_grad_(move_poses))
+        self._size = start.poses.scale.log().requires_grad_(move_poses)
+
+    def groups(self, settings: ReconstructionSettings) -> list[dict[str, Any]]:
+        groups: list[dict[str, Any]] = [{"params": [self._latents], "lr": settings.rate}]
+        if self._move_poses:
+            placed = [self._placed.translation, self._placed.rotation, self._size]
+            groups.append({"params": placed, "lr": settings.pose_rate})
+        return groups
+
+    def latents(self) -> Tensor:
+        return self._latents
+
+    def poses(self) -> PoseTensors:
+        return self._placed._replace(scale=self._size.exp()) if self._move_poses else self._start.poses
+
+    def prior(self, off: float, moved: bool) -> Tensor:
+        losses = self._start.model.config.losses
+        return latent_penalty(self._latents, losses, losses.ramp)
+
+
+class FamilyUnknowns:
+    """Along the family's principal directions, each in its spread there; what a start has beside these stays.
+
+    count: of the points that are known, each with an error of its own.
+    """
+
+    def __init__(self, start: NeuralShape, move_poses: bool, count: int) -> None:
+        self._start, self._move_poses, self._count = start, move_poses, count
+        self._vectors = PartVectors.of(start.model)
+        self._form = self._vectors.of_latents(start.latents).requires_grad_()
+        self._place = self._vectors.of_poses(start.poses).requires_grad_(move_poses)
+        self._beside = start.latents - self._vectors.latents(self._form.detach())
+
+    def groups(self, settings: ReconstructionSettings) -> list[dict[str, Any]]:
+        groups: list[dict[str, Any]] = [{"params": [self._form], "lr": _LATENTS_FASTER * settings.rate}]
+        if self._move_poses:
+            groups.append({"params": [self._place], "lr": _POSES_FASTER * settings.pose_rate})
+        return groups
+
+    def latents(self) -> Tensor:
+        return self._vectors.latents(self._form) + self._beside
+
+    def poses(self) -> PoseTensors:
+        return self._vectors.poses(self._place) if self._move_poses else self._start.poses
+
+    def prior(self, off: float, moved: bool) -> Tensor:
+        unlikely = self._form.square().sum()
+        if moved:
+            unlikely = unlikely + self._place.square().sum()
+        # Of sum |d| / off + unlikely / 2, what is minimised is the mean of the first.
+        return torch.as_tensor(0.5 * off / self._count) * unlikely
