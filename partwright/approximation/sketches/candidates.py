@@ -14,26 +14,27 @@ from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.candidate import Candidate, posed
 from partwright.approximation.sketches.holes import hole_parts
 from partwright.approximation.sketches.rims import SHARP, bottom_rim, limited, rimmed_body, top_rim
+from partwright.approximation.sketches.rods import (
+    ELSEWHERE,
+    MOST_REGIONS,
+    SAME_AREA,
+    goes_on,
+    is_rod,
+    rod,
+    round_at_ends,
+)
 from partwright.approximation.sketches.sections import FINE, Region, View, profile_of
 from partwright.approximation.sketches.turned import turned
 from partwright.errors import ParameterError
 from partwright.fields.profile import Profile, circle_of
 from partwright.fields.rims import Rim
 
-_INSIDE = 0.02  # of a section: what of it may lie outside of the next slab's, and it still goes on
-_MOST_REGIONS = 4  # of a section
-_ELSEWHERE = (0.1, 0.9)  # of a slab, where it is looked at, too
-_SAME_AREA = 0.01
 _LEAST_SHARE = 0.01  # of the largest region's area
 _AXES = 2
 _LEAST_AXIS = 0.2  # of the area of all walls, that those about an axis have
 _NEAR_AXIS = 4e-3
 _BALANCED = 0.98  # of the largest second moment of a section's area, that the least has
 _MOST_SLABS = 10
-_LEAVES = 0.005  # of a round section, that lies outside where a rod ends in a bend
-_HALVINGS = 7  # of a slab, for the height at which it does
-_AT_LEVEL = 0.02  # unit lengths: where it does so near to a level it ends there
-_SLENDER = 2.0  # times as long as it is wide
 _ALL_RIM = 0.95  # of a slab's height
 
 
@@ -73,14 +74,15 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
     thick = sorted(range(len(slabs)), key=lambda i: slabs[i][0] - slabs[i][1])[:_MOST_SLABS]
     done: set[tuple[int, int, int]] = set()
     for i in sorted(thick):
+        by_itself = list(round_at_ends(view, *slabs[i]))
         for region in _regions(view, *slabs[i]):
             first = last = i
-            while first > 0 and _goes_on(region, view.regions(middles[first - 1])):
+            while first > 0 and goes_on(region, view.regions(middles[first - 1])):
                 first -= 1
-            while last + 1 < len(slabs) and _goes_on(region, view.regions(middles[last + 1])):
+            while last + 1 < len(slabs) and goes_on(region, view.regions(middles[last + 1])):
                 last += 1
             spans = {(first, last), (i, i)}
-            if region.is_round and all(_goes_on(o, [region]) for m in middles for o in view.regions(m)):
+            if region.is_round and all(goes_on(o, [region]) for m in middles for o in view.regions(m)):
                 spans.add((0, len(slabs) - 1))  # the ends of a hole through a round wall are not flat
             for a, b in spans:
                 key = (a, b, round(region.area * 1e5))
@@ -88,114 +90,27 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
                     done.add(key)
                     yield from _extruded(view, region, slabs[a][0], slabs[b][1], holes)
                     yield from _rounded(view, region, slabs, a, b, holes)
-            if region.is_round or _is_rod(region, *slabs[i]):
-                yield from _rods(view, region, slabs, i, (middles[i], middles[i]), holes)
-        for region, heights in _round_at_ends(view, *slabs[i]):
-            yield from _rods(view, region, slabs, i, heights, holes)
+            if region.is_round or is_rod(region, *slabs[i]):
+                by_itself.append((region, (middles[i], middles[i])))
+        for region, heights in by_itself:
+            reach = rod(view, region, slabs, i, heights)
+            if reach is not None:
+                yield from _extruded(view, region, *reach, holes)
     seen = view.silhouette
     if len(seen) == 1 and seen[0].is_round:  # of what a drill leaves where it comes through a round wall
         yield from _extruded(view, seen[0], slabs[0][0], slabs[-1][1], False)
 
 
-def _rods(
-    view: View,
-    region: Region,
-    slabs: list[tuple[float, float]],
-    i: int,
-    heights: tuple[float, float],
-    holes: bool,
-) -> Iterator[Candidate]:
-    """A region of two heights within a slab, as far as it goes on by itself below the first and above the
-    second: a rod ends where it bends, not at a face."""
-    middles = [(low + high) / 2 for low, high in slabs]
-    levels = [z for slab in slabs for z in slab]
-    below = [z for z in middles[: i + 1][::-1] if z < heights[0]]
-    above = [z for z in middles[i:] if z > heights[1]]
-    low = _end(view, region, heights[0], below, levels[0], levels)
-    high = _end(view, region, heights[1], above, levels[-1], levels)
-    if _is_straight(view, region, max(low, slabs[i][0]), min(high, slabs[i][1])):
-        yield from _extruded(view, region, low, high, holes)
-
-
-def _end(
-    view: View, region: Region, inside: float, beyond: Sequence[float], last: float, levels: Sequence[float]
-) -> float:
-    """To where a region goes on that is there at a height; beyond: heights further on, in order."""
-    for outside in (*beyond, last + 0.02 * (inside - last)):
-        if not _goes_on(region, view.regions(outside), _LEAVES):
-            break
-        inside = outside
-    else:
-        return last
-    for _ in range(_HALVINGS):
-        between = (inside + outside) / 2
-        if _goes_on(region, view.regions(between), _LEAVES):
-            inside = between
-        else:
-            outside = between
-    level = min(levels, key=lambda z: abs(z - inside))
-    return level if abs(level - inside) < _AT_LEVEL else inside
-
-
-def _round_at_ends(view: View, low: float, high: float) -> Iterator[tuple[Region, tuple[float, float]]]:
-    """Round regions near the ends of a slab that its middle has but as part of others: of pipes that meet
-    there. And the first and the last height at which each is seen."""
-    first, last = (low + share * (high - low) for share in _ELSEWHERE)
-    middle = view.regions((low + high) / 2)[:_MOST_REGIONS]
-    below, above = (
-        [
-            region
-            for region in view.regions(height)[:_MOST_REGIONS]
-            if not any(_is_as_large(region, other) for other in middle) and region.is_round
-        ]
-        for height in (first, last)
-    )
-    for region in below:
-        again = next((one for one in above if _is_as_large(region, one) and _goes_on(region, [one])), None)
-        above = [one for one in above if one is not again]
-        yield region, (first, first if again is None else last)
-    yield from ((region, (last, last)) for region in above)
-
-
-def _is_as_large(one: Region, other: Region) -> bool:
-    return abs(one.area - other.area) < _SAME_AREA * other.area
-
-
-def _is_straight(view: View, region: Region, low: float, high: float) -> bool:
-    """Whether a round region is nowhere part of a wider round one, as in a cone."""
-    heights = (low + share * (high - low) for share in _ELSEWHERE)
-    return not any(
-        other.is_round and other.area > (1 + _SAME_AREA) * region.area and _goes_on(region, [other], _LEAVES)
-        for height in heights
-        for other in view.regions(height)[:_MOST_REGIONS]
-    )
-
-
-def _is_rod(region: Region, low: float, high: float) -> bool:
-    """Whether it is much longer than wide."""
-    left, bottom, right, top = region.section.bounds()
-    return bool(high - low > _SLENDER * max(right - left, top - bottom))
-
-
 def _regions(view: View, low: float, high: float) -> Iterator[Region]:
     """Of a slab: those in its middle, and others elsewhere in it that hold these, where a hole across it has
     cut the middle."""
-    middle = view.regions((low + high) / 2)[:_MOST_REGIONS]
+    middle = view.regions((low + high) / 2)[:MOST_REGIONS]
     yield from (region for region in middle if region.area >= _LEAST_SHARE * middle[0].area)
-    for share in _ELSEWHERE:
+    for share in ELSEWHERE:
         for region in view.regions(low + share * (high - low))[:1]:
-            larger = not any(region.area < (1 + _SAME_AREA) * other.area for other in middle)
-            if larger and all(_goes_on(other, [region]) for other in middle):
+            larger = not any(region.area < (1 + SAME_AREA) * other.area for other in middle)
+            if larger and all(goes_on(other, [region]) for other in middle):
                 yield region
-
-
-def _goes_on(region: Region, others: Sequence[Region], least: float = _INSIDE) -> bool:
-    left = region.section
-    for other in others:
-        left = left - other.section
-        if left.is_empty():
-            return True
-    return bool(left.area() < least * region.area)
 
 
 def _outlines(region: Region, holes: bool) -> Iterator[tuple[CrossSection, Profile | None]]:
@@ -300,7 +215,7 @@ def _axes(view: View) -> list[np.ndarray]:
     votes: list[tuple[float, np.ndarray]] = []
     straight = 0.0
     for low, high in view.slabs:
-        for region in view.regions((low + high) / 2)[:_MOST_REGIONS]:
+        for region in view.regions((low + high) / 2)[:MOST_REGIONS]:
             profile = region.profile
             for side in (side for loop in profile.sides for side in loop) if profile else ():
                 if side.centre is None:
