@@ -19,6 +19,7 @@ import numpy as np
 from partwright.approximation.ellipsoid import Ellipsoid
 from partwright.approximation.hull_faces import beyond_faces, faces_of
 from partwright.approximation.largest_within import LARGEST, largest_within
+from partwright.approximation.smallest_ball import smallest_ball
 from partwright.assembly import Part, Similarity
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.manifolds import surface_of
@@ -30,7 +31,7 @@ CONVEX_KINDS = (Box, Cylinder, Sphere, Capsule, Ellipsoid)  # that a convex soli
 Mode = Literal["nearest", "around", "within"]
 _DIRECTIONS = 400  # on the sphere, in which supports are compared, beside the faces' own
 _CELLS = 18  # along each side of the lattice on which volumes are compared
-_ROUNDS = 400  # of the algorithms for the smallest ball and ellipsoid, at most
+_ROUNDS = 400  # of the algorithm for the smallest ellipsoid, at most
 _TRIED = 40  # faces of a hull that a box is laid along
 _MARGIN = 1e-6  # of the size: room around, so that rounding leaves nothing outside
 
@@ -308,16 +309,6 @@ def _ellipsoid_around(body: _Body, frame: np.ndarray) -> tuple[Field, Similarity
     reach = float(np.linalg.norm((points - centre) @ axes / radii, axis=1).max()) * (1 + _MARGIN)
     x, y, z = (reach * radii).tolist()
     return Ellipsoid((x, y, z)), _placed(axes, centre)
-
-
-def smallest_ball(points: np.ndarray, rounds: int = _ROUNDS) -> tuple[np.ndarray, float]:
-    """Centre and radius of the smallest ball around points (N, d), to about a hundredth, by steps towards the
-    farthest one (Badoiu and Clarkson, 2003); it contains them all."""
-    centre: np.ndarray = points.mean(axis=0)
-    for turn in range(1, rounds):
-        far = points[((points - centre) ** 2).sum(axis=1).argmax()]
-        centre = centre + (far - centre) / (turn + 1)
-    return centre, float(np.sqrt(((points - centre) ** 2).sum(axis=1).max()))
 
 
 def _largest(kind: type[Field], body: _Body, frame: np.ndarray) -> tuple[Field, Similarity]:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.ball_filling import Balls, Place, filling_balls
-from partwright.approximation.convex_fit import smallest_ball
+from partwright.approximation.smallest_ball import smallest_ball
 from partwright.robots.enclosing import halves
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ _BEGINNINGS: tuple[tuple[Place, float], ...] = (
     ("anywhere", 30.0),
 )
 _SHRUNK = 40  # times that points are shared out by depth
-_STEPS = 50  # towards the farthest point, to find a ball's centre
 _LEAST = 1e-3  # by less of all radii it is not worth to go on
 _FINE = 4e-3  # of the size: edges of pieces that are cut no further
 _MOST = 400_000  # pieces that are cut further
@@ -89,7 +88,7 @@ def _around(points: np.ndarray, owner: np.ndarray, balls: Balls) -> Balls:
     owners, first = np.unique(owner[order], return_index=True)
     found = []
     for i, own in zip(owners, np.split(points[order], first[1:]), strict=True):
-        centre, radius = smallest_ball(own, _STEPS)
+        centre, radius = smallest_ball(own)
         here = float(np.linalg.norm(own - balls[i, :3], axis=1).max())
         found.append([*centre, radius] if radius < here else [*balls[i, :3], here])
     return np.array(found)

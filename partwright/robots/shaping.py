@@ -203,16 +203,25 @@ def _fit_for_natives(pieces: list[Piece], wishes: Wishes) -> list[Piece]:
     def error(entry: tuple[Piece, ConvexFit]) -> float:
         return entry[1].volume_error_ratio * entry[0].hull.volume()
 
+    def cut(entry: tuple[Piece, ConvexFit]) -> list[tuple[Piece, ConvexFit]]:
+        ways = [list(map(fitted, parts)) for parts in halved(entry[0])]
+        return min(ways, key=lambda parts: sum(map(error, parts)), default=[])
+
+    def pays(worst: tuple[Piece, ConvexFit], parts: list[tuple[Piece, ConvexFit]]) -> bool:
+        return error(worst) - sum(map(error, parts)) > least * (len(parts) - 1)
+
     done: list[Piece] = []
     waiting = [fitted(piece) for piece in pieces]
     while waiting and len(done) + len(waiting) < wishes.most:
         worst = waiting.pop(max(range(len(waiting)), key=lambda i: error(waiting[i])))
-        ways = [list(map(fitted, parts)) for parts in halved(worst[0])]
-        best = min(ways, key=lambda parts: sum(map(error, parts)), default=[])
-        near = worst[1].deviation <= wishes.tolerance
-        saved = error(worst) - sum(map(error, best))
-        if near or not best or saved <= least * (len(best) - 1):
-            done.append(worst[0])
+        parts = [] if worst[1].deviation <= wishes.tolerance else cut(worst)
+        ahead = wishes.mode != "within" and parts and not pays(worst, parts)
+        if ahead:  # halves of a ball are no nearer to the cylinders around them than it is; quarters are
+            parts = [part for half in parts for part in cut(half) or [half]]
+            room = wishes.most - len(done) - len(waiting)
+            parts = parts if len(parts) <= room else []
+        if parts and pays(worst, parts):
+            waiting += parts
         else:
-            waiting += best
+            done.append(worst[0])
     return done + [piece for piece, _ in waiting]
