@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 BEHIND = 0.03
 """Of the objective, by which a tree is well behind another."""
+PERFECT = 0.985
+"""R from which on a tree can hardly become better, but plainer."""
 _FEW, _CHEAP = 1, 2.2  # features, and prices of plain ones, of which none is left to save
 _BLANKS = 2
 _PATIENT = 6  # steps after which a tree may be well behind
@@ -36,18 +38,19 @@ def cut_from_blanks(
         return best
     blanks = [blank for blank in silhouettes(search.body, search.frames) if blank.key not in tried]
     gains = search.gains(search.empty, blanks, True) if blanks else np.zeros(0)
-    found, whole, most = best, None, -math.inf
+    found, whole, highest = best, None, -math.inf
+    most = len(best.steps) if best.score > PERFECT else None
     for index in np.argsort(-gains)[:_BLANKS]:
         start = search.extended(search.empty, blanks[index], True)
-        tree = search.grown(start, others, best, patient=_PATIENT)
+        tree = search.grown(start, others, best, patient=_PATIENT, most=most)
         if tree.objective < best.objective - BEHIND:
             continue
         tree = search.ended(tree, others)
         if tree.off > best.off:
             continue  # skins where a cut runs along the blank's own walls, say, which freeform does not mend
         whole = search.mend(best) if whole is None else whole
-        if tree.objective > max(_least(search, tree, whole), most):
-            most = tree.objective
+        if tree.objective > max(_least(search, tree, whole), highest):
+            highest = tree.objective
             rival = search.mend(tree)
             if worth(rival) > _least(search, rival, whole) and _freeform(rival) <= _freeform(whole):
                 found, whole = tree, rival

@@ -25,7 +25,7 @@ from partwright.meshing.manifolds import simplified
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_bases import bases, is_nearly_whole, various
-from partwright.superfrusta.feature_blanks import BEHIND, cut_from_blanks
+from partwright.superfrusta.feature_blanks import BEHIND, PERFECT, cut_from_blanks
 from partwright.superfrusta.feature_bores import bores
 from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_mending import farthest, mended
@@ -47,7 +47,7 @@ _COMPLEX = 20_000  # triangles of a piece that is no feature
 _MOST = 24
 _FOR_MENDING = 10
 _MOST_LOOKED = 150  # pieces whose candidates are made: a part of hundreds is no part that was drawn
-_PERFECT, _PLAIN = 0.985, 6.0  # R, and prices of plain features, with which no other base is tried
+_PLAIN = 6.0  # prices of plain features, with which no other base is tried
 _TIE = 3e-4, 30_000  # of the objective, with so many samples: of what is as good, the plainest is taken
 _LOOKED = 40  # candidates, by what they gain alone
 _SHARE = 0.25  # of what the best candidate gains alone, that another that is tried with its copies gains
@@ -113,17 +113,16 @@ class FeatureSearch:
                 break
             tried.add(own[index].key)
             tree = self.grown(self.extended(empty, own[index], True), others, best)
-            if best is None or tree.objective > best.objective:
-                best = tree
-        if best is not None and best.score < _POOR:
-            built = self._built_up(empty, own, others, gains)
-            if built is not None and built.score >= _POOR and built.objective > best.objective:
-                best = built
+            rivals = [tree]
+            if best is None and tree.score < _POOR:
+                built = self._built_up(empty, own, others, gains)
+                rivals += [built] if built is not None and built.score >= _POOR else []
+            best = max([*([best] if best is not None else []), *rivals], key=lambda one: one.objective)
         return cut_from_blanks(self, self.ended(best, others), others, tried) if best is not None else None
 
     def _is_done(self, tree: FeatureTree) -> bool:
         """Whether hardly anything is left that another base could do better, or more plainly."""
-        return tree.score > _PERFECT and tree.price <= _PLAIN * self.alpha
+        return tree.score > PERFECT and tree.price <= _PLAIN * self.alpha
 
     def ended(self, tree: FeatureTree, others: Sequence[Candidate]) -> FeatureTree:
         """A tree that has grown, recast and mended."""
@@ -158,11 +157,13 @@ class FeatureSearch:
         best: FeatureTree | None,
         only_own: bool = False,
         patient: int = _PATIENT,
+        most: int | None = None,
     ) -> FeatureTree:
-        """Until nothing pays, or it is well behind where the best so far was after as many steps.
+        """Until nothing pays, it has the most steps, or is well behind where the best so far was after as
+        many.
 
         only_own: of what is added, only bodies that are the shape's own."""
-        while len(tree.features) < self.most:
+        while len(tree.features) < self.most and (most is None or len(tree.steps) < most):
             step = self.step(tree, own, only_own)
             if step is None:
                 break

@@ -23,7 +23,8 @@ _FEWEST = 3  # chords of an arc that is not entered along a tangent
 _CLOSED = 9  # chords of a full circle, at least
 _EVEN = 1.4  # times the second longest chord of an arc, that its longest may be
 _COLLINEAR = 1e-6  # unit lengths: how far a corner is off by rounding alone
-_MANY = 2  # times as many corners as are drawn, from which on they may be of arcs
+_MANY = 2  # times as many corners as sides, from which on they may be of arcs
+_SIDES = 24  # of an outline at most that is drawn again for that
 _SAME = 1e-9
 
 
@@ -41,7 +42,7 @@ def fitted_loop(points: np.ndarray, tolerance: float) -> Loop | None:
     # Collinear corners are where the triangles of a wall meet: they would hide that chords are even. So do
     # those that are left of a small arc in many chords where most of them count as collinear.
     plain = _of_lines_and_arcs(points, tolerance / 4, tolerance)
-    if plain is not None and len(points) <= _MANY * len(plain):
+    if plain is not None and len(plain) > min(_SIDES, len(points) / _MANY):
         return plain
     loops = (plain, _of_lines_and_arcs(points, _COLLINEAR, tolerance))
     return min((loop for loop in loops if loop is not None), key=len, default=None)
