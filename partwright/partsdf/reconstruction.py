@@ -35,7 +35,7 @@ from partwright.partsdf.starts import (
     latents_by_part,
 )
 from partwright.partsdf.targets import Target
-from partwright.partsdf.unknowns import FamilyUnknowns, FreeUnknowns, Unknowns
+from partwright.partsdf.unknowns import Unknowns, unknowns_of
 from partwright.shapes import Shape
 
 
@@ -265,9 +265,7 @@ def _optimised(
 ) -> tuple[NeuralShape, bool]:
     """Adam on the latents, and on the poses if they are to move; a cancellation keeps what was found. Also
     whether all iterations were done."""
-    unknowns: Unknowns = FreeUnknowns(start, move_poses)
-    if target.low is not None:
-        unknowns = FamilyUnknowns(start, move_poses, target.count)
+    unknowns = unknowns_of(start, move_poses, target)
     optimiser = torch.optim.Adam(unknowns.groups(settings))
     generator = torch.Generator().manual_seed(seed)
     halves = target.halves()

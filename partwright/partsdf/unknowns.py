@@ -1,9 +1,10 @@
 """What a reconstruction moves: latents and poses as they are, or in the spread that the family has them in.
 
-A surface tells every number. Points tell it as far as noise and what is not seen leave it open, and there a
-surface of free numbers follows the noise. So where points are all that is known, numbers are moved along the
-principal directions of the training shapes' and drawn towards their means: to the most likely shape of the
-family, given the points, if errors of these are Laplacian and the family's numbers normal.
+Of known parts every number moves by itself, as the paper has it. Where parts are unknown, numbers move along
+the principal directions of the training shapes', each in its spread: that takes a quarter of the steps, as
+what varies most moves most. And where points are all that is known, which leave open what noise and what is
+not seen hide, they are drawn towards the family's means: to the most likely shape, given the points, if
+errors of these are Laplacian and the family's numbers normal.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from torch import Tensor
 
 from partwright.partsdf.losses import latent_penalty
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.part_vectors import PartVectors
+from partwright.partsdf.part_vectors import MOST, PartVectors
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
+from partwright.partsdf.targets import Target
 
 # Steps in the family's spread, over those of the numbers themselves.
 _LATENTS_FASTER, _POSES_FASTER = 10.0, 25.0
@@ -70,7 +72,8 @@ class FreeUnknowns:
 class FamilyUnknowns:
     """Along the family's principal directions, each in its spread there; what a start has beside these stays.
 
-    count: of the points that are known, each with an error of its own.
+    count: of the points that are known, each with an error of its own; 0 where a surface is, which leaves
+    nothing open.
     """
 
     def __init__(self, start: NeuralShape, move_poses: bool, count: int) -> None:
@@ -93,8 +96,19 @@ class FamilyUnknowns:
         return self._vectors.poses(self._place) if self._move_poses else self._start.poses
 
     def prior(self, off: float, moved: bool) -> Tensor:
+        if not self._count:
+            return torch.zeros(())
         unlikely = self._form.square().sum()
         if moved:
             unlikely = unlikely + self._place.square().sum()
         # Of sum |d| / off + unlikely / 2, what is minimised is the mean of the first.
         return torch.as_tensor(0.5 * off / self._count) * unlikely
+
+
+def unknowns_of(start: NeuralShape, move_poses: bool, target: Target) -> Unknowns:
+    """The family's, where parts are unknown and there are training shapes enough for all its directions."""
+    model = start.model
+    enough = len(model.shapes) > min(MOST, model.latents.shape[2]) and bool(model.present.any(dim=0).all())
+    if target.part is not None or not enough:
+        return FreeUnknowns(start, move_poses)
+    return FamilyUnknowns(start, move_poses, target.count)

@@ -103,7 +103,7 @@ def test_latents_places_sizes_and_rotations_all_move(model: Model, lamps: Prepar
     )
     points = torch.tensor(known.points @ turn.T)
     target = Target(points, torch.tensor(known.sdf))
-    settings = ReconstructionSettings(iterations=200, points=512, pose_rate=1e-2)
+    settings = ReconstructionSettings(iterations=200, points=512, pose_rate=4e-3)
     found = reconstruct_unknown(model, target, settings)
     start = NeuralShape.trained(model, "lamp0")
     for before, after in ((start.latents, found.latents), *zip(start.poses, found.poses, strict=True)):
