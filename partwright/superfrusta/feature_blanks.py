@@ -21,8 +21,8 @@ BEHIND = 0.03
 PERFECT = 0.985
 """R from which on a tree can hardly become better, but plainer."""
 _FEW, _CHEAP = 1, 2.2  # features, and prices of plain ones, of which none is left to save
-_BLANKS = 2
-_PATIENT = 6  # steps after which a tree may be well behind
+_BLANKS, _PLAIN = 2, 4.0  # and prices of plain ones, with which but one is tried
+_PATIENT = 6  # steps after which a tree may be well behind, and no more than the best has, but for one
 
 
 def cut_from_blanks(
@@ -40,9 +40,10 @@ def cut_from_blanks(
     gains = search.gains(search.empty, blanks, True) if blanks else np.zeros(0)
     found, whole, highest = best, None, -math.inf
     most = len(best.steps) if best.score > PERFECT else None
-    for index in np.argsort(-gains)[:_BLANKS]:
+    patient = min(_PATIENT, len(best.steps) + 1)
+    for index in np.argsort(-gains)[: _BLANKS if best.price > _PLAIN * search.alpha else 1]:
         start = search.extended(search.empty, blanks[index], True)
-        tree = search.grown(start, others, best, patient=_PATIENT, most=most)
+        tree = search.grown(start, others, best, patient=patient, most=most)
         if tree.objective < best.objective - BEHIND:
             continue
         tree = search.ended(tree, others)
