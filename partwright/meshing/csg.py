@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 TOLERANCE = 2.5e-4  # of the longest side
 _NUDGE = 5e-7  # of the longest side
+_SLIT = 1e-4  # of the area, that more than what growing itself changes is no chance
 MOST_PARTS = 10_000  # copies counted: these take a minute, and gigabytes where they are curved
 _STEP = 3  # by which a node's nudge outdoes those within it
 _ROOM = 0.02  # of the longest side, around the bounds
@@ -112,8 +113,9 @@ class _Builder:
 
         Faces that were meant to touch differ by rounding once they are turned, and leave a slit or a skin
         without width between them. It shows: with every solid (but the first of a difference) larger by
-        a share of the box, the result has another topology, and that is the one that was meant. The share
-        outdoes those by which solids within these were made larger, and no others: it shows in the volume.
+        a share of the box, the result has another topology, or where a slit is open to a side, less area, and
+        that is the one that was meant. The share outdoes those by which solids within these were made larger,
+        and no others: it shows in the volume.
         """
         from manifold3d import Manifold, OpType
 
@@ -126,7 +128,10 @@ class _Builder:
         further = _NUDGE * _STEP**within * float(np.ptp(self.box, axis=0).max())
         larger = [self.larger(child, one, further) for child, one in zip(children, solids, strict=True)]
         clear = Manifold.batch_boolean([solids[0], *larger[1:]] if subtract else larger, operation)
-        if _topology(plain) == _topology(clear):
+        pairs = zip(larger, solids, strict=True)
+        own = sum(abs(big.surface_area() - one.surface_area()) for big, one in pairs)
+        slit = abs(plain.surface_area() - clear.surface_area()) > _SLIT * plain.surface_area() + 2 * own
+        if not slit and _topology(plain) == _topology(clear):
             return plain
         self._nudges[id(node)] = within + 1
         return simplified(clear, 4 * further)

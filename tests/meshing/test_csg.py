@@ -196,6 +196,24 @@ def test_what_touches_has_no_slit_nor_skin_however_it_is_turned(name: str) -> No
         assert mesh.is_watertight
 
 
+def test_a_rib_in_a_corner_leaves_no_slit_that_is_open_to_a_side() -> None:
+    """Such a slit changes neither how many bodies there are nor their genus, but it has two walls."""
+    whole = Assembly((
+        Part(Box((6, 4, 1)), (3, 0, 0.5)),
+        Part(Box((1, 4, 4)), (0.5, 0, 3)),
+        Part(Box((2, 1, 2)), (2, 0, 2)),
+    ))  # fmt: skip
+    area = (2 * (6 * 4 + 6 * 1 + 4 * 1)) + 2 * 4 * (4 + 1)  # the base, and the walls of the plate
+    area += 2 * (2 * 2) + 2 * (2 * 1) - 2 * (2 * 1)  # sides and the other walls of the rib, and its feet
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        turn, move = rng.normal(size=4), rng.normal(size=3)
+        pose = Similarity(1.0, tuple(turn / np.linalg.norm(turn)), tuple(move))
+        solid = solid_of(whole.transformed(pose))
+        assert solid.volume() == pytest.approx(24 + 16 + 4, rel=1e-4)
+        assert solid.surface_area() == pytest.approx(area, rel=1e-3)
+
+
 def test_components_are_counted_as_by_taking_the_solid_apart() -> None:
     from manifold3d import Manifold, OpType
 
