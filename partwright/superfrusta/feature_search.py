@@ -25,7 +25,7 @@ from partwright.meshing.manifolds import simplified
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_bases import bases, is_nearly_whole, various
-from partwright.superfrusta.feature_blanks import BEHIND, PERFECT, cut_from_blanks
+from partwright.superfrusta.feature_blanks import BEHIND, PERFECT, cut_from_blanks, worth
 from partwright.superfrusta.feature_bores import bores
 from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_mending import farthest, mended
@@ -103,22 +103,29 @@ class FeatureSearch:
         empty = self.empty
         gains = self.gains(empty, own, True)
         order = bases(own, gains)
-        best: FeatureTree | None = None
+        grown: list[FeatureTree] = []
         tried: set[tuple[float, ...]] = set()
         others = [candidate for candidate in own if not (candidate.cuts or candidate.usual)]
         for index in order:
+            best = max(grown, key=lambda tree: tree.objective, default=None)
             if best is not None and gains[index] < _RIVAL * gains[order[0]]:
                 break
             if best is not None and self._is_done(best) and not is_nearly_whole(own[index]):
                 break
             tried.add(own[index].key)
-            tree = self.grown(self.extended(empty, own[index], True), others, best)
-            rivals = [tree]
-            if best is None and tree.score < _POOR:
+            grown.append(self.grown(self.extended(empty, own[index], True), others, best))
+            if best is None and grown[0].score < _POOR:
                 built = self._built_up(empty, own, others, gains)
-                rivals += [built] if built is not None and built.score >= _POOR else []
-            best = max([*([best] if best is not None else []), *rivals], key=lambda one: one.objective)
-        return cut_from_blanks(self, self.ended(best, others), others, tried) if best is not None else None
+                grown += [built] if built is not None and built.score >= _POOR else []
+        return cut_from_blanks(self, self._nearest(grown, others), others, tried) if grown else None
+
+    def _nearest(self, grown: Sequence[FeatureTree], others: Sequence[Candidate]) -> FeatureTree:
+        """The best of trees, ended; where that is far off, the second where it is worth more."""
+        first, *rest = sorted(grown, key=lambda tree: -tree.objective)[:2]
+        best = self.ended(first, others)
+        if not best.off or not rest or rest[0].objective < best.objective - best.off:
+            return best
+        return max(best, self.ended(rest[0], others), key=worth)
 
     def _is_done(self, tree: FeatureTree) -> bool:
         """Whether hardly anything is left that another base could do better, or more plainly."""

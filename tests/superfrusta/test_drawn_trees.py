@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 import trimesh
@@ -195,3 +196,15 @@ def test_a_slot_in_a_bent_plate_is_a_slot() -> None:
     tree, _ = found(Assembly((Part(bent, (0, 0, 0), upright), cut), "difference"))
     assert [added for added, _, _ in kinds(tree)] == [True, False]
     assert tree.score > 0.99
+
+
+def test_of_trees_the_one_that_is_near_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Though another explains a little more: it is far off where nothing mends it."""
+    shape = pw.load_shape(trimesh.creation.box((1, 1, 1)))
+    settings = Settings.for_quality("draft")
+    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+    far, near = FeatureTree(score=0.99), FeatureTree(score=0.98)
+    monkeypatch.setattr(search, "ended", lambda tree, _: replace(tree, off=0.2 if tree is far else 0.0))
+    assert search._nearest([near, far], ()) == near
+    monkeypatch.setattr(search, "ended", lambda tree, _: tree)
+    assert search._nearest([near, far], ()) is far
