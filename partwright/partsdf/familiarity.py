@@ -13,8 +13,8 @@ from partwright.partsdf.targets import Target
 
 # Measured by benchmarks/partsdf_familiarity.py: shapes of a family that were held out come to 0.08 at most,
 # those of other families to 0.24 at least; real toys to 0.18, and since latents move as the family varies,
-# cars and vehicles by the model of chairs to no more than they, so that these are not told. Odd latents alone say little, as many latents mean the same form:
-# they count at most half again.
+# cars and vehicles by the model of chairs to no more than they, so that these are not told. Odd latents alone
+# say little, as many latents mean the same form: they count at most half again.
 STRANGE, _MOST_ODD = 0.2, 1.5
 # Of points, which do not tell inside from outside, errors are far smaller: a new car, chair and mixer came
 # to 0.007 at most from 2,048 and from 30,000 points; with noise of 1 % of the diagonal, by halves, or by
