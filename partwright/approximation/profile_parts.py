@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from partwright.assembly import Part, Similarity
+from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Frustum, Revolution, Sphere, Tube
 from partwright.fields.profile import Loop, Profile, circle_of
 from partwright.fields.rims import Rim
@@ -56,6 +57,14 @@ def extruded_part(
     )
     field = Extrusion(profile.moved((-x, -y)), height, taper, **own)
     return _placed(field, frame, frame @ (x, y, middle))
+
+
+def with_profile(part: Part, profile: Profile) -> Part:
+    """What an extrusion without taper and rims is with another profile, in its frame: no copies, no name."""
+    assert isinstance(part.field, Extrusion)
+    frame, half = rotation_matrix(part.rotation), part.field.height / 2
+    x, y, z = (frame.T @ np.array(part.translation)).tolist()
+    return extruded_part(profile.moved((x, y)), frame, z - half, z + half)
 
 
 def _rectangle(loop: Loop) -> tuple[tuple[float, float], np.ndarray, tuple[float, float]] | None:

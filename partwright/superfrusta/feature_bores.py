@@ -21,15 +21,26 @@ from partwright.superfrusta.feature_steps import Step
 _CHORD = 1e-3  # unit lengths: how far chords of a hole may be off
 
 
-def bores(steps: Sequence[Step]) -> list[Candidate]:
-    """One for each hole of parts that were added, where another was added later."""
-    last = max((k for k, step in enumerate(steps) if step.added), default=0)
-    return [
-        Candidate(hole, partial(_solid, hole), _sides(hole), float(solid_of(hole, _CHORD).volume()))
-        for step in steps[:last]
-        if step.added
-        for hole in _holes(step.chosen.part)
-    ]
+class Bores:
+    """Made of each candidate of one search once."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[Candidate, list[Candidate]]] = {}
+
+    def of(self, steps: Sequence[Step]) -> list[Candidate]:
+        """One for each hole of parts that were added, where another was added later."""
+        last = max((k for k, step in enumerate(steps) if step.added), default=0)
+        return [bore for step in steps[:last] if step.added for bore in self._in(step.chosen)]
+
+    def _in(self, chosen: Candidate) -> list[Candidate]:
+        key = id(chosen)
+        if key not in self._known:
+            self._known[key] = chosen, [_bore(hole) for hole in _holes(chosen.part)]
+        return self._known[key][1]
+
+
+def _bore(hole: Part) -> Candidate:
+    return Candidate(hole, partial(_solid, hole), _sides(hole), float(solid_of(hole, _CHORD).volume()))
 
 
 def _holes(part: Part) -> Iterator[Part]:

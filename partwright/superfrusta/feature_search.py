@@ -26,7 +26,7 @@ from partwright.methods import Checkpoint
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_bases import bases, is_nearly_whole, various
 from partwright.superfrusta.feature_blanks import BEHIND, PERFECT, cut_from_blanks, worth
-from partwright.superfrusta.feature_bores import bores
+from partwright.superfrusta.feature_bores import Bores
 from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_mending import farthest, mended
 from partwright.superfrusta.feature_own_bodies import OwnBodies
@@ -92,6 +92,7 @@ class FeatureSearch:
         self._masks: dict[int, tuple[Candidate, NDArray[np.float32]]] = {}
         self._of_piece: dict[tuple[float, ...], list[Candidate]] = {}
         self._own_bodies = OwnBodies(self)
+        self._bores = Bores()
 
     def run(self) -> FeatureTree | None:
         """The best tree; None where the surface encloses nothing to take sections of."""
@@ -214,7 +215,7 @@ class FeatureSearch:
         adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
         if only_own:
             adding = [c for c in adding if c in self._own_bodies]
-        cutting = [*bores(tree.steps), *(c for piece in excess for c in self.candidates_of(piece))]
+        cutting = [*self._bores.of(tree.steps), *(c for piece in excess for c in self.candidates_of(piece))]
         if banned is not None:
             adding, cutting = ([c for c in pool if c.key != banned] for pool in (adding, cutting))
         rivals: list[tuple[float, Candidate, bool]] = []

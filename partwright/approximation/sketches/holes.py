@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from partwright.approximation.profile_parts import extruded_part
+from partwright.approximation.profile_parts import with_profile
 from partwright.assembly import Part, Similarity
 from partwright.assembly.checks import Quaternion
 from partwright.assembly.similarity import rotation_matrix
@@ -41,20 +41,14 @@ def holes_apart(part: Part) -> tuple[Part, tuple[Part, ...]]:
     apart = [group for group in groups if len(group) > 1 or circle_of(group[0]) is not None]
     if not apart:
         return part, ()
-    frame, height = rotation_matrix(part.rotation), field.height
-    middle = frame.T @ np.array(part.translation)
+    frame = rotation_matrix(part.rotation)
     kept = tuple(loop for group in groups if group not in apart for loop in group)
-
-    def extruded(profile: Profile) -> Part:
-        low, high = middle[2] - height / 2, middle[2] + height / 2
-        return extruded_part(profile.moved(middle[:2]), frame, low, high)
-
-    body = extruded(Profile(field.profile.outline, kept))
+    body = with_profile(part, Profile(field.profile.outline, kept))
     holes = []
     for first, *others in apart:
         own = [_shift(frame, _middle(other) - _middle(first)) for other in others]
         moves = [*own, *(move @ inner for move in part.instances for inner in (Similarity(), *own))]
-        holes.append(dataclasses.replace(extruded(Profile(first)), instances=tuple(moves)))
+        holes.append(dataclasses.replace(with_profile(part, Profile(first)), instances=tuple(moves)))
     return dataclasses.replace(body, instances=part.instances, name=part.name), tuple(holes)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from partwright.approximation.profile_parts import extruded_part
+from partwright.approximation.profile_parts import with_profile
 from partwright.approximation.sketches.holes import is_empty
 from partwright.approximation.sketches.open_turns import (
     beside,
@@ -94,12 +94,7 @@ def _without_islands(part: Part, distance: Callable[[np.ndarray], np.ndarray]) -
     profile = Profile(field.profile.outline, kept)
     if field.has_rims:
         return dataclasses.replace(part, field=dataclasses.replace(field, profile=profile))
-    frame, half = rotation_matrix(part.rotation), field.height / 2
-    x, y, z = (frame.T @ np.array(part.translation)).tolist()
-    plain = extruded_part(profile.moved((x, y)), frame, z - half, z + half)
-    return dataclasses.replace(
-        part, field=plain.field, translation=plain.translation, rotation=plain.rotation
-    )
+    return dataclasses.replace(with_profile(part, profile), instances=part.instances, name=part.name)
 
 
 def centred(part: Part) -> Part:
