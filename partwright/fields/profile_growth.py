@@ -11,6 +11,7 @@ from partwright.errors import ParameterError
 from partwright.fields.profile import Corner, Loop, Profile, Side, loop_area
 from partwright.fields.profile_offset import Point, kept_bulge, parallels_cross, turn_between
 
+_NEARLY_STRAIGHT = 0.4  # radians: where the corner of a line that moves and one that does not may stay
 _NEARLY_SMOOTH = 0.02  # radians: where sides run into one another, their corner moves along their normal
 
 
@@ -27,22 +28,32 @@ def grown_profile(profile: Profile, by: float, still: Collection[int] = ()) -> P
     return with_moved_sides(profile, [0.0 if i in still else by for i in range(count)])
 
 
-def with_moved_sides(profile: Profile, by: Sequence[float]) -> Profile:
-    """`grown_profile` with a length for each side, counted over all loops."""
+def with_moved_sides(profile: Profile, by: Sequence[float], tilted: bool = False) -> Profile:
+    """`grown_profile` with a length for each side, counted over all loops.
+
+    tilted: a line that moves keeps its corner with one that does not and goes on in nearly its direction,
+    where their parallels would meet far away."""
     outwards = iter(by)
-    loops = [_grown_loop(sides, [-next(outwards) for _ in sides]) for sides in profile.sides]
+    loops = [_grown_loop(sides, [-next(outwards) for _ in sides], tilted) for sides in profile.sides]
     result = Profile(loops[0], tuple(loops[1:]))
     if any(loop_area(a) * loop_area(b) <= 0 for a, b in zip(loops, profile.loops, strict=True)):
         raise ParameterError(f"profile: nothing is left of a loop {-min(by):.6g} further inside")
     return result
 
 
-def _grown_loop(sides: tuple[Side, ...], depths: list[float]) -> Loop:
+def _grown_loop(sides: tuple[Side, ...], depths: list[float], tilted: bool) -> Loop:
     count = len(sides)
+
+    def stays(i: int) -> bool:
+        pair = sides[i - 1], sides[i]
+        if not (depths[i - 1] and depths[i]):
+            straight = all(side.centre is None for side in pair)
+            either = depths[i - 1] or depths[i]
+            return not either or (tilted and straight and abs(turn_between(*pair)) < _NEARLY_STRAIGHT)
+        return False
+
     starts = [
-        _corner(sides[i - 1], sides[i], depths[i - 1], depths[i])
-        if depths[i - 1] or depths[i]
-        else sides[i].start
+        sides[i].start if stays(i) else _corner(sides[i - 1], sides[i], depths[i - 1], depths[i])
         for i in range(count)
     ]
     corners: list[Corner] = []

@@ -70,6 +70,20 @@ def test_an_arc_of_a_cut_moves_out_where_it_lies_in_the_air() -> None:
     assert with_open_sides(flat, walled.distance) == flat
 
 
+def test_an_open_side_beside_a_wall_that_goes_on_in_its_direction_moves_out_at_its_other_end() -> None:
+    """Between the teeth of a helical gear: parallels of the two would meet beyond the wall's end."""
+    outline = [(0.0, -0.4), (0.5, -0.4, 0.1), (0.5, -0.2), (0.5, 0.2), (0.52, 0.4), (0.0, 0.4)]
+    cut = Part(Extrusion(Profile(outline), 0.2))
+    plate, wall = Part(Box((1.0, 1.0, 0.2))), Part(Box((0.3, 0.4, 0.2)), (0.65, 0.4, 0.0))
+    left = Assembly((Assembly((plate, cut), "difference"), wall))
+    wider = with_open_sides(cut, left.distance)
+    assert wider.bounds()[1][0] == pytest.approx(0.51 + BEYOND)
+    points = np.random.default_rng(0).uniform((-0.1, -0.5, -0.1), (0.6, 0.5, 0.1), (20000, 3))
+    more = points[(wider.distance(points) < 0) & (cut.distance(points) >= 0)]
+    assert len(more) > 100
+    assert left.distance(more).min() > -1e-3
+
+
 def test_round_sides_of_a_turned_cut_move_out_where_they_lie_in_the_air() -> None:
     ball = Part(Sphere(0.5))
     rim = math.sqrt(0.25 - 0.04)  # where the ball is as high as the cut begins

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 
@@ -59,9 +60,9 @@ def with_grown_sides(
     by = [reach(side) for loop in field.profile.sides for side in loop]
     if not any(by):
         return part
-    for share in _SHARES:
+    for share, tilted in product(_SHARES, (False, True)):
         try:
-            profile = with_moved_sides(field.profile, [share * each for each in by])
+            profile = with_moved_sides(field.profile, [share * each for each in by], tilted)
             grown = dataclasses.replace(field, profile=profile)
         except ParameterError:  # its sides would cross, or its rims have no room
             continue
