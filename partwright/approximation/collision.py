@@ -220,7 +220,7 @@ def _compared(piece: Piece, chain: list[Geometry], to: str) -> Change:
     surface = union.refine_to_length(0.05).to_mesh()
     places, faces = surface.vert_properties[:, :3].astype(np.float64), surface.tri_verts.astype(np.int64)
     there = np.abs(piece.node.distance(places * side + middle)).max()
-    back = MeshDistance(places, faces, faces, True).unsigned(own.to_mesh().vert_properties[:, :3]).max()
+    back = MeshDistance(places, faces, faces, True).exact(own.to_mesh().vert_properties[:, :3]).max()
     deviation = max(float(there), float(back) * side)
     return Change(piece.part_names, to, apart / own.volume(), deviation)
 

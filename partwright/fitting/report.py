@@ -145,8 +145,8 @@ def point_deviations(shape: Shape, surface: trimesh.Trimesh) -> PointDeviations:
     """
     assert shape.points is not None
     faces = np.asarray(surface.faces, dtype=np.int64)
-    exact = MeshDistance(np.asarray(surface.vertices, dtype=np.float64), faces, faces, closed=False)
-    off = exact.nearest(shape.points)[1].astype(np.float64)
+    surface_distance = MeshDistance(np.asarray(surface.vertices), faces, faces, closed=False)
+    off = surface_distance.exact(shape.points)
     numbers = (float(off.mean()), float(np.quantile(off, 0.95)), float(off.max()))
     return PointDeviations(len(off), *numbers, *(number / _side(shape) for number in numbers))
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 COUNT = 30_000
 _STEP = 5e-4  # unit lengths: half of what a field's slope is measured over
 _STEPS = 3
-_NEARLY_ALL = 0.98
+_FIRST = 0.02  # of all points: so many are measured at the field first
 _ON = 1e-4  # a point whose distance is less lies on the surface
 _APART = 0.005  # unit lengths: surfaces that are nearer need no second look
 _BESIDE = 0.01  # unit lengths from a face at which open space is looked for
@@ -88,22 +88,44 @@ def surface_deviation(
     if len(corners) > COUNT:
         corners = corners[:: -(-len(corners) // COUNT)]
     on_shape = np.concatenate([target, corners])
-    to_result = MeshDistance(vertices, np.asarray(faces), np.asarray(faces), True).unsigned(on_shape)
+    to_result = MeshDistance(vertices, np.asarray(faces), np.asarray(faces), True).exact(on_shape)
     apart = np.flatnonzero(to_result > _APART)
     shown = np.delete(np.arange(len(on_shape)), apart[buried(shape.unit_distance, on_shape[apart])])
     on_shape, to_result = on_shape[shown], to_result[shown]
-    far = to_result >= np.quantile(to_result, _NEARLY_ALL)
-    feet, on_it = projected(distance, on_shape[far])
-    there = np.linalg.norm(feet - on_shape[far], axis=1)
-    to_result[far] = np.where(on_it, np.minimum(there, to_result[far]), to_result[far])
+
+    def to_field(some: np.ndarray) -> np.ndarray:
+        feet, on_it = projected(distance, on_shape[some])
+        there = np.linalg.norm(feet - on_shape[some], axis=1)
+        return np.where(on_it, np.minimum(there, to_result[some]), to_result[some])
+
+    to_result = _furthest_again(to_result, to_field)
     to_shape = shape.unit_unsigned(result)
     apart = np.flatnonzero(to_shape > _APART)
     shown = np.delete(np.arange(len(result)), apart[buried(distance, result[apart])])
     result, to_shape = result[shown], to_shape[shown]
-    far = to_shape >= np.quantile(to_shape, _NEARLY_ALL)
-    result[far], _ = projected(distance, result[far])
-    to_shape[far] = shape.unit_unsigned(result[far])
+
+    def of_field(some: np.ndarray) -> np.ndarray:
+        result[some], _ = projected(distance, result[some])
+        return shape.unit_unsigned(result[some])
+
+    to_shape = _furthest_again(to_shape, of_field)
     return deviation(result, to_shape, on_shape, to_result, protrusion(shape.unit_distance, result, to_shape))
+
+
+def _furthest_again(distances: np.ndarray, measured: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Distances (N,), the largest measured again until none that is left is larger than all of these.
+
+    measured: distances (n,) of the points with these indices (n,).
+    """
+    again = distances.copy()
+    order = np.argsort(-distances, kind="stable")
+    largest, start, count = 0.0, 0, max(1, round(_FIRST * len(order)))
+    while start < len(order) and distances[order[start]] > largest:
+        some = order[start : start + count]
+        again[some] = measured(some)
+        largest = max(largest, float(again[some].max()))
+        start, count = start + count, 2 * count
+    return again
 
 
 def buried(distance: Callable[[np.ndarray], np.ndarray], points: np.ndarray) -> np.ndarray:

@@ -157,13 +157,13 @@ class Shape:
         """
         return self.unit_nearest(points)[0]
 
-    def unit_unsigned(self, points: ArrayLike) -> NDArray[np.float32]:
+    def unit_unsigned(self, points: ArrayLike) -> NDArray[np.float64]:
         """Distance (N,) to the surface at points (N, 3), both in the unit frame: `unit_distance` without the
-        sign, for less.
+        sign, in double precision.
 
         Raises as `unit_distance` does.
         """
-        return self._source.unsigned(_checked(points))
+        return self._source.exact(_checked(points))
 
     def unit_nearest(self, points: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Signed distance (N,) at points (N, 3), unit frame, and the row (N,) of `faces` that is nearest.

@@ -84,7 +84,10 @@ def check(assembly: Assembly, shape: Shape, bounds: DistanceBounds, seed: int = 
     surface = mesh_assembly(assembly)
     if bounds.inside is not None:
         points = assembly_points(assembly, surface, _COUNT, seeds[1])
-        found["inside"] = _side(shape.unit_distance(points), points)
+        depth = shape.unit_distance(points).astype(np.float64)
+        beyond = depth > 0
+        depth[beyond] = shape.unit_unsigned(points[beyond])
+        found["inside"] = _side(depth, points)
     if bounds.tolerance is not None:
         vertices, faces = np.asarray(surface.vertices), np.asarray(surface.faces)
         on_mesh = sample_triangles(vertices, faces, COUNT, seeds[2])[0]
@@ -114,6 +117,6 @@ def assembly_points(
     return projected(assembly.distance, points)[0].astype(np.float32)
 
 
-def _side(distance: NDArray[np.float32], points: NDArray[np.float32]) -> Side:
+def _side(distance: NDArray[np.floating], points: NDArray[np.float32]) -> Side:
     worst = int(distance.argmax())
     return Side(float(distance[worst]), points[worst].astype(np.float64))
