@@ -50,12 +50,17 @@ class Deviations:
     @property
     def norm(self) -> float:
         """One length for all parts."""
-        return float((self.by_part**_POWER).sum() ** (1 / _POWER))
+        return norm(self.by_part)
 
     def worst(self, part: int) -> int:
         """The point at which a part is furthest off."""
         mine = np.flatnonzero(self.part == part)
         return int(mine[self.off[mine].argmax()])
+
+
+def norm(off: NDArray[np.float64]) -> float:
+    """One length for how far off several parts are: near the largest."""
+    return float((off**_POWER).sum() ** (1 / _POWER))
 
 
 def deviations(samples: FitSamples, rows: Rows) -> Deviations:

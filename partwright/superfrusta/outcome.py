@@ -63,7 +63,7 @@ def assembly_of(
         names = [*fixed, *(f"{_STEM[bool(added[i])]}_{i + 1:02d}" for i in range(len(fixed), len(rows)))]
     else:
         sides = shape.frame.length_to_unit(np.ptp(shape.vertices, axis=0))
-        names = part_names(rows, sides, shape.up, fixed)
+        names = part_names(rows, sides, shape.up, fixed, moves)
     parts = parts_from_rows(rows[:, :UNSIGNED], names)
     if settings.family == "solid":
         parts = tuple(

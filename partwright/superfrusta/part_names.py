@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from partwright.assembly import Similarity
 from partwright.assembly.names import unique_names
 from partwright.fields.columns import Column
 from partwright.metrics.deviation import place_name
@@ -21,16 +22,34 @@ _BENT = 0.3  # of half a turn
 _BALL = 0.55  # of the half-sides is dilation
 
 
-def part_names(rows: Rows, sides: np.ndarray, up: str | None, fixed: Sequence[str] = ()) -> list[str]:
+def part_names(
+    rows: Rows,
+    sides: np.ndarray,
+    up: str | None,
+    fixed: Sequence[str] = (),
+    moves: Sequence[tuple[Similarity, ...]] = (),
+) -> list[str]:
     """Names of rows (M, 17) in the unit frame, of which the first have the fixed ones; none twice.
 
-    sides: (3,) of the shape's bounding box, unit lengths. up: its up axis, z if None.
+    sides: (3,) of the shape's bounding box, unit lengths. up: its up axis, z if None. moves: those of each
+    part's further copies, if any.
     """
     wanted = []
-    for row in rows[len(fixed) :]:
-        place = place_name(_middle(row), sides, up).replace(" ", "_")
-        wanted.append(f"{form(row)}_{place}")
+    for i in range(len(fixed), len(rows)):
+        copies = moves[i] if moves else ()
+        middle = _middle(rows[i])[None]
+        places = [
+            place_name(place, sides, up) for place in [middle[0], *(move(middle)[0] for move in copies)]
+        ]
+        wanted.append(f"{form(rows[i])}_{_shared(places).replace(' ', '_')}")
     return unique_names([*fixed, *wanted], ["part"] * len(rows))
+
+
+def _shared(places: Sequence[str]) -> str:
+    """What the places of a part's copies have in common, in words."""
+    others = [set(place.split()) for place in places[1:]]
+    shared = " ".join(word for word in places[0].split() if all(word in other for other in others))
+    return shared or ("both sides" if len(places) == 2 else "all around")
 
 
 def form(row: np.ndarray) -> str:

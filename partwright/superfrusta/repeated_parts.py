@@ -2,37 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from partwright.fields.columns import Column
-from partwright.superfrusta.deviations import deviations
+from partwright.superfrusta.deviations import deviations, norm
 from partwright.superfrusta.objective import score
+from partwright.superfrusta.repeat_candidates import Repeat, repeat_candidates
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, image, refit
-from partwright.superfrusta.symmetry import Isometry, Symmetry, groups
+from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, refit
+from partwright.superfrusta.symmetry import Symmetry, groups
 
-_EVERY = 6  # samples that matching looks at
-_SELF = 0.5  # IoU from which a part and its image are the same place
-_COVERED = 0.6  # share of a part within the images of another from which they replace it
-_TRIED = 24  # repeats that are scored
-_UNREFITTED_SCORE_LOSS = 0.01  # of R: a repeat that costs more before a refit is not tried
+_PRICE = 0.5  # of a part's: at the whole price repeats that save a part buy it with much of the surface
+_TRIED = 64  # repeats at most
+_GIVEN_UP = 3  # of those that are chosen, at most
+_UNREFITTED_SCORE_LOSS = 0.01  # of R: what a repeat may cost before a refit beyond the parts that it saves
+_UNREFITTED_OFF = 0.03  # unit lengths: so much more than before a part may be off before a refit
 _GRID_EVERY = 3
-_TOLERANCE = np.array([2e-3, 1e-3, 4e-3])  # of R, IoU and deviations, that all repeats together may cost
-_REFIT = ((100.0, 6),)
+_FURTHER = 0.009  # unit lengths, half a hundredth of the longest side: likewise, after it
+_REFITS = (((100.0, 6),), ((40.0, 4), (100.0, 8), (200.0, 8)))
 
 
 @dataclass(frozen=True)
-class Repeat:
-    """Part `base` with its images in place of the parts `replaced`."""
+class _Trial:
+    """An assembly as leaves, the `value` that mending serves with a price for each leaf, and the most that a
+    part is off, unit lengths."""
 
-    base: int
-    isometries: tuple[Isometry, ...]
-    replaced: frozenset[int]
+    leaves: list[RepeatedPart]
+    value: float
+    iou: float
+    off: float
 
 
 def repeat(
@@ -40,90 +41,90 @@ def repeat(
 ) -> list[RepeatedPart]:
     """The assembly as leaves, of which those that repeat under the symmetries are one each.
 
-    Repeats that replace the most parts come first. Together they cost at most 2e-3 of R, 1e-3 of IoU and
-    4e-3 unit lengths of the deviations: where they cost more, the copies of each leaf are refitted as one,
-    and if that is not enough the costliest repeats are given up. An IoU that the settings ask for is kept.
-    The first `locked` rows stay leaves of their own.
+    Repeats are taken that are worth the most: the parts that they save, less what they cost of R. The copies
+    of each leaf are refitted as one. Together they may not lower the objective, nor leave a part further off
+    than any was, by over half a percent of the longest side; where they do, they are given up one by one. An
+    IoU that the settings ask for is kept. The first `locked` rows stay leaves of their own.
     """
-    reached = _measures(samples, rows)
-    least = reached - _TOLERANCE
-    if settings.min_iou is not None:
-        least[1] = max(least[1], min(reached[1], settings.min_iou))
+    whole = _measured(samples, _leaves(rows, []), settings)
 
-    def good(leaves: list[RepeatedPart]) -> bool:
-        return bool((_measures(samples, expanded(leaves)) >= least).all())
+    def good(trial: _Trial) -> bool:
+        reached = settings.min_iou is None or trial.iou >= min(whole.iou, settings.min_iou)
+        return reached and trial.off <= whole.off + _FURTHER and trial.value >= whole.value
 
-    wanted = candidates(samples, rows, groups(found), locked)
-    chosen = _chosen(samples, rows, wanted)
-    leaves = _leaves(rows, chosen)
-    if good(leaves):
-        return leaves
-    leaves = refit(samples, leaves, _REFIT, settings, locked)
-    if good(leaves):
-        return leaves
-    kept: list[Repeat] = []
-    for one in chosen:
-        if good(_leaves(rows, [*kept, one])):
-            kept.append(one)
-    return _leaves(rows, kept)
+    best = whole
+    for chosen in _choices(samples, whole, repeat_candidates(samples, rows, groups(found), locked), settings):
+        for _ in range(_GIVEN_UP + 1):
+            plain = _leaves(rows, chosen)
+            refits = [refit(samples, plain, stages, settings, locked) for stages in _REFITS]
+            trials = [_measured(samples, leaves, settings) for leaves in (plain, *refits)]
+            better = [trial for trial in trials if good(trial)]
+            best = max([best, *better], key=lambda trial: trial.value)
+            if best is not whole or len(chosen) == 1:
+                break
+            chosen = _without_the_worst(samples, rows, chosen, settings)
+    return best.leaves
 
 
-def _measures(samples: FitSamples, rows: Rows) -> NDArray[np.float64]:
-    """R, IoU on the grid (a refit leans towards the samples that it saw), and the deviations, negative."""
+def _without_the_worst(
+    samples: FitSamples, rows: Rows, chosen: Sequence[Repeat], settings: Settings
+) -> list[Repeat]:
+    rest = [[other for other in chosen if other is not one] for one in chosen]
+    return max(rest, key=lambda some: _measured(samples, _leaves(rows, some), settings).value)
+
+
+def _measured(samples: FitSamples, leaves: list[RepeatedPart], settings: Settings) -> _Trial:
+    """IoU is that on the grid: a refit leans towards the samples that it saw. Of copies the one that is
+    furthest off counts."""
+    rows = expanded(leaves)
     occupied = samples.distance_of(rows, samples.grid_points[::_GRID_EVERY]) < 0
     inside = samples.grid.values.ravel()[::_GRID_EVERY] < 0
     both, either = np.count_nonzero(occupied & inside), np.count_nonzero(occupied | inside)
-    return np.array([score(samples, rows), both / np.maximum(either, 1), -deviations(samples, rows).norm])
+    firsts = np.cumsum([0, *(1 + len(leaf.isometries) for leaf in leaves[:-1])])
+    off = np.maximum.reduceat(deviations(samples, rows).by_part, firsts)
+    value = score(samples, rows) - _PRICE * settings.alpha * len(leaves) - settings.firmness * norm(off)
+    return _Trial(leaves, value, float(both / np.maximum(either, 1)), float(off.max()))
 
 
-def candidates(
-    samples: FitSamples, rows: Rows, found: Sequence[tuple[Isometry, ...]], locked: int
-) -> list[Repeat]:
-    """Repeats that would replace parts, those that replace the most first."""
-    points = samples.points[::_EVERY]
-    parts = samples.parts_of(rows, points) < 0
-    sizes = np.maximum(parts.sum(axis=1), 1)
-    result = []
-    for group in found:
-        for base in range(locked, len(rows)):
-            images = samples.parts_of(np.stack([image(rows[base], g) for g in group]), points) < 0
-            distinct = _distinct(parts[base], images)
-            covered = images[distinct].any(axis=0) if distinct else np.zeros(len(points), bool)
-            share = (parts & covered).sum(axis=1) / sizes
-            share[:locked] = share[base] = 0
-            share[rows[:, Column.SIGN] != rows[base, Column.SIGN]] = 0
-            replaced = frozenset(np.flatnonzero(share > _COVERED).tolist())
-            if replaced:
-                result.append(Repeat(base, tuple(group[i] for i in distinct), replaced))
-    return sorted(result, key=lambda r: (-len(r.replaced), len(r.isometries)))
+def _choices(
+    samples: FitSamples, whole: _Trial, wanted: list[Repeat], settings: Settings
+) -> Iterator[list[Repeat]]:
+    """Repeats that get along, in several ways, none twice.
 
+    Those are taken first that save the most parts, or the most for what they cost of R before a refit; all of
+    them, or those that leave no part far off before one: a refit may bring it back, but need not.
+    """
+    rows = expanded(whole.leaves)
+    wanted = sorted(wanted, key=lambda one: -len(one.replaced))[:_TRIED]
+    scores = [score(samples, expanded(_leaves(rows, [one]))) for one in wanted]
+    costs = score(samples, rows) - np.array(scores)
+    saved = np.array([len(one.replaced) for one in wanted])
+    likely = costs - _PRICE * settings.alpha * saved <= _UNREFITTED_SCORE_LOSS
+    offs: dict[int, float] = {}
 
-def _distinct(base: NDArray[np.bool_], images: NDArray[np.bool_]) -> list[int]:
-    """Images (K, N) that are neither where the part itself is nor where an earlier one is."""
-    kept: list[int] = []
-    for i, one in enumerate(images):
-        others = np.concatenate([base[None], images[kept]])
-        both, either = (others & one).sum(axis=1), (others | one).sum(axis=1)
-        if (both < _SELF * either).all():
-            kept.append(i)
-    return kept
+    def near(i: int) -> bool:
+        if i not in offs:
+            offs[i] = _measured(samples, _leaves(rows, [wanted[i]]), settings).off
+        return offs[i] <= whole.off + _UNREFITTED_OFF
 
-
-def _chosen(samples: FitSamples, rows: Rows, wanted: list[Repeat]) -> list[Repeat]:
-    """Repeats that get along, those first that cost least of R before a refit."""
-    whole = score(samples, rows)
-    priced = [(whole - score(samples, expanded(_leaves(rows, [one]))), one) for one in wanted[:_TRIED]]
-    chosen: list[tuple[float, Repeat]] = []
-    taken: set[int] = set()
-    for cost, one in sorted(priced, key=lambda entry: (-len(entry[1].replaced), entry[0])):
-        involved = {one.base, *one.replaced}
-        if cost <= _UNREFITTED_SCORE_LOSS and not taken & involved:
-            chosen.append((cost, one))
-            taken |= involved
-    return [one for _, one in sorted(chosen, key=lambda entry: entry[0])]
+    seen: list[list[int]] = [[]]
+    for order in (
+        np.argsort(costs - _PRICE * settings.alpha * saved, kind="stable"),
+        np.lexsort((costs, -saved)),
+    ):
+        for all_ in (True, False):
+            chosen: list[int] = []
+            taken: frozenset[int] = frozenset()
+            for i in order[likely[order]].tolist():
+                if not taken & wanted[i].parts and (all_ or near(i)):
+                    chosen.append(i)
+                    taken |= wanted[i].parts
+            if chosen not in seen:
+                seen.append(chosen)
+                yield [wanted[i] for i in chosen]
 
 
 def _leaves(rows: Rows, repeats: Sequence[Repeat]) -> list[RepeatedPart]:
-    gone = frozenset[int]().union(*(r.replaced for r in repeats))
-    isometries = {r.base: r.isometries for r in repeats}
+    gone = frozenset[int]().union(*(one.replaced for one in repeats))
+    isometries = {base: one.isometries for one in repeats for base in one.bases}
     return [RepeatedPart(row, isometries.get(i, ())) for i, row in enumerate(rows) if i not in gone]

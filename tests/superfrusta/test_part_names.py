@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from partwright.assembly import Similarity
 from partwright.fields.columns import Column
 from partwright.superfrusta.part_names import form, part_names
 from tests.superfrusta.rows import row
@@ -56,6 +57,14 @@ def test_places_and_twins() -> None:
     assert names == ["block_upper", "block_front_left", "block_upper_02", "block_middle"]
     turned = part_names(rows[[3, 1, 0, 2]], SIDES, "z")
     assert turned == ["block_middle", "block_front_left", "block_upper", "block_upper_02"]
+
+
+def test_a_part_with_copies_is_called_by_what_their_places_share() -> None:
+    rows = np.stack([part((0.1, 0.1, 0.6), at, roundness=1.0) for at in ((-0.8, -0.8, -0.8), (-0.8, 0, 0))])
+    across = Similarity(translation=(1.6, 0, 0))
+    legs = (across, Similarity(translation=(0, 1.6, 0)), Similarity(translation=(1.6, 1.6, 0)))
+    assert part_names(rows, SIDES, "z", moves=[legs, (across,)]) == ["rod_lower", "rod_both_sides"]
+    assert part_names(rows[1:], SIDES, "z", moves=[(across, across)]) == ["rod_all_around"]
 
 
 def test_fixed_names_stay_and_are_not_given_again() -> None:

@@ -135,6 +135,39 @@ def test_repeats_that_would_hurt_are_refused() -> None:
     assert score(samples, expanded(leaves)) >= score(samples, exact) - 2e-3 - 1e-9
 
 
+BODY, POST, BAR = (
+    ((1.0, 1.6, 0.3), (0, 0, 0)),
+    ((0.2, 0.2, 0.8), (0, 0.7, 0.5)),
+    ((1.0, 0.3, 0.2), (0, 0.7, 1.0)),
+)
+
+
+def seat(
+    *boxes: tuple[tuple[float, float, float], tuple[float, float, float]],
+) -> tuple[FitSamples, np.ndarray]:
+    """FitSamples of a body with an arm of post and bar at both ends of y, and rows of boxes, unit frame."""
+    arms = [(size, (x, sign * y, z)) for size, (x, y, z) in (POST, BAR) for sign in (1, -1)]
+    shape = load_shape(union(*(box(size, place) for size, place in (BODY, *arms))))
+    parts = Assembly(tuple(Part(SuperFrustum(size), place, blend=0.001) for size, place in boxes))
+    unit = parts.translated([-c for c in shape.frame.centre]).scaled(shape.frame.scale)
+    return FitSamples.of(shape, DRAFT), subtracting(rows(unit.parts))
+
+
+@pytest.mark.parametrize(
+    "other_arm", [[], [((0.6, 0.3, 0.9), (0, -0.7, 0.6))]], ids=["that lacks", "that has one part for both"]
+)
+def test_parts_of_one_side_stand_for_a_side(other_arm: list) -> None:
+    """No part of the other side is covered by the image of one."""
+    samples, found = seat(BODY, POST, BAR, *other_arm)
+    across = (Symmetry("mirror", 2, mirror(np.eye(3)[1], np.zeros(3)), 0.0),)
+    leaves = repeat(samples, found, across, DRAFT)
+    assert [len(leaf.rows) for leaf in leaves] == [1, 2, 2]
+    assert score(samples, expanded(leaves)) > 0.99 > 0.9 > score(samples, found)
+    kept = repeat(samples, found, across, DRAFT, locked=2)
+    assert [len(leaf.rows) for leaf in kept[:2]] == [1, 1]
+    assert np.array_equal(expanded(kept)[:2], found[:2])
+
+
 X, Z, ORIGIN = np.eye(3)[0], np.eye(3)[2], np.zeros(3)
 
 

@@ -1,0 +1,139 @@
+"""Parts that may stand for others under a symmetry of the shape: one for its images, or groups for groups.
+
+What one side has as one part the other may have as two; of such sides the better one is to stand for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.fields.columns import Column
+from partwright.superfrusta.samples import FitSamples, Rows
+from partwright.superfrusta.symmetric_fit import image
+from partwright.superfrusta.symmetry import Isometry
+
+_EVERY = 6  # samples that matching looks at
+_SELF = 0.5  # IoU from which a part and its image are the same place
+_COVERED = 0.6  # share of a part within the images of another from which they replace it
+_ON_ONE_SIDE = 0.85  # share of a part in one domain of the symmetry from which it belongs there
+_MEETS = 0.25  # of the smaller: what a part and the image of another share, if both stand for one place
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """Parts `bases` with their images in place of the parts `replaced`."""
+
+    bases: tuple[int, ...]
+    isometries: tuple[Isometry, ...]
+    replaced: frozenset[int]
+
+    @property
+    def parts(self) -> frozenset[int]:
+        return self.replaced | frozenset(self.bases)
+
+
+def repeat_candidates(
+    samples: FitSamples, rows: Rows, found: Sequence[tuple[Isometry, ...]], locked: int
+) -> list[Repeat]:
+    """Of sets of isometries under which the shape stays what it is; none twice.
+
+    Bases that replace nothing may bring what is missing where their images go. The first `locked` rows are in
+    no repeat.
+    """
+    points = samples.points[::_EVERY]
+    parts = samples.parts_of(rows, points) < 0
+    points, parts = points[parts.any(axis=0)], parts[:, parts.any(axis=0)]
+    result: dict[tuple[tuple[int, ...], frozenset[int], int], Repeat] = {}
+    for group in found:
+        images = np.stack([samples.parts_of(_images(rows, one), points) < 0 for one in group])
+        meeting = _meeting(rows, parts, images)
+        for base in range(locked, len(rows)):
+            for one in (
+                _of_part(rows, parts, images[:, base], group, base, locked),
+                _of_group(points, parts, meeting, group, base, locked),
+            ):
+                if one is not None:
+                    result.setdefault((one.bases, one.replaced, len(one.isometries)), one)
+    return list(result.values())
+
+
+def _images(rows: Rows, isometry: Isometry) -> Rows:
+    return np.stack([image(row, isometry) for row in rows])
+
+
+def _of_part(
+    rows: Rows, parts: Mask, images: Mask, group: Sequence[Isometry], base: int, locked: int
+) -> Repeat | None:
+    """One part for those that its images (K, N) cover. It may lie on a plane or an axis, so that some images
+    are the same."""
+    distinct = _distinct(parts[base], images)
+    if not distinct:
+        return None
+    covered = images[distinct].any(axis=0)
+    share = (parts & covered).sum(axis=1) / np.maximum(parts.sum(axis=1), 1)
+    share[:locked] = share[base] = 0
+    share[rows[:, Column.SIGN] != rows[base, Column.SIGN]] = 0
+    replaced = frozenset(np.flatnonzero(share > _COVERED).tolist())
+    return Repeat((base,), tuple(group[i] for i in distinct), replaced) if replaced else None
+
+
+def _distinct(base: Mask, images: Mask) -> list[int]:
+    """Images (K, N) that are neither where the part itself is nor where an earlier one is."""
+    kept: list[int] = []
+    for i, one in enumerate(images):
+        others = np.concatenate([base[None], images[kept]])
+        both, either = (others & one).sum(axis=1), (others | one).sum(axis=1)
+        if (both < _SELF * either).all():
+            kept.append(i)
+    return kept
+
+
+def _of_group(
+    points: NDArray[np.float32],
+    parts: Mask,
+    meeting: Mask,
+    group: Sequence[Isometry],
+    base: int,
+    locked: int,
+) -> Repeat | None:
+    """A part and others on its side for all that their images meet on the other sides.
+
+    A side is what lies nearer to the part's middle than to the images of this (a Dirichlet domain). What lies
+    on several is in no group.
+    """
+    if not parts[base].any():
+        return None
+    middle = points[parts[base]].mean(axis=0, dtype=np.float64)[None]
+    middles = np.concatenate([middle, *(isometry(middle) for isometry in group)])
+    side = ((points[:, None] - middles) ** 2).sum(axis=-1).argmin(axis=1)
+    share = np.stack([(parts & (side == k)).sum(axis=1) for k in range(len(middles))], axis=1)
+    whole = share.max(axis=1) >= _ON_ONE_SIDE * np.maximum(parts.sum(axis=1), 1)
+    whole[:locked] = False
+    side_of = np.where(whole, share.argmax(axis=1), -1)
+    if side_of[base] != 0:
+        return None
+    together = {base}
+    todo = [base]
+    while todo:
+        one = todo.pop()
+        met = set(np.flatnonzero(meeting[one] & whole & (side_of != side_of[one])).tolist()) - together
+        together |= met
+        todo += sorted(met)
+    bases = tuple(sorted(one for one in together if side_of[one] == 0))
+    return Repeat(bases, tuple(group), frozenset(together - set(bases)))
+
+
+def _meeting(rows: Rows, parts: Mask, images: Mask) -> Mask:
+    """(M, M) whether parts and images (K, M, N) of others are in one place, and all added or all cut."""
+    sizes = parts.sum(axis=1)
+    least = _MEETS * np.maximum(np.minimum(sizes[:, None], sizes), 1)
+    whole = parts.astype(np.float32)
+    met = np.any([image.astype(np.float32) @ whole.T > least for image in images], axis=0)
+    sign = rows[:, Column.SIGN]
+    return np.asarray((met | met.T) & (sign[:, None] == sign))
