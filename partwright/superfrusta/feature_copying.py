@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -145,16 +145,14 @@ def _hole_corners(part: Part) -> int:
     return sum(map(len, part.field.profile.holes)) if isinstance(part.field, Extrusion) else 0
 
 
-def without(search: FeatureSearch, tree: FeatureTree, dropped: Collection[int]) -> FeatureTree:
-    """The tree of all steps but some, as if those had never been taken."""
+def replayed(search: FeatureSearch, steps: Sequence[Step]) -> FeatureTree:
+    """The tree of steps, whatever they followed before."""
     result = search.empty
-    for k, step in enumerate(tree.steps):
-        if k not in dropped:
-            covered = result.covered | step.within if step.added else result.covered & ~step.within
-            score = search.score_of(covered)
-            objective = score - result.price - search.price(step.chosen.sides)
-            again = replace(step, covered=covered, score=score, objective=objective)
-            result = joined_by(search, result, again)
+    for step in steps:
+        covered = result.covered | step.within if step.added else result.covered & ~step.within
+        score = search.score_of(covered)
+        objective = score - result.price - search.price(step.chosen.sides)
+        result = joined_by(search, result, replace(step, covered=covered, score=score, objective=objective))
     return result
 
 

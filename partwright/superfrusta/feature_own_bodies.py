@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from partwright.approximation.sketches.candidate import Candidate
     from partwright.superfrusta.feature_search import FeatureSearch
 
-_OUTSIDE = 0.05  # of a body, that may lie outside of the shape
+_OUTSIDE = 0.02  # of a body, that may lie outside of the shape
 _OWN = 0.4  # of its walls, that are walls of the shape at least: a slice of a body has others
 _NEAR = 8e-3  # unit lengths: turned bodies are made with walls half as far inside
 _POINTS = 400

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.approximation.sketches.candidate import Candidate
-from partwright.superfrusta.feature_copying import without
+from partwright.superfrusta.feature_copying import replayed
 from partwright.superfrusta.feature_steps import FeatureTree, Step
 
 if TYPE_CHECKING:
@@ -35,7 +35,8 @@ def recast(search: FeatureSearch, tree: FeatureTree, own: Sequence[Candidate]) -
         k, group = max(groups, key=lambda one: len(one[1]))
         banned = tree.steps[k].chosen.key
         tried.add(banned)
-        other = _grown_without(search, without(search, tree, group), own, banned, len(tree.steps))
+        rest = replayed(search, [step for j, step in enumerate(tree.steps) if j not in group])
+        other = _grown_without(search, rest, own, banned, len(tree.steps))
         if other.objective > tree.objective + search.tie:
             tree = other
     return tree

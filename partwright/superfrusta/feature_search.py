@@ -28,6 +28,7 @@ from partwright.superfrusta.feature_bases import bases, is_nearly_whole, various
 from partwright.superfrusta.feature_blanks import BEHIND, PERFECT, cut_from_blanks, worth
 from partwright.superfrusta.feature_bores import Bores
 from partwright.superfrusta.feature_copying import joined_by, with_copies
+from partwright.superfrusta.feature_exchange import exchanged
 from partwright.superfrusta.feature_mending import farthest, mended
 from partwright.superfrusta.feature_own_bodies import OwnBodies
 from partwright.superfrusta.feature_recasting import recast
@@ -58,7 +59,7 @@ _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
 _SHARE_OF_A_PATTERN = 0.4  # of that, that each of its copies can gain at most
-_POOR = 0.95  # R below which a shape is also built up of bodies of its own, which then have to reach it
+_POOR = 0.95  # R that a tree of bodies of the shape's own has to reach
 
 
 class FeatureSearch:
@@ -115,8 +116,8 @@ class FeatureSearch:
                 break
             tried.add(own[index].key)
             grown.append(self.grown(self.extended(empty, own[index], True), others, best))
-            if best is None and grown[0].score < _POOR:
-                built = self._built_up(empty, own, others, gains)
+            if best is None and not self._is_done(grown[0]):
+                built = self._built_up(empty, own, others, gains, grown[0])
                 grown += [built] if built is not None and built.score >= _POOR else []
         return cut_from_blanks(self, self._nearest(grown, others), others, tried) if grown else None
 
@@ -148,6 +149,7 @@ class FeatureSearch:
         own: Sequence[Candidate],
         others: Sequence[Candidate],
         gains: NDArray[np.float64],
+        best: FeatureTree,
     ) -> FeatureTree | None:
         """Of bodies that are the shape's own, the largest first, as long as there are any, and then of all
         else: rings with balls are not cut from an outline."""
@@ -156,7 +158,7 @@ class FeatureSearch:
         if first is None:
             return None
         tree = self.grown(self.extended(empty, own[first], True), others, None, True)
-        return self.grown(tree, others, None)
+        return self.grown(tree, others, best)
 
     def grown(
         self,
@@ -168,9 +170,22 @@ class FeatureSearch:
         most: int | None = None,
     ) -> FeatureTree:
         """Until nothing pays, it has the most steps, or is well behind where the best so far was after as
-        many.
+        many; on from where better bodies stand in place of some.
 
         only_own: of what is added, only bodies that are the shape's own."""
+        tree = self._grown(tree, own, best, only_own, patient, most)
+        other = exchanged(self, tree, own)
+        return tree if other is tree else self._grown(other, own, best, only_own, patient, most)
+
+    def _grown(
+        self,
+        tree: FeatureTree,
+        own: Sequence[Candidate],
+        best: FeatureTree | None,
+        only_own: bool,
+        patient: int,
+        most: int | None,
+    ) -> FeatureTree:
         while len(tree.features) < self.most and (most is None or len(tree.steps) < most):
             step = self.step(tree, own, only_own)
             if step is None:
@@ -329,12 +344,20 @@ class FeatureSearch:
             self._masks[id(candidate)] = known
         return known[1]
 
-    def gains(self, tree: FeatureTree, pool: Sequence[Candidate], added: bool) -> NDArray[np.float64]:
-        """(C,) by how much each raises R beyond its price."""
+    def gains(
+        self,
+        tree: FeatureTree,
+        pool: Sequence[Candidate],
+        added: bool,
+        free: NDArray[np.bool_] | None = None,
+    ) -> NDArray[np.float64]:
+        """(C,) by how much each raises R beyond its price. free: (N,) the samples that it can change, all
+        where it is None."""
         inside, outside = self.weights * self.inside[:, None], self.weights * ~self.inside[:, None]
         both = (inside * tree.covered[:, None]).sum(axis=0)
         either = inside.sum(axis=0) + (outside * tree.covered[:, None]).sum(axis=0)
         changes = ~tree.covered if added else tree.covered
+        changes = changes if free is None else changes & free
         columns = (np.hstack([inside, outside]) * changes[:, None]).astype(np.float32)
         sign = 1.0 if added else -1.0
         scores = []

@@ -187,6 +187,25 @@ def test_a_hexagonal_bar_is_extruded_along_itself() -> None:
     assert tree.score > 0.99
 
 
+def test_a_bent_hexagonal_key_is_its_legs_and_its_bend() -> None:
+    """Each leg ends where its walls do, not where it would leave the bend."""
+    outline = Profile.regular(6, 3)
+    along_x, upright = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0), (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
+    bend = Revolution(outline.moved((8.0, 0.0)), 90)
+    legs = Part(Extrusion(outline, 60), (0, 0, -30)), Part(Extrusion(outline, 22), (19, 0, 8), along_x)
+    tree, _ = found(Assembly((*legs, Part(bend, (8, 0, 0), upright))))
+    assert sorted(kinds(tree)) == [(True, "extrusion", 1), (True, "extrusion", 1), (True, "revolution", 1)]
+    assert tree.score > 0.998
+
+
+def test_a_bolt_is_its_shaft_and_its_head() -> None:
+    """A disc about as wide as the head explains more than the shaft alone, before the head is there."""
+    head = Part(Extrusion(Profile.regular(6, 9.8), 6.4), (0, 0, 18.2))
+    tree, _ = found(Assembly((Part(Cylinder(5, 30)), head)))
+    assert kinds(tree) == [(True, "cylinder", 1), (True, "extrusion", 1)]
+    assert tree.score > 0.99
+
+
 def test_a_slot_in_a_bent_plate_is_a_slot() -> None:
     """And not the end of one of two plates."""
     bent = Extrusion(Profile([(0, 0), (60, 0), (60, 4), (12, 4), (40, 70), (36, 72), (8, 4), (0, 4)]), 50)

@@ -12,7 +12,7 @@ from partwright.approximation.sketches.candidates import candidates
 from partwright.assembly import Assembly, Part
 from partwright.fields import Box, Cylinder
 from partwright.meshing import mesh_assembly
-from partwright.superfrusta.feature_copying import without
+from partwright.superfrusta.feature_copying import replayed
 from partwright.superfrusta.feature_recasting import recast
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import FeatureTree
@@ -75,7 +75,7 @@ def test_what_is_drawn_as_it_is_stays(search: FeatureSearch) -> None:
 def test_a_step_that_is_taken_back_leaves_what_the_others_make(search: FeatureSearch) -> None:
     web, wrong = box((1.8, 0.8, 0.2)), box((0.3, 0.3, 0.3), (0.0, 0.2, 0.3))
     tree = search.extended(search.extended(search.empty, web, True), wrong, True)
-    left = without(search, tree, {1})
+    left = replayed(search, tree.steps[:1])
     alone = search.extended(search.empty, web, True)
     assert (left.covered == alone.covered).all()
     assert left.score == pytest.approx(alone.score)

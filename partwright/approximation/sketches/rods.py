@@ -16,7 +16,8 @@ SAME_AREA = 0.01
 _INSIDE = 0.02  # of a section: what of it may lie outside of the next slab's, and it still goes on
 _LEAVES = 0.005  # of a rod's section, that lies outside where it ends in a bend
 _HALVINGS = 7  # of a slab, for the height at which it does
-_AT_LEVEL = 0.02  # unit lengths: where it does so near to a level it ends there
+_AT_LEVEL = 0.02  # unit lengths: where it does so near to a level it ends there, or where most walls end
+_WALLS = 0.03  # of the width of all walls, that end there at least
 _SLENDER = 2.0  # times as long as it is wide
 
 
@@ -52,7 +53,10 @@ def _end(
         else:
             outside = between
     level = min(levels, key=lambda z: abs(z - inside))
-    return level if abs(level - inside) < _AT_LEVEL else inside
+    if abs(level - inside) < _AT_LEVEL:
+        return level
+    ends = [end for end in view.wall_ends(_WALLS) if abs(end[1] - inside) < _AT_LEVEL]
+    return max(ends, default=(0.0, inside))[1]
 
 
 def round_at_ends(view: View, low: float, high: float) -> Iterator[tuple[Region, tuple[float, float]]]:

@@ -91,13 +91,26 @@ class View:
         found = sorted(_heights(height, weight, least), reverse=True)[:_MOST_LEVELS]
         inner = [z for _, z in found if low + _SAME_LEVEL < z < high - _SAME_LEVEL]
         if not inner:
-            upright = (np.abs(normal[:, 2]) < 2 * area * _UPRIGHT) & (area > 0)
-            bottom, top = corners[upright, :, 2].min(axis=1), corners[upright, :, 2].max(axis=1)
-            width = 2 * area[upright] / np.maximum(top - bottom, _SAME_LEVEL)
-            most = _WALLS * float(width.sum())
-            ends = [*_heights(bottom, width, most), *_heights(top, width, most)]
-            inner = [z for _, z in ends if low + _SAME_LEVEL < z < high - _SAME_LEVEL]
+            inner = [z for _, z in self.wall_ends(_WALLS) if low + _SAME_LEVEL < z < high - _SAME_LEVEL]
         return [low, *sorted(inner), high]
+
+    def wall_ends(self, share: float) -> list[tuple[float, float]]:
+        """How much of the width of upright walls begins or ends at a height, and the height; those with more
+        than a share of all."""
+        bottom, top, width = self._upright_walls
+        least = share * float(width.sum())
+        return [*_heights(bottom, width, least), *_heights(top, width, least)]
+
+    @cached_property
+    def _upright_walls(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of faces that stand upright: from where to where, and how wide, (U,) each."""
+        vertices, faces = self.mesh
+        corners = vertices[faces]
+        normal = area_vectors(corners)
+        area = np.linalg.norm(normal, axis=1) / 2
+        upright = (np.abs(normal[:, 2]) < 2 * area * _UPRIGHT) & (area > 0)
+        bottom, top = corners[upright, :, 2].min(axis=1), corners[upright, :, 2].max(axis=1)
+        return bottom, top, 2 * area[upright] / np.maximum(top - bottom, _SAME_LEVEL)
 
     @property
     def slabs(self) -> Iterator[tuple[float, float]]:
