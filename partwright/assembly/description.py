@@ -54,7 +54,8 @@ def _leaf(part: Part, digits: int) -> str:
         own = " ".join([part.field.kind, ", ".join(numbers), f"at {_numbers(part.translation, digits)}"])
     copies = f", {len(part.copies)} copies" if part.instances else ""
     blend = f", blend {_number(part.blend, digits)}" if part.blend else ""
-    return f"{part.name + ': ' if part.name else ''}{own}{copies}{blend}"
+    thread = f", thread {part.metadata['thread']}" if "thread" in part.metadata else ""
+    return f"{part.name + ': ' if part.name else ''}{own}{thread}{copies}{blend}"
 
 
 def _quadric(form: NormalForm, digits: int) -> str:

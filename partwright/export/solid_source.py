@@ -101,9 +101,11 @@ class SourcePart:
 
     @property
     def title(self) -> str:
-        """The part's name, and how often it is there."""
+        """The part's name, its thread if it has one, and how often it is there."""
         times = f", {len(self.part.copies)} times" if self.copies else ""
-        return f"{comment(self.part.name)}{times}"
+        said = self.part.metadata.get("thread")
+        thread = f", thread {comment(str(said))}" if said else ""
+        return f"{comment(self.part.name)}{thread}{times}"
 
     def variables(self) -> dict[str, str]:
         """Name of the parameter -> name of the variable."""

@@ -7,17 +7,20 @@ primitives.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar
 
 from partwright.errors import SettingError
-from partwright.superfrusta import settings
+from partwright.methods import FitRequest, Fitted
 from partwright.superfrusta.families import Family
+from partwright.superfrusta.featured import wants_features
 from partwright.superfrusta.method import SuperFrusta
+from partwright.superfrusta.settings import Settings as CommonSettings
+from partwright.superfrusta.threaded import plain_shape, with_threads
 
 
 @dataclass(frozen=True)
-class Settings(settings.Settings):
+class Settings(CommonSettings):
     """The settings of a SuperFrusta fit with other defaults."""
 
     method: ClassVar[str] = "solids"
@@ -48,7 +51,7 @@ class Settings(settings.Settings):
         Raises:
             SettingError: the preset or a change is unknown or out of range.
         """
-        preset = asdict(settings.Settings.for_quality(quality))
+        preset = asdict(CommonSettings.for_quality(quality))
         unknown = set(changes) - set(preset) - {"profiles"}
         if unknown:
             raise SettingError(f"unknown settings: {', '.join(sorted(unknown))}")
@@ -63,6 +66,12 @@ class Solids(SuperFrusta):
 
     def settings(self, quality: str = "normal", **changes: Any) -> Settings:
         return Settings.for_quality(quality, **changes)
+
+    def fit(self, request: FitRequest[CommonSettings]) -> Fitted:
+        if not wants_features(request):
+            return super().fit(request)
+        plain, threads = plain_shape(request.shape)
+        return with_threads(super().fit(replace(request, shape=plain)), threads)
 
 
 METHOD = Solids()

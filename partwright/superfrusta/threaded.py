@@ -1,0 +1,98 @@
+"""Fits of what has screw threads: they are taken out before, and said of the parts that stand for them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from manifold3d import Manifold, Mesh
+
+from partwright.approximation.sketches.threads import Thread, without_threads
+from partwright.assembly import Assembly, Part
+from partwright.methods import Fitted
+from partwright.shapes import Shape, load_shape
+from partwright.superfrusta.thread_standards import standard_thread
+
+_NEAR = 0.08  # of the thread's depth, that a part's wall may be away from its crests
+_ALONG, _AROUND = 7, 8  # places that are looked at
+_DIGITS = 4
+
+
+def plain_shape(shape: Shape) -> tuple[Shape, list[Thread]]:
+    """The shape without its threads, and these in its own units; itself where it has none."""
+    vertices, faces = shape.unit_mesh
+    closed = Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
+    body, threads = without_threads(closed)
+    if not threads:
+        return shape, []
+    mesh = body.to_mesh64()
+    corners = shape.frame.from_unit(np.asarray(mesh.vert_properties, np.float64)[:, :3])
+    plain = load_shape((corners, np.asarray(mesh.tri_verts, np.int64)), shape.unit, shape.up)
+    plain.name = shape.name
+    own = [
+        dataclasses.replace(
+            thread,
+            axis=shape.frame.from_unit(thread.axis[None])[0],
+            **{
+                name: getattr(thread, name) / shape.frame.scale
+                for name in ("pitch", "inner", "outer", "length")
+            },
+        )
+        for thread in threads
+    ]
+    return plain, own
+
+
+def with_threads(fitted: Fitted, threads: Sequence[Thread]) -> Fitted:
+    """The fit with metadata of parts whose walls are the crests of threads, and a line for each thread."""
+    whole, lines = fitted.assembly, []
+    for thread in threads:
+        part = _wall(whole, thread)
+        said = description(thread, whole.unit)
+        where = f"{part.name}: " if part is not None else ""
+        depth = _rounded(thread.outer - thread.inner)
+        lines.append(
+            f"{where}{said['thread_kind']} thread {said['thread']}, drawn plain, as wide as its crests: its "
+            f"grooves, {depth:g} deep, count as deviation"
+        )
+        if part is not None:
+            whole = whole.replace_part(
+                part.name, dataclasses.replace(part, metadata={**part.metadata, **said})
+            )
+    return dataclasses.replace(fitted, assembly=whole, warnings=(*fitted.warnings, *lines))
+
+
+def description(thread: Thread, unit: str | None) -> dict[str, str | float]:
+    """What a drawing says of a thread: `thread` (its standard name, or diameter x pitch), `thread_kind`
+    (external or internal), `thread_hand`; `thread_diameter`, `thread_pitch`, `thread_length` in own units."""
+    diameter, pitch = _rounded(2 * thread.outer), _rounded(abs(thread.pitch))
+    name = standard_thread(2 * thread.outer, abs(thread.pitch), unit)
+    return {
+        "thread": name or f"{diameter:g} x {pitch:g}",
+        "thread_kind": "internal" if thread.internal else "external",
+        "thread_diameter": diameter,
+        "thread_pitch": pitch,
+        "thread_length": _rounded(thread.length),
+        "thread_hand": "left" if thread.pitch < 0 else "right",
+    }
+
+
+def _wall(whole: Assembly, thread: Thread) -> Part | None:
+    """The smallest part whose surface is at the crests, if there is one."""
+    crest = thread.inner if thread.internal else thread.outer
+    x = np.cross(thread.direction, np.eye(3)[int(np.abs(thread.direction).argmin())])
+    x /= np.linalg.norm(x)
+    y = np.cross(thread.direction, x)
+    turns = 2 * math.pi * np.arange(_AROUND)[:, None] / _AROUND
+    ring = crest * (np.cos(turns) * x + np.sin(turns) * y)
+    along = thread.length * np.linspace(-0.3, 0.3, _ALONG)[:, None, None] * thread.direction
+    points = (thread.axis + along + ring).reshape(-1, 3)
+    most = max(_NEAR * (thread.outer - thread.inner), 1e-3 * thread.outer)
+    walls = [part for part in whole.parts if float(np.median(np.abs(part.distance(points)))) < most]
+    return min(walls, key=lambda part: float(np.prod(np.ptp(part.bounds(), axis=0))), default=None)
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")

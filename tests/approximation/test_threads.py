@@ -1,0 +1,82 @@
+"""Screw threads are found, measured and taken out; springs, gears and turned grooves are not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+from partwright.approximation.sketches.threads import without_threads
+from partwright.meshing.manifolds import closed
+from tests.threaded import INNER, LENGTH, PITCH, RADIUS, threaded
+
+
+def turned_askew(body: Manifold) -> Manifold:
+    return body.rotate((20, 30, 40)).translate((0.1, -0.2, 0.3))
+
+
+@pytest.mark.parametrize("pitch", [PITCH, -PITCH])
+def test_a_rod_becomes_the_cylinder_around_it(pitch: float) -> None:
+    rod = turned_askew(threaded(pitch))
+    plain, (thread,) = without_threads(rod)
+    assert thread.pitch == pytest.approx(pitch, rel=5e-3)
+    assert (thread.inner, thread.outer) == pytest.approx((INNER, RADIUS), abs=3e-3)
+    assert thread.length == pytest.approx(LENGTH, abs=PITCH)
+    assert not thread.internal
+    ends = turned_askew(Manifold.cube((1e-6, 1e-6, 1.0))).bounding_box()
+    assert thread.axis == pytest.approx((0.1, -0.2, 0.3), abs=PITCH / 2)
+    assert abs(thread.direction) == pytest.approx(np.abs(np.subtract(ends[3:], ends[:3])), abs=1e-3)
+    assert plain.volume() == pytest.approx(math.pi * RADIUS**2 * LENGTH, rel=5e-3)
+    assert plain.genus() == 0
+    assert plain.volume() > 1.1 * rod.volume()
+
+
+def test_a_tapped_hole_becomes_as_narrow_as_its_crests() -> None:
+    block = Manifold.cube((1.4, 1.4, 0.9), True)
+    nut = block - threaded()
+    plain, (thread,) = without_threads(nut)
+    assert thread.internal
+    assert thread.pitch == pytest.approx(PITCH, rel=5e-3)
+    assert thread.length == pytest.approx(0.9, abs=1e-3)
+    assert plain.volume() == pytest.approx(block.volume() - math.pi * INNER**2 * 0.9, rel=5e-3)
+    assert plain.genus() == 1
+
+
+def test_what_is_beside_a_thread_stays() -> None:
+    head = Manifold.cylinder(0.4, 0.7, 0.7, 6).translate((0, 0, 0.5))
+    shank = Manifold.cylinder(0.5, RADIUS, RADIUS, 60).translate((0, 0, -1.0))
+    plain, threads = without_threads(threaded() + head + shank)
+    assert len(threads) == 1
+    whole = Manifold.cylinder(1.5, RADIUS, RADIUS, 96).translate((0, 0, -1.0)) + head
+    assert (plain ^ whole).volume() == pytest.approx(whole.volume(), rel=5e-3)
+    assert plain.volume() == pytest.approx(whole.volume(), rel=5e-3)
+
+
+def test_what_is_no_thread_stays_as_it_is() -> None:
+    ridges = [Manifold.cylinder(0.06, 0.3, 0.4, 60).translate((0, 0, 0.06 * k)) for k in range(8)]
+    grooved = sum(ridges[1:], ridges[0])
+    slotted = threaded() - Manifold.cube((0.15, 1.0, 2.0), True).translate((0.4, 0, 0))
+    for body in (grooved, slotted, Manifold.cylinder(1.0, 0.4, 0.2, 60), Manifold.sphere(0.5, 60)):
+        plain, threads = without_threads(body)
+        assert threads == []
+        assert plain.volume() == body.volume()
+
+
+def test_a_spring_is_no_thread() -> None:
+    turns, around, along = 5.0, 12, 240
+    t = np.linspace(0, 2 * math.pi * turns, along + 1)[:, None]
+    a = 2 * math.pi * np.arange(around) / around
+    out = 0.4 + 0.05 * np.cos(a)
+    points = np.stack([out * np.cos(t), out * np.sin(t), 0.03 * t + 0.05 * np.sin(a)], axis=-1)
+    k, j = np.divmod(np.arange(along * around), around)
+    right = (j + 1) % around
+    one, two, three, four = k * around + j, k * around + right, (k + 1) * around + j, (k + 1) * around + right
+    walls = [np.column_stack(c) for c in ((one, three, two), (two, three, four))]
+    caps = [[(0, i, i + 1) for i in range(1, around - 1)]]
+    last = along * around
+    caps += [[(last, last + i + 1, last + i) for i in range(1, around - 1)]]
+    body = closed(points.reshape(-1, 3), np.concatenate([*walls, *map(np.array, caps)]))
+    assert abs(body.volume()) > 0
+    assert without_threads(body)[1] == []

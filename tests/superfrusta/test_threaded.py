@@ -1,0 +1,53 @@
+"""A fit of what has threads: plain parts that say which thread they have."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from manifold3d import Manifold
+
+import partwright as pw
+from partwright.fields import Cylinder, Extrusion
+from partwright.meshing.manifolds import as_mesh
+from partwright.superfrusta.thread_standards import standard_thread
+from tests.threaded import LENGTH, RADIUS, threaded
+
+SCALE = 5.0 / RADIUS  # to M10, coarse
+ACROSS = 17.0
+
+
+def bolt() -> Manifold:
+    head = Manifold.cylinder(6.4, ACROSS / math.sqrt(3), ACROSS / math.sqrt(3), 6)
+    return threaded().scale((SCALE,) * 3) + head.translate((0, 0, SCALE * LENGTH / 2))
+
+
+def test_a_bolt_is_a_shaft_that_says_its_thread_and_a_head(tmp_path) -> None:
+    shape = pw.load_shape(as_mesh(bolt()), unit="mm")
+    fitted = pw.fit(shape, "solids", quality="draft")
+    shaft, head = sorted(fitted.assembly.parts, key=lambda part: not part.metadata)
+    assert isinstance(shaft.field, Cylinder)
+    assert shaft.field.radius == pytest.approx(5.0, abs=0.02)
+    assert isinstance(head.field, Extrusion)
+    assert len(head.field.profile.corners) == 6
+    assert head.metadata == {}
+    said = dict(shaft.metadata)
+    assert said.pop("thread_diameter") == pytest.approx(10.0, rel=2e-3)
+    assert said.pop("thread_pitch") == pytest.approx(1.5, rel=5e-3)
+    assert said.pop("thread_length") == pytest.approx(15.0, abs=0.8)
+    assert said == {"thread": "M10", "thread_kind": "external", "thread_hand": "right"}
+    assert any("external thread M10" in line for line in fitted.warnings)
+    assert "thread M10" in fitted.assembly.describe()
+    out = tmp_path / "bolt.scad"
+    pw.export(fitted.assembly, out)
+    assert "thread M10" in out.read_text()
+
+
+def test_threads_by_their_standard_names() -> None:
+    assert standard_thread(7.9, 1.25, "mm") == "M8"
+    assert standard_thread(8.0, 1.0, "mm") == "M8x1"
+    assert standard_thread(0.25, 1 / 20, "in") == "1/4-20 UNC"
+    assert standard_thread(25.4 / 4, 25.4 / 28, "mm") == "1/4-28 UNF"
+    assert standard_thread(8.0, 1.25, None) is None
+    assert standard_thread(8.0, 3.0, "mm") is None
+    assert standard_thread(9.3, 1.25, "mm") is None
