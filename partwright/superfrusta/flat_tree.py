@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,20 +73,22 @@ def flattened(node: Node) -> list[tuple[Part, bool]]:
 
 
 def _meetings(parts: Sequence[Part], added: Sequence[bool]) -> NDArray[np.bool_]:
-    """(M, M): whether the interiors of a subtracted part and an added one meet."""
+    """(M, M): whether the interiors of a subtracted part and an added one meet, in any of their copies."""
     meets = np.zeros((len(parts), len(parts)), bool)
-    boxes = [part.bounds() for part in parts]
     cuts = [i for i, plus in enumerate(added) if not plus]
     for i in cuts:
         for j in set(range(len(parts))) - set(cuts):
-            low = np.maximum(boxes[i][0], boxes[j][0])
-            high = np.minimum(boxes[i][1], boxes[j][1])
-            if (low < high).all():
-                meets[i, j] = meets[j, i] = _meet(parts[i], parts[j], low, high)
+            # Copy by copy: in a box around a row of them, a lattice may miss what is thin.
+            pairs = product(parts[i].copies, parts[j].copies)
+            meets[i, j] = meets[j, i] = any(_meet(one, other) for one, other in pairs)
     return meets
 
 
-def _meet(a: Part, b: Part, low: NDArray[np.float64], high: NDArray[np.float64]) -> bool:
+def _meet(a: Part, b: Part) -> bool:
+    boxes = np.array([a.bounds(), b.bounds()])
+    low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
+    if not (low < high).all():
+        return False
     steps = (np.arange(_PER_SIDE) + 0.5) / _PER_SIDE
     lattice = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
     points = (low + lattice * (high - low)).astype(np.float32)

@@ -207,6 +207,16 @@ def test_repeated_holes_are_subtracted_with_all_their_copies() -> None:
     assert (np.sign(inside) == (1, 1, -1)).all()
 
 
+def test_thin_cuts_far_apart_are_not_lost() -> None:
+    """A rebate along either side: between the two, no more than a hundredth of the way is in one."""
+    rebate = Part(Box((0.02, 2, 0.2)), (0.5, 0, 0.4), instances=(Similarity(rotation=(0, 0, 0, 1)),))
+    tree = nested((Part(Box((1, 1, 1))), rebate), (True, False), plain=True)
+    assert tree.operation == "difference"
+    assert (
+        np.sign(tree.distance(np.array([[0.495, 0, 0.4], [-0.495, 0, 0.4], [0, 0, 0.4]]))) == (1, 1, -1)
+    ).all()
+
+
 def test_cuts_end_a_little_beyond_the_solid_in_the_open_and_nowhere_else() -> None:
     mesh = plate()
     samples = FitSamples.of(load_shape(mesh), DRAFT)
