@@ -17,12 +17,14 @@ from partwright.meshing.csg import check_count, has_exact_mesh, mesh_csg
 from partwright.meshing.marching import mesh_field
 from partwright.meshing.small_components import without_small_components
 from partwright.meshing.thin_parts import thin_solids, united
+from partwright.meshing.thin_walls import has_thin_walls
 
 if TYPE_CHECKING:
     import trimesh
 
 # Cells across the thinnest wall. Under sqrt(3) a slanted wall would show holes; 3 also keep a thin rod round.
 ACROSS, _ACROSS_PART = 2.0, 3.0
+_HOLED = 1.75  # cells across a slanted wall, under which there may be holes in it
 _FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin walls
 _PART_CELLS = 120_000  # a part's surface is given at most this many cells
 _MOST = 1024.0  # cells along one axis of a part
@@ -40,9 +42,10 @@ def mesh_assembly(
     where all leaves are quadrics or named solids without blends. Otherwise by marching cubes:
 
     resolution: cells along the longest side; up to twice as many where that is enough to put two cells across
-    a thin wall. Parts that are thinner still are meshed along their own axes and united with the whole by a
-    boolean (see `thin_parts`). Where thin ones are subtracted or intersected, holes may
-    be left (the mesh is closed all the same); crumbs that are shorter than three cells are left out.
+    a thin part, and where cuts leave walls that are so thin. Parts that are thinner still are meshed along
+    their own axes and united with the whole by a boolean (see `thin_parts`). Where thin ones are subtracted
+    or intersected, holes may be left (the mesh is closed all the same); crumbs that are shorter than three
+    cells are left out.
 
     Raises NoSurfaceError where nothing is left of the assembly, as when a difference takes all away, or where
     it does not end; ParameterError where it has no exact mesh, but one is asked for, or where it has more
@@ -97,13 +100,26 @@ def _marched(node: Assembly | Part, cell: float, sharp: bool) -> trimesh.Trimesh
 
     lower, upper = node.bounds()
     frame, longest = _frame(lower, upper), float((upper - lower).max())
-    thinnest = min((part.field.wall for part in node.parts if not _is_thin(part, cell)), default=np.inf)
+    thick = [part.field.wall for part in node.parts if not _is_thin(part, cell)]
+    thinnest = min(thick, default=np.inf)
     counts = int(np.ceil(longest / min(cell, thinnest / ACROSS)))
     local = node.transformed(frame)
     room = _ROOM + (upper - lower) * frame.scale / 2
     mesh = mesh_field(local.distance, -room, room, counts, lipschitz=_lipschitz(node), sharp=sharp)
+    finest, across = int(np.ceil(_FINEST * longest / cell)), _HOLED * 2 * room.max() / counts
+    carved = counts < finest and len(thick) == len(node.parts) and _carved(node)
+    if carved and has_thin_walls(local.distance, mesh.vertices, across):
+        counts = finest
+        mesh = mesh_field(local.distance, -room, room, counts, lipschitz=_lipschitz(node), sharp=sharp)
     vertices, faces = without_small_components(mesh.vertices, mesh.faces, np.full(3, 2 * room.max() / counts))
     return trimesh.Trimesh(frame.inverse()(vertices), faces, process=False)
+
+
+def _carved(node: Assembly | Part) -> bool:
+    """Whether a wall may be thinner than those of the parts: where a cut ends beside another surface."""
+    if isinstance(node, Part):
+        return False
+    return node.operation != "union" or any(_carved(child) for child in node.children)
 
 
 def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimesh.Trimesh:

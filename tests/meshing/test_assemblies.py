@@ -98,6 +98,20 @@ def test_thin_wall_in_an_assembly() -> None:
     assert mesh.volume == pytest.approx(0.02, rel=0.02)
 
 
+def test_a_thin_wall_that_a_cut_leaves() -> None:
+    """Under a cell of the resolution that was asked for, though neither part is thin."""
+    turn = (0.8, 0.36, 0.48, 0.0)
+    cup = Part(Cylinder(0.5, 1.0), rotation=turn) - Part(
+        Cylinder(0.48, 1.0), rotation=turn, translation=tuple(Similarity(rotation=turn)([[0, 0, 0.02]])[0])
+    )
+    mesh = mesh_assembly(cup, 60, exact=False)
+    assert mesh.is_volume
+    assert mesh.euler_number == 2
+    assert mesh.volume == pytest.approx(np.pi * (0.25 - 0.48**2 * 0.98), rel=0.03)
+    thick = Part(Cylinder(0.5, 1.0), rotation=turn) - Part(Cylinder(0.3, 2.0), rotation=turn)
+    assert len(mesh_assembly(thick, 60, exact=False).faces) < len(mesh.faces) / 3  # of cells as asked for
+
+
 def test_a_sheet_is_whole_beside_thick_parts_and_is_cut_with_them() -> None:
     """A wall of a thousandth of the size, where a frame stands on it and a hole goes through both."""
     turn = (0.9659258, 0.2588190, 0.0, 0.0)
