@@ -15,6 +15,7 @@ from os import cpu_count
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from partwright.fields.columns import ROTATION, Column
 from partwright.fields.kernel import Target
@@ -43,6 +44,8 @@ _REFITTED = 2  # of the ways to change a part
 _LEAST_HALVED = 100  # voxels
 _ABOUT = 0.2  # unit lengths: how far from a point that is off a narrow hole may reach
 _HOLES = 2  # that are looked for there
+_AS_FAR = 0.6  # of the furthest: what is missing elsewhere beside the same part is tried together with it
+_AT_ONCE = 4  # such places at most
 _JOINED = 4  # pairs at most, and of the most promising that are tried for each
 
 
@@ -230,9 +233,12 @@ class Mending:
                 yield with_new(carved.last)
             for one in self.holes(rows, off, worst):
                 yield with_new(one[None])
-        missed = self.missed(rows, off.points[worst]) if off.distance[worst] <= 0 else None
-        if missed is not None:
-            yield with_new(self.fitted(missed, rows, rows[part]))
+        missed = self.missed(rows, off, worst) if off.distance[worst] <= 0 else []
+        found = [self.fitted(voxels, rows, rows[part]) for voxels in missed]
+        if found:
+            yield with_new(found[0])
+        if len(found) > 1:
+            yield with_new(np.concatenate(found))
         if np.count_nonzero(mine) > _LEAST_HALVED:
             yield instead(*(self.fitted(half, others, rows[part], cut) for half in _halves(samples, mine)))
 
@@ -254,15 +260,22 @@ class Mending:
         found, _, losses = finalists(self.samples, [region], self.settings, self.settings.overlap)
         return found[[int(losses.argmin())]]
 
-    def missed(self, rows: Rows, place: NDArray[np.float32]) -> Mask | None:
-        """The connected voxels inside the shape, about a place, that no part covers."""
+    def missed(self, rows: Rows, off: Deviations, worst: int) -> list[Mask]:
+        """The connected voxels inside the shape that no part covers, about the worst point, and about others
+        of its part that are nearly as far off: while one of two antennas is missing, the other is no gain."""
         grid = self.samples.grid
         open_ = (grid.values < 0) & (self.samples.grid_field(rows) > 0)
+        if not open_.any():
+            return []
         labels, _ = ndimage.label(open_, np.ones((3, 3, 3)))
-        away = np.linalg.norm(self.samples.grid_points[open_.ravel()] - place, axis=1)
-        if not len(away) or away.min() > 3 * grid.spacing:
-            return None
-        return np.asarray((labels == labels[open_][away.argmin()]).ravel())
+        alike = (off.part == off.part[worst]) & (off.distance <= 0) & (off.off > _AS_FAR * off.off[worst])
+        points = off.points[alike][np.argsort(-off.off[alike], kind="stable")]
+        away, nearest = cKDTree(self.samples.grid_points[open_.ravel()]).query(points)
+        if away[0] > 3 * grid.spacing:
+            return []
+        regions = labels[open_][nearest[away <= 3 * grid.spacing]]
+        _, first = np.unique(regions, return_index=True)
+        return [(labels == regions[one]).ravel() for one in np.sort(first)[:_AT_ONCE]]
 
 
 def next_to_mend(best: Trial, given_up: list[tuple[NDArray[np.float32], float]]) -> int | None:

@@ -243,3 +243,13 @@ def test_a_sheet_over_a_hole_is_off_although_it_passes_between_voxels() -> None:
     off = deviations(found, rows)
     assert off.by_part == pytest.approx([0.0, 0.0, radius], abs=0.02)
     assert off.points[off.worst(2)] == pytest.approx([-0.36, 0.1, 0.013], abs=0.03)
+
+
+def test_two_that_are_missing_beside_one_part_are_found() -> None:
+    """While one is missing still, the other alone is no gain: the part is as far off as before."""
+    body = ((1.0, 0.8, 1.2), (0.0, 0.0, -0.3))
+    rods = [((0.07, 0.07, 0.6), (x, 0.0, 0.6)) for x in (-0.3, 0.3)]
+    samples = FitSamples.of(load_shape(union(box(*body), *(box(*rod) for rod in rods))), SETTINGS)
+    mended = Mending(samples, SETTINGS)(np.array([box_row(*body)]))
+    assert len(mended) == 3
+    assert deviations(samples, mended).norm < 0.06 < 0.5 < deviations(samples, mended[:1]).norm
