@@ -13,6 +13,7 @@ from partwright.approximation.sketches.directions import frames, long_axis
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.approximation.sketches.outlines import fitted_loop
 from partwright.approximation.sketches.sections import profile_of
+from partwright.approximation.sketches.tangents import with_tangents
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Revolution, Tube
 from partwright.fields.profile import Profile, circle, circle_of
@@ -69,6 +70,32 @@ def test_corners_within_a_wall_are_no_corners() -> None:
     loop = fitted_loop(square, TOLERANCE)
     assert loop is not None
     assert len(loop) == 4
+
+
+def test_walls_of_a_slot_are_lines_though_a_corner_of_the_mesh_lies_within_them() -> None:
+    turns = np.linspace(-0.5, 0.5, 64) * math.pi
+    half = np.column_stack([0.063 + 0.081 * np.cos(turns), 0.081 * np.sin(turns)])
+    middle = np.array([[0.0, 0.081 + 5e-7]])  # as in single precision
+    points = np.concatenate([half, middle, -half, -middle])
+    loop = fitted_loop(points, TOLERANCE)
+    assert loop is not None
+    assert sorted(round(abs(bulge), 3) for _, _, bulge in loop) == [0.0, 0.0, 1.0, 1.0]
+
+
+def test_an_arc_begins_where_the_line_is_tangent_to_it() -> None:
+    """In vents of a lid, one chord of an end counted as part of the wall."""
+    lean = math.radians(3)
+    x, y = 0.02 * math.cos(lean), 0.2 + 0.02 * math.sin(lean)
+    bulge = math.tan((math.pi - lean) / 4)
+    off = Profile([(0.02, -0.2), (x, y, bulge), (-0.02, 0.2), (-0.02, -0.2, 1.0)])
+    exact = with_tangents(off, TOLERANCE)
+    assert exact.corners == pytest.approx(
+        np.array([(0.02, -0.2, 0.0), (0.02, 0.2, 1.0), (-0.02, 0.2, 0.0), (-0.02, -0.2, 1.0)]), abs=1e-4
+    )
+    corner = Profile([(0.02, -0.2), (0.02, 0.2, 0.8), (-0.02, 0.2), (-0.02, -0.2, 1.0)])
+    assert with_tangents(corner, TOLERANCE) is corner
+    drawn = Profile([(0.02, -0.2), (0.02, 0.2, 1.0), (-0.02, 0.2), (-0.02, -0.2, 1.0)])
+    assert with_tangents(drawn, TOLERANCE) is drawn
 
 
 def test_what_is_flat_is_no_outline() -> None:

@@ -45,7 +45,12 @@ def fitted_loop(points: np.ndarray, tolerance: float) -> Loop | None:
     if plain is not None and len(plain) > min(_SIDES, len(points) / _MANY):
         return plain
     loops = (plain, _of_lines_and_arcs(points, _COLLINEAR, tolerance))
-    return min((loop for loop in loops if loop is not None), key=len, default=None)
+    return min((loop for loop in loops if loop is not None), key=_plainness, default=None)
+
+
+def _plainness(loop: Loop) -> tuple[int, int]:
+    """Sides, and how many of them are arcs: a slot's walls are none, though their first chords may pass."""
+    return len(loop), sum(bulge != 0.0 for _, _, bulge in loop)
 
 
 def is_circle(points: np.ndarray, tolerance: float) -> bool:

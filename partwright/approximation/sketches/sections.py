@@ -14,6 +14,7 @@ from partwright.approximation.sketches.outlines import fitted_loop, is_circle
 from partwright.approximation.sketches.pinches import unpinched
 from partwright.approximation.sketches.rims import Leaning
 from partwright.approximation.sketches.slits import TOUCHING, touches_itself, without_slits
+from partwright.approximation.sketches.tangents import with_tangents
 from partwright.errors import ParameterError
 from partwright.fields.profile import Loop, Profile
 from partwright.shapes.topology import area_vectors
@@ -177,7 +178,7 @@ def _profile(section: CrossSection, tolerance: float, mended: bool = False) -> P
     outline, more = unpinched(loops[0], FINE)
     profile = _valid(outline, holes + more)
     if profile is None or not touches_itself(profile.loops, TOUCHING):
-        return profile
+        return with_tangents(profile, FINE) if profile is not None else None
     tried = () if mended else without_slits(section, _SLIT * tolerance)
     simple = (_profile(one, tolerance, True) for one in tried)
     return next((one for one in simple if one is not None), None)
