@@ -191,5 +191,5 @@ def _literal(value: Any) -> str:
 FORMAT = Format(
     "Blender",
     write,
-    frozenset({Holds.NAMES, Holds.PARAMETERS, Holds.SUBTRACTION, Holds.BLENDS, Holds.LEARNED}),
+    frozenset({Holds.NAMES, Holds.PARAMETERS, Holds.SUBTRACTION, Holds.BLENDS, Holds.LEARNED, Holds.MAPS}),
 )

@@ -40,6 +40,7 @@ class Holds(Enum):
     SUBTRACTION = "what is taken away, as an operation"
     BLENDS = "rounded joints between parts"
     LEARNED = "learned parts, be it as the nearest solid"
+    MAPS = "colours and normals of textured parts"
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,14 @@ class Format:
     """A drawing of the profiles that parts are swept of; an assembly without any is refused."""
     needs: tuple[str, str] | None = None
     """A module and the extra of this package that brings it: ("pxr", "usd")."""
+
+    def lost_maps(self, assembly: Assembly) -> list[str]:
+        """Names of the parts whose maps the file leaves out."""
+        from partwright.textures.maps import KEY
+
+        if Holds.MAPS in self.holds:
+            return []
+        return [part.name for part in assembly.parts if KEY in part.metadata]
 
     @property
     def options(self) -> tuple[str, ...]:

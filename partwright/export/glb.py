@@ -336,7 +336,7 @@ def coloured(mesh: trimesh.Trimesh, colour: np.ndarray) -> trimesh.Trimesh:
 FORMAT = Format(
     "GLB",
     write,
-    frozenset({Holds.NAMES, Holds.GROUPS, Holds.COPIES, Holds.PARAMETERS, Holds.LEARNED}),
+    frozenset({Holds.NAMES, Holds.GROUPS, Holds.COPIES, Holds.PARAMETERS, Holds.LEARNED, Holds.MAPS}),
     lengths="metres",
     up="y",
 )

@@ -234,7 +234,7 @@ def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
 FORMAT = Format(
     "USD",
     write,
-    frozenset({Holds.NAMES, Holds.GROUPS, Holds.COPIES, Holds.PARAMETERS, Holds.LEARNED}),
+    frozenset({Holds.NAMES, Holds.GROUPS, Holds.COPIES, Holds.PARAMETERS, Holds.LEARNED, Holds.MAPS}),
     most=10_000,
     needs=("pxr", "usd"),
 )

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import trimesh
 
@@ -14,6 +15,7 @@ from partwright.cli.main import main
 from partwright.errors import ParameterError
 from partwright.export.formats import FORMATS
 from partwright.fields import Box, Quadric, Sphere, SuperFrustum
+from partwright.textures import PartMap
 
 CUBE = Assembly((Part(Box((1, 1, 1)), name="box"),), unit="mm", up="z")
 SHEET = Assembly((Part(SuperFrustum((1, 1, 1), onion=1.0), name="sheet"),), unit="mm", up="z")
@@ -154,3 +156,35 @@ def test_one_line_says_what_was_written(capsys: Any, folder: Path) -> None:
     assert len(said) == 1
     assert said[0].startswith(f"wrote {target}: OpenSCAD, ")
     assert said[0].endswith(f"1 of 2 parts is approximated, see {target}.report.json for how far off")
+
+
+@pytest.mark.parametrize(
+    ("textured", "suffix", "said"),
+    [
+        (
+            2,
+            ".stl",
+            "; without the maps of all 2 parts, which Assembly file, GLB, HTML, Blender, USD can hold",
+        ),
+        (
+            1,
+            ".glsl",
+            "; without the map of 1 of 2 parts, which Assembly file, GLB, HTML, Blender, USD can hold",
+        ),
+        (2, ".glb", " kB"),
+        (0, ".ply", " kB"),
+    ],
+)
+def test_maps_that_a_format_lacks_are_not_lost_in_silence(
+    capsys: Any, folder: Path, textured: int, suffix: str, said: str
+) -> None:
+    image = {"texture": PartMap(np.full((4, 4, 3), 200, np.uint8)).text()}
+    parts = [
+        Part(Box((1, 1, 1)), (2 * i, 0, 0), name=f"box {i}", metadata=image if i < textured else {})
+        for i in range(2)
+    ]
+    source, target = folder / "source.json", folder / f"a{suffix}"
+    Assembly(tuple(parts)).save(source)
+    assert main(["export", str(source), "-o", str(target)]) == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    assert line.endswith(said)
