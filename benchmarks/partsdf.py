@@ -5,7 +5,7 @@
     python benchmarks/partsdf.py encode --family FOLDER --model MODEL [--shapes N]
     python benchmarks/partsdf.py images --family FOLDER --model MODEL [--shapes N] [--views N]
     python benchmarks/partsdf.py scans --family FOLDER --model MODEL [--shapes N] [--surface]
-    python benchmarks/partsdf.py familiarity --families FOLDER [--shapes N] [--others N]
+    python benchmarks/partsdf.py familiarity --shapes-from FOLDER [--names A,B] [--shapes N] [--others N]
     python benchmarks/partsdf.py shortlist --families FOLDER [--names A,B] [--shapes N]
     python benchmarks/partsdf.py real --shapes-from FOLDER
     python benchmarks/partsdf.py generate --family FOLDER --model MODEL [--held N] [--fresh N]
@@ -20,7 +20,8 @@
 encoder, `scans` from few points, noise and missing halves, `generate` new ones against held-out ones.
 `soundness` says how many of these come apart, and what it costs to make them anew.
 `real` finds real chairs and vehicles by models of made ones. `familiarity` shows every model that ships
-shapes of its own family and of the others': who is warned of. `shortlist` says what it costs to judge
+new shapes of its own family and of the others, and real ones: who is warned of. `shortlist` says
+what it costs to judge
 most exchanged parts at few samples. `decoders` trains the paper's and the local one for the same
 seconds. `ablations` trains every variant in --work, one after another. `training` tables
 trainings in FOLDER/NAME, and keeps their logs. Trainings go on where they were stopped, and every shape's
@@ -103,7 +104,8 @@ def main() -> None:
     one = command("real", reality)
     one.add_argument("--shapes-from", type=Path, required=True, help="folder of toys/ and parts/")
     one = measuring("familiarity", strangers)
-    one.add_argument("--families", type=Path, required=True, help="folder of prepared families")
+    one.add_argument("--shapes-from", type=Path, required=True, help="folder of toys/ and parts/")
+    one.add_argument("--names", default="cars,chairs,mixers,vehicles")
     one.add_argument("--others", type=int, default=2, help="shapes of each other family")
     one = command("generate", generation)
     one.add_argument("--family", required=True)

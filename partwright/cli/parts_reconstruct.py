@@ -56,7 +56,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--iterations",
         metavar="N",
         type=int,
-        help="steps; 0: the start as it is (default: 400)",
+        help="steps; 0: the start as it is (default: 200)",
     )
     option("--points", metavar="N", type=int, help="samples a step (default: 2048)")
     option(

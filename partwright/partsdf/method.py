@@ -100,6 +100,7 @@ class LearnedParts(Method[Settings]):
             "absent": [name for name in model.parts if name not in found.names()],
             "turn": list(turn),
             "residual": known.residual,
+            "layout": known.layout,
             "oddness": known.latents,
             "resolution": meshed.resolution,
             "evaluations": {"meshing": meshed.evaluations, "dense grid": meshed.dense},

@@ -15,7 +15,7 @@ START_SHAPES = ("auto", "encoder", "nearest", "mean")
 class ReconstructionSettings:
     """How latents and poses are optimised until they decode to a shape (section 4.1)."""
 
-    iterations: int = 400
+    iterations: int = 200
     """Steps (paper: 800); 0 leaves the start as it is."""
     points: int = 2048
     """Samples a step, half of them inside (paper: 8,000, all that it draws)."""
