@@ -26,12 +26,11 @@ _SMOOTH = math.radians(25)  # between faces of one patch
 _LEAST_AREA, _LEAST_FACES = 2e-3, 24  # of the surface, that a patch has
 _TRIMMED, _ROUNDS = 0.85, 3  # of a patch, that is fitted again: chords beside edges lean
 _UPRIGHT = 1e-3  # of the largest: least spread of normals that are those of no cylinder and no plane
-_ACROSS, _ONLY = (
-    0.03,
-    30.0,
-)  # root mean square of the cosine between velocity and normal; how much worse others are
+_ACROSS = 0.03  # root mean square of the cosine between velocity and normal, at most
+_ONLY = 30.0  # times as far off all other motions are, squared
 _KEPT, _RADIAL = 0.1, 0.95  # of a face: cosine to the velocity, and to the way out, at most
-_UNEVEN, _PITCHES, _COHERENT = 0.06, 241, 0.5
+_UNEVEN, _PITCHES = 0.06, 241  # of the pitch, that is tried around it, in so many steps
+_COHERENT = 0.5  # of the flanks' area, that agrees on where a turn lies, at least
 _TURNS = 1.3  # that a patch goes around, at least
 _DEPTH = (0.02, 0.35)  # of the outer radius
 _CLIMB = (0.7, 30.0)  # depths that a thread climbs in a turn
