@@ -21,7 +21,7 @@ _GIVEN_UP = 3  # of those that are chosen, at most
 _UNREFITTED_SCORE_LOSS = 0.01  # of R: what a repeat may cost before a refit beyond the parts that it saves
 _UNREFITTED_OFF = 0.03  # unit lengths: so much more than before a part may be off before a refit
 _GRID_EVERY = 3
-_FURTHER = 0.009  # unit lengths, half a hundredth of the longest side: likewise, after it
+_FURTHER = 0.0045  # unit lengths, a quarter percent of the longest side: likewise, after it
 _REFITS = (((100.0, 6),), ((40.0, 4), (100.0, 8), (200.0, 8)))
 
 
@@ -43,8 +43,8 @@ def repeat(
 
     Repeats are taken that are worth the most: the parts that they save, less what they cost of R. The copies
     of each leaf are refitted as one. Together they may not lower the objective, nor leave a part further off
-    than any was, by over half a percent of the longest side; where they do, they are given up one by one. An
-    IoU that the settings ask for is kept. The first `locked` rows stay leaves of their own.
+    than any was, by over a quarter percent of the longest side; where they do, they are given up one by one.
+    An IoU that the settings ask for is kept. The first `locked` rows stay leaves of their own.
     """
     whole = _measured(samples, _leaves(rows, []), settings)
 
