@@ -22,6 +22,7 @@ PERFECT = 0.985
 """R from which on a tree can hardly become better, but plainer."""
 _FEW, _CHEAP = 1, 2.2  # features, and prices of plain ones, of which none is left to save
 _BLANKS, _PLAIN = 2, 4.0  # and prices of plain ones, with which but one is tried
+_PLAINER = 0.5  # prices of a feature
 _PATIENT = 6  # steps after which a tree may be well behind, and no more than the best has, but for one
 
 
@@ -59,8 +60,10 @@ def cut_from_blanks(
 
 
 def _least(search: FeatureSearch, tree: FeatureTree, whole: FeatureTree) -> float:
-    """What a tree has to be worth to be taken instead: of what is as good, the plainest is."""
-    return worth(whole) + (search.tie if tree.price >= whole.price else 0.0)
+    """What a tree has to be worth to be taken instead: of what is as good, the plainest is; by a few sides
+    less it is no plainer."""
+    plainer = tree.price < whole.price - _PLAINER * search.alpha
+    return worth(whole) + (0.0 if plainer else search.tie)
 
 
 def worth(tree: FeatureTree) -> float:

@@ -187,6 +187,18 @@ def test_a_hexagonal_bar_is_extruded_along_itself() -> None:
     assert tree.score > 0.99
 
 
+def test_a_housing_with_a_port_is_no_blank_with_corners_put_back() -> None:
+    """Which has fewer sides by one, and is as good."""
+    walls, cavity = Profile.rectangle(87.5, 50.5, 13), Profile.rectangle(77.5, 40.5, 8)
+    port = Part(Cylinder(6.5, 15), (0, 22.75, 19), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
+    corners = [(x, y, 3.25) for x in (28.75, -28.75) for y in (12.25, -12.25)]
+    cuts = Part(Extrusion(cavity, 30), (0, 0, 21.5)), at(Cylinder(2.75, 16.5), *corners), port
+    tree, _ = found(Assembly((Part(Extrusion(walls, 31.5), (0, 0, 15.75)), *cuts), "difference"))
+    assert (False, "cylinder", 1) in kinds(tree)
+    assert len(tree.features) == 3
+    assert tree.score > 0.99
+
+
 def test_a_bent_hexagonal_key_is_its_legs_and_its_bend() -> None:
     """Each leg ends where its walls do, not where it would leave the bend."""
     outline = Profile.regular(6, 3)
