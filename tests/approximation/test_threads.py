@@ -33,6 +33,11 @@ def test_a_rod_becomes_the_cylinder_around_it(pitch: float) -> None:
     assert plain.volume() > 1.1 * rod.volume()
 
 
+def test_both_flanks_are_one_thread_in_coarse_chords_too() -> None:
+    _, threads = without_threads(threaded(around=24))
+    assert [thread.pitch for thread in threads] == [pytest.approx(PITCH, rel=0.01)]
+
+
 def test_a_tapped_hole_becomes_as_narrow_as_its_crests() -> None:
     block = Manifold.cube((1.4, 1.4, 0.9), True)
     nut = block - threaded()

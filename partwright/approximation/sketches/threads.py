@@ -101,12 +101,13 @@ def _candidates(body: Manifold) -> list[Thread]:
             thread.length > _TURNS * climb
             and _DEPTH[0] * thread.outer < depth < _DEPTH[1] * thread.outer
             and _CLIMB[0] * depth < climb < min(_CLIMB[1] * depth, _STEEP * thread.outer)
-            and not any(_is_same(thread, other) for other in found)
         ):
             flanks = _flanks(thread, mesh)
             thread = _between_ends(_screw(mesh, flanks) or screw, corners)
             thread = _as_long_as(thread, mesh.vertices[np.unique(mesh.faces[flanks])])
-            found.append(_with_even_turns(thread, mesh, flanks))
+            thread = _with_even_turns(thread, mesh, flanks)
+            if not any(_is_same(thread, other) for other in found):
+                found.append(thread)
     return found
 
 
