@@ -117,8 +117,7 @@ class FeatureSearch:
             tried.add(own[index].key)
             grown.append(self.grown(self.extended(empty, own[index], True), others, best))
             if best is None and not self._is_done(grown[0]):
-                built = self._built_up(empty, own, others, gains, grown[0])
-                grown += [built] if built is not None and built.score >= _POOR else []
+                grown += self._built_up(empty, own, others, gains, grown[0])
         return cut_from_blanks(self, self._nearest(grown, others), others, tried) if grown else None
 
     def _nearest(self, grown: Sequence[FeatureTree], others: Sequence[Candidate]) -> FeatureTree:
@@ -150,15 +149,18 @@ class FeatureSearch:
         others: Sequence[Candidate],
         gains: NDArray[np.float64],
         best: FeatureTree,
-    ) -> FeatureTree | None:
-        """Of bodies that are the shape's own, the largest first, as long as there are any, and then of all
-        else: rings with balls are not cut from an outline."""
+    ) -> list[FeatureTree]:
+        """The tree of bodies that are the shape's own, the largest first, as long as there are any, and then
+        of all else: rings with balls are not cut from an outline. None where it explains too little, or saves
+        less than a feature: a counterbore is no wide hole with a ring in it."""
         order = np.argsort(-gains).tolist()
         first = next((i for i in order if own[i] in self._own_bodies), None)
         if first is None:
-            return None
+            return []
         tree = self.grown(self.extended(empty, own[first], True), others, None, True)
-        return self.grown(tree, others, best)
+        tree = self.grown(tree, others, best)
+        better = tree.objective > best.objective + self.alpha
+        return [tree] if tree.score >= _POOR and better else []
 
     def grown(
         self,
@@ -228,6 +230,7 @@ class FeatureSearch:
         missed = self._pieces(tree.missed, self.inside & ~tree.covered, patterns)
         excess = self._pieces(tree.excess, ~self.inside & tree.covered, patterns)
         adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
+        adding = [c for c in adding if not self._own_bodies.lines_a_hole(c)]
         if only_own:
             adding = [c for c in adding if c in self._own_bodies]
         cutting = [*self._bores.of(tree.steps), *(c for piece in excess for c in self.candidates_of(piece))]
