@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -46,21 +47,22 @@ def plain_shape(shape: Shape) -> tuple[Shape, list[Thread]]:
 
 
 def with_threads(fitted: Fitted, threads: Sequence[Thread]) -> Fitted:
-    """The fit with metadata of parts whose walls are the crests of threads, and a line for each thread."""
-    whole, lines = fitted.assembly, []
+    """The fit with metadata of parts whose walls are the crests of threads, and a line for those of a part
+    that are alike."""
+    whole = fitted.assembly
+    counts: Counter[str] = Counter()
     for thread in threads:
         part = _wall(whole, thread)
         said = description(thread, whole.unit)
-        where = f"{part.name}: " if part is not None else ""
-        depth = _rounded(thread.outer - thread.inner)
-        lines.append(
-            f"{where}{said['thread_kind']} thread {said['thread']}, drawn plain, as wide as its crests: its "
-            f"grooves, {depth:g} deep, count as deviation"
-        )
+        kind, depth = f"{said['thread_kind']} thread {said['thread']}", thread.outer - thread.inner
+        counts[
+            f"{part.name if part is not None else fitted.assembly.name}: {kind}, drawn plain, as wide as its "
+            f"crests: its grooves, {depth:.2g} deep, count as deviation"
+        ] += 1
         if part is not None:
-            whole = whole.replace_part(
-                part.name, dataclasses.replace(part, metadata={**part.metadata, **said})
-            )
+            noted = dataclasses.replace(part, metadata={**part.metadata, **said})
+            whole = whole.replace_part(part.name, noted)
+    lines = [f"{line} ({count} times)" if count > 1 else line for line, count in counts.items()]
     return dataclasses.replace(fitted, assembly=whole, warnings=(*fitted.warnings, *lines))
 
 

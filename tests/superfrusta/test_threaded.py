@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
+import numpy as np
 import pytest
 from manifold3d import Manifold
 
 import partwright as pw
-from partwright.fields import Cylinder, Extrusion
+from partwright.approximation.sketches.threads import Thread
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.fields import Box, Cylinder, Extrusion
 from partwright.meshing.manifolds import as_mesh
+from partwright.methods import Fitted
 from partwright.superfrusta.thread_standards import standard_thread
+from partwright.superfrusta.threaded import with_threads
 from tests.threaded import LENGTH, RADIUS, threaded
 
 SCALE = 5.0 / RADIUS  # to M10, coarse
@@ -41,6 +47,23 @@ def test_a_bolt_is_a_shaft_that_says_its_thread_and_a_head(tmp_path) -> None:
     out = tmp_path / "bolt.scad"
     pw.export(fitted.assembly, out)
     assert "thread M10" in out.read_text()
+
+
+def test_holes_that_are_alike_are_one_line() -> None:
+    hole = Part(
+        Cylinder(2.4, 10), (22, 0, 0), instances=(Similarity(translation=(-44, 0, 0)),), name="bolt_hole"
+    )
+    plate = Assembly((Part(Box((60, 40, 8)), name="plate"), hole), "difference", unit="mm")
+    up = np.array([0.0, 0.0, 1.0])
+    threads = [Thread(np.array([x, 0.0, 0.0]), up, -1.0, 2.4, 3.0, 8.0, True) for x in (22, -22)]
+    said = with_threads(Fitted(plate, "converged", {}), threads)
+    (line,) = said.warnings
+    assert line.startswith("bolt_hole: internal thread M6")
+    assert line.endswith("(2 times)")
+    assert said.assembly["bolt_hole"].metadata["thread_hand"] == "left"
+    assert said.assembly["plate"].metadata == {}
+    away = dataclasses.replace(threads[0], axis=np.array([0.0, 0.0, 0.0]))
+    assert with_threads(Fitted(plate, "converged", {}), [away]).assembly == plate
 
 
 def test_threads_by_their_standard_names() -> None:
