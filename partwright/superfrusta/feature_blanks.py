@@ -22,7 +22,6 @@ PERFECT = 0.985
 """R from which on a tree can hardly become better, but plainer."""
 _FEW, _CHEAP = 1, 2.2  # features, and prices of plain ones, of which none is left to save
 _BLANKS, _PLAIN = 2, 4.0  # and prices of plain ones, with which but one is tried
-_PLAINER = 0.5  # prices of a feature
 _PATIENT = 6  # steps after which a tree may be well behind, and no more than the best has, but for one
 
 
@@ -60,10 +59,14 @@ def cut_from_blanks(
 
 
 def _least(search: FeatureSearch, tree: FeatureTree, whole: FeatureTree) -> float:
-    """What a tree has to be worth to be taken instead: of what is as good, the plainest is; by a few sides
-    less it is no plainer."""
-    plainer = tree.price < whole.price - _PLAINER * search.alpha
+    """What a tree has to be worth to be taken instead: of what is as good, the plainest is, if it has no more
+    copies."""
+    plainer = tree.price < whole.price and _copies(tree) <= _copies(whole)
     return worth(whole) + (0.0 if plainer else search.tie)
+
+
+def _copies(tree: FeatureTree) -> int:
+    return sum(len(part.copies) for feature in tree.features for part in feature.parts)
 
 
 def worth(tree: FeatureTree) -> float:
