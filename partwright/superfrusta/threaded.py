@@ -12,6 +12,7 @@ from manifold3d import Manifold, Mesh
 
 from partwright.approximation.sketches.threads import Thread, without_threads
 from partwright.assembly import Assembly, Part
+from partwright.meshing.manifolds import surface_of
 from partwright.methods import Fitted
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta.thread_standards import standard_thread
@@ -28,22 +29,22 @@ def plain_shape(shape: Shape) -> tuple[Shape, list[Thread]]:
     body, threads = without_threads(closed)
     if not threads:
         return shape, []
-    mesh = body.to_mesh64()
-    corners = shape.frame.from_unit(np.asarray(mesh.vert_properties, np.float64)[:, :3])
-    plain = load_shape((corners, np.asarray(mesh.tri_verts, np.int64)), shape.unit, shape.up)
+    corners, triangles = surface_of(body)
+    plain = load_shape((shape.frame.from_unit(corners), triangles), shape.unit, shape.up)
     plain.name = shape.name
-    own = [
-        dataclasses.replace(
-            thread,
-            axis=shape.frame.from_unit(thread.axis[None])[0],
-            **{
-                name: getattr(thread, name) / shape.frame.scale
-                for name in ("pitch", "inner", "outer", "length")
-            },
-        )
-        for thread in threads
-    ]
-    return plain, own
+    return plain, [_in_own_units(thread, shape) for thread in threads]
+
+
+def _in_own_units(thread: Thread, shape: Shape) -> Thread:
+    scale = shape.frame.scale
+    return dataclasses.replace(
+        thread,
+        axis=shape.frame.from_unit(thread.axis[None])[0],
+        pitch=thread.pitch / scale,
+        inner=thread.inner / scale,
+        outer=thread.outer / scale,
+        length=thread.length / scale,
+    )
 
 
 def with_threads(fitted: Fitted, threads: Sequence[Thread]) -> Fitted:
