@@ -16,6 +16,7 @@ from partwright.fields.profile import Loop, Profile, Side
 from partwright.fields.profile_offset import turn_between
 
 _LEAN = math.radians(15)  # by which a line and an arc turn at their corner, at most
+_ROUND = math.radians(60)  # an arc's sweep at least: flatter ones stand for other curves, as a tooth's flank
 _SMOOTH = 1e-7  # radians: there is nothing to do
 
 
@@ -49,7 +50,7 @@ def _tangent(sides: Sequence[Side], tolerance: float) -> Loop | None:
 def _tangency(before: Side, after: Side, tolerance: float) -> tuple[float, float] | None:
     """Where the corner of two sides belongs, if one is a line and the other an arc about along it."""
     line, arc = (before, after) if before.centre is None else (after, before)
-    if line.centre is not None or arc.centre is None:
+    if line.centre is not None or arc.centre is None or abs(arc.sweep) < _ROUND:
         return None
     turn = abs(turn_between(before, after))
     if not _SMOOTH < turn < _LEAN:
