@@ -13,7 +13,7 @@ import numpy as np
 
 from partwright.errors import ParameterError
 from partwright.fields.profile import Loop, Profile, Side
-from partwright.fields.profile_offset import turn_between
+from partwright.fields.profile_offset import kept_bulge, turn_between
 
 _LEAN = math.radians(15)  # by which a line and an arc turn at their corner, at most
 _ROUND = math.radians(60)  # an arc's sweep at least: flatter ones stand for other curves, as a tooth's flank
@@ -23,11 +23,11 @@ _SMOOTH = 1e-7  # radians: there is nothing to do
 def with_tangents(profile: Profile, tolerance: float) -> Profile:
     """The profile with corners moved to points of tangency that are within the tolerance of line and arc, and
     arcs about their centres; as it is where that is none, or sides would cross."""
-    loops = [_tangent(sides, tolerance) for sides in profile.sides]
-    if all(loop is None for loop in loops):
-        return profile
-    outline, *holes = (new or old for new, old in zip(loops, profile.loops, strict=True))
     try:
+        loops = [_tangent(sides, tolerance) for sides in profile.sides]
+        if all(loop is None for loop in loops):
+            return profile
+        outline, *holes = (new or old for new, old in zip(loops, profile.loops, strict=True))
         return Profile(outline, tuple(holes))
     except ParameterError:
         return profile
@@ -42,8 +42,8 @@ def _tangent(sides: Sequence[Side], tolerance: float) -> Loop | None:
     corners = []
     for i, side in enumerate(sides):
         start, end = starts[i], starts[(i + 1) % count]
-        moved = side.centre is not None and (start, end) != (side.start, side.end)
-        corners.append((*start, _bulge(side, start, end) if moved else side.bulge))
+        moved = (start, end) != (side.start, side.end)
+        corners.append((*start, kept_bulge(side, start, end, 0.0, curved=True) if moved else side.bulge))
     return tuple(corners)
 
 
@@ -64,13 +64,3 @@ def _tangency(before: Side, after: Side, tolerance: float) -> tuple[float, float
         return None
     x, y = foot.tolist()
     return x, y
-
-
-def _bulge(side: Side, start: tuple[float, float], end: tuple[float, float]) -> float:
-    """Of an arc about the side's centre from one point to another, the way the side goes."""
-    assert side.centre is not None
-    spokes = (np.subtract(start, side.centre), np.subtract(end, side.centre))
-    first, last = (math.atan2(spoke[1], spoke[0]) for spoke in spokes)
-    sign = math.copysign(1.0, side.sweep)
-    sweep = (sign * (last - first)) % (2 * math.pi)
-    return sign * math.tan(sweep / 4)
