@@ -85,13 +85,11 @@ def description(thread: Thread, unit: str | None) -> dict[str, str | float]:
 def _wall(whole: Assembly, thread: Thread) -> Part | None:
     """The smallest part whose surface is at the crests, if there is one."""
     crest = thread.inner if thread.internal else thread.outer
-    x = np.cross(thread.direction, np.eye(3)[int(np.abs(thread.direction).argmin())])
-    x /= np.linalg.norm(x)
-    y = np.cross(thread.direction, x)
+    x, y, z, middle = thread.frame.T
     turns = 2 * math.pi * np.arange(_AROUND)[:, None] / _AROUND
     ring = crest * (np.cos(turns) * x + np.sin(turns) * y)
-    along = thread.length * np.linspace(-0.3, 0.3, _ALONG)[:, None, None] * thread.direction
-    points = (thread.axis + along + ring).reshape(-1, 3)
+    along = thread.length * np.linspace(-0.3, 0.3, _ALONG)[:, None, None] * z
+    points = (middle + along + ring).reshape(-1, 3)
     most = max(_NEAR * (thread.outer - thread.inner), 1e-3 * thread.outer)
     walls = [part for part in whole.parts if float(np.median(np.abs(part.distance(points)))) < most]
     return min(walls, key=lambda part: float(np.prod(np.ptp(part.bounds(), axis=0))), default=None)

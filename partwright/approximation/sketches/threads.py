@@ -62,6 +62,13 @@ class Thread:
     length: float
     internal: bool
 
+    @property
+    def frame(self) -> np.ndarray:
+        """(3, 4): from where the axis is z, and its point the origin."""
+        x = np.cross(self.direction, np.eye(3)[int(np.abs(self.direction).argmin())])
+        x /= np.linalg.norm(x)
+        return np.column_stack([x, np.cross(self.direction, x), self.direction, self.axis])
+
 
 def without_threads(body: Manifold) -> tuple[Manifold, list[Thread]]:
     """The body with its grooves filled as far as their crests, and the threads, the largest first. One that a
@@ -151,7 +158,7 @@ def _with_even_turns(thread: Thread, mesh: trimesh.Trimesh, flanks: np.ndarray) 
     hundredths, the places of many turns much better. As it is where there is more than one start."""
     off = mesh.triangles_center[flanks] - thread.axis
     along = off @ thread.direction
-    frame = _frame(thread)
+    frame = thread.frame
     angle = np.arctan2(off @ frame[:, 1], off @ frame[:, 0])
     upwards = mesh.face_normals[flanks] @ thread.direction > 0
     weights = mesh.area_faces[flanks]
@@ -202,13 +209,6 @@ def _is_same(one: Thread, other: Thread) -> bool:
     )
 
 
-def _frame(thread: Thread) -> np.ndarray:
-    """(3, 4): from where the axis is z, and the middle the origin."""
-    x = np.cross(thread.direction, np.eye(3)[int(np.abs(thread.direction).argmin())])
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(thread.direction, x), thread.direction, thread.axis])
-
-
 def _strip(thread: Thread, within: float, beyond: float) -> CrossSection:
     """Half a section of the thread, with so many widths on the axis' side and outside, and a little at its
     ends where it has more than one."""
@@ -220,7 +220,7 @@ def _strip(thread: Thread, within: float, beyond: float) -> CrossSection:
 
 def _sections(body: Manifold, thread: Thread) -> list[CrossSection]:
     """In half planes through the axis: x away from it, y along it."""
-    frame = _frame(thread)
+    frame = thread.frame
     result = []
     for k in range(_SECTIONS):
         angle = _OFFSET + 2 * math.pi * k / _SECTIONS
@@ -242,7 +242,7 @@ def _is_behind(sections: Sequence[CrossSection], thread: Thread, outside: bool) 
 
 def _grooves(thread: Thread) -> Manifold:
     """All that is between its radii."""
-    return _strip(thread, 1, 1).revolve(_CIRCLE).transform(_frame(thread))
+    return _strip(thread, 1, 1).revolve(_CIRCLE).transform(thread.frame)
 
 
 def _filling(sections: Sequence[CrossSection], thread: Thread) -> Manifold:
@@ -250,4 +250,4 @@ def _filling(sections: Sequence[CrossSection], thread: Thread) -> Manifold:
     strip = _strip(thread, 1, 2) if thread.internal else _strip(thread, 2, 1)
     seen = CrossSection.batch_boolean([section ^ strip for section in sections], OpType.Add)
     rounding = _ROUNDING * (thread.outer - thread.inner)  # crests are strips of chords
-    return seen.simplify(rounding).revolve(_CIRCLE).transform(_frame(thread))
+    return seen.simplify(rounding).revolve(_CIRCLE).transform(thread.frame)
