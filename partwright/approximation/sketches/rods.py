@@ -55,7 +55,7 @@ def _end(
     level = min(levels, key=lambda z: abs(z - inside))
     if abs(level - inside) < _AT_LEVEL:
         return level
-    ends = [end for end in view.wall_ends(_WALLS) if abs(end[1] - inside) < _AT_LEVEL]
+    ends = [(share, z) for share, z in view.wall_ends if share > _WALLS and abs(z - inside) < _AT_LEVEL]
     return max(ends, default=(0.0, inside))[1]
 
 

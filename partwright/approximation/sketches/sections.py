@@ -81,10 +81,8 @@ class View:
     def levels(self) -> list[float]:
         """Heights of flat faces, from the lowest point to the highest; where there is none between these,
         those at which upright walls begin and end."""
-        vertices, faces = self.mesh
-        corners = vertices[faces]
-        normal = area_vectors(corners)
-        area = np.linalg.norm(normal, axis=1) / 2
+        vertices, _ = self.mesh
+        corners, normal, area = self._faces
         flat = np.abs(normal[:, 2]) > 2 * area * _FLAT
         height, weight = corners[flat, :, 2].mean(axis=1), area[flat]
         low, high = float(vertices[:, 2].min()), float(vertices[:, 2].max())
@@ -92,26 +90,27 @@ class View:
         found = sorted(_heights(height, weight, least), reverse=True)[:_MOST_LEVELS]
         inner = [z for _, z in found if low + _SAME_LEVEL < z < high - _SAME_LEVEL]
         if not inner:
-            inner = [z for _, z in self.wall_ends(_WALLS) if low + _SAME_LEVEL < z < high - _SAME_LEVEL]
+            ends = (z for share, z in self.wall_ends if share > _WALLS)
+            inner = [z for z in ends if low + _SAME_LEVEL < z < high - _SAME_LEVEL]
         return [low, *sorted(inner), high]
 
-    def wall_ends(self, share: float) -> list[tuple[float, float]]:
-        """How much of the width of upright walls begins or ends at a height, and the height; those with more
-        than a share of all."""
-        bottom, top, width = self._upright_walls
-        least = share * float(width.sum())
-        return [*_heights(bottom, width, least), *_heights(top, width, least)]
+    @cached_property
+    def wall_ends(self) -> list[tuple[float, float]]:
+        """At which upright walls begin or end: what share of the width of all does, and the height."""
+        corners, normal, area = self._faces
+        upright = (np.abs(normal[:, 2]) < 2 * area * _UPRIGHT) & (area > 0)
+        bottom, top = corners[upright, :, 2].min(axis=1), corners[upright, :, 2].max(axis=1)
+        width = 2 * area[upright] / np.maximum(top - bottom, _SAME_LEVEL)
+        ends, whole = [*_heights(bottom, width, 0.0), *_heights(top, width, 0.0)], float(width.sum())
+        return [(one / whole, z) for one, z in ends]
 
     @cached_property
-    def _upright_walls(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of faces that stand upright: from where to where, and how wide, (U,) each."""
+    def _faces(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Corners (F, 3, 3), normals (F, 3) twice as long as areas, areas (F,)."""
         vertices, faces = self.mesh
         corners = vertices[faces]
         normal = area_vectors(corners)
-        area = np.linalg.norm(normal, axis=1) / 2
-        upright = (np.abs(normal[:, 2]) < 2 * area * _UPRIGHT) & (area > 0)
-        bottom, top = corners[upright, :, 2].min(axis=1), corners[upright, :, 2].max(axis=1)
-        return bottom, top, 2 * area[upright] / np.maximum(top - bottom, _SAME_LEVEL)
+        return corners, normal, np.linalg.norm(normal, axis=1) / 2
 
     @property
     def slabs(self) -> Iterator[tuple[float, float]]:
