@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.superfrusta.feature_copying import replayed
-from partwright.superfrusta.feature_steps import FeatureTree, Step
+from partwright.superfrusta.feature_steps import FeatureTree, Step, fold
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
@@ -31,10 +31,10 @@ def exchanged(search: FeatureSearch, tree: FeatureTree, own: Sequence[Candidate]
         if len(tree.steps) < 2 or not places:
             break
         rivals = [_paying(search, _with_other(search, tree.steps, k, own)) for k in places]
-        best = max(rivals, key=lambda steps: _objective(search, steps))
-        if _objective(search, best) <= _objective(search, tree.steps) + search.tie:
+        value, steps = max(rivals, key=lambda rival: rival[0])
+        if value <= _objective(search, tree.steps) + search.tie:
             break
-        other = replayed(search, best)
+        other = replayed(search, steps)
         if other.objective <= tree.objective + search.tie:
             break
         tree = other
@@ -47,37 +47,33 @@ def _is_once(step: Step) -> bool:
 
 def _with_other(search: FeatureSearch, steps: Sequence[Step], k: int, own: Sequence[Candidate]) -> list[Step]:
     """The steps with the candidate that explains most in the place of one."""
-    rest = [*steps[:k], *steps[k + 1 :]]
-    taken = np.zeros(len(search.inside), bool)
-    for step in steps[k + 1 :]:
-        taken |= step.within
+    before, after = steps[:k], steps[k + 1 :]
     pool = [one for one in own if one.key != steps[k].chosen.key and (k == 0 or not one.cuts)]
     if not pool:
         return list(steps)
-    gains = search.gains(FeatureTree(covered=_fold(rest, len(search.inside))), pool, True, ~taken)
-    chosen = pool[int(gains.argmax())]
-    within = search.mask(chosen) > 0
-    return [*steps[:k], replace(steps[k], chosen=chosen, part=chosen.part, within=within), *steps[k + 1 :]]
+    left = FeatureTree(covered=_fold(search, [*before, *after]))
+    taken = np.logical_or.reduce([np.zeros(len(search.inside), bool), *(step.within for step in after)])
+    chosen = pool[int(search.gains(left, pool, True, ~taken).argmax())]
+    other = replace(steps[k], chosen=chosen, part=chosen.part, within=search.mask(chosen) > 0)
+    return [*before, other, *after]
 
 
-def _paying(search: FeatureSearch, steps: list[Step]) -> list[Step]:
-    """The steps without those but the first that no longer pay, the vainest first."""
+def _paying(search: FeatureSearch, steps: list[Step]) -> tuple[float, list[Step]]:
+    """The steps without those but the first that no longer pay, the vainest first; and their objective."""
+    value = _objective(search, steps)
     while len(steps) > 1:
-        fewer = [[*steps[:k], *steps[k + 1 :]] for k in range(1, len(steps))]
-        best = max(fewer, key=lambda rest: _objective(search, rest))
-        if _objective(search, best) <= _objective(search, steps):
+        fewer = ([*steps[:k], *steps[k + 1 :]] for k in range(1, len(steps)))
+        best, rest = max(((_objective(search, rest), rest) for rest in fewer), key=lambda one: one[0])
+        if best <= value:
             break
-        steps = best
-    return steps
+        value, steps = best, rest
+    return value, steps
 
 
 def _objective(search: FeatureSearch, steps: Sequence[Step]) -> float:
     price = sum(search.price(step.chosen.sides) for step in steps)
-    return search.score_of(_fold(steps, len(search.inside))) - price
+    return search.score_of(_fold(search, steps)) - price
 
 
-def _fold(steps: Sequence[Step], count: int) -> NDArray[np.bool_]:
-    covered = np.zeros(count, bool)
-    for step in steps:
-        covered = covered | step.within if step.added else covered & ~step.within
-    return covered
+def _fold(search: FeatureSearch, steps: Sequence[Step]) -> NDArray[np.bool_]:
+    return fold(((step.added, step.within) for step in steps), len(search.inside))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from partwright.meshing.manifolds import surface_of
 from partwright.superfrusta.feature_mending import FAR
-from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers, within_box
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers, fold, within_box
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
@@ -83,7 +83,4 @@ def mask_of(feature: Feature, points: NDArray[np.float32]) -> NDArray[np.bool_]:
 
 
 def fold_of_masks(tree: FeatureTree, masks: list[NDArray[np.bool_]], kept: list[int]) -> NDArray[np.bool_]:
-    covered = np.zeros(len(masks[0]), bool)
-    for k in kept:
-        covered = covered | masks[k] if tree.features[k].added else covered & ~masks[k]
-    return covered
+    return fold(((tree.features[k].added, masks[k]) for k in kept), len(masks[0]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -79,12 +79,8 @@ class FeatureTree:
 
     def at(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
         """(N,) whether points (N, 3) lie within the fold."""
-        covered = np.zeros(len(points), bool)
-        for feature in self.features:
-            for part in feature.parts:
-                within = covers(part, points)
-                covered = covered | within if feature.added else covered & ~within
-        return covered
+        steps = ((f.added, covers(part, points)) for f in self.features for part in f.parts)
+        return fold(steps, len(points))
 
     def distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
         """(N,) of the fold at points (N, 3); beyond edges a bound."""
@@ -111,6 +107,14 @@ class FeatureTree:
     @property
     def objective(self) -> float:
         return self.score - self.price
+
+
+def fold(steps: Iterable[tuple[bool, NDArray[np.bool_]]], count: int) -> NDArray[np.bool_]:
+    """Which of so many samples are covered: whether each step is added or cut, and its samples (N,)."""
+    covered = np.zeros(count, bool)
+    for added, within in steps:
+        covered = covered | within if added else covered & ~within
+    return covered
 
 
 def image_of(part: Part, move: Similarity) -> Part:
