@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from manifold3d import Manifold, Mesh
 from numpy.typing import NDArray
 
 from partwright.approximation.sketches.bodies import bodies
-from partwright.approximation.sketches.candidate import Candidate
+from partwright.approximation.sketches.candidate import AskedOnce, Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames, long_axis
 from partwright.fields import Swept
@@ -29,8 +30,9 @@ from partwright.superfrusta.feature_blanks import BEHIND, PERFECT, cut_from_blan
 from partwright.superfrusta.feature_bores import Bores
 from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_exchange import exchanged
+from partwright.superfrusta.feature_linings import lines_a_hole
 from partwright.superfrusta.feature_mending import farthest, mended
-from partwright.superfrusta.feature_own_bodies import OwnBodies
+from partwright.superfrusta.feature_own_bodies import is_own_body
 from partwright.superfrusta.feature_recasting import recast
 from partwright.superfrusta.feature_steps import FeatureTree, covers, within_box
 from partwright.superfrusta.feature_symmetry import symmetries
@@ -90,9 +92,10 @@ class FeatureSearch:
         self.inside = samples.inside[::_EVERY]
         directions = [frame[:, 2] for frame in self.frames]
         self.turns, self.mirrors = symmetries(self.body, directions, samples.surface, samples.measure)
-        self._masks: dict[int, tuple[Candidate, NDArray[np.float32]]] = {}
         self._of_piece: dict[tuple[float, ...], list[Candidate]] = {}
-        self._own_bodies = OwnBodies(self)
+        self.mask = AskedOnce(self._mask)
+        self._is_own = AskedOnce(partial(is_own_body, self))
+        self._lines_a_hole = AskedOnce(lambda candidate: lines_a_hole(candidate.part, samples.measure))
         self._bores = Bores()
 
     def run(self) -> FeatureTree | None:
@@ -154,7 +157,7 @@ class FeatureSearch:
         of all else: rings with balls are not cut from an outline. None where it explains too little, or saves
         less than a feature: a counterbore is no wide hole with a ring in it."""
         order = np.argsort(-gains).tolist()
-        first = next((i for i in order if own[i] in self._own_bodies), None)
+        first = next((i for i in order if self._is_own(own[i])), None)
         if first is None:
             return []
         tree = self.grown(self.extended(empty, own[first], True), others, None, True)
@@ -230,9 +233,7 @@ class FeatureSearch:
         missed = self._pieces(tree.missed, self.inside & ~tree.covered, patterns)
         excess = self._pieces(tree.excess, ~self.inside & tree.covered, patterns)
         adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
-        adding = [c for c in adding if not self._own_bodies.lines_a_hole(c)]
-        if only_own:
-            adding = [c for c in adding if c in self._own_bodies]
+        adding = [c for c in adding if not self._lines_a_hole(c) and (not only_own or self._is_own(c))]
         cutting = [*self._bores.of(tree.steps), *(c for piece in excess for c in self.candidates_of(piece))]
         if banned is not None:
             adding, cutting = ([c for c in pool if c.key != banned] for pool in (adding, cutting))
@@ -336,16 +337,12 @@ class FeatureSearch:
         along = long_axis(*surface)
         return own, news([along] if along is not None else [])
 
-    def mask(self, candidate: Candidate) -> NDArray[np.float32]:
+    def _mask(self, candidate: Candidate) -> NDArray[np.float32]:
         """(N,) 1 at the samples within."""
-        known = self._masks.get(id(candidate))
-        if known is None:
-            within = covers(candidate.part, self.points)
-            for cut in candidate.cuts:
-                within &= ~covers(cut, self.points)
-            known = candidate, within.astype(np.float32)
-            self._masks[id(candidate)] = known
-        return known[1]
+        within = covers(candidate.part, self.points)
+        for cut in candidate.cuts:
+            within &= ~covers(cut, self.points)
+        return within.astype(np.float32)
 
     def gains(
         self,

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 import trimesh
-from manifold3d import Manifold
 
 import partwright as pw
-from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Field, Profile, Revolution, Tube
@@ -21,7 +18,7 @@ from partwright.meshing.csg import mesh_csg
 from partwright.superfrusta import feature_search
 from partwright.superfrusta.feature_assembly import FeatureAssembly
 from partwright.superfrusta.feature_copying import with_copies
-from partwright.superfrusta.feature_own_bodies import OwnBodies
+from partwright.superfrusta.feature_linings import lines_a_hole
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import FeatureTree
 from partwright.superfrusta.samples import FitSamples
@@ -233,17 +230,12 @@ def test_a_ring_in_a_hole_is_no_body_and_a_hollow_post_is() -> None:
         Part(Cylinder(0.08, 0.6), (-0.36, 0, 0)),
     )
     shape = Assembly((Assembly(bored, "difference"), post))
-    own = OwnBodies(SimpleNamespace(samples=SimpleNamespace(measure=shape.distance)))  # type: ignore[arg-type]
-
-    def lines_a_hole(part: Part) -> bool:
-        return own.lines_a_hole(Candidate(part, lambda further: Manifold(), 2, 0.1))
-
-    assert lines_a_hole(ring)
-    assert lines_a_hole(Part(turned, ring.translation))
-    assert lines_a_hole(Part(Extrusion(Profile.rectangle(0.3, 0.3), 0.1), (0.0, 0.0, 0.0))) is False
-    assert not lines_a_hole(post)
+    assert lines_a_hole(ring, shape.distance)
+    assert lines_a_hole(Part(turned, ring.translation), shape.distance)
+    assert lines_a_hole(Part(Extrusion(Profile.rectangle(0.3, 0.3), 0.1)), shape.distance) is False
+    assert not lines_a_hole(post, shape.distance)
     plate = Profile(Profile.rectangle(1.4, 0.6).outline, (circle(0.16, (-0.36, 0.0)),))
-    assert not lines_a_hole(Part(Extrusion(plate, 0.2)))
+    assert not lines_a_hole(Part(Extrusion(plate, 0.2)), shape.distance)
 
 
 def test_a_slot_in_a_bent_plate_is_a_slot() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Generic, TypeVar
 
 import numpy as np
 from manifold3d import Manifold
@@ -12,6 +13,7 @@ from manifold3d import Manifold
 from partwright.assembly import Part
 from partwright.fields.rims import Rim
 
+_T = TypeVar("_T")
 _CHORDS = 4e-3  # unit lengths
 
 
@@ -45,6 +47,20 @@ class Candidate:
         return tuple(
             np.round([*self.part.bounds().ravel(), self.volume, *depths, len(self.cuts)], 3).tolist()
         )
+
+
+class AskedOnce(Generic[_T]):
+    """A question to candidates, which each is asked but once."""
+
+    def __init__(self, question: Callable[[Candidate], _T]) -> None:
+        self._question = question
+        self._answers: dict[int, tuple[Candidate, _T]] = {}  # kept with them, or another might get its number
+
+    def __call__(self, candidate: Candidate) -> _T:
+        known = self._answers.get(id(candidate))
+        if known is None:
+            known = self._answers[id(candidate)] = candidate, self._question(candidate)
+        return known[1]
 
 
 def posed(body: Manifold, frame: np.ndarray) -> Manifold:
