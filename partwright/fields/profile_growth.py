@@ -46,11 +46,12 @@ def _grown_loop(sides: tuple[Side, ...], depths: list[float], tilted: bool) -> L
 
     def stays(i: int) -> bool:
         pair = sides[i - 1], sides[i]
-        if not (depths[i - 1] and depths[i]):
-            straight = all(side.centre is None for side in pair)
-            either = depths[i - 1] or depths[i]
-            return not either or (tilted and straight and abs(turn_between(*pair)) < _NEARLY_STRAIGHT)
-        return False
+        if depths[i - 1] and depths[i]:
+            return False
+        if not (depths[i - 1] or depths[i]):
+            return True
+        straight = pair[0].centre is None and pair[1].centre is None
+        return tilted and straight and abs(turn_between(*pair)) < _NEARLY_STRAIGHT
 
     starts = [
         sides[i].start if stays(i) else _corner(sides[i - 1], sides[i], depths[i - 1], depths[i])
