@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from manifold3d import Manifold
@@ -21,22 +21,15 @@ from partwright.superfrusta.feature_steps import Step
 _CHORD = 1e-3  # unit lengths: how far chords of a hole may be off
 
 
-class Bores:
-    """Made of each candidate of one search once."""
+def bores(steps: Sequence[Step], of: Callable[[Candidate], list[Candidate]]) -> list[Candidate]:
+    """One for each hole of parts that were added, where another was added later. of: `bores_of`."""
+    last = max((k for k, step in enumerate(steps) if step.added), default=0)
+    return [bore for step in steps[:last] if step.added for bore in of(step.chosen)]
 
-    def __init__(self) -> None:
-        self._known: dict[int, tuple[Candidate, list[Candidate]]] = {}
 
-    def of(self, steps: Sequence[Step]) -> list[Candidate]:
-        """One for each hole of parts that were added, where another was added later."""
-        last = max((k for k, step in enumerate(steps) if step.added), default=0)
-        return [bore for step in steps[:last] if step.added for bore in self._in(step.chosen)]
-
-    def _in(self, chosen: Candidate) -> list[Candidate]:
-        key = id(chosen)
-        if key not in self._known:
-            self._known[key] = chosen, [_bore(hole) for hole in _holes(chosen.part)]
-        return self._known[key][1]
+def bores_of(chosen: Candidate) -> list[Candidate]:
+    """One for each hole of a candidate."""
+    return [_bore(hole) for hole in _holes(chosen.part)]
 
 
 def _bore(hole: Part) -> Candidate:

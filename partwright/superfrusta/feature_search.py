@@ -27,7 +27,7 @@ from partwright.methods import Checkpoint
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_bases import bases, is_nearly_whole, various
 from partwright.superfrusta.feature_blanks import BEHIND, PERFECT, cut_from_blanks, worth
-from partwright.superfrusta.feature_bores import Bores
+from partwright.superfrusta.feature_bores import bores, bores_of
 from partwright.superfrusta.feature_copying import joined_by, with_copies
 from partwright.superfrusta.feature_exchange import exchanged
 from partwright.superfrusta.feature_linings import lines_a_hole
@@ -96,7 +96,7 @@ class FeatureSearch:
         self.mask = AskedOnce(self._mask)
         self._is_own = AskedOnce(partial(is_own_body, self))
         self._lines_a_hole = AskedOnce(lambda candidate: lines_a_hole(candidate.part, samples.measure))
-        self._bores = Bores()
+        self._bores_of = AskedOnce(bores_of)
 
     def run(self) -> FeatureTree | None:
         """The best tree; None where the surface encloses nothing to take sections of."""
@@ -234,7 +234,10 @@ class FeatureSearch:
         excess = self._pieces(tree.excess, ~self.inside & tree.covered, patterns)
         adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
         adding = [c for c in adding if not self._lines_a_hole(c) and (not only_own or self._is_own(c))]
-        cutting = [*self._bores.of(tree.steps), *(c for piece in excess for c in self.candidates_of(piece))]
+        cutting = [
+            *bores(tree.steps, self._bores_of),
+            *(c for piece in excess for c in self.candidates_of(piece)),
+        ]
         if banned is not None:
             adding, cutting = ([c for c in pool if c.key != banned] for pool in (adding, cutting))
         rivals: list[tuple[float, Candidate, bool]] = []
