@@ -145,6 +145,7 @@ TABLES = (
     Table("enrichment.md", "enrichment.py", None, 0, "--shapes {data} --rows build/enrichment.csv", 60),
     Table("textures.md", "textures.py", None, 0,
           "--shapes {data} --output benchmarks/results/textures.md", 30),
+    Table("threads.md", "threads.py", "", 1, "--shapes {data}", 1),
     Table("known_features.md", "known_features.py", "--count 4", 1, "--count 100", 15),
     Table("convexes_by_hand.md", "convexes_by_hand.py", "", 0.1, "", 0.1, "solids.csv and capri.csv"),
     Table("pretraining_cost.md", "pretraining_cost.py", "--steps 2", 1, "", 2),
