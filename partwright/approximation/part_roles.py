@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from partwright.approximation.tooth_roles import GAP, tooth_role
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.group_copies import in_runs, numbered_names
 from partwright.assembly.names import unique_names
@@ -79,14 +80,16 @@ def _bulk(node: Node) -> float:
 
 _CUTS = (
     "hole", "bolt_hole", "blind_hole", "counterbored_hole", "countersunk_hole", "bore", "countersink",
-    "dimple", "groove", "slot", "opening", "pocket", "island",
+    "dimple", "groove", "slot", "opening", "pocket", "island", GAP,
 )  # fmt: skip
 
 
 def _name(node: Node, cut_from: Node | None, roles: dict[str, str]) -> None:
     if isinstance(node, Part):
         if _is_solid(node):
-            roles[node.name] = _cut(node, cut_from) if cut_from else _added(node.field)
+            roles[node.name] = tooth_role(node, cut_from) or (
+                _cut(node, cut_from) if cut_from else _added(node.field)
+            )
         return
     first, *others = node.children
     if node.operation == "difference" and cut_from is not None:

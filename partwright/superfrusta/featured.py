@@ -19,6 +19,7 @@ from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_pruning import pruned
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
+from partwright.superfrusta.feature_teeth import with_teeth_apart
 from partwright.superfrusta.feature_thinning import thinned
 from partwright.superfrusta.flat_tree import flattened
 from partwright.superfrusta.samples import FitSamples
@@ -71,7 +72,7 @@ class FeaturedFit:
         if tree is None:
             return None, False
         if settings.min_iou is None:
-            return with_pockets(tree, self._samples.points), False
+            return with_teeth_apart(search, with_pockets(tree, self._samples.points)), False
         for count in range(1, len(tree.features) + 1):
             shorter = tree.first(count)
             if volume_iou(shorter, self._samples) >= settings.min_iou:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from partwright.approximation.part_roles import with_role_names
@@ -70,3 +72,25 @@ def test_holes_are_called_after_how_they_are_made() -> None:
     after = with_role_names(Assembly((Part(Box((40, 40, 6)), name="x"), *cuts), "difference"))
     names = ["counterbored_hole", "countersunk_hole", "blind_hole", "slot", "groove", "bolt_hole"]
     assert [part.name for part in after.parts] == ["base_plate", *names]
+
+
+def test_what_stands_around_an_axis_is_teeth_and_holes_in_it_are_not() -> None:
+    def ring(part: Part, count: int) -> Part:
+        turns = (Similarity.turn((0, 0, 1), 2 * np.pi * k / count) for k in range(1, count))
+        return replace(part, instances=tuple(turns))
+
+    wheel = Part(Cylinder(20, 5), name="a")
+    cuts = (
+        ring(Part(Box((4, 2, 9)), (20, 0, 0), name="b"), 16),
+        ring(Part(Cylinder(1, 9), (15, 0, 0), name="c"), 16),
+    )
+    after = with_role_names(Assembly((wheel, *cuts), "difference"))
+    assert [part.name for part in after.parts] == ["base_cylinder", "tooth_gap", "bolt_hole"]
+    groove = Part(Cylinder(1, 9), (20, 0, 0), name="d")
+    shifts = (Similarity(translation=tuple(m([20, 0, 0]) - [20, 0, 0])) for m in ring(groove, 12).instances)
+    after = with_role_names(Assembly((wheel, replace(groove, instances=tuple(shifts))), "difference"))
+    assert after.parts[1].name == "tooth_gap"
+    blades = ring(Part(Box((20, 1, 3)), (28, 0, 0), name="e"), 8)
+    teeth = ring(Part(Box((4, 3, 5)), (20, 0, 0), name="f"), 20)
+    after = with_role_names(Assembly((wheel, blades, teeth)))
+    assert {part.name for part in after.parts} == {"blade", "tooth", "base_cylinder"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import trimesh
 
@@ -16,11 +17,12 @@ from partwright.fields.profile import circle
 from partwright.meshing import mesh_assembly
 from partwright.meshing.csg import mesh_csg
 from partwright.superfrusta import feature_search
-from partwright.superfrusta.feature_assembly import FeatureAssembly
+from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
 from partwright.superfrusta.feature_copying import with_copies
 from partwright.superfrusta.feature_linings import lines_a_hole
 from partwright.superfrusta.feature_search import FeatureSearch
-from partwright.superfrusta.feature_steps import FeatureTree
+from partwright.superfrusta.feature_steps import Feature, FeatureTree
+from partwright.superfrusta.feature_teeth import with_teeth_apart
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.solids import Settings
 
@@ -259,3 +261,27 @@ def test_of_trees_the_one_that_is_near_is_taken(monkeypatch: pytest.MonkeyPatch)
     assert search._nearest([near, far], ()) == near
     monkeypatch.setattr(search, "ended", lambda tree, _: tree)
     assert search._nearest([near, far], ()) is far
+
+
+def test_a_gear_is_a_disc_and_one_gap_again_and_again() -> None:
+    """And not an outline of 96 sides; the tree is as near to the shape."""
+    step = 2 * math.pi / 24
+    corners = [
+        (radius * math.cos(k * step + a), radius * math.sin(k * step + a), math.tan(sweep / 4))
+        for k in range(24)
+        for radius, a, sweep in ((18, -0.09, 0.18), (18, 0.09, 0), (21, 0.11, 0.05), (21, 0.16, 0))
+    ]
+    wheel = Part(Extrusion(Profile(tuple(corners), (circle(5),)), 10))
+    drawn = Assembly((wheel, Part(Tube(9, 4, 18), (0, 0, 4))))
+    shape, settings = pw.load_shape(mesh_assembly(drawn), unit="mm"), Settings.for_quality("draft")
+    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+    none = np.zeros(0, bool)
+    parts = in_unit_frame(shape, drawn).parts
+    tree = FeatureTree([Feature(True, parts[0], none, 98), Feature(True, parts[1], none, 4)])
+    before = search.scored(tree)
+    after = with_teeth_apart(search, tree)
+    assert {kind for _, kind, count in kinds(after) if count == 24} == {"extrusion"}
+    assert len(after.features) == len(tree.features) + 1
+    assert max(feature.sides for feature in after.features) <= 8
+    assert after.score > before.score - 2e-4
+    assert after.objective > before.objective

@@ -1,0 +1,78 @@
+"""Names of what stands around an axis again and again: teeth, blades, and the gaps between teeth."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.approximation.sketches.outlines import circle_through
+from partwright.assembly import Node, Part
+from partwright.assembly.similarity import rotation_matrix
+from partwright.fields import Cylinder
+
+Floats = NDArray[np.float64]
+
+GAP = "tooth_gap"
+_FEWEST = 8  # of a wheel
+_SAME = 1e-3  # of the part's size: how far copies may be off a turn
+_STEPS = 200
+_LONG = 3.0  # a blade's length over its width, at least
+
+
+def tooth_role(part: Part, cut_from: Node | None) -> str | None:
+    """What a part is called that is there again in turns about an axis; None where it is something else, such
+    as a bolt hole, which has the body all around it. cut_from: what it is cut from, if it is."""
+    axis = _axis(part)
+    if axis is None:
+        return None
+    about, direction = axis
+    middle = part.copies[0].bounds().mean(axis=0)
+    outward = middle - about
+    outward = outward - direction * float(outward @ direction)
+    if np.linalg.norm(outward) < _SAME * _size(part):
+        return None
+    outward = outward / np.linalg.norm(outward)
+    ends = _ends(part, middle, outward)
+    if cut_from is not None:
+        return GAP if (cut_from.distance(ends) > 0).any() else None
+    sideways = _ends(part, middle, np.cross(direction, outward))
+    length, width = (float(np.linalg.norm(one - other)) for one, other in (ends, sideways))
+    return "blade" if length > _LONG * width else "tooth"
+
+
+def _axis(part: Part) -> tuple[Floats, Floats] | None:
+    """A point (3,) on the axis about which all copies are turned, and its direction; None where there are too
+    few, or they are moved otherwise."""
+    moves = part.instances
+    if len(moves) + 1 < _FEWEST:
+        return None
+    size = _size(part)
+    if isinstance(part.field, Cylinder):  # which is the same turned within itself
+        frame = rotation_matrix(part.rotation)
+        middles = np.array([copy.translation for copy in part.copies]) @ frame
+        (x, y), _, off = circle_through(middles[:, :2])
+        level = float(np.ptp(middles[:, 2])) < _SAME * size
+        return (frame @ (x, y, 0.0), frame[:, 2]) if level and off < _SAME * size else None
+    turn = np.array(moves[0].rotation[1:])
+    if not turn.any():
+        return None
+    direction = turn / np.linalg.norm(turn)
+    matrix = np.eye(3) - rotation_matrix(moves[0].rotation)
+    about = np.linalg.lstsq(matrix, np.array(moves[0].translation), rcond=None)[0]
+    on_axis = np.array([about, about + size * direction])
+    stay = all(np.abs(move(on_axis) - on_axis).max() < _SAME * size for move in moves)
+    return (about, direction) if stay else None
+
+
+def _size(part: Part) -> float:
+    return float(np.ptp(part.bounds(), axis=0).max())
+
+
+def _ends(part: Part, middle: Floats, direction: Floats) -> Floats:
+    """(2, 3) where a line through its middle leaves the part itself, at either end."""
+    alone = part.copies[0]
+    reach = float(np.linalg.norm(np.ptp(alone.bounds(), axis=0)))
+    along = np.linspace(-reach, reach, 2 * _STEPS + 1)
+    within = along[alone.distance(middle + along[:, None] * direction) < 0]
+    first, last = (within.min(), within.max()) if len(within) else (0.0, 0.0)
+    return middle + np.array([[first], [last]]) * direction

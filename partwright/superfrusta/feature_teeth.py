@@ -1,0 +1,71 @@
+"""Outlines of gears in a tree of features as a disc and one tooth, or one gap, with its copies: that is how
+they are drawn, and how they are changed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from partwright.approximation.profile_parts import with_profile
+from partwright.approximation.sketches.rims import SHARP
+from partwright.approximation.sketches.teeth import Teeth, toothed
+from partwright.assembly import Part, Similarity
+from partwright.fields import Extrusion
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
+
+if TYPE_CHECKING:
+    from partwright.superfrusta.feature_search import FeatureSearch
+
+_LOSS = 1e-3  # of R: one tooth is not quite the next
+
+
+def with_teeth_apart(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
+    """The tree with every outline as a circle and teeth where that is worth more, and about as near."""
+    best = search.scored(tree)
+    found, least = tree, best.score - _LOSS
+    while True:
+        others = [search.scored(replace(found, features=features)) for features in _rewritten(search, found)]
+        near = [other for other in others if other.score >= least]
+        other = max(near, key=lambda one: one.objective, default=best)
+        if other.objective <= best.objective:
+            return found
+        best = found = other
+
+
+def _rewritten(search: FeatureSearch, tree: FeatureTree) -> Iterator[list[Feature]]:
+    for i, feature in enumerate(tree.features):
+        field = feature.part.field
+        if (
+            feature.freeform
+            or not isinstance(field, Extrusion)
+            or field.taper
+            or field.rims != (SHARP, SHARP)
+        ):
+            continue
+        for teeth in toothed(field.profile):
+            if teeth.added or i == 0:  # what is cut from it would be cut from what is there before
+                steps = [_step(search, feature, part, added) for part, added in _parts(feature, teeth)]
+                yield [*tree.features[:i], *steps, *tree.features[i + 1 :]]
+
+
+def _step(search: FeatureSearch, feature: Feature, part: Part, added: bool) -> Feature:
+    profile = part.field.profile if isinstance(part.field, Extrusion) else None
+    sides = len(profile.corners) if profile is not None else 2
+    return replace(feature, part=part, added=added, covers=covers(part, search.points), sides=sides)
+
+
+def _parts(feature: Feature, teeth: Teeth) -> Iterator[tuple[Part, bool]]:
+    """The base and the teeth, and whether each is added."""
+    whole = feature.part
+    yield replace(with_profile(whole, teeth.base), instances=whole.instances), feature.added
+    tooth = with_profile(whole, teeth.tooth)
+    pose = whole.pose
+    x, y = teeth.centre
+    turns = [
+        pose @ Similarity.turn((0, 0, 1), 2 * math.pi * k / teeth.order, (x, y, 0)) @ pose.inverse()
+        for k in range(1, teeth.order)
+    ]
+    copies = [*turns, *(move @ turn for move in whole.instances for turn in (Similarity(), *turns))]
+    yield replace(tooth, instances=tuple(copies)), teeth.added is feature.added
