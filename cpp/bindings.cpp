@@ -1,5 +1,5 @@
 // The Python face of the kernel. Arguments are checked by its callers: fields/kernel.py, fields/profile_distance.py,
-// meshing/hulls.py, approximation/half_space.py, partsdf/part_networks.py.
+// meshing/hulls.py, approximation/half_space.py, approximation/sketches/chains.py, partsdf/part_networks.py.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "beyond_planes.hpp"
+#include "chains.hpp"
 #include "evaluate.hpp"
 #include "hull.hpp"
 #include "morphology.hpp"
@@ -265,6 +266,18 @@ NB_MODULE(_kernel, m) {
     return out;
   }, "vertices"_a, "faces"_a, "areas"_a, "normal"_a, "offsets"_a,
      "Volume (K,) of a solid beyond each of parallel planes.");
+
+  m.def("circle_through", [](In<double> points) {
+    const Circle circle = circle_through(points.data(), int64_t(points.shape(0)));
+    return nb::make_tuple(circle.x, circle.y, circle.radius, circle.off);
+  }, "points"_a, "Centre and radius of the circle nearest to points (K, 2), and the largest distance of any from it.");
+
+  m.def("open_line", [](In<double> points, double tolerance) {
+    const std::vector<int64_t> kept = open_line(points.data(), int64_t(points.shape(0)), tolerance);
+    auto out = array<int64_t>({kept.size()});
+    std::copy(kept.begin(), kept.end(), out.data());
+    return out;
+  }, "points"_a, "tolerance"_a, "Indices of the corners of an open chain (K, 2) that lines within the tolerance need.");
 
   m.def("networks_distances", [](In<float> local, std::vector<In<float>> weights, std::vector<In<float>> shifts, In<float> scale,
                                  In<float> room, In<float> unit, float reach, int octaves, int threads) {

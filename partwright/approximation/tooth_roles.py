@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.approximation.sketches.outlines import circle_through
+from partwright.approximation.sketches.chains import circle_through
 from partwright.assembly import Node, Part
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Cylinder

@@ -18,7 +18,15 @@ from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Extrusion
 from partwright.meshing.csg import solid_of
-from partwright.superfrusta.feature_steps import Feature, FeatureTree, Step, as_move, covers, image_of
+from partwright.superfrusta.feature_steps import (
+    Feature,
+    FeatureTree,
+    Step,
+    as_move,
+    covers,
+    image_of,
+    within_box,
+)
 from partwright.superfrusta.feature_symmetry import reflected, reflection
 
 if TYPE_CHECKING:
@@ -51,8 +59,8 @@ def with_copies(
     count_of_hits = float(within[wrong].sum())
     share = max(_COPY - _BY_CHANCE / math.sqrt(max(count_of_hits, 1.0)), _LEAST_COPY)
     least = share * (reached - tree.score)
-    few, hits = search.points[wrong], share * count_of_hits
-    left = ~within[wrong]
+    few, hits = search.points[wrong & ~within], share * count_of_hits
+    left = np.ones(len(few), bool)
 
     def joined(copy: Part, hit: NDArray[np.bool_], count: int = 1) -> bool:
         """Whether that many further copies gain enough, which they then do. hit: those of `few` within."""
@@ -75,8 +83,9 @@ def with_copies(
         moves += moves_between(inner, pieces, search.frames, search.body)
         moves += shifts_between(chosen, others)
         moves += _shifts(part, search.turns, search.mirrors)
-        found = ((move, copy := part.transformed(move), covers(copy, few)) for move in moves)
-        may_pay = {move: (copy, hit) for move, copy, hit in found if float((hit & left).sum()) > hits}
+        found = ((move, part.transformed(move)) for move in moves)
+        near = ((move, copy) for move, copy in found if within_box(few, *copy.bounds()).sum() > hits)
+        may_pay = {move: (copy, hit) for move, copy in near if (hit := covers(copy, few)).sum() > hits}
         kept = (move for move in _nearest_first(search, part, list(may_pay)) if joined(*may_pay[move]))
         part = replace(part, instances=tuple(kept))
         images = ((plane, image_of(part, plane)) for plane in planes)

@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 
+from partwright.approximation.sketches.chains import circle_through, open_line
 from partwright.fields.profile import Corner, Loop, circle
 
 _TURN = math.radians(37)
@@ -25,7 +26,6 @@ _EVEN = 1.4  # times the second longest chord of an arc, that its longest may be
 _COLLINEAR = 1e-6  # unit lengths: how far a corner is off by rounding alone
 _MANY = 2  # times as many corners as sides, from which on they may be of arcs
 _SIDES = 24  # of an outline at most that is drawn again for that
-_SAME = 1e-9
 
 
 def fitted_loop(points: np.ndarray, tolerance: float) -> Loop | None:
@@ -89,54 +89,12 @@ def _whole_circle(points: np.ndarray, tolerance: float) -> Loop | None:
     return circle(radius, (float(centre[0]), float(centre[1])))
 
 
-def circle_through(points: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Centre (2,), radius, and the largest distance of the points (K, 2) from the circle nearest to them."""
-    middle = points.mean(axis=0)
-    local = points - middle
-    square = (local**2).sum(axis=1)
-    (xx, xy), (_, yy) = local.T @ local
-    px, py = local.T @ square
-    determinant = xx * yy - xy * xy
-    if determinant <= 1e-12 * (xx + yy) ** 2:
-        return middle, math.inf, math.inf
-    x, y = (yy * px - xy * py) / (2 * determinant), (xx * py - xy * px) / (2 * determinant)
-    solution = np.array([x, y, square.mean()])
-    radius = math.sqrt(max(float(solution[2] + solution[:2] @ solution[:2]), 0.0))
-    off = np.abs(np.linalg.norm(local - solution[:2], axis=1) - radius)
-    return middle + solution[:2], radius, float(off.max())
-
-
 def _straightened(points: np.ndarray, tolerance: float) -> np.ndarray:
     """Indices of the corners that stay: the farthest from chords, until all others lie on them."""
     count = len(points)
     first = int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))
     order = (np.arange(count + 1) + first) % count
-    line = points[order]
-    kept = np.zeros(count + 1, bool)
-    kept[[0, count]] = True
-    far = int(np.argmax(np.linalg.norm(line - line[0], axis=1)))
-    kept[far] = True
-    stack = [(0, far), (far, count)]
-    while stack:
-        a, b = stack.pop()
-        if b - a < 2:
-            continue
-        off = _off_chord(line[a], line[b], line[a + 1 : b])
-        worst = int(off.argmax())
-        if off[worst] > tolerance:
-            middle = a + 1 + worst
-            kept[middle] = True
-            stack += [(a, middle), (middle, b)]
-    return np.sort(order[:-1][kept[:-1]])
-
-
-def _off_chord(a: np.ndarray, b: np.ndarray, points: np.ndarray) -> np.ndarray:
-    way = b - a
-    length = float(way @ way)
-    if length <= _SAME**2:
-        return np.linalg.norm(points - a, axis=1)
-    share = np.clip((points - a) @ way / length, 0, 1)
-    return np.asarray(np.linalg.norm(points - a - share[:, None] * way, axis=1))
+    return np.sort(order[open_line(points[order], tolerance)[:-1]])
 
 
 def _arcs(points: np.ndarray, tolerance: float) -> list[tuple[int, int]]:
@@ -219,7 +177,7 @@ def _joined(points: np.ndarray, arcs: list[tuple[int, int]], tolerance: float) -
         chain = points[(start + np.arange(chords + 1)) % count]
         corners += _arc(chain)
         gap = points[np.arange(end, then + 1) % count]
-        between = gap[_open_line(gap, tolerance)[:-1]]
+        between = gap[open_line(gap, tolerance)[:-1]]
         corners += [(float(x), float(y), 0.0) for x, y in between]
     return tuple(corners) if len(corners) >= 2 else None
 
@@ -236,19 +194,3 @@ def _arc(chain: np.ndarray) -> list[Corner]:
         (float(chain[i, 0]), float(chain[i, 1]), math.tan(float(angle[j] - angle[i]) / 4))
         for i, j in ((0, cut), (cut, -1))
     ]
-
-
-def _open_line(points: np.ndarray, tolerance: float) -> list[int]:
-    """Indices, ends included, of the corners of an open chain that stay."""
-    kept, stack = {0, len(points) - 1}, [(0, len(points) - 1)]
-    while stack:
-        a, b = stack.pop()
-        if b - a < 2:
-            continue
-        off = _off_chord(points[a], points[b], points[a + 1 : b])
-        worst = int(off.argmax())
-        if off[worst] > tolerance:
-            middle = a + 1 + worst
-            kept.add(middle)
-            stack += [(a, middle), (middle, b)]
-    return sorted(kept)

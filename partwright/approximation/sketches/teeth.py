@@ -10,7 +10,8 @@ import numpy as np
 from manifold3d import CrossSection
 from numpy.typing import NDArray
 
-from partwright.approximation.sketches.outlines import circle_through, fitted_loop
+from partwright.approximation.sketches.chains import circle_through
+from partwright.approximation.sketches.outlines import fitted_loop
 from partwright.approximation.sketches.sections import FINE
 from partwright.errors import ParameterError
 from partwright.fields.profile import Loop, Profile, circle
