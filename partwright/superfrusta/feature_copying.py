@@ -115,11 +115,10 @@ def _nearest_first(search: FeatureSearch, part: Part, moves: Sequence[Similarity
     if not len(points):
         return list(moves)
 
-    def off(move: Similarity) -> float:
-        away = np.abs(search.samples.measure(move(points).astype(np.float32)))
-        return round(float(np.minimum(away, _AROUND).mean()) / _EXACT)
-
-    return sorted(moves, key=off)
+    images = np.concatenate([move(points) for move in moves]).astype(np.float32)
+    away = np.minimum(np.abs(search.samples.measure(images)), _AROUND).reshape(len(moves), -1)
+    off = np.round(away.mean(axis=1) / _EXACT)
+    return [moves[i] for i in np.argsort(off, kind="stable")]
 
 
 def joined_by(search: FeatureSearch, tree: FeatureTree, step: Step) -> FeatureTree:

@@ -90,6 +90,9 @@ class FeatureSearch:
         self.points = samples.points[::_EVERY]
         self.weights = _weights(samples)[::_EVERY]
         self.inside = samples.inside[::_EVERY]
+        inside = self.inside[:, None]
+        self._in_and_out = np.hstack([self.weights * inside, self.weights * ~inside])
+        self._whole = self.weights[self.inside].sum(axis=0)
         directions = [frame[:, 2] for frame in self.frames]
         self.turns, self.mirrors = symmetries(self.body, directions, samples.surface, samples.measure)
         self._of_piece: dict[tuple[float, ...], list[Candidate]] = {}
@@ -292,7 +295,6 @@ class FeatureSearch:
         """Connected pieces that may pay and are no skin, the largest first. wrong: the samples in them.
         patterns: may pay by a share, where others of their form do so, too."""
         points, weight = self.points[wrong], self.weights[wrong]
-        total = self.weights[self.inside].sum(axis=0)
         found = [
             (volume, piece)
             for volume, piece in bodies(residual, _LEAST_PIECE * self.volume, _THIN)
@@ -302,7 +304,7 @@ class FeatureSearch:
 
         def pays(piece: Manifold) -> bool:
             within = within_box(points, *np.reshape(piece.bounding_box(), (2, 3)))
-            return float((weight[within].sum(axis=0) / total).mean()) > least
+            return float((weight[within].sum(axis=0) / self._whole).mean()) > least
 
         paying = np.array([volume for volume, piece in found if pays(piece)])
         # One of a row may have few samples by chance: it is a copy of what pays.
@@ -356,12 +358,10 @@ class FeatureSearch:
     ) -> NDArray[np.float64]:
         """(C,) by how much each raises R beyond its price. free: (N,) the samples that it can change, all
         where it is None."""
-        inside, outside = self.weights * self.inside[:, None], self.weights * ~self.inside[:, None]
-        both = (inside * tree.covered[:, None]).sum(axis=0)
-        either = inside.sum(axis=0) + (outside * tree.covered[:, None]).sum(axis=0)
+        both, either = self._overlap(tree.covered)
         changes = ~tree.covered if added else tree.covered
         changes = changes if free is None else changes & free
-        columns = (np.hstack([inside, outside]) * changes[:, None]).astype(np.float32)
+        columns = (self._in_and_out * changes[:, None]).astype(np.float32)
         sign = 1.0 if added else -1.0
         scores = []
         for start in range(0, len(pool), _BATCH):
@@ -379,9 +379,13 @@ class FeatureSearch:
 
     def score_of(self, covered: NDArray[np.bool_]) -> float:
         """R of what covers such samples (N,)."""
-        both = self.weights[covered & self.inside].sum(axis=0)
-        either = self.weights[covered | self.inside].sum(axis=0)
+        both, either = self._overlap(covered)
         return float((both / np.maximum(either, 1e-9)).mean())
+
+    def _overlap(self, covered: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(2,) of what covers such samples (N,) and the shape: weights of both together, and of either."""
+        sums = covered.astype(np.float64) @ self._in_and_out
+        return sums[:2], self._whole + sums[2:]
 
 
 def _stands_for(candidate: Candidate, piece: Manifold) -> bool:

@@ -85,7 +85,9 @@ def symmetries(
 
 
 def _turns(axis: Floats, centre: Floats, points: Floats, measure: Measure) -> list[Similarity]:
-    errors = {n: _error(_turn(axis, n, 1, centre)(points), measure) for n in _ORDERS}
+    images = np.concatenate([_turn(axis, n, 1, centre)(points) for n in _ORDERS])
+    means = _off(images, measure).reshape(len(_ORDERS), -1).mean(axis=1)
+    errors = dict(zip(_ORDERS, means.tolist(), strict=True))
     limit = min(_ERROR, _RIVAL * min(errors.values()) + _NOISE)
     orders = [n for n, own in errors.items() if own < limit]
     if len(orders) == len(_ORDERS):
@@ -95,7 +97,11 @@ def _turns(axis: Floats, centre: Floats, points: Floats, measure: Measure) -> li
 
 
 def _error(image: Floats, measure: Measure) -> float:
-    return float(np.abs(measure(image.astype(np.float32))).mean())
+    return float(_off(image, measure).mean())
+
+
+def _off(points: Floats, measure: Measure) -> NDArray[np.float32]:
+    return np.abs(measure(points.astype(np.float32)))
 
 
 def _distinct(directions: Sequence[Floats]) -> list[Floats]:

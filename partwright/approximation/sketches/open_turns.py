@@ -79,10 +79,11 @@ def in_the_air(
 ) -> bool:
     """Whether points (N, 3) of a part's frame lie outside of the shape, or no deeper than a burr, in all its
     copies."""
-    return all(
-        bool((distance(points @ rotation_matrix(copy.rotation).T + copy.translation) > -burr).all())
-        for copy in part.copies
-    )
+    turned = (points @ rotation_matrix(copy.rotation).T + copy.translation for copy in part.copies)
+    first, *others = turned
+    if not (distance(first) > -burr).all():
+        return False
+    return not others or bool((distance(np.concatenate(others)) > -burr).all())
 
 
 def beside(side: Side, reach: float) -> np.ndarray:
