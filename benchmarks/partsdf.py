@@ -52,6 +52,8 @@ from partsdf_soundness import sounding
 from partsdf_speed import speed
 from partsdf_trainings import trainings
 
+from partwright.partsdf.settings import ReconstructionSettings
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(
@@ -68,7 +70,8 @@ def main() -> None:
     def measuring(name: str, run: Callable[[argparse.Namespace], None]) -> argparse.ArgumentParser:
         one = command(name, run)
         one.add_argument("--shapes", type=int, default=10_000, help="at most so many test shapes")
-        one.add_argument("--iterations", type=int, default=400, help="of a reconstruction")
+        default = ReconstructionSettings().iterations
+        one.add_argument("--iterations", type=int, default=default, help="of a reconstruction")
         one.add_argument("--points", type=int, default=2048, help="of an iteration")
         one.add_argument("--resolution", type=int, default=256, help="of the mesh that is measured")
         one.add_argument("--epochs", type=int, default=60, help="of a training")

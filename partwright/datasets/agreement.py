@@ -42,7 +42,7 @@ def _axis_namings() -> Array:
     return np.stack([m for m in matrices if np.linalg.det(m) > 0])
 
 
-_NAMINGS = _axis_namings()
+AXIS_NAMINGS = _axis_namings()
 
 
 def agreed(shapes: Sequence[Sequence[PrimitiveFit]]) -> list[PrimitiveFit]:
@@ -116,8 +116,8 @@ def _named(fits: Sequence[PrimitiveFit], reference: _Reference) -> tuple[Array, 
     """
     sizes = np.log([fit.scale for fit in fits])
     if fits[0].kind == CUBOID:
-        turned = np.stack([fit.rotation for fit in fits])[:, None] @ _NAMINGS
-        named = (np.abs(_NAMINGS).transpose(0, 2, 1) @ sizes[:, None, :, None])[..., 0]
+        turned = np.stack([fit.rotation for fit in fits])[:, None] @ AXIS_NAMINGS
+        named = (np.abs(AXIS_NAMINGS).transpose(0, 2, 1) @ sizes[:, None, :, None])[..., 0]
         return turned.reshape(-1, 3, 3), named.reshape(-1, 3)
     ends = [(fit.rotation[:, 2], -fit.rotation[:, 2]) for fit in fits]
     swung = [_swung(reference.rotation, axis) for pair in ends for axis in pair]

@@ -23,6 +23,7 @@ from partwright.partsdf.data import pose_tensors, present_parts
 from partwright.partsdf.losses import aggregate, intersection, terms
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.pose_naming import named_like
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.starts import (
@@ -86,6 +87,8 @@ def reconstruct(
     part = torch.zeros(len(shape.part)) if model.config.one_part else torch.tensor(shape.part)
     target = Target(torch.tensor(shape.points), torch.tensor(shape.sdf), part.long())
     poses = pose_tensors(shape, model.config)
+    if model.config.poses and not model.config.one_part:
+        poses = named_like(poses, model.average_pose)
     start = replace(NeuralShape.mean(model, present_parts(shape, model.config)), poses=poses)
     if settings.exchange and settings.iterations:
         return _found_by_part(start, target, settings, seed, told, checkpoint)
