@@ -21,7 +21,7 @@ from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.resampling import TRIES, Sample, sound_samples
-from partwright.partsdf.soundness import GAP, OFFSET, Judge, largest_offset
+from partwright.partsdf.soundness import GAP, OFFSET, THROUGH, Judge, largest_offset
 
 _FOLDS = 8
 _RESOLUTION = 96
@@ -35,12 +35,14 @@ def sounding(arguments: argparse.Namespace) -> None:
         f"{count} shapes a row. Apart: a piece of a part is more than {GAP} (of 1.8) from all others, or "
         f"more than in training shapes; odd: two parts lie by more than {OFFSET} beyond the range of the "
         f"training shapes to each other (for trained ones: of those of the other {_FOLDS - 1} eighths); "
-        f"empty: a part has no surface. Anew: each up to {TRIES} times. MMD-CD and COV-CD against {count} "
-        f"held-out shapes, made with another seed, {POINTS} points each, meshes of {_RESOLUTION}^3. Seconds "
-        "of the processor a shape, to make and to judge.", "",
+        f"empty: a part has no surface; through: more than {100 * THROUGH:.0f} % of a part's surface came "
+        "out of another part's far side, beyond the most in a few training shapes. Anew: parts that came "
+        f"through are drawn back, and each shape is made up to {TRIES} times. MMD-CD and COV-CD against "
+        f"{count} held-out shapes, made with another seed, {POINTS} points each, meshes of {_RESOLUTION}^3. "
+        "Seconds of the processor a shape, to make and to judge.", "",
         command_line(), "",
-        "| family | shapes | broken % | apart | odd | empty | tries | MMD-CD x1e4 | COV-CD % | s |",
-        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+        "| family | shapes | broken % | apart | odd | empty | through | tries | MMD-CD x1e4 | COV-CD % | s |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]  # fmt: skip
     for name in arguments.names.split(","):
         model = load_model(name)
@@ -70,6 +72,7 @@ def cells(samples: Sequence[Sample], held: list[np.ndarray]) -> str:
         [one.gap > one.allowed for one in judged],
         [one.offset > OFFSET for one in judged],
         [bool(one.empty) for one in judged],
+        [bool(one.through) for one in judged],
     )
     shares = " | ".join(f"{100 * np.mean(one):.0f}" for one in broken)
     tries = np.mean([one.tries for one in samples])

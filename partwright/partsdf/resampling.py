@@ -1,4 +1,5 @@
-"""New shapes that hang together: what a generator makes, and makes anew where parts came apart."""
+"""New shapes that hang together: what a generator makes, and makes anew where parts came apart; those that
+came through others are drawn back."""
 
 from __future__ import annotations
 
@@ -8,9 +9,11 @@ from dataclasses import dataclass, replace
 from partwright.methods import check_count
 from partwright.partsdf.generator import Draw, Generator
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.piercing import drawn_back
 from partwright.partsdf.soundness import Judge, Soundness
 
 TRIES = 8  # with half of the shapes unsound, one of 256 stays so
+_DRAWN_BACK = 3  # times at most, each of one part
 _CHANGES = (0.6, 0.7, 0.8, 0.9)  # of the first one, in the tries after it; then nothing of it is left
 ShareDone = Callable[[float], None]  # told how much is done, from 0 to 1, at most
 
@@ -37,8 +40,10 @@ def sound_samples(
 ) -> list[Sample]:
     """As `Generator.generate`, each made anew until it is sound, up to `tries` times in all.
 
-    What is sound at once is what `generate` makes. Else new noise takes over more of it with each try, then
-    all: replaced by anything, shapes that often come apart, as benches, would be rare.
+    What is sound at once is what `generate` makes; 1 try takes all as they come. A part that comes through
+    another is drawn back, unless it is to stay. What is broken else is made anew: new noise takes over more
+    of it with each try, then all. Replaced by anything, shapes that often come apart, as benches, would be
+    rare.
 
     Raises:
         SettingError: no try is allowed; else as `Generator.generate`.
@@ -54,15 +59,32 @@ def sound_samples(
             return generator.generate(draw, seed, like, change=much)[0]
         return generator.generate(draw, seed, source, keep, keep_layout, change)[0]
 
+    def judged(shape: NeuralShape) -> Sample:
+        sample = Sample(shape, judge(shape), 1)
+        return _mended(sample, judge, keep, keep_layout) if tries > 1 else sample
+
     best: list[Sample] = []
     for number, shape in enumerate(first):
-        sample = Sample(shape, judge(shape), 1)
+        sample = judged(shape)
         while sample.soundness.faults() and sample.tries < tries:
-            shape = made(number, sample.tries)
-            new = Sample(shape, judge(shape), 0)
+            new = judged(made(number, sample.tries))
             least = min(sample, new, key=lambda one: one.soundness.badness)
             sample = replace(least, tries=sample.tries + 1)
         best.append(sample)
         if told is not None:
             told(len(best) / count)
     return best
+
+
+def _mended(sample: Sample, judge: Judge, keep: Sequence[str], keep_layout: bool) -> Sample:
+    """The sample with parts that came through others drawn back, one by one, as long as that helps."""
+    for _ in range(_DRAWN_BACK):
+        free = [tip for tip in sample.soundness.through if tip.part not in keep]
+        if not free:
+            break
+        shape = drawn_back(sample.shape, free[0], move_pose=not keep_layout)
+        new = replace(sample, shape=shape, soundness=judge(shape))
+        if new.soundness.badness >= sample.soundness.badness:
+            break
+        sample = new
+    return sample

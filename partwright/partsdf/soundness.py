@@ -1,8 +1,8 @@
 """Whether a new shape hangs together as those of its family do: what an eye would call broken, measured.
 
-Three things are looked for: a part that is said to be there and has no surface; a piece of a part that is
-apart from all others; and two parts that lie to each other as in no training shape, as a leg that ends above
-its seat.
+Four things are looked for: a part that is said to be there and has no surface; a piece of a part that is
+apart from all others; two parts that lie to each other as in no training shape, as a leg that ends above its
+seat; and a part that comes through another, as a blade through the wall of its tube.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from partwright.errors import NoSurfaceError
 from partwright.partsdf.meshing import mesh_shape, resolution_for_wall
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.piercing import Tip, tips
 from partwright.partsdf.poses import PoseTensors, rotation_matrices
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 GAP, OFFSET = 0.02, 0.03  # unit lengths
 _SLACK = 0.1  # of the training shapes' range, by which two parts may lie beyond it
 _PIECE = 0.01  # of its part's surface: what is less is a crumb of the mesh
+THROUGH = 0.01  # of a part's surface, beyond what comes through in training shapes
 _COARSE, _FINE = 64, 112  # cells along the unit frame, by the thinnest wall
 _JUDGES = 8  # training shapes whose own gaps are looked at
 
@@ -38,7 +40,8 @@ _JUDGES = 8  # training shapes whose own gaps are looked at
 class Soundness:
     """empty: parts without a surface. gap: the widest that is left when all pieces of parts are joined by the
     narrowest, and the parts on its sides. allowed: a gap that is none for this family. offset: how far beyond
-    the training shapes' range two parts lie to each other, and these two. Unit lengths."""
+    the training shapes' range two parts lie to each other, and these two. Unit lengths. through: what
+    of parts came through others, more than in training shapes, the least area first."""
 
     empty: tuple[str, ...]
     gap: float
@@ -46,6 +49,7 @@ class Soundness:
     allowed: float
     offset: float
     offset_between: tuple[str, ...]
+    through: tuple[Tip, ...] = ()
 
     def faults(self) -> list[str]:
         """What is broken, a few words each; nothing where it is sound."""
@@ -55,12 +59,13 @@ class Soundness:
         if self.offset > OFFSET:
             first, second = self.offset_between
             said.append(f"{first} and {second} lie as in no training shape, by {self.offset:.2f}")
-        return said
+        return said + [f"{tip.part} comes through another part" for tip in self.through[:1]]
 
     @property
     def badness(self) -> float:
         """By how much the worst of it exceeds what is allowed, 1 where it just does."""
-        return 2.0 * len(self.empty) + max(self.gap / self.allowed, self.offset / OFFSET)
+        through = 1.0 + sum(tip.share for tip in self.through) if self.through else 0.0
+        return 2.0 * len(self.empty) + max(self.gap / self.allowed, self.offset / OFFSET, through)
 
 
 class Judge:
@@ -75,15 +80,33 @@ class Judge:
         gap, between = widest_gap(parts)
         allowed = GAP if gap <= GAP else max(GAP, self._own_gap)
         empty = tuple(name for name in shape.names() if name not in parts)
-        return Soundness(empty, gap, between, allowed, *largest_offset(shape))
+        through = tuple(tip for tip in tips(shape, parts) if tip.share > THROUGH)
+        if through:
+            known = self._own_tips
+            through = tuple(tip for tip in through if tip.share > THROUGH + known.get(tip.part, 0.0))
+        return Soundness(empty, gap, between, allowed, *largest_offset(shape), through)
+
+    @cached_property
+    def _trained(self) -> list[tuple[NeuralShape, dict[str, trimesh.Trimesh]]]:
+        """A few training shapes and the meshes of their parts."""
+        names = self.model.shapes
+        rows = np.unique(np.linspace(0, len(names) - 1, _JUDGES).round().astype(int)).tolist()
+        shapes = [NeuralShape.trained(self.model, names[i]) for i in rows]
+        return [(one, _meshes(one)) for one in shapes]
 
     @cached_property
     def _own_gap(self) -> float:
-        """The widest gap of a few training shapes: parts of some families are apart from one another."""
-        names = self.model.shapes
-        rows = np.unique(np.linspace(0, len(names) - 1, _JUDGES).round().astype(int)).tolist()
-        trained = [NeuralShape.trained(self.model, names[i]) for i in rows]
-        return max(widest_gap(_meshes(one))[0] for one in trained)
+        """The widest gap of training shapes: parts of some families are apart from one another."""
+        return max(widest_gap(parts)[0] for _, parts in self._trained)
+
+    @cached_property
+    def _own_tips(self) -> dict[str, float]:
+        """By part, the largest share of its surface that came through others in training shapes."""
+        most: dict[str, float] = {}
+        for shape, parts in self._trained:
+            for tip in tips(shape, parts):
+                most[tip.part] = max(most.get(tip.part, 0.0), tip.share)
+        return most
 
 
 def widest_gap(parts: dict[str, trimesh.Trimesh]) -> tuple[float, tuple[str, ...]]:
