@@ -35,7 +35,7 @@ def sounding(arguments: argparse.Namespace) -> None:
         f"{count} shapes a row. Apart: a piece of a part is more than {GAP} (of 1.8) from all others, or "
         f"more than in training shapes; odd: two parts lie by more than {OFFSET} beyond the range of the "
         f"training shapes to each other (for trained ones: of those of the other {_FOLDS - 1} eighths); "
-        f"empty: a part has no surface; through: more than {100 * THROUGH:.0f} % of a part's surface came "
+        f"empty: a part has no surface; through: more than {100 * THROUGH:.1f} % of a part's surface came "
         "out of another part's far side, beyond the most in a few training shapes. Anew: parts that came "
         f"through are drawn back, and each shape is made up to {TRIES} times. MMD-CD and COV-CD against "
         f"{count} held-out shapes, made with another seed, {POINTS} points each, meshes of {_RESOLUTION}^3. "

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 GAP, OFFSET = 0.02, 0.03  # unit lengths
 _SLACK = 0.1  # of the training shapes' range, by which two parts may lie beyond it
 _PIECE = 0.01  # of its part's surface: what is less is a crumb of the mesh
-THROUGH = 0.01  # of a part's surface, beyond what comes through in training shapes
+THROUGH = 0.005  # of a part's surface, beyond what comes through in training shapes
 _COARSE, _FINE = 64, 112  # cells along the unit frame, by the thinnest wall
 _JUDGES = 8  # training shapes whose own gaps are looked at
 
