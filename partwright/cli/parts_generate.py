@@ -11,8 +11,9 @@ CHANGE = 0.4  # of `--change`, where it is not given
 TRIES = 8  # of `--tries`: with half of the shapes unsound, one of 256 stays so
 
 _EPILOG = """\
-SHAPE is an assembly of neural parts (.json), or MODEL:NAME for a shape that the model was trained on, by name
-or number: mixers:3. The same seed makes the same shapes, and fewer of them the first of more.
+SHAPE is an assembly of neural parts (.json); MODEL:NAME for a shape that the model was trained on, by name
+or number: mixers:3; or a mesh, points or a picture, for what is found in it. The same seed makes the same
+shapes, and fewer of them the first of more.
 """
 
 
@@ -48,7 +49,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option(
         "--like",
         metavar="SHAPE",
-        help="samples near a shape, or near what is found in a mesh, points or a picture",
+        help="samples near a shape",
     )
     option(
         "--change",

@@ -6,6 +6,7 @@ import json
 import os
 from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ import trimesh
 from PIL import Image
 
 import partwright as pw
-from partwright.cli.main import main
+from partwright.cli.commands.parts_generate import _kept
+from partwright.cli.main import main, parser
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import SettingError, UnreadableFileError
 from partwright.partsdf.config import read_config
@@ -50,6 +52,21 @@ def test_train(lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixt
     assert sizes[1] < sizes[0]
     assert main(arguments) == 0  # all epochs are done: the same model again
     assert [(tmp_path / "out" / "model.safetensors").stat().st_size] == sizes[:1]
+
+
+@pytest.mark.parametrize("option", ["--poses", "--keep plate --of", "--like"])
+def test_what_samples_are_made_after_may_be_a_mesh_or_picture(
+    option: str, model: Model, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    commands = "partwright.cli.commands.parts_generate."
+    lamps = [NeuralShape.trained(model, name) for name in ("lamp0", "lamp1")]
+    monkeypatch.setattr(commands + "found_in", lambda _, path, seed: (lamps[seed], (f"{path} is odd",)))
+    seen = SimpleNamespace(shape=lamps[0], warnings=("seen from below",))
+    monkeypatch.setattr(commands + "reconstruct_photo", lambda *_: seen)
+    for file, said in (("lamp.stl", "lamp.stl is odd"), ("lamp.jpg", "seen from below")):
+        line = ["parts", "generate", "--model", "lamps", *option.split(), file]
+        assert _kept(parser().parse_args(line), model)[0] is lamps[0]
+        assert said in capsys.readouterr().err
 
 
 def test_encoder_and_generator(

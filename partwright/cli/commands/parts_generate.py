@@ -126,15 +126,20 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _kept(arguments: argparse.Namespace, model: Model) -> tuple[NeuralShape | None, list[str]]:
     """The shape of which something stays, and its parts that do."""
-    suffix = Path(arguments.like or "").suffix.lower()
-    if suffix in PICTURE_SUFFIXES:
-        seen = reconstruct_photo(model, arguments.like)
-        warn(seen.warnings)
-        return seen.shape, []
-    if suffix in SUFFIXES:
-        found, warnings = found_in(model, arguments.like, seed=arguments.seed)
-        warn(warnings)
-        return found, []
     text = arguments.of or arguments.poses or arguments.like
     keep = [name.strip() for name in arguments.keep.split(",")] if arguments.keep else []
-    return (open_source(text, arguments.model).shape if text else None), keep
+    return (_source(text, arguments, model) if text else None), keep
+
+
+def _source(text: str, arguments: argparse.Namespace, model: Model) -> NeuralShape:
+    """A shape of the model, or what is found in a mesh, points or a picture; says what is odd about that."""
+    suffix = Path(text).suffix.lower()
+    if suffix in PICTURE_SUFFIXES:
+        seen = reconstruct_photo(model, text)
+        warn(seen.warnings)
+        return seen.shape
+    if suffix in SUFFIXES:
+        found, warnings = found_in(model, text, seed=arguments.seed)
+        warn(warnings)
+        return found
+    return open_source(text, arguments.model).shape
