@@ -20,13 +20,14 @@ Floats = NDArray[np.float64]
 Measure = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 _ORDERS = range(36, 1, -1)
+_MULTIPLES = range(2, 7)  # of the largest that is one, that are looked at, too
 _ROUND = 12  # the largest order that is looked at where all are symmetries
 _ERROR = 1e-2  # unit lengths: mean distance from the surface to its image; each copy is looked at anyway
 _RIVAL, _NOISE = 2.0, 2e-4  # of the least error of an axis, and unit lengths, that another order may have
 _POINTS = 300
 _PARALLEL = 0.9999
 _APART, _NEAR = 1e-5, 0.05  # unit lengths between the middles of volume and box, to try both
-_MOST = 48
+_MOST = 240
 
 
 def centre_of_volume(body: Manifold) -> Floats:
@@ -85,15 +86,26 @@ def symmetries(
 
 
 def _turns(axis: Floats, centre: Floats, points: Floats, measure: Measure) -> list[Similarity]:
-    images = np.concatenate([_turn(axis, n, 1, centre)(points) for n in _ORDERS])
-    means = _off(images, measure).reshape(len(_ORDERS), -1).mean(axis=1)
-    errors = dict(zip(_ORDERS, means.tolist(), strict=True))
+    errors = _errors(_ORDERS, axis, centre, points, measure)
     limit = min(_ERROR, _RIVAL * min(errors.values()) + _NOISE)
     orders = [n for n, own in errors.items() if own < limit]
     if len(orders) == len(_ORDERS):
         orders = [n for n in orders if n <= _ROUND]
+    elif orders:
+        most = max(orders)
+        more = _errors([k * most for k in _MULTIPLES], axis, centre, points, measure)
+        orders += [n for n, own in more.items() if own < errors[most] + _NOISE]
     largest = [n for n in orders if not any(other % n == 0 for other in orders if other > n)]
     return [_turn(axis, n, k, centre) for n in largest for k in range(1, n)]
+
+
+def _errors(
+    orders: Sequence[int], axis: Floats, centre: Floats, points: Floats, measure: Measure
+) -> dict[int, float]:
+    """By how much a turn of each order misses on average, unit lengths."""
+    images = np.concatenate([_turn(axis, n, 1, centre)(points) for n in orders])
+    means = _off(images, measure).reshape(len(orders), -1).mean(axis=1)
+    return dict(zip(orders, means.tolist(), strict=True))
 
 
 def _error(image: Floats, measure: Measure) -> float:

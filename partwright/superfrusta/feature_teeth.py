@@ -46,8 +46,9 @@ def _rewritten(search: FeatureSearch, tree: FeatureTree) -> Iterator[list[Featur
             continue
         for teeth in toothed(field.profile):
             if teeth.added or i == 0:  # what is cut from it would be cut from what is there before
-                steps = [_step(search, feature, part, added) for part, added in _parts(feature, teeth)]
-                yield [*tree.features[:i], *steps, *tree.features[i + 1 :]]
+                base, tooth = (_step(search, feature, part, added) for part, added in _parts(feature, teeth))
+                for steps in ((base, tooth), (tooth,)) if i else ((base, tooth),):  # it may stand on another
+                    yield [*tree.features[:i], *steps, *tree.features[i + 1 :]]
 
 
 def _step(search: FeatureSearch, feature: Feature, part: Part, added: bool) -> Feature:

@@ -359,3 +359,19 @@ def test_a_bore_through_two_walls_is_one_and_bolt_holes_are_copies() -> None:
     in_the_way = bolted | Part(Box((0.1, 0.5, 1.0)), (0, 0.25, 0))  # of one pair
     assert [len(hole.copies) for hole in merged_holes(pairs, bolted.distance)] == [2]
     assert [len(hole.copies) for hole in merged_holes(pairs, in_the_way.distance)] == [4]
+
+
+def test_what_stands_on_a_flat_end_of_a_turned_body_is_not_parted_from_it() -> None:
+    """Chords are off along the radius only: around the body there is no skin over its flat ends."""
+    disc = Manifold.cylinder(0.2, 0.9, 0.9, 64) + Manifold.cylinder(0.6, 0.3, 0.3, 64)
+    blade = Manifold.cube((0.3, 0.05, 0.3)).translate((0.45, 0, 0.1))
+    found = candidates(disc + blade, [np.eye(3)], holes=False)
+    volume = math.pi * (0.9**2 * 0.2 + 0.3**2 * 0.4)
+    all_turned = (c for c in found if isinstance(c.part.field, Revolution))
+    turned = min(all_turned, key=lambda c: abs(c.bodies[0].volume() - volume))
+    inner, outer = turned.bodies
+    left = (disc + blade) - outer
+    low, high = np.reshape(left.bounding_box(), (2, 3))
+    assert low[2] == pytest.approx(0.2, abs=1e-5)
+    assert high[2] == pytest.approx(0.4, abs=1e-5)
+    assert np.reshape(inner.bounding_box(), (2, 3))[:, 2] == pytest.approx((0.0, 0.6), abs=1e-5)

@@ -285,3 +285,22 @@ def test_a_gear_is_a_disc_and_one_gap_again_and_again() -> None:
     assert max(feature.sides for feature in after.features) <= 8
     assert after.score > before.score - 2e-4
     assert after.objective > before.objective
+
+
+def test_teeth_on_a_shaft_stand_on_it() -> None:
+    """The disc at their roots goes where another body is there already."""
+    teeth = Profile(
+        tuple(
+            (math.hypot(x, y) * math.cos(a), math.hypot(x, y) * math.sin(a), 0.0)
+            for k in range(12)
+            for x, y in ((10, -1.5), (12, -1.5), (12, 1.5), (10, 1.5))
+            for a in [k * math.pi / 6 + math.atan2(y, x)]
+        )
+    )
+    drawn = Assembly((Part(Cylinder(math.hypot(10, 1.5), 50)), Part(Extrusion(teeth, 20), (0, 0, 5))))
+    shape, settings = pw.load_shape(mesh_assembly(drawn), unit="mm"), Settings.for_quality("draft")
+    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+    none = np.zeros(0, bool)
+    parts = in_unit_frame(shape, drawn).parts
+    tree = FeatureTree([Feature(True, parts[0], none, 2), Feature(True, parts[1], none, 48)])
+    assert kinds(with_teeth_apart(search, tree)) == [(True, "cylinder", 1), (True, "box", 12)]

@@ -126,7 +126,8 @@ def _teeth(line: Floats, order: int, outward: bool) -> Iterator[tuple[float, Loo
 def _closed(chain: Floats, root: float, further: float, outward: bool) -> Loop | None:
     """A tooth whose flanks (K, 2) stand on a circle about the origin, into which it reaches; a full circle
     where it is of one."""
-    middle, radius, off = circle_through(chain)
+    middles = (chain[1:] + chain[:-1]) / 2
+    middle, radius, off = circle_through(np.vstack([chain, middles]))
     if off < FINE and radius < root:
         return circle(radius, (float(middle[0]), float(middle[1])))
     first, last = chain[0], chain[-1]

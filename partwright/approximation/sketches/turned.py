@@ -9,7 +9,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from manifold3d import CrossSection, FillRule, JoinType, Manifold
+from manifold3d import CrossSection, FillRule, Manifold
 from scipy.spatial import cKDTree
 
 from partwright.approximation.profile_parts import revolved_part
@@ -240,8 +240,10 @@ def _revolved(axis: Axis, region: CrossSection, begin: float, angle: float) -> I
         return
 
     def make(further: float) -> Manifold:
-        grown = half.scale((1e3, 1e3)).offset(1e3 * further, JoinType.Miter, 2.0)
-        body = Manifold.revolve(grown, 128, degrees).scale((1e-3,) * 3)
+        # Chords are off along the radius only: what stands on a flat end is not to be parted from it.
+        out, in_ = (half.translate((by, 0.0)) for by in (further, -further))
+        grown = half + out + in_ if further > 0 else half ^ out ^ in_
+        body = Manifold.revolve(grown, 128, degrees)
         return posed(body.translate((float(foot[0]), float(foot[1]), 0.0)), frame)
 
     yield Candidate(part, make, len(profile.corners), half.area() * degrees)
