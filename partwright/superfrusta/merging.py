@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from partwright.fields.columns import ROTATION, Column
 from partwright.superfrusta.growing import Region, fit_regions
 from partwright.superfrusta.objective import coverage, occupancy_score, removal_scores, score
+from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.pruning import neighbours
 from partwright.superfrusta.refining import TOUCH_UP, refine
 from partwright.superfrusta.samples import FitSamples, Rows
@@ -19,7 +21,9 @@ from partwright.superfrusta.settings import Settings
 
 _TOUCHING = 0.03  # unit lengths
 _UNREFITTED_SCORE_LOSS = 0.02  # of R: a merger that costs more before its refit is not tried
-_FITTED = 20  # pairs that get a part fitted
+_FITTED = 16  # pairs that get a part fitted: those with the least valuable member
+_FILLED = 6  # and those that fill their convex hull best
+_FULL = 0.85  # share of the hull that these fill, at least
 _TRIED = 6  # of them, pairs that are tried with a refit
 
 
@@ -73,13 +77,21 @@ def mergers(
     samples: FitSamples, rows: Rows, settings: Settings, locked: int, apart: bool = False
 ) -> list[Merger]:
     """Best first. Of the pairs that touch, or of all where they may lie apart, those with the least valuable
-    member are fitted, in one batch."""
+    member are fitted, and those that together are nearly convex: a plank in two halves, each of which is
+    worth much. All in one batch."""
     without, _ = removal_scores(samples, rows)
-    found = list(combinations(range(len(rows)), 2)) if apart else _touching_pairs(samples, rows)
-    found = [(i, j) for i, j in found if rows[i, Column.SIGN] == rows[j, Column.SIGN]]
-    value = {pair: float(-max(without[list(pair)])) for pair in found if pair[0] >= locked}
+    touching = _touching_pairs(samples, rows)
     owner = owners(samples, rows)
-    pairs = [p for p in sorted(value, key=lambda p: (value[p], p)) if np.isin(owner, p).any()][:_FITTED]
+
+    def suited(pair: tuple[int, int]) -> bool:
+        alike = rows[pair[0], Column.SIGN] == rows[pair[1], Column.SIGN]
+        return bool(alike and pair[0] >= locked and np.isin(owner, pair).any())
+
+    every = list(filter(suited, combinations(range(len(rows)), 2) if apart else touching))
+    cheap = sorted(every, key=lambda pair: (-max(without[list(pair)]), pair))[:_FITTED]
+    filled = _hulls_filled(rows, [pair for pair in touching if suited(pair) and pair not in cheap])
+    full = [pair for pair in sorted(filled, key=lambda pair: -filled[pair]) if filled[pair] > _FULL]
+    pairs = cheap + full[:_FILLED]
     if not pairs:
         return []
     regions = [
@@ -106,6 +118,22 @@ def mergers(
     together = folded(occupied, added)
     gains = np.subtract(occupancy_score(samples, np.array(trials)), occupancy_score(samples, together))
     return [Merger(pairs[i], merged[i], float(gains[i])) for i in np.argsort(-gains, kind="stable")]
+
+
+def _hulls_filled(rows: Rows, pairs: list[tuple[int, int]]) -> dict[tuple[int, int], float]:
+    """The volume of both parts' convex hulls, by that of the hull of both."""
+    of_part = {part: _hull(surface_points(rows[[part]])[0]) for part in {i for pair in pairs for i in pair}}
+    result = {}
+    for pair in pairs:
+        (first, one), (second, other) = (of_part[part] for part in pair)
+        result[pair] = (one + other) / max(_hull(np.concatenate([first, second]))[1], 1e-12)
+    return result
+
+
+def _hull(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Corners (n, 3) of the convex hull, and its volume."""
+    hull = ConvexHull(points, qhull_options="QJ")
+    return points[hull.vertices], float(hull.volume)
 
 
 def _touching_pairs(samples: FitSamples, rows: Rows) -> list[tuple[int, int]]:
@@ -178,9 +206,12 @@ def carried_out(
     part: NDArray[np.float32],
     settings: Settings,
     locked: int,
+    alone: bool = False,
 ) -> Rows:
-    """The rows with `part` in place of both, it and its neighbours refitted."""
-    moving = neighbours(samples, rows, first) | neighbours(samples, rows, second)
+    """The rows with `part` in place of both, it and its neighbours refitted, or it alone."""
+    moving = np.zeros(len(rows), bool)
+    if not alone:
+        moving = neighbours(samples, rows, first) | neighbours(samples, rows, second)
     moving[first] = True
     moving[:locked] = False
     merged = _replaced(rows, first, second, part)
