@@ -5,7 +5,7 @@ What one side has as one part the other may have as two; of such sides the bette
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,21 +46,47 @@ def repeat_candidates(
     Bases that replace nothing may bring what is missing where their images go. The first `locked` rows are in
     no repeat.
     """
-    points = samples.points[::_EVERY]
-    parts = samples.parts_of(rows, points) < 0
-    points, parts = points[parts.any(axis=0)], parts[:, parts.any(axis=0)]
+    seen = Occupancies.of(samples, rows)
+    every = range(locked, len(rows))
+    return without_twins(one for group in found for one in seen.candidates(group, every, locked))
+
+
+def without_twins(wanted: Iterable[Repeat]) -> list[Repeat]:
+    """The first of those that are of the same parts."""
     result: dict[tuple[tuple[int, ...], frozenset[int], int], Repeat] = {}
-    for group in found:
-        images = np.stack([samples.parts_of(_images(rows, one), points) < 0 for one in group])
-        meeting = _meeting(rows, parts, images)
-        for base in range(locked, len(rows)):
+    for one in wanted:
+        result.setdefault((one.bases, one.replaced, len(one.isometries)), one)
+    return list(result.values())
+
+
+@dataclass(frozen=True)
+class Occupancies:
+    """Where parts of `rows` (M, 17) are: `parts` (M, N) at those of the samples, `points` (N, 3), that any
+    covers."""
+
+    samples: FitSamples
+    rows: Rows
+    points: NDArray[np.float32]
+    parts: Mask
+
+    @classmethod
+    def of(cls, samples: FitSamples, rows: Rows) -> Occupancies:
+        points = samples.points[::_EVERY]
+        parts = samples.parts_of(rows, points) < 0
+        covered = parts.any(axis=0)
+        return cls(samples, rows, points[covered], parts[:, covered])
+
+    def candidates(self, group: Sequence[Isometry], bases: Iterable[int], locked: int) -> Iterator[Repeat]:
+        """Repeats under the isometries of a group, of each of the bases by itself and with others."""
+        images = np.stack([self.samples.parts_of(_images(self.rows, one), self.points) < 0 for one in group])
+        meeting = _meeting(self.rows, self.parts, images)
+        for base in bases:
             for one in (
-                _of_part(rows, parts, images[:, base], group, base, locked),
-                _of_group(points, parts, meeting, group, base, locked),
+                _of_part(self.rows, self.parts, images[:, base], group, base, locked),
+                _of_group(self.points, self.parts, meeting, group, base, locked),
             ):
                 if one is not None:
-                    result.setdefault((one.bases, one.replaced, len(one.isometries)), one)
-    return list(result.values())
+                    yield one
 
 
 def _images(rows: Rows, isometry: Isometry) -> Rows:

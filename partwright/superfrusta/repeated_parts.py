@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from partwright.superfrusta.deviations import deviations, norm
+from partwright.superfrusta.local_repeats import LOCAL_TOLERANCE, local_repeats
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.repeat_candidates import Repeat, repeat_candidates
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, refit
-from partwright.superfrusta.symmetry import Symmetry, groups
+from partwright.superfrusta.symmetry import TOLERANCE, Symmetry, groups
 
 _PRICE = 0.5  # of a part's: at the whole price repeats that save a part buy it with much of the surface
 _TRIED = 64  # repeats at most
@@ -22,6 +23,9 @@ _UNREFITTED_SCORE_LOSS = 0.01  # of R: what a repeat may cost before a refit bey
 _UNREFITTED_OFF = 0.03  # unit lengths: so much more than before a part may be off before a refit
 _GRID_EVERY = 3
 _FURTHER = 0.0045  # unit lengths, a quarter percent of the longest side: likewise, after it
+_LOOSER = (
+    2.0  # times the median distance from the surface to the assembly, which what is missing hardly moves
+)
 _REFITS = (((100.0, 6),), ((40.0, 4), (100.0, 8), (200.0, 8)))
 
 
@@ -53,7 +57,10 @@ def repeat(
         return reached and trial.off <= whole.off + _FURTHER and trial.value >= whole.value
 
     best = whole
-    for chosen in _choices(samples, whole, repeat_candidates(samples, rows, groups(found), locked), settings):
+    tolerance = max(LOCAL_TOLERANCE, symmetry_tolerance(samples, rows))
+    wanted = repeat_candidates(samples, rows, groups(found), locked)
+    wanted += local_repeats(samples, rows, locked, tolerance)
+    for chosen in _choices(samples, whole, wanted, settings):
         for _ in range(_GIVEN_UP + 1):
             plain = _leaves(rows, chosen)
             refits = [refit(samples, plain, stages, settings, locked) for stages in _REFITS]
@@ -64,6 +71,16 @@ def repeat(
                 break
             chosen = _without_the_worst(samples, rows, chosen, settings)
     return best.leaves
+
+
+def symmetry_tolerance(samples: FitSamples, rows: Rows) -> float:
+    """Mean distance of a shape's surface from its image, unit lengths, up to which it counts as symmetric.
+
+    A symmetry need not hold better than the assembly fits: a scan or a generated mesh is alike on both sides
+    but for its noise, which no part follows.
+    """
+    residual = np.median(np.abs(samples.distance_of(rows, samples.surface)))
+    return max(TOLERANCE, _LOOSER * float(residual))
 
 
 def _without_the_worst(

@@ -25,7 +25,7 @@ from partwright.superfrusta.objective import coverage, score, volume_iou
 from partwright.superfrusta.outcome import Step, chosen
 from partwright.superfrusta.pruning import cheapest_removal, drop_least, prune
 from partwright.superfrusta.refining import COARSE_TO_FINE, FINE, POLISH, optimise
-from partwright.superfrusta.repeated_parts import repeat
+from partwright.superfrusta.repeated_parts import repeat, symmetry_tolerance
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.simplification import extend_cuts, simplify_kinds
@@ -258,7 +258,8 @@ class ResidualFit:
         self.enforce_budget()
         assert self.best is not None
         with self.timed("symmetry"):
-            found = symmetries(shape, self.settings, self.samples.seed)
+            tolerance = symmetry_tolerance(self.samples, self.best)
+            found = symmetries(shape, self.settings, self.samples.seed, tolerance)
             self.leaves = repeat(self.samples, self.best, found, self.settings, self.locked)
             rows = expanded(self.leaves)
         self.report_progress("symmetry", self.settings.rounds, rows, 1.0, len(self.leaves))

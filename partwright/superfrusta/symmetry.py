@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -99,19 +99,19 @@ def symmetries(
     found: list[Symmetry] = []
 
     def consider(kind: Literal["mirror", "rotation"], order: int, candidate: Isometry) -> Isometry | None:
-        if _error(grid, candidate, points) > _PROMISING:
+        if image_error(grid, candidate, points) > _PROMISING:
             return None
-        refined = _refined(grid, candidate, points)
-        if any(s.isometry.near(refined) for s in found):
-            return refined
-        if _error(grid, refined, points) > 2 * tolerance:
+        best = refined(grid, candidate, points, conjugated)
+        if any(s.isometry.near(best) for s in found):
+            return best
+        if image_error(grid, best, points) > 2 * tolerance:
             return None
-        image = refined(points[::_VERIFY_EVERY]).astype(np.float32)
+        image = best(points[::_VERIFY_EVERY]).astype(np.float32)
         error = float(np.abs(shape.unit_distance(image)).mean())
         if error > tolerance:
             return None
-        found.append(Symmetry(kind, order, refined, error))
-        return refined
+        found.append(Symmetry(kind, order, best, error))
+        return best
 
     for normal in axes:
         consider("mirror", 2, mirror(normal, centre))
@@ -184,7 +184,8 @@ def _fans(moments: Floats, principal: Floats) -> Iterator[Floats]:
             yield np.concatenate([principal[None, :, along], across])
 
 
-def _error(grid: DistanceGrid, isometry: Isometry, points: Floats) -> float:
+def image_error(grid: DistanceGrid, isometry: Isometry, points: Floats) -> float:
+    """Mean distance from the surface of the images of points (N, 3)."""
     return float(np.abs(_sampled(grid, isometry(points))).mean())
 
 
@@ -198,28 +199,41 @@ def _sampled(grid: DistanceGrid, points: Floats) -> Floats:
     return np.asarray(values + grid.spacing * np.linalg.norm(cell - within, axis=1), np.float64)
 
 
-def _refined(grid: DistanceGrid, isometry: Isometry, points: Floats) -> Isometry:
-    """The conjugate E T E^-1 under a small rigid motion E that brings the image of the surface closest to it.
+def refined(
+    grid: DistanceGrid,
+    isometry: Isometry,
+    points: Floats,
+    nudged: Callable[[Isometry, Floats], Isometry],
+    enough: float = _EXACT,
+) -> Isometry:
+    """An isometry that brings the images of points (N, 3) closer to the surface, by Gauss-Newton.
 
-    Conjugation keeps what T is: a mirror stays one, a rotation keeps its angle.
+    nudged: it after a small rigid motion, given as a twist (6,). enough: mean distance that needs no more.
     """
     for _ in range(_STEPS):
         residual = _sampled(grid, isometry(points))
-        if np.abs(residual).mean() < _EXACT:
+        if np.abs(residual).mean() < enough:
             break
-        nudged = [_conjugated(isometry, _WIDTH * unit) for unit in np.eye(6)]
-        jacobian = np.stack([(_sampled(grid, n(points)) - residual) / _WIDTH for n in nudged], axis=1)
+        ways = [nudged(isometry, _WIDTH * unit) for unit in np.eye(6)]
+        jacobian = np.stack([(_sampled(grid, way(points)) - residual) / _WIDTH for way in ways], axis=1)
         step = np.linalg.lstsq(jacobian, -residual, rcond=0.05)[0]
-        better = _conjugated(isometry, np.clip(step, -0.1, 0.1))
+        better = nudged(isometry, np.clip(step, -0.1, 0.1))
         if np.abs(_sampled(grid, better(points))).mean() >= np.abs(residual).mean():
             break
         isometry = better
     return isometry
 
 
-def _conjugated(isometry: Isometry, twist: Floats) -> Isometry:
+def conjugated(isometry: Isometry, twist: Floats) -> Isometry:
+    """E T E^-1 under a rigid motion E. That keeps what T is: a mirror stays one, a rotation keeps its
+    angle."""
     motion = Isometry(_turn(twist[:3]), twist[3:])
     return motion @ isometry @ motion.inverse()
+
+
+def shifted(isometry: Isometry, twist: Floats) -> Isometry:
+    """E T under a rigid motion E."""
+    return Isometry(_turn(twist[:3]), twist[3:]) @ isometry
 
 
 def _turn(vector: Floats) -> Floats:
