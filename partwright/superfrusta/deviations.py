@@ -23,6 +23,7 @@ _BESIDE = 0.005  # unit lengths from a surface at which a gap is looked for
 _AROUND = _BESIDE * np.concatenate([np.eye(3), -np.eye(3)])[:, None].astype(np.float32)
 _STEPS, _FLAT = 4, 0.1  # of a walk to the surface; least squared slope that a step is taken by
 _DEEPEST_BLEND = 0.08  # unit lengths: a quarter of the largest blend
+OUTSIDE = 1.2  # times that sticking out counts, which is seen before what is missing
 _POWER = 4.0  # of the norm over parts: near the largest, but with a word for the others
 
 
@@ -31,7 +32,8 @@ class Deviations:
     """Where the surfaces of a shape and of an assembly are apart, further than the grid can be wrong.
 
     points: (n, 3), unit frame. distance: (n,) of the shape, signed. off: (n,) from the other surface, unit
-    lengths. part: (n,) that the point lies on, or that is the nearest to it. parts: of the assembly.
+    lengths; times `OUTSIDE` where the point lies outside of the shape. part: (n,) that the point lies on, or
+    that is the nearest to it. parts: of the assembly.
     """
 
     points: Floats
@@ -73,6 +75,7 @@ def deviations(samples: FitSamples, rows: Rows) -> Deviations:
     points, distance, off, part = (np.concatenate(one) for one in found)
     # At an edge, what is read off the grid may be wrong by half a voxel.
     kept = off > max(_CLOSE, samples.grid.spacing / 2)
+    off = np.where(distance > 0, np.float32(OUTSIDE), np.float32(1)) * off
     return Deviations(points[kept], distance[kept], off[kept], part[kept].astype(np.int64), len(rows))
 
 

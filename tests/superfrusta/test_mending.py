@@ -13,7 +13,7 @@ from partwright.fields import kernel
 from partwright.fields.columns import WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
-from partwright.superfrusta.deviations import deviations, walked
+from partwright.superfrusta.deviations import OUTSIDE, deviations, walked
 from partwright.superfrusta.mending import Mending, next_to_mend
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.part_surfaces import surface_points
@@ -110,7 +110,7 @@ def test_a_void_that_only_blends_wall_is_off_by_its_depth(samples: FitSamples) -
 def test_a_thin_tab_is_off_by_its_length(samples: FitSamples, exact: np.ndarray) -> None:
     tab = box_row((0.3, 0.3, 0.006), (-0.3, 0.55, 0.1))
     off = deviations(samples, np.vstack([exact, tab]))
-    assert off.by_part == pytest.approx([0.0, 0.0, 0.3], abs=0.02)
+    assert off.by_part == pytest.approx([0.0, 0.0, OUTSIDE * 0.3], abs=0.02)
     assert off.distance[off.worst(2)] == pytest.approx(0.3, abs=0.02)
     assert off.points[off.worst(2), 1] == pytest.approx(0.7, abs=0.01)
     # It has next to no volume.
@@ -214,7 +214,7 @@ def test_a_hole_that_is_narrower_than_voxels_tell_is_seen_and_carved() -> None:
     assert 2 * radius < 3 * found.grid.spacing
     solid = np.array([box_row(*plate)])
     off = deviations(found, solid)
-    assert off.norm == pytest.approx(0.15, abs=0.02)  # half of the plate's thickness
+    assert off.norm == pytest.approx(OUTSIDE * 0.15, abs=0.02)  # half of the plate's thickness
     assert np.linalg.norm(off.points[off.worst(0), :2] - (0.3, 0.2)) < radius + 0.01
     mended = Mending(found, SETTINGS)(solid)
     (cut,) = mended[mended[:, Column.SIGN] < 0]
