@@ -92,13 +92,14 @@ def application(session: Session, token: str, hosts: frozenset[str]) -> App:
         if suffix not in FORMATS:
             return _refused(UnsupportedFormatError(f"{suffix!r:.40} names no format"))
         try:
-            name, data, changed = await asyncio.to_thread(_exported, session, suffix)
+            name, data, changed, bare = await asyncio.to_thread(_exported, session, suffix)
         except PartwrightError as error:
             return _refused(error)
         quoted = urllib.parse.quote(name)
         headers = {
             "content-disposition": f"attachment; filename*=UTF-8''{quoted}",
             "x-approximated": str(changed),
+            "x-without-maps": str(bare),
         }
         return Response(data, media_type="application/octet-stream", headers=headers)
 
@@ -231,16 +232,18 @@ def _triangles(session: Session) -> bytes:
     return b"".join(array.tobytes() for array in arrays)
 
 
-def _exported(session: Session, suffix: str) -> tuple[str, bytes, int]:
-    """Name, content, and how many parts had to be approximated; what is beside the file is left out."""
+def _exported(session: Session, suffix: str) -> tuple[str, bytes, int, int]:
+    """Name, content, how many parts had to be approximated, and how many lost their maps; what is beside the
+    file is left out."""
     from partwright.export.export_report import approximated_parts
 
     stem = re.sub(r"[^\w.-]+", "_", session.file.stem).strip(".") or "assembly"
     with tempfile.TemporaryDirectory(prefix="partwright-") as folder:
         path = Path(folder) / f"{stem}{suffix}"
-        export(session.assembly(), path)
+        assembly = session.assembly()
+        export(assembly, path)
         changed = len(approximated_parts(path)) if report_path(path).exists() else 0
-        return path.name, path.read_bytes(), changed
+        return path.name, path.read_bytes(), changed, len(FORMATS[suffix].lost_maps(assembly))
 
 
 async def _dropped(request: Request, session: Session) -> dict[str, str]:

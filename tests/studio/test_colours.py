@@ -118,6 +118,12 @@ def test_the_shader_shows_the_maps_and_edits_keep_them(shared: Callable[..., Pag
     found = colours.at(colours.vertices[near])
     off = np.abs(found - part_map(part).at(part.field, points[near] - part.translation))
     assert np.median(off) < 3
+    # A format that holds none is told of.
+    assert page.page.locator(".toast").count() == 0
+    page.page.get_by_role("button", name="Download").click()
+    with page.page.expect_download():
+        page.page.get_by_role("menuitem", name=".glsl").click()
+    page.page.locator(".toast", has_text="Without the maps of 3 parts").wait_for()
     # And the list's colours come back where they are asked for.
     page.page.get_by_role("button", name="View").click()
     page.page.get_by_role("menuitem", name="Parts in plain colours").click()

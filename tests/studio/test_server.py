@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from partwright.assembly import Assembly, Part, load_assembly
 from partwright.assembly.file_text import to_text
 from partwright.fields import Box, Cylinder, Sphere
+from partwright.textures import PartMap
 
 pytest.importorskip("starlette", reason="the studio's server needs starlette")
 pytest.importorskip("httpx", reason="starlette's test client needs httpx")
@@ -156,6 +159,18 @@ def test_every_format_comes_by_its_name_and_no_path_does(client: TestClient) -> 
     assert "stool.stl" in answer.headers["content-disposition"]
     for given in ("../../etc/passwd", "", "stl", ".nothing"):
         assert client.get(f"/{TOKEN}/export", params={"format": given}).status_code == 422
+
+
+def test_an_export_says_of_how_many_parts_it_leaves_the_maps_out(tmp_path: Path) -> None:
+    image = {"texture": PartMap(np.full((4, 4, 3), 200, np.uint8)).text()}
+    STOOL.replace_part("leg", replace(STOOL["leg"], metadata=image)).save(tmp_path / "stool.json")
+    app: Any = application(
+        opened(tmp_path / "stool.json", state=tmp_path / "state"), TOKEN, frozenset({HOST})
+    )
+    with TestClient(app, base_url=f"http://{HOST}") as client:
+        for suffix, bare in ((".scad", "1"), (".glb", "0")):
+            answer = client.get(f"/{TOKEN}/export", params={"format": suffix})
+            assert answer.headers["x-without-maps"] == bare
 
 
 def test_files_that_are_dropped_are_read_limited_and_put_nowhere(

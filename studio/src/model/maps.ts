@@ -25,6 +25,9 @@ const textOf = (part: Part, key: Baked): string | null => {
   return typeof text === "string" && text.startsWith("data:image/png;base64,") ? text : null;
 };
 
+/** How many parts a file without maps leaves bare. */
+export const countTextured = (parts: Iterable<Part>): number => [...parts].filter((part) => textOf(part, "texture") !== null).length;
+
 export class PartMaps {
   maps: Maps | null = null;
   private layers = new Map<string, number>();

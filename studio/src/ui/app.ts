@@ -3,12 +3,12 @@
 import { HINTS, type Measuring } from "../edit/measure";
 import { KINDS } from "../model/edits";
 import { isLearned } from "../model/learned";
-import { PartMaps } from "../model/maps";
+import { countTextured, PartMaps } from "../model/maps";
 import { rgb } from "../model/palette";
 import type { Store } from "../model/store";
-import { readAssembly, writeAssembly } from "../model/tree";
+import { leaves, readAssembly, writeAssembly } from "../model/tree";
 import { Commands } from "./commands";
-import { type Button, button, menu, save, toast } from "./controls";
+import { type Button, button, menu, save, tellOfMaps, toast } from "./controls";
 import { h, icon, type Icon } from "./dom";
 import { Inspector } from "./inspector";
 import { PartList } from "./parts";
@@ -200,6 +200,7 @@ export class App {
         return;
       }
       const data = format === "stl" ? files.toStl(surface, this.store) : files.toGlb(surface, this.store);
+      if (format === "stl") tellOfMaps(countTextured(leaves(this.store.root)));
       save(data, format === "stl" ? "model/stl" : "model/gltf-binary", `${this.fileName}.${format}`);
     } catch (error) {
       toast(`The mesh could not be made: ${String(error)}`, undefined, true);
@@ -211,6 +212,7 @@ export class App {
   private async saveGlsl(): Promise<void> {
     if (this.store.program.parts.some(isLearned)) return toast("A shader cannot hold learned parts; take a mesh.", undefined, true);
     const { toGlsl } = await import("../mesh/glsl");
+    tellOfMaps(countTextured(leaves(this.store.root)));
     save(toGlsl(this.store.root), "text/plain", `${this.fileName}.glsl`);
   }
 

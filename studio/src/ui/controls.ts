@@ -186,6 +186,11 @@ export function toast(text: string, action?: Button, error = false): void {
   setTimeout(close, error || action ? 12000 : 5000);
 }
 
+/** What a file leaves out that was just saved: the maps of so many parts. */
+export function tellOfMaps(bare: number): void {
+  if (bare) toast(`Without the ${bare === 1 ? "map of one part" : `maps of ${bare} parts`}: the format holds none. The assembly file does.`);
+}
+
 export function save(data: BlobPart, type: string, name: string): void {
   const url = URL.createObjectURL(new Blob([data], { type }));
   const link = h("a", { href: url, download: name });

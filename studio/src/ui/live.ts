@@ -9,7 +9,7 @@ import { Link } from "../server/link";
 import type { Learned, State, Step as SavedStep } from "../server/messages";
 import type { Look } from "../view/renderer";
 import type { App } from "./app";
-import { type Button, button, save, toast } from "./controls";
+import { type Button, button, save, tellOfMaps, toast } from "./controls";
 import { h } from "./dom";
 import { FitPanel } from "./fit";
 import { ImprovePanel } from "./improve";
@@ -288,6 +288,7 @@ export class Live {
       if (!answer.ok) throw new Error(((await answer.json()) as { message: string }).message);
       const name = /filename\*=UTF-8''(.*)$/.exec(answer.headers.get("content-disposition") ?? "")?.[1] ?? `assembly${format}`;
       save(await answer.arrayBuffer(), "application/octet-stream", decodeURIComponent(name));
+      tellOfMaps(Number(answer.headers.get("x-without-maps")));
       const changed = Number(answer.headers.get("x-approximated"));
       if (changed) toast(`${changed} ${changed === 1 ? "part is" : "parts are"} approximated: the format cannot hold ${changed === 1 ? "it" : "them"} exactly.`);
     } catch (error) {
