@@ -76,7 +76,7 @@ def add_method(group: Group) -> None:
         "--symmetry",
         action=argparse.BooleanOptionalAction,
         default=None,
-        help="where the shape is symmetric, parts come as repeats (default: on)",
+        help="parts that are alike, on both sides or in several places, come as repeats (default: on)",
     )
     option(
         "--subtract",

@@ -76,7 +76,8 @@ class Settings:
     curve: bool = False
     """Thin out down to one part and keep the assembly of every size on the way."""
     symmetry: bool = True
-    """Where the shape has a mirror plane or a rotation, parts come as repeats (docs/repeats.md)."""
+    """Where the shape has a mirror plane or a rotation, or is alike in several places, parts come as repeats
+    (docs/repeats.md)."""
 
     def __post_init__(self) -> None:
         for name in ("rounds", "regions", "attempts", "trials", "patience", "near", "uniform"):

@@ -79,7 +79,7 @@ def test_parts_alike_by_chance_stay_apart() -> None:
 def test_a_symmetry_need_not_hold_better_than_the_assembly_fits() -> None:
     boxes: list[Box] = [((2, 1.2, 0.15), (0, 0, 1.0))]
     boxes += [((0.15, 0.15, 1.05), (x, y, 0.5)) for x in (-0.85, 0.85) for y in (-0.5, 0.5)]
-    rough = table().subdivide_to_size(0.1)
+    rough = table().subdivide_to_size(0.15)
     rough.vertices += np.random.default_rng(0).normal(0, 0.008, rough.vertices.shape)
     samples, found = known(rough, boxes)
     shape = load_shape(rough)
