@@ -6,7 +6,7 @@ chance, as an ear and a foot, stay parts of their own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import permutations, product
@@ -44,19 +44,25 @@ _TURNS = [
 
 
 def local_repeats(
-    samples: FitSamples, rows: Rows, locked: int, tolerance: float = LOCAL_TOLERANCE
+    samples: FitSamples,
+    rows: Rows,
+    locked: int,
+    tolerance: float = LOCAL_TOLERANCE,
+    nearly: Sequence[Isometry] = (),
 ) -> list[Repeat]:
     """Of each part alone, and with others for what is made otherwise where their images are: of seven tines
     some may be one part and some two. The first `locked` rows are in no repeat.
 
-    tolerance: mean distance from the shape's surface to what a part stands for, moved; unit lengths.
+    tolerance: mean distance from the shape's surface to what a part stands for, moved; unit lengths. nearly:
+    isometries that may hold for a part after a small motion: one arm is raised a little higher.
     """
     forms = _Forms(samples, rows, locked, tolerance)
     seen = Occupancies.of(samples, rows)
     found = (
         one
         for base in range(locked, len(rows))
-        if (group := forms.group(base))
+        for group in (forms.group(base), *forms.nearly(base, nearly))
+        if group
         for one in seen.candidates(group, [base], locked)
     )
     return without_twins(one for one in found if forms.hold(one))
@@ -83,6 +89,13 @@ class _Forms:
                 kept.append(one)
                 places.append(place)
         return tuple(kept)
+
+    def nearly(self, base: int, isometries: Sequence[Isometry]) -> Iterator[tuple[Isometry]]:
+        """Each that takes what a part stands for to where it is again, after a small motion."""
+        for one in isometries if len(self.surfaces[base]) >= _FEWEST else ():
+            there = self.refined(base, one)
+            if self.there(base, there):
+                yield (there,)
 
     def powers(self, base: int, way: Isometry) -> Iterator[Isometry]:
         """Of a move and of its inverse, for as long as each leads where what the part stands for is, and not

@@ -18,10 +18,11 @@ from partwright.superfrusta.symmetry import TOLERANCE, Symmetry, groups
 
 _PRICE = 0.5  # of a part's: at the whole price repeats that save a part buy it with much of the surface
 _TRIED = 64  # repeats at most
-_GIVEN_UP = 3  # of those that are chosen, at most
+_GIVEN_UP = 1  # of those that are chosen, at most
 _UNREFITTED_SCORE_LOSS = 0.01  # of R: what a repeat may cost before a refit beyond the parts that it saves
 _UNREFITTED_OFF = 0.03  # unit lengths: so much more than before a part may be off before a refit
 _GRID_EVERY = 3
+_HOPELESS = 0.01  # of the value: what is so much worse after a brief refit gets no longer one
 _FURTHER = 0.0045  # unit lengths, a quarter percent of the longest side: likewise, after it
 _LOOSER = (
     2.0  # times the median distance from the surface to the assembly, which what is missing hardly moves
@@ -41,9 +42,15 @@ class _Trial:
 
 
 def repeat(
-    samples: FitSamples, rows: Rows, found: Sequence[Symmetry], settings: Settings, locked: int = 0
+    samples: FitSamples,
+    rows: Rows,
+    found: Sequence[Symmetry],
+    settings: Settings,
+    locked: int = 0,
+    nearly: Sequence[Symmetry] = (),
 ) -> list[RepeatedPart]:
-    """The assembly as leaves, of which those that repeat under the symmetries are one each.
+    """The assembly as leaves, of which those that repeat under the symmetries, or in several places, are one
+    each. What holds only `nearly` for the whole may hold for a part after a small motion.
 
     Repeats are taken that are worth the most: the parts that they save, less what they cost of R. The copies
     of each leaf are refitted as one. Together they may not lower the objective, nor leave a part further off
@@ -59,12 +66,14 @@ def repeat(
     best = whole
     tolerance = max(LOCAL_TOLERANCE, symmetry_tolerance(samples, rows))
     wanted = repeat_candidates(samples, rows, groups(found), locked)
-    wanted += local_repeats(samples, rows, locked, tolerance)
+    wanted += local_repeats(samples, rows, locked, tolerance, [one.isometry for one in nearly])
     for chosen in _choices(samples, whole, wanted, settings):
         for _ in range(_GIVEN_UP + 1):
-            plain = _leaves(rows, chosen)
-            refits = [refit(samples, plain, stages, settings, locked) for stages in _REFITS]
-            trials = [_measured(samples, leaves, settings) for leaves in (plain, *refits)]
+            trials = [_measured(samples, _leaves(rows, chosen), settings)]
+            for stages in _REFITS:
+                if trials[-1].value > whole.value - (_HOPELESS if len(trials) > 1 else np.inf):
+                    leaves = refit(samples, trials[0].leaves, stages, settings, locked)
+                    trials.append(_measured(samples, leaves, settings))
             better = [trial for trial in trials if good(trial)]
             best = max([best, *better], key=lambda trial: trial.value)
             if best is not whole or len(chosen) == 1:
@@ -108,8 +117,9 @@ def _choices(
 ) -> Iterator[list[Repeat]]:
     """Repeats that get along, in several ways, none twice.
 
-    Those are taken first that save the most parts, or the most for what they cost of R before a refit; all of
-    them, or those that leave no part far off before one: a refit may bring it back, but need not.
+    Those are taken first that are worth the most by themselves, that save the most for what they cost of R
+    before a refit, or that save the most parts; all of them, or those that leave no part far off before a
+    refit, which may bring it back, but need not.
     """
     rows = expanded(whole.leaves)
     wanted = sorted(wanted, key=lambda one: -len(one.replaced))[:_TRIED]
@@ -117,28 +127,24 @@ def _choices(
     costs = score(samples, rows) - np.array(scores)
     saved = np.array([len(one.replaced) for one in wanted])
     likely = costs - _PRICE * settings.alpha * saved <= _UNREFITTED_SCORE_LOSS
-    offs: dict[int, float] = {}
-
-    def near(i: int) -> bool:
-        if i not in offs:
-            offs[i] = _measured(samples, _leaves(rows, [wanted[i]]), settings).off
-        return offs[i] <= whole.off + _UNREFITTED_OFF
-
+    alone = {
+        i: _measured(samples, _leaves(rows, [wanted[i]]), settings) for i in np.flatnonzero(likely).tolist()
+    }
+    near = [i for i, trial in alone.items() if trial.off <= whole.off + _UNREFITTED_OFF]
+    cheap = sorted(alone, key=lambda i: costs[i] - _PRICE * settings.alpha * saved[i])
+    many = sorted(alone, key=lambda i: (-saved[i], costs[i]))
+    worthy = sorted(near, key=lambda i: -alone[i].value)
     seen: list[list[int]] = [[]]
-    for order in (
-        np.argsort(costs - _PRICE * settings.alpha * saved, kind="stable"),
-        np.lexsort((costs, -saved)),
-    ):
-        for all_ in (True, False):
-            chosen: list[int] = []
-            taken: frozenset[int] = frozenset()
-            for i in order[likely[order]].tolist():
-                if not taken & wanted[i].parts and (all_ or near(i)):
-                    chosen.append(i)
-                    taken |= wanted[i].parts
-            if chosen not in seen:
-                seen.append(chosen)
-                yield [wanted[i] for i in chosen]
+    for order in (worthy, cheap, [i for i in cheap if i in near], many):
+        chosen: list[int] = []
+        taken: frozenset[int] = frozenset()
+        for i in order:
+            if not taken & wanted[i].parts:
+                chosen.append(i)
+                taken |= wanted[i].parts
+        if chosen not in seen:
+            seen.append(chosen)
+            yield [wanted[i] for i in chosen]
 
 
 def _leaves(rows: Rows, repeats: Sequence[Repeat]) -> list[RepeatedPart]:

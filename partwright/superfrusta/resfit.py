@@ -30,7 +30,7 @@ from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.simplification import extend_cuts, simplify_kinds
 from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded
-from partwright.superfrusta.symmetry import symmetries
+from partwright.superfrusta.symmetry import NEARLY, symmetries
 
 # In growth, parts need only pay this; the settings' alpha decides when the assembly is thinned out.
 GROWTH_ALPHA = 1e-3
@@ -259,8 +259,10 @@ class ResidualFit:
         assert self.best is not None
         with self.timed("symmetry"):
             tolerance = symmetry_tolerance(self.samples, self.best)
-            found = symmetries(shape, self.settings, self.samples.seed, tolerance)
-            self.leaves = repeat(self.samples, self.best, found, self.settings, self.locked)
+            found, nearly = (
+                symmetries(shape, self.settings, self.samples.seed, mean) for mean in (tolerance, NEARLY)
+            )
+            self.leaves = repeat(self.samples, self.best, found, self.settings, self.locked, nearly)
             rows = expanded(self.leaves)
         self.report_progress("symmetry", self.settings.rounds, rows, 1.0, len(self.leaves))
 

@@ -17,7 +17,7 @@ from partwright.superfrusta.repeated_parts import repeat, symmetry_tolerance
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetric_fit import expanded
-from partwright.superfrusta.symmetry import TOLERANCE, symmetries
+from partwright.superfrusta.symmetry import TOLERANCE, Symmetry, mirror, symmetries
 from tests.superfrusta.meshes import box, table, union
 from tests.superfrusta.rows import subtracting
 
@@ -29,6 +29,7 @@ Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 HANDLE: Box = ((0.9, 0.4, 0.4), (-1.3, 0.1, 0.1))
 BACK: Box = ((1.8, 0.3, 0.2), (0.0, 0.0, 0.0))
 TINES: list[Box] = [((0.18, 0.2, 0.8), (x, 0.0, -0.4)) for x in (-0.75, -0.25, 0.25, 0.75)]
+SIDES = ((0.7, 0.0), (-0.7, 0.06))  # of a body, and how much higher an arm is there
 HALVES: list[Box] = [((0.18, 0.2, 0.4), (0.25, 0.0, z)) for z in (-0.2, -0.6)]
 
 
@@ -74,6 +75,19 @@ def test_parts_alike_by_chance_stay_apart() -> None:
     ball = trimesh.creation.icosphere(3, 0.31).apply_translation((0.8, 0, 0))
     samples, found = known(union(box(*ends[0]), box(*bar), ball), [*ends, bar])
     assert [len(leaf.rows) for leaf in repeat(samples, found, (), DRAFT)] == [1, 1, 1]
+
+
+def test_arms_that_are_nearly_mirrored_become_one_though_one_is_raised() -> None:
+    body: Box = ((1.0, 1.6, 0.3), (0, 0, 0))
+    arms = [[((0.2, 0.2, 0.8), (0, y, 0.4 + up)), ((1.0, 0.3, 0.2), (0, y, 0.9 + up))] for y, up in SIDES]
+    shape = union(*(box(*one) for one in (body, *arms[0], *arms[1])))
+    stump: Box = ((0.4, 0.3, 0.9), (0, -0.7, 0.6))
+    samples, found = known(shape, [body, *arms[0], stump])
+    across = (Symmetry("mirror", 2, mirror(np.eye(3)[1], np.zeros(3)), 0.01),)
+    assert len(repeat(samples, found, (), DRAFT)) == 4
+    leaves = repeat(samples, found, (), DRAFT, nearly=across)
+    assert [len(leaf.rows) for leaf in leaves] == [1, 2, 2]
+    assert score(samples, expanded(leaves)) > 0.98 > 0.9 > score(samples, found)
 
 
 def test_a_symmetry_need_not_hold_better_than_the_assembly_fits() -> None:
