@@ -121,12 +121,8 @@ class Mending:
         part_of = np.arange(len(best.rows))  # which of the parts as they were each row is; -1: a joined one
         while left := [one for one in left if one.gain > -_HOPELESS and np.isin(one.pair, part_of).all()]:
             first = left[:_JOINED]
-            tried = self.at_once([partial(self.merged, best.rows, one, part_of) for one in first])
-            gaining = [
-                (trials[0], one)
-                for trials, one in zip(tried, first, strict=True)
-                if trials and trials[0].value > best.value
-            ]
+            tried = self.at_once([partial(self.merged, best, one, part_of) for one in first])
+            gaining = [(trial, one) for trials, one in zip(tried, first, strict=True) for trial in trials]
             if not gaining:
                 break
             best, joined = max(gaining, key=lambda pair: pair[0].value)
@@ -135,14 +131,18 @@ class Mending:
             left = [one for _, one in gaining] + left[_JOINED:]
         return best
 
-    def merged(self, rows: Rows, merger: Merger, part_of: NDArray[np.int64]) -> list[Trial]:
-        """With a pair as one, the better way first: the new part fitted alone, or with its
-        neighbours, which are where they are nowhere far off: a refit may undo that."""
+    def merged(self, best: Trial, merger: Merger, part_of: NDArray[np.int64]) -> list[Trial]:
+        """With a pair as one: the new part fitted alone, or with its neighbours where that does not pay.
+
+        These are where they are nowhere far off, which a refit may undo. None where neither pays.
+        """
         first, second = (int(np.flatnonzero(part_of == part)[0]) for part in merger.pair)
-        place = self.samples, rows, first, second, merger.part, self.settings, self.locked
-        trials = [self.trial(carried_out(*place, alone=alone)) for alone in (True, False)]
-        allowed = [trial for trial in trials if self.allowed(trial.rows, rows)]
-        return sorted(allowed, key=lambda trial: -trial.value)
+        place = self.samples, best.rows, first, second, merger.part, self.settings, self.locked
+        for alone in (True, False):
+            trial = self.trial(carried_out(*place, alone=alone))
+            if trial.value > best.value and self.allowed(trial.rows, best.rows):
+                return [trial]
+        return []
 
     def slimmed(self, best: Trial) -> Trial:
         """Without the parts that do not pay for themselves any more."""

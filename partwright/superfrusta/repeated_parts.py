@@ -68,7 +68,7 @@ def repeat(
     wanted = repeat_candidates(samples, rows, groups(found), locked)
     wanted += local_repeats(samples, rows, locked, tolerance, [one.isometry for one in nearly])
     for chosen in _choices(samples, whole, wanted, settings):
-        for _ in range(_GIVEN_UP + 1):
+        for left in range(_GIVEN_UP, -1, -1):
             trials = [_measured(samples, _leaves(rows, chosen), settings)]
             for stages in _REFITS:
                 if trials[-1].value > whole.value - (_HOPELESS if len(trials) > 1 else np.inf):
@@ -76,7 +76,7 @@ def repeat(
                     trials.append(_measured(samples, leaves, settings))
             better = [trial for trial in trials if good(trial)]
             best = max([best, *better], key=lambda trial: trial.value)
-            if best is not whole or len(chosen) == 1:
+            if best is not whole or len(chosen) == 1 or not left:
                 break
             chosen = _without_the_worst(samples, rows, chosen, settings)
     return best.leaves
@@ -127,15 +127,14 @@ def _choices(
     costs = score(samples, rows) - np.array(scores)
     saved = np.array([len(one.replaced) for one in wanted])
     likely = costs - _PRICE * settings.alpha * saved <= _UNREFITTED_SCORE_LOSS
-    alone = {
-        i: _measured(samples, _leaves(rows, [wanted[i]]), settings) for i in np.flatnonzero(likely).tolist()
-    }
+    every = np.flatnonzero(likely).tolist()
+    cheap = sorted(every, key=lambda i: costs[i] - _PRICE * settings.alpha * saved[i])
+    many = sorted(every, key=lambda i: (-saved[i], costs[i]))
+    alone = {i: _measured(samples, _leaves(rows, [wanted[i]]), settings) for i in cheap}
     near = [i for i, trial in alone.items() if trial.off <= whole.off + _UNREFITTED_OFF]
-    cheap = sorted(alone, key=lambda i: costs[i] - _PRICE * settings.alpha * saved[i])
-    many = sorted(alone, key=lambda i: (-saved[i], costs[i]))
     worthy = sorted(near, key=lambda i: -alone[i].value)
     seen: list[list[int]] = [[]]
-    for order in (worthy, cheap, [i for i in cheap if i in near], many):
+    for order in (worthy, cheap, near, many):
         chosen: list[int] = []
         taken: frozenset[int] = frozenset()
         for i in order:
