@@ -93,7 +93,7 @@ class _Forms:
     def nearly(self, base: int, isometries: Sequence[Isometry]) -> Iterator[tuple[Isometry]]:
         """Each that takes what a part stands for to where it is again, after a small motion."""
         for one in isometries if len(self.surfaces[base]) >= _FEWEST else ():
-            there = self.refined(base, one)
+            there = self.refined(base, one, self.tolerance / 4)
             if self.there(base, there):
                 yield (there,)
 

@@ -18,11 +18,12 @@ from partwright.superfrusta.symmetry import TOLERANCE, Symmetry, groups
 
 _PRICE = 0.5  # of a part's: at the whole price repeats that save a part buy it with much of the surface
 _TRIED = 64  # repeats at most
+_NEARLY = 1  # planes, the most exact first, that are tried part by part
 _GIVEN_UP = 1  # of those that are chosen, at most
 _UNREFITTED_SCORE_LOSS = 0.01  # of R: what a repeat may cost before a refit beyond the parts that it saves
 _UNREFITTED_OFF = 0.03  # unit lengths: so much more than before a part may be off before a refit
 _GRID_EVERY = 3
-_HOPELESS = 0.01  # of the value: what is so much worse after a brief refit gets no longer one
+_HOPELESS = 0.004  # of the value: what is so much worse after a brief refit gets no longer one
 _FURTHER = 0.0045  # unit lengths, a quarter percent of the longest side: likewise, after it
 _LOOSER = (
     2.0  # times the median distance from the surface to the assembly, which what is missing hardly moves
@@ -37,7 +38,6 @@ class _Trial:
 
     leaves: list[RepeatedPart]
     value: float
-    iou: float
     off: float
 
 
@@ -50,7 +50,7 @@ def repeat(
     nearly: Sequence[Symmetry] = (),
 ) -> list[RepeatedPart]:
     """The assembly as leaves, of which those that repeat under the symmetries, or in several places, are one
-    each. What holds only `nearly` for the whole may hold for a part after a small motion.
+    each. A plane that holds only `nearly` for the whole may hold for a part after a small motion.
 
     Repeats are taken that are worth the most: the parts that they save, less what they cost of R. The copies
     of each leaf are refitted as one. Together they may not lower the objective, nor leave a part further off
@@ -60,20 +60,26 @@ def repeat(
     whole = _measured(samples, _leaves(rows, []), settings)
 
     def good(trial: _Trial) -> bool:
-        reached = settings.min_iou is None or trial.iou >= min(whole.iou, settings.min_iou)
-        return reached and trial.off <= whole.off + _FURTHER and trial.value >= whole.value
+        if trial.off > whole.off + _FURTHER or trial.value < whole.value:
+            return False
+        if settings.min_iou is None:
+            return True
+        return _grid_iou(samples, trial) >= min(_grid_iou(samples, whole), settings.min_iou)
 
     best = whole
     tolerance = max(LOCAL_TOLERANCE, symmetry_tolerance(samples, rows))
     wanted = repeat_candidates(samples, rows, groups(found), locked)
-    wanted += local_repeats(samples, rows, locked, tolerance, [one.isometry for one in nearly])
+    mirrors = [one.isometry for one in nearly if one.kind == "mirror"]
+    wanted += local_repeats(samples, rows, locked, tolerance, mirrors[:_NEARLY])
     for chosen in _choices(samples, whole, wanted, settings):
         for left in range(_GIVEN_UP, -1, -1):
             trials = [_measured(samples, _leaves(rows, chosen), settings)]
             for stages in _REFITS:
-                if trials[-1].value > whole.value - (_HOPELESS if len(trials) > 1 else np.inf):
-                    leaves = refit(samples, trials[0].leaves, stages, settings, locked)
-                    trials.append(_measured(samples, leaves, settings))
+                leaves = refit(samples, trials[0].leaves, stages, settings, locked)
+                trials.append(_measured(samples, leaves, settings))
+                nearer = trials[-1].off <= whole.off + 2 * _FURTHER
+                if not nearer or trials[-1].value < whole.value - _HOPELESS:
+                    break
             better = [trial for trial in trials if good(trial)]
             best = max([best, *better], key=lambda trial: trial.value)
             if best is not whole or len(chosen) == 1 or not left:
@@ -100,16 +106,20 @@ def _without_the_worst(
 
 
 def _measured(samples: FitSamples, leaves: list[RepeatedPart], settings: Settings) -> _Trial:
-    """IoU is that on the grid: a refit leans towards the samples that it saw. Of copies the one that is
-    furthest off counts."""
+    """Of copies the one that is furthest off counts."""
     rows = expanded(leaves)
-    occupied = samples.distance_of(rows, samples.grid_points[::_GRID_EVERY]) < 0
-    inside = samples.grid.values.ravel()[::_GRID_EVERY] < 0
-    both, either = np.count_nonzero(occupied & inside), np.count_nonzero(occupied | inside)
     firsts = np.cumsum([0, *(1 + len(leaf.isometries) for leaf in leaves[:-1])])
     off = np.maximum.reduceat(deviations(samples, rows).by_part, firsts)
     value = score(samples, rows) - _PRICE * settings.alpha * len(leaves) - settings.firmness * norm(off)
-    return _Trial(leaves, value, float(both / np.maximum(either, 1)), float(off.max()))
+    return _Trial(leaves, value, float(off.max()))
+
+
+def _grid_iou(samples: FitSamples, trial: _Trial) -> float:
+    """On the grid: a refit leans towards the samples that it saw."""
+    occupied = samples.distance_of(expanded(trial.leaves), samples.grid_points[::_GRID_EVERY]) < 0
+    inside = samples.grid.values.ravel()[::_GRID_EVERY] < 0
+    both, either = int((occupied & inside).sum()), int((occupied | inside).sum())
+    return both / max(either, 1)
 
 
 def _choices(
@@ -128,8 +138,8 @@ def _choices(
     saved = np.array([len(one.replaced) for one in wanted])
     likely = costs - _PRICE * settings.alpha * saved <= _UNREFITTED_SCORE_LOSS
     every = np.flatnonzero(likely).tolist()
-    cheap = sorted(every, key=lambda i: costs[i] - _PRICE * settings.alpha * saved[i])
-    many = sorted(every, key=lambda i: (-saved[i], costs[i]))
+    cheap = sorted(every, key=lambda i: float(costs[i] - _PRICE * settings.alpha * saved[i]))
+    many = sorted(every, key=lambda i: (-int(saved[i]), float(costs[i])))
     alone = {i: _measured(samples, _leaves(rows, [wanted[i]]), settings) for i in cheap}
     near = [i for i, trial in alone.items() if trial.off <= whole.off + _UNREFITTED_OFF]
     worthy = sorted(near, key=lambda i: -alone[i].value)
