@@ -92,9 +92,10 @@ def _pieces(count: int, edges: np.ndarray) -> np.ndarray:
 @one_core_each()
 def drawn_back(shape: NeuralShape, tip: Tip, move_pose: bool = True) -> NeuralShape:
     """The shape with latent and pose of the tip's part moved along the family's directions, until the tip is
-    none of it; all other parts' stay as they are. move_pose: else the latent alone moves."""
+    none of it; all other parts' stay as they are. move_pose: else, and of models without poses, the latent
+    alone moves."""
     part = shape.model.index(tip.part)
-    unknowns = FamilyUnknowns(shape, move_pose, 0)
+    unknowns = FamilyUnknowns(shape, move_pose and shape.model.config.poses, 0)
     optimiser = torch.optim.Adam(unknowns.groups(_RATES))
     moved = [tensor for group in optimiser.param_groups for tensor in group["params"]]
     others = torch.arange(len(shape.present)) != part
