@@ -68,7 +68,7 @@ def cells(samples: Sequence[Sample], held: list[np.ndarray]) -> str:
     scores = scores_of_distances(chamfer_matrix(clouds), chamfer_matrix(clouds, held), chamfer_matrix(held))
     judged = [one.soundness for one in samples]
     broken = (
-        [bool(one.faults()) for one in judged],
+        [bool(one.breaks()) for one in judged],
         [one.gap > one.allowed for one in judged],
         [one.offset > OFFSET for one in judged],
         [bool(one.empty) for one in judged],

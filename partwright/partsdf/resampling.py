@@ -66,7 +66,7 @@ def sound_samples(
     best: list[Sample] = []
     for number, shape in enumerate(first):
         sample = judged(shape)
-        while sample.soundness.faults() and sample.tries < tries:
+        while sample.soundness.breaks() and sample.tries < tries:
             new = judged(made(number, sample.tries))
             least = min(sample, new, key=lambda one: one.soundness.badness)
             sample = replace(least, tries=sample.tries + 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -78,7 +79,8 @@ def test_a_ball_that_came_through_its_plate_is_drawn_back(
     (tip,) = found.through
     assert tip.part == "ball"
     assert tip.share > THROUGH
-    assert "ball comes through another part" in found.faults()
+    assert found.faults() == [*found.breaks(), "ball comes through another part"]
+    assert replace(found, through=(replace(tip, share=0.015),)).faults() == found.breaks()
     sample = Sample(broken, found, 1)
     assert _mended(sample, judge, ["ball"], keep_layout=False) is sample
     mended = _mended(sample, judge, [], keep_layout=False)
