@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -84,10 +85,10 @@ _CUTS = (
 )  # fmt: skip
 
 
-def _name(node: Node, cut_from: Node | None, roles: dict[str, str]) -> None:
+def _name(node: Node, cut_from: Node | None, roles: dict[str, str], beside: Sequence[Node] = ()) -> None:
     if isinstance(node, Part):
         if _is_solid(node):
-            roles[node.name] = tooth_role(node, cut_from) or (
+            roles[node.name] = tooth_role(node, cut_from, beside) or (
                 _cut(node, cut_from) if cut_from else _added(node.field)
             )
         return
@@ -102,7 +103,7 @@ def _name(node: Node, cut_from: Node | None, roles: dict[str, str]) -> None:
         return
     _name(first, None, roles)
     for child in others:
-        _name(child, first, roles)
+        _name(child, first, roles, [other for other in others if other is not child])
 
 
 def _is_solid(part: Part) -> bool:

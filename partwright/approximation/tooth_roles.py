@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,15 +15,16 @@ from partwright.fields import Cylinder
 Floats = NDArray[np.float64]
 
 GAP = "tooth_gap"
-_FEWEST = 8  # of a wheel
+_FEWEST, _FEW = 5, 8  # of a fan's blades, and of a wheel's teeth
 _SAME = 1e-3  # of the part's size: how far copies may be off a turn
 _STEPS = 200
 _LONG = 3.0  # a blade's length over its width, at least
 
 
-def tooth_role(part: Part, cut_from: Node | None) -> str | None:
+def tooth_role(part: Part, cut_from: Node | None, beside: Sequence[Node] = ()) -> str | None:
     """What a part is called that is there again in turns about an axis; None where it is something else, such
-    as a bolt hole, which has the body all around it. cut_from: what it is cut from, if it is."""
+    as a bolt hole, which has the body all around it. cut_from: what it is cut from, if it is; beside: what
+    else is."""
     axis = _axis(part)
     if axis is None:
         return None
@@ -33,11 +36,13 @@ def tooth_role(part: Part, cut_from: Node | None) -> str | None:
         return None
     outward = outward / np.linalg.norm(outward)
     ends = _ends(part, middle, outward)
+    few = len(part.copies) < _FEW
     if cut_from is not None:
-        return GAP if (cut_from.distance(ends) > 0).any() else None
+        is_open = np.logical_or.reduce([cut_from.distance(ends) > 0, *(o.distance(ends) < 0 for o in beside)])
+        return GAP if is_open.any() and not few else None
     sideways = _ends(part, middle, np.cross(direction, outward))
     length, width = (float(np.linalg.norm(one - other)) for one, other in (ends, sideways))
-    return "blade" if length > _LONG * width else "tooth"
+    return "blade" if length > _LONG * width else None if few else "tooth"
 
 
 def _axis(part: Part) -> tuple[Floats, Floats] | None:

@@ -27,7 +27,7 @@ _RIVAL, _NOISE = 2.0, 2e-4  # of the least error of an axis, and unit lengths, t
 _POINTS = 300
 _PARALLEL = 0.9999
 _APART, _NEAR = 1e-5, 0.05  # unit lengths between the middles of volume and box, to try both
-_MOST = 240
+_MOST = 48  # turns, or as many as one axis has
 
 
 def centre_of_volume(body: Manifold) -> Floats:
@@ -67,22 +67,23 @@ def symmetries(
     surface: (N, 3) points on it. measure: signed distance (n,) at points. A body that is not quite symmetric,
     as of holes that are askew, may be so about the middle of its box and not of its volume: both are tried.
     """
-    turns: list[Similarity] = []
     mirrors: list[Similarity] = []
     if body.is_empty() or body.volume() <= 0:
-        return turns, mirrors
+        return [], mirrors
+    turns: list[list[Similarity]] = []
     points = surface[:: max(1, len(surface) // _POINTS)].astype(np.float64)
     centre, middle = centre_of_volume(body), np.reshape(body.bounding_box(), (2, 3)).mean(axis=0)
     for axis in _distinct(directions):
         along = axis * float(axis @ (middle - centre))
-        turns += _turns(axis, centre, points, measure)
+        turns.append(_turns(axis, centre, points, measure))
         planes = [reflection(axis, centre)]
         if _APART < float(np.linalg.norm(middle - centre - along)) < _NEAR:
-            turns += _turns(axis, middle, points, measure)
+            turns.append(_turns(axis, middle, points, measure))
         if _APART < float(np.linalg.norm(along)) < _NEAR:
             planes.append(reflection(axis, middle))
         mirrors += [one for one in planes if _error(reflected(one, points), measure) < _ERROR]
-    return turns[:_MOST], mirrors
+    most = max(_MOST, *map(len, turns))
+    return [turn for own in turns for turn in own][:most], mirrors
 
 
 def _turns(axis: Floats, centre: Floats, points: Floats, measure: Measure) -> list[Similarity]:
@@ -96,7 +97,8 @@ def _turns(axis: Floats, centre: Floats, points: Floats, measure: Measure) -> li
         more = _errors([k * most for k in _MULTIPLES], axis, centre, points, measure)
         orders += [n for n, own in more.items() if own < errors[most] + _NOISE]
     largest = [n for n in orders if not any(other % n == 0 for other in orders if other > n)]
-    return [_turn(axis, n, k, centre) for n in largest for k in range(1, n)]
+    turns = [_turn(axis, n, k, centre) for n in largest for k in range(1, n)]
+    return turns[: max([_MOST, *largest[:1]])]
 
 
 def _errors(

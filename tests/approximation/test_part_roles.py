@@ -94,3 +94,8 @@ def test_what_stands_around_an_axis_is_teeth_and_holes_in_it_are_not() -> None:
     teeth = ring(Part(Box((4, 3, 5)), (20, 0, 0), name="f"), 20)
     after = with_role_names(Assembly((wheel, blades, teeth)))
     assert {part.name for part in after.parts} == {"blade", "tooth", "base_cylinder"}
+    inner = ring(Part(Box((4, 2, 9)), (11, 0, 0), name="g"), 16)
+    after = with_role_names(Assembly((wheel, inner, Part(Cylinder(10, 9), name="h")), "difference"))
+    assert [part.name for part in after.parts] == ["base_cylinder", "tooth_gap", "hole"]
+    fan = Assembly((wheel, ring(blades.copies[0], 5), ring(teeth.copies[0], 5)))
+    assert {part.name for part in with_role_names(fan).parts} == {"blade", "block", "base_cylinder"}

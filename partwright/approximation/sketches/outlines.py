@@ -105,7 +105,8 @@ def _arcs(points: np.ndarray, tolerance: float) -> list[tuple[int, int]]:
     turn = (heading - np.roll(heading, 1) + math.pi) % (2 * math.pi) - math.pi  # at each corner
     # A chain passes a corner that turns a little, and to the same side as the one before.
     passes = (np.abs(turn) <= _STEEP) & (np.abs(turn) > 1e-4)
-    first = int(np.argmax((way**2).sum(axis=1)))  # within an arc only where all is round
+    # From a corner that none passes, if there is one: else an arc may be cut in two where all is round.
+    first = int(np.argmax((way**2).sum(axis=1) * np.where(passes.all(), 1.0, ~passes)))
     found: list[tuple[int, int]] = []
     at = 0
     while at < count - 1:

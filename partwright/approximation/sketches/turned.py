@@ -9,7 +9,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from manifold3d import CrossSection, FillRule, Manifold
+from manifold3d import CrossSection, FillRule, JoinType, Manifold
 from scipy.spatial import cKDTree
 
 from partwright.approximation.profile_parts import revolved_part
@@ -38,6 +38,7 @@ _DRAWN = math.radians(15)  # the steps in which bends are drawn
 _ABOUT = math.radians(4)  # how well smooth ends are told
 _LONG = 20.0  # tolerances, that a line is long whose direction is told by them
 _OFFSET = 0.0137  # radians: no plane along faces
+_SKIN = 7e-4  # unit lengths: of what rounding leaves over a flat end
 
 
 @dataclass(frozen=True)
@@ -240,9 +241,12 @@ def _revolved(axis: Axis, region: CrossSection, begin: float, angle: float) -> I
         return
 
     def make(further: float) -> Manifold:
-        # Chords are off along the radius only: what stands on a flat end is not to be parted from it.
+        # Chords are off along the radius: what stands on a flat end is not to be parted from it. Of what lies
+        # within, the ends are a little off even so, or skins over them would join pieces.
         out, in_ = (half.translate((by, 0.0)) for by in (further, -further))
         grown = half + out + in_ if further > 0 else half ^ out ^ in_
+        if further < 0:
+            grown = grown.scale((1e3, 1e3)).offset(-1e3 * _SKIN, JoinType.Miter, 2.0).scale((1e-3, 1e-3))
         body = Manifold.revolve(grown, 128, degrees)
         return posed(body.translate((float(foot[0]), float(foot[1]), 0.0)), frame)
 
