@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,13 +33,7 @@ _FINE = 1e-4  # unit lengths: such a distance that cannot be told from none
 _ONE_PLACE = 0.03  # unit lengths between middles
 _MOST = 24  # copies
 
-# The rotations of a cube: a part's frame may be turned though its form is not.
-_TURNS = [
-    turn
-    for order in permutations(range(3))
-    for signs in product((1.0, -1.0), repeat=3)
-    if np.linalg.det(turn := np.diag(signs)[list(order)]) > 0
-]
+_TURNS = Rotation.create_group("O").as_matrix().round()  # of a cube: a frame may be turned, its form not
 
 
 def local_repeats(

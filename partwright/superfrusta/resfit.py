@@ -259,9 +259,8 @@ class ResidualFit:
         assert self.best is not None
         with self.timed("symmetry"):
             tolerance = symmetry_tolerance(self.samples, self.best)
-            found, nearly = (
-                symmetries(shape, self.settings, self.samples.seed, mean) for mean in (tolerance, NEARLY)
-            )
+            nearly = symmetries(shape, self.settings, self.samples.seed, max(tolerance, NEARLY))
+            found = [one for one in nearly if one.error <= tolerance]
             self.leaves = repeat(self.samples, self.best, found, self.settings, self.locked, nearly)
             rows = expanded(self.leaves)
         self.report_progress("symmetry", self.settings.rounds, rows, 1.0, len(self.leaves))
