@@ -22,16 +22,19 @@ _LOSS = 1e-3  # of R: one tooth is not quite the next
 
 
 def with_teeth_apart(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
-    """The tree with every outline as a circle and teeth where that is worth more, and about as near."""
-    best = search.scored(tree)
-    found, least = tree, best.score - _LOSS
+    """The tree with every outline as a circle and teeth where these have less than half of its corners and
+    the tree is about as near: that they are two features does not count, as both say more than one did."""
+    least = search.scored(tree).score - _LOSS
     while True:
-        others = [search.scored(replace(found, features=features)) for features in _rewritten(search, found)]
+        others = [search.scored(replace(tree, features=features)) for features in _rewritten(search, tree)]
         near = [other for other in others if other.score >= least]
-        other = max(near, key=lambda one: one.objective, default=best)
-        if other.objective <= best.objective:
-            return found
-        best = found = other
+        if not near:
+            return tree
+        tree = min(near, key=lambda one: (_corners(one), -one.score))
+
+
+def _corners(tree: FeatureTree) -> int:
+    return sum(feature.sides for feature in tree.features)
 
 
 def _rewritten(search: FeatureSearch, tree: FeatureTree) -> Iterator[list[Feature]]:
@@ -47,6 +50,8 @@ def _rewritten(search: FeatureSearch, tree: FeatureTree) -> Iterator[list[Featur
         for teeth in toothed(field.profile):
             if teeth.added or i == 0:  # what is cut from it would be cut from what is there before
                 base, tooth = (_step(search, feature, part, added) for part, added in _parts(feature, teeth))
+                if 2 * (base.sides + tooth.sides) >= len(field.profile.corners):
+                    continue
                 for steps in ((base, tooth), (tooth,)) if i else ((base, tooth),):  # it may stand on another
                     yield [*tree.features[:i], *steps, *tree.features[i + 1 :]]
 

@@ -18,7 +18,7 @@ from partwright.fields.profile import Loop, Profile, circle
 
 Floats = NDArray[np.float64]
 
-_LEAST = 24  # sides of a loop that may save some
+_LEAST = 16  # sides of a loop that may save some
 _CHORD = FINE / 50
 _NEAR = 1.5 * FINE  # unit lengths: how far a circle is moved off arcs, that no slivers are left along them
 _ON_CIRCLE = _NEAR / 4
