@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.open_sides import with_open_sides
 from partwright.approximation.sketches.repeats import moves_between, planes_between, shifts_between
+from partwright.approximation.sketches.teeth import drawn_corners
 from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Extrusion
@@ -150,7 +151,7 @@ def joined_by(search: FeatureSearch, tree: FeatureTree, step: Step) -> FeatureTr
 
 def _hole_corners(part: Part) -> int:
     """Of the holes of a profile that is extruded."""
-    return sum(map(len, part.field.profile.holes)) if isinstance(part.field, Extrusion) else 0
+    return drawn_corners(part.field.profile.holes) if isinstance(part.field, Extrusion) else 0
 
 
 def replayed(search: FeatureSearch, steps: Sequence[Step]) -> FeatureTree:

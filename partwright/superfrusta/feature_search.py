@@ -21,6 +21,7 @@ from partwright.approximation.sketches.bodies import bodies
 from partwright.approximation.sketches.candidate import AskedOnce, Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames, long_axis
+from partwright.approximation.sketches.teeth import FEATURE
 from partwright.fields import Swept
 from partwright.meshing.manifolds import simplified
 from partwright.methods import Checkpoint
@@ -39,7 +40,7 @@ from partwright.superfrusta.feature_symmetry import symmetries
 from partwright.superfrusta.samples import FitSamples
 
 _FREE_SIDES = 4
-_SIDE_PRICE = 1 / 25  # of a feature's
+_SIDE_PRICE = 1 / FEATURE  # of a feature's
 _LEAST_PIECE = 2e-5  # of the volume
 _SAME_PIECE = 0.01  # of a piece's volume, that one of the same form may be off
 _THIN = 2.5e-3  # unit lengths: twice the volume over the area of a skin between a wall and its chords

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from manifold3d import CrossSection, FillRule, OpType
 
-from partwright.approximation.sketches.teeth import Teeth, toothed
+from partwright.approximation.sketches.teeth import FEATURE, Teeth, drawn_corners, toothed
 from partwright.fields.profile import Corner, Loop, Profile, circle, circle_of
 
 _CHORD = 1e-6
@@ -94,3 +94,11 @@ def test_what_is_no_wheel_has_no_teeth() -> None:
     rack = [(0.1 * k, 0.3 * ((k // 2) % 2), 0.0) for k in range(40)] + [(4.0, -0.5, 0.0), (0.0, -0.5, 0.0)]
     for loop in (tuple(uneven), tuple(rack), Profile.regular(48, 0.8).outline):
         assert not list(toothed(Profile(loop)))
+
+
+def test_a_wheel_counts_as_it_is_drawn() -> None:
+    """A circle, one tooth and one feature more; other outlines as they are."""
+    assert drawn_corners([wheel(60, 0.7, 0.8), circle(0.2)]) == 2 + FEATURE + 4 + 2
+    assert drawn_corners([wheel(9, 0.7, 0.8)]) == 36  # too few to save anything
+    rack = [(0.1 * k, 0.3 * ((k // 2) % 2), 0.0) for k in range(60)] + [(6.0, -0.5, 0.0), (0.0, -0.5, 0.0)]
+    assert drawn_corners([tuple(rack)]) == 62

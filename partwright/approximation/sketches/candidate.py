@@ -21,10 +21,10 @@ _CHORDS = 4e-3  # unit lengths
 class Candidate:
     """A part, and what makes the same body with the mesh's own walls, chords and all.
 
-    make: the body, further out by a length where its walls are not the mesh's own. sides: of its profile.
-    volume, rims: tell candidates apart. cuts: parts that are cut from it and belong to it, holes with sharp
-    edges in a body with round ones; only a tree's first part may have such. usual: whether it is turned from
-    what most half sections have in common, and not all, nor any.
+    make: the body, further out by a length where its walls are not the mesh's own. sides: of its profile, as
+    that is drawn (`drawn_corners`). volume, rims: tell candidates apart. cuts: parts that are cut from it and
+    belong to it, holes with sharp edges in a body with round ones; only a tree's first part may have such.
+    usual: whether it is turned from what most half sections have in common, and not all, nor any.
     """
 
     part: Part

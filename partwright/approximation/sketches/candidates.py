@@ -24,6 +24,7 @@ from partwright.approximation.sketches.rods import (
     round_at_ends,
 )
 from partwright.approximation.sketches.sections import FINE, Region, View, profile_of
+from partwright.approximation.sketches.teeth import drawn_corners
 from partwright.approximation.sketches.turned import turned
 from partwright.errors import ParameterError
 from partwright.fields.profile import Profile, circle_of
@@ -142,7 +143,7 @@ def extrusion(
         grown = section.offset(by, JoinType.Miter, 2.0) if by else section
         return posed(Manifold.extrude(grown, high - low).translate((0, 0, low)), frame)
 
-    return Candidate(part, make, len(profile.corners), section.area() * (high - low))
+    return Candidate(part, make, drawn_corners(profile.loops), section.area() * (high - low))
 
 
 def _rounded(

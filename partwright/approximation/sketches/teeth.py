@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from manifold3d import CrossSection
@@ -18,6 +19,8 @@ from partwright.fields.profile import Loop, Profile, circle
 
 Floats = NDArray[np.float64]
 
+FEATURE = 25
+"""Corners of an outline that cost as much as one more feature."""
 _LEAST = 16  # sides of a loop that may save some
 _CHORD = FINE / 50
 _NEAR = 1.5 * FINE  # unit lengths: how far a circle is moved off arcs, that no slivers are left along them
@@ -67,6 +70,21 @@ def toothed(profile: Profile) -> Iterator[Teeth]:
                 yield Teeth(base, Profile(tooth).moved((x, y)), (x, y), order, outward is (i == 0))
             except ParameterError:  # the circle crosses another loop
                 continue
+
+
+def drawn_corners(loops: Iterable[Loop]) -> int:
+    """Corners that loops are drawn with: each as it is, or, where it is a wheel, a circle's and one tooth's,
+    and `FEATURE` for being one feature more."""
+    return sum(map(_drawn, loops))
+
+
+@lru_cache(maxsize=512)
+def _drawn(loop: Loop) -> int:
+    if len(loop) < FEATURE + _LEAST:
+        return len(loop)
+    line = Profile(loop).polylines(FINE)[0]
+    order = _order(line - _centre(line))
+    return len(loop) if order is None else min(len(loop), 2 + FEATURE + round(len(loop) / order))
 
 
 def _centre(line: Floats) -> Floats:
