@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from partwright.datasets.agreement import _NAMINGS, agreed
+from partwright.datasets.agreement import AXIS_NAMINGS, agreed
 from partwright.datasets.primitives import (
     CUBOID,
     CYLINDER,
@@ -40,7 +40,7 @@ def test_a_turned_cuboid_is_found(turn: np.ndarray) -> None:
     fit = best(fit_primitives(box(scale, turn, place)), CUBOID)
     np.testing.assert_allclose(np.sort(fit.scale), np.sort(scale), atol=0.01)
     np.testing.assert_allclose(fit.translation, place, atol=0.01)
-    angles = [np.abs(Rotation.from_matrix(fit.rotation @ m @ turn.T).magnitude()) for m in _NAMINGS]
+    angles = [np.abs(Rotation.from_matrix(fit.rotation @ m @ turn.T).magnitude()) for m in AXIS_NAMINGS]
     assert np.degrees(min(angles)) < 2
     assert fit.chamfer < 2e-3
     assert np.linalg.det(fit.rotation) == pytest.approx(1)
@@ -81,7 +81,7 @@ def test_nearest_points_lie_on_the_surface_and_none_of_it_is_nearer() -> None:
 
 
 def renamed(fit: PrimitiveFit, rng: np.random.Generator) -> PrimitiveFit:
-    naming = _NAMINGS[rng.integers(24)]
+    naming = AXIS_NAMINGS[rng.integers(24)]
     return replace(fit, rotation=fit.rotation @ naming, scale=np.abs(naming.T) @ fit.scale)
 
 
