@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from partwright.fields.columns import ROTATION, Column
+from partwright.meshing.hulls import hull_volume
 from partwright.superfrusta.growing import Region, fit_regions
 from partwright.superfrusta.objective import coverage, occupancy_score, removal_scores, score
 from partwright.superfrusta.part_surfaces import surface_points
@@ -122,18 +122,12 @@ def mergers(
 
 def _hulls_filled(rows: Rows, pairs: list[tuple[int, int]]) -> dict[tuple[int, int], float]:
     """The volume of both parts' convex hulls, by that of the hull of both."""
-    of_part = {part: _hull(surface_points(rows[[part]])[0]) for part in {i for pair in pairs for i in pair}}
-    result = {}
-    for pair in pairs:
-        (first, one), (second, other) = (of_part[part] for part in pair)
-        result[pair] = (one + other) / max(_hull(np.concatenate([first, second]))[1], 1e-12)
-    return result
-
-
-def _hull(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-    """Corners (n, 3) of the convex hull, and its volume."""
-    hull = ConvexHull(points, qhull_options="QJ")
-    return points[hull.vertices], float(hull.volume)
+    points = {part: surface_points(rows[[part]])[0] for part in {i for pair in pairs for i in pair}}
+    own = {part: hull_volume(places) for part, places in points.items()}
+    return {
+        (i, j): (own[i] + own[j]) / max(hull_volume(np.concatenate([points[i], points[j]])), 1e-12)
+        for i, j in pairs
+    }
 
 
 def _touching_pairs(samples: FitSamples, rows: Rows) -> list[tuple[int, int]]:
