@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class _Reference:
+class Reference:
     """What the namings are compared with."""
 
     rotation: Array
@@ -45,6 +45,13 @@ def _axis_namings() -> Array:
 AXIS_NAMINGS = _axis_namings()
 
 
+def namings(rotations: Array, log_scales: Array) -> tuple[Array, Array]:
+    """Of boxes of rotations (F, 3, 3) and logarithms of half-lengths (F, 3) the same (F, 24, 3, 3) and
+    (F, 24, 3), their axes named in every way; as they are in the first."""
+    turned = rotations[:, None] @ AXIS_NAMINGS
+    return turned, (np.abs(AXIS_NAMINGS).transpose(0, 2, 1) @ log_scales[:, None, :, None])[..., 0]
+
+
 def agreed(shapes: Sequence[Sequence[PrimitiveFit]]) -> list[PrimitiveFit]:
     """One fit for each shape, from all fits of one part in the shapes that have it.
 
@@ -52,7 +59,7 @@ def agreed(shapes: Sequence[Sequence[PrimitiveFit]]) -> list[PrimitiveFit]:
     """
     kind = _kind_of(shapes)
     good = [_as_good(fits, kind) for fits in shapes]
-    world = _Reference(np.eye(3), np.zeros(3))
+    world = Reference(np.eye(3), np.zeros(3))
     every = max(len(good) // _REFERENCES, 1)
     starts = [_best(fits, world, turn_only=True) for fits in good[::every]]
     reference = min((_reference([fit]) for fit in starts), key=lambda r: _total(good, r))
@@ -80,44 +87,44 @@ def _as_good(fits: Sequence[PrimitiveFit], kind: str) -> list[PrimitiveFit]:
     return [fit for fit in own if fit.chamfer <= limit]
 
 
-def _reference(fits: Sequence[PrimitiveFit]) -> _Reference:
+def _reference(fits: Sequence[PrimitiveFit]) -> Reference:
     from scipy.spatial.transform import Rotation
 
     quaternions = np.stack([Rotation.from_matrix(fit.rotation).as_quat() for fit in fits])
     x, y, z, w = mean_rotation(quaternions)
     log_scale = np.mean([np.log(fit.scale) for fit in fits], axis=0)
-    return _Reference(Rotation.from_quat([x, y, z, w]).as_matrix(), log_scale)
+    return Reference(Rotation.from_quat([x, y, z, w]).as_matrix(), log_scale)
 
 
-def _total(good: Sequence[Sequence[PrimitiveFit]], reference: _Reference) -> float:
-    return sum(float(_costs(*_named(fits, reference), reference).min()) for fits in good)
+def _total(good: Sequence[Sequence[PrimitiveFit]], reference: Reference) -> float:
+    return sum(float(costs(*_named(fits, reference), reference).min()) for fits in good)
 
 
-def _costs(rotations: Array, log_scales: Array, reference: _Reference, turn_only: bool = False) -> Array:
-    """(K,) of rotations (K, 3, 3) and logarithms of half-lengths (K, 3)."""
-    cosine = (np.sum(rotations * reference.rotation, axis=(1, 2)) - 1) / 2
+def costs(rotations: Array, log_scales: Array, reference: Reference, turn_only: bool = False) -> Array:
+    """(...) of rotations (..., 3, 3) and logarithms of half-lengths (..., 3): squared angles to a reference,
+    and squared differences."""
+    cosine = (np.sum(rotations * reference.rotation, axis=(-2, -1)) - 1) / 2
     angle = np.arccos(np.clip(cosine, -1, 1))
-    apart = 0.0 if turn_only else np.sum((log_scales - reference.log_scale) ** 2, axis=1)
+    apart = 0.0 if turn_only else np.sum((log_scales - reference.log_scale) ** 2, axis=-1)
     return np.asarray(angle**2 + apart)
 
 
-def _best(fits: Sequence[PrimitiveFit], reference: _Reference, turn_only: bool = False) -> PrimitiveFit:
+def _best(fits: Sequence[PrimitiveFit], reference: Reference, turn_only: bool = False) -> PrimitiveFit:
     """The fit and naming nearest to the reference, or to its rotation alone."""
     rotations, log_scales = _named(fits, reference)
-    best = int(_costs(rotations, log_scales, reference, turn_only).argmin())
+    best = int(costs(rotations, log_scales, reference, turn_only).argmin())
     fit = fits[best // (len(rotations) // len(fits))]
     return replace(fit, rotation=rotations[best], scale=np.exp(log_scales[best]))
 
 
-def _named(fits: Sequence[PrimitiveFit], reference: _Reference) -> tuple[Array, Array]:
+def _named(fits: Sequence[PrimitiveFit], reference: Reference) -> tuple[Array, Array]:
     """Rotations (K, 3, 3) and logarithms of half-lengths (K, 3) of the same solids, axes named in every way.
 
     A cylinder is turned as near to the reference as may be. As many of each fit, one fit after the other.
     """
     sizes = np.log([fit.scale for fit in fits])
     if fits[0].kind == CUBOID:
-        turned = np.stack([fit.rotation for fit in fits])[:, None] @ AXIS_NAMINGS
-        named = (np.abs(AXIS_NAMINGS).transpose(0, 2, 1) @ sizes[:, None, :, None])[..., 0]
+        turned, named = namings(np.stack([fit.rotation for fit in fits]), sizes)
         return turned.reshape(-1, 3, 3), named.reshape(-1, 3)
     ends = [(fit.rotation[:, 2], -fit.rotation[:, 2]) for fit in fits]
     swung = [_swung(reference.rotation, axis) for pair in ends for axis in pair]

@@ -7,10 +7,10 @@ and a part that is turned by a quarter or a half in its own frame is another for
 
 from __future__ import annotations
 
+import numpy as np
 import torch
-from torch import Tensor
 
-from partwright.datasets.agreement import AXIS_NAMINGS
+from partwright.datasets.agreement import Reference, costs, namings
 from partwright.partsdf.part_vectors import quaternions
 from partwright.partsdf.poses import PoseTensors, rotation_matrices
 
@@ -19,18 +19,19 @@ def named_like(poses: PoseTensors, reference: PoseTensors) -> PoseTensors:
     """The same boxes (P, ...), the axes of each named so that it agrees best with the reference's: least sum
     of squared angle and squared difference of the half-lengths' logarithms. What agrees as it is stays, to
     the bit."""
-    namings = torch.from_numpy(AXIS_NAMINGS).float()
-    turned = rotation_matrices(poses.rotation)[:, None] @ namings  # (P, 24, 3, 3)
-    sizes = (namings.abs().mT @ poses.scale[:, None, :, None]).squeeze(-1)
-    cosine = ((turned * rotation_matrices(reference.rotation)[:, None]).sum(dim=(-1, -2)) - 1) / 2
-    apart = (sizes.log() - reference.scale.log()[:, None]).square().sum(dim=-1)
-    costs = cosine.clamp(-1, 1).arccos().square() + apart
-    as_it_is = int((namings - torch.eye(3)).abs().sum(dim=(1, 2)).argmin())
-    best = costs.argmin(dim=1)
+    turned, log_scales = namings(*_numbers(poses))
+    rotation, log_scale = _numbers(reference)
+    best = costs(turned, log_scales, Reference(rotation[:, None], log_scale[:, None])).argmin(axis=1)
+    every = np.arange(len(best))
+    named = torch.from_numpy(turned[every, best]), torch.from_numpy(np.exp(log_scales[every, best]))
+    same = torch.from_numpy(best == 0)[:, None]
+    rotations = torch.where(same, poses.rotation, quaternions(named[0].to(poses.rotation.dtype)))
+    return PoseTensors(
+        poses.translation, rotations, torch.where(same, poses.scale, named[1].to(poses.scale.dtype))
+    )
 
-    def chosen(each: Tensor) -> Tensor:
-        return each[torch.arange(len(best)), best]
 
-    same = (best == as_it_is)[:, None]
-    rotation = torch.where(same, poses.rotation, quaternions(chosen(turned)))
-    return PoseTensors(poses.translation, rotation, torch.where(same, poses.scale, chosen(sizes)))
+def _numbers(poses: PoseTensors) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations (P, 3, 3) and logarithms of half-lengths (P, 3)."""
+    matrices = rotation_matrices(poses.rotation.detach())
+    return matrices.double().numpy(), np.log(poses.scale.detach().double().numpy())
