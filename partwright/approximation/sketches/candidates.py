@@ -23,7 +23,7 @@ from partwright.approximation.sketches.rods import (
     rod,
     round_at_ends,
 )
-from partwright.approximation.sketches.sections import FINE, Region, View, profile_of
+from partwright.approximation.sketches.sections import FINE, Region, View, area_centre, profile_of
 from partwright.approximation.sketches.teeth import drawn_corners
 from partwright.approximation.sketches.turned import turned
 from partwright.errors import ParameterError
@@ -245,13 +245,10 @@ def _axes(view: View) -> list[np.ndarray]:
 
 def _balance(region: Region) -> np.ndarray | None:
     """The centre (2,) of a section that is as long in any direction: of a gear. None of others."""
-    loops = [np.asarray(p, dtype=np.float64) for p in region.section.to_polygons()]
-    a = np.concatenate(loops)
-    b = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
-    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    area = float(cross.sum()) / 2
-    centre = ((a + b) * cross[:, None]).sum(axis=0) / (6 * area)
-    a, b = a - centre, b - centre
+    polygons = region.section.to_polygons()
+    centre = area_centre(polygons)
+    loops = [np.asarray(polygon, dtype=np.float64) - centre for polygon in polygons]
+    a, b = np.concatenate(loops), np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     both = np.einsum("ni,nj->nij", a, a) + np.einsum("ni,nj->nij", b, b)
     both = both + (np.einsum("ni,nj->nij", a, b) + np.einsum("ni,nj->nij", b, a)) / 2

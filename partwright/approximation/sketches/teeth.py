@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from partwright.approximation.sketches.chains import circle_through
 from partwright.approximation.sketches.outlines import fitted_loop
-from partwright.approximation.sketches.sections import FINE
+from partwright.approximation.sketches.sections import FINE, area_centre
 from partwright.errors import ParameterError
 from partwright.fields.profile import Loop, Profile, circle
 
@@ -53,9 +53,7 @@ def toothed(profile: Profile) -> Iterator[Teeth]:
     for i, loop in enumerate(profile.loops):
         if len(loop) < _LEAST:
             continue
-        line = Profile(loop).polylines(_CHORD)[0]
-        centre = _centre(line)
-        line = line - centre
+        line, centre = _centred(loop, _CHORD)
         order = _order(line)
         if order is None:
             continue
@@ -82,16 +80,15 @@ def drawn_corners(loops: Iterable[Loop]) -> int:
 def _drawn(loop: Loop) -> int:
     if len(loop) < FEATURE + _LEAST:
         return len(loop)
-    line = Profile(loop).polylines(FINE)[0]
-    order = _order(line - _centre(line))
+    order = _order(_centred(loop, FINE)[0])
     return len(loop) if order is None else min(len(loop), 2 + FEATURE + round(len(loop) / order))
 
 
-def _centre(line: Floats) -> Floats:
-    """(2,) of the area within a closed line (K, 2)."""
-    after = np.roll(line, -1, axis=0)
-    cross = line[:, 0] * after[:, 1] - line[:, 1] * after[:, 0]
-    return np.asarray(((line + after) * cross[:, None]).sum(axis=0) / (3 * cross.sum()))
+def _centred(loop: Loop, chord: float) -> tuple[Floats, Floats]:
+    """A closed line (K, 2) about the centre (2,) of the area within; how far its chords may be off."""
+    line = Profile(loop).polylines(chord)[0]
+    centre = area_centre([line])
+    return line - centre, centre
 
 
 def _order(line: Floats) -> int | None:
