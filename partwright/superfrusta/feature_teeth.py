@@ -4,15 +4,15 @@ they are drawn, and how they are changed."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from partwright.approximation.profile_parts import with_profile
 from partwright.approximation.sketches.rims import SHARP
 from partwright.approximation.sketches.teeth import Teeth, toothed
-from partwright.assembly import Part, Similarity
-from partwright.fields import Extrusion
+from partwright.assembly import Similarity
+from partwright.fields import Extrusion, Profile
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
 
 if TYPE_CHECKING:
@@ -49,29 +49,27 @@ def _rewritten(search: FeatureSearch, tree: FeatureTree) -> Iterator[list[Featur
             continue
         for teeth in toothed(field.profile):
             if teeth.added or i == 0:  # what is cut from it would be cut from what is there before
-                base, tooth = (_step(search, feature, part, added) for part, added in _parts(feature, teeth))
+                base, tooth = _steps(search, feature, teeth)
                 if 2 * (base.sides + tooth.sides) >= len(field.profile.corners):
                     continue
                 for steps in ((base, tooth), (tooth,)) if i else ((base, tooth),):  # it may stand on another
                     yield [*tree.features[:i], *steps, *tree.features[i + 1 :]]
 
 
-def _step(search: FeatureSearch, feature: Feature, part: Part, added: bool) -> Feature:
-    profile = part.field.profile if isinstance(part.field, Extrusion) else None
-    sides = len(profile.corners) if profile is not None else 2
-    return replace(feature, part=part, added=added, covers=covers(part, search.points), sides=sides)
-
-
-def _parts(feature: Feature, teeth: Teeth) -> Iterator[tuple[Part, bool]]:
-    """The base and the teeth, and whether each is added."""
-    whole = feature.part
-    yield replace(with_profile(whole, teeth.base), instances=whole.instances), feature.added
-    tooth = with_profile(whole, teeth.tooth)
+def _steps(search: FeatureSearch, feature: Feature, teeth: Teeth) -> tuple[Feature, Feature]:
+    """The base, and the teeth."""
+    whole, (x, y) = feature.part, teeth.centre
     pose = whole.pose
-    x, y = teeth.centre
     turns = [
         pose @ Similarity.turn((0, 0, 1), 2 * math.pi * k / teeth.order, (x, y, 0)) @ pose.inverse()
         for k in range(1, teeth.order)
     ]
     copies = [*turns, *(move @ turn for move in whole.instances for turn in (Similarity(), *turns))]
-    yield replace(tooth, instances=tuple(copies)), teeth.added is feature.added
+
+    def step(profile: Profile, instances: Sequence[Similarity], added: bool) -> Feature:
+        part = replace(with_profile(whole, profile), instances=tuple(instances))
+        within = covers(part, search.points)
+        return replace(feature, part=part, added=added, covers=within, sides=len(profile.corners))
+
+    base = step(teeth.base, whole.instances, feature.added)
+    return base, step(teeth.tooth, copies, teeth.added is feature.added)
