@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from partwright.approximation.sketches.bodies import bodies
 from partwright.approximation.sketches.candidate import AskedOnce, Candidate
 from partwright.approximation.sketches.candidates import candidates
-from partwright.approximation.sketches.directions import frames, long_axis
+from partwright.approximation.sketches.directions import frames
 from partwright.approximation.sketches.teeth import FEATURE
 from partwright.fields import Swept
 from partwright.meshing.manifolds import simplified
@@ -34,6 +34,7 @@ from partwright.superfrusta.feature_exchange import exchanged
 from partwright.superfrusta.feature_linings import lines_a_hole
 from partwright.superfrusta.feature_mending import farthest, mended
 from partwright.superfrusta.feature_own_bodies import is_own_body
+from partwright.superfrusta.feature_piece_candidates import PieceCandidates, stands_for
 from partwright.superfrusta.feature_recasting import recast
 from partwright.superfrusta.feature_steps import FeatureTree, covers, within_box
 from partwright.superfrusta.feature_symmetry import symmetries
@@ -50,14 +51,11 @@ _PATIENT = 3  # steps after which a tree may be well behind
 _COMPLEX = 20_000  # triangles of a piece that is no feature
 _MOST = 24
 _FOR_MENDING = 10
-_MOST_LOOKED = 150  # pieces whose candidates are made: a part of hundreds is no part that was drawn
 _PLAIN = 6.0  # prices of plain features, with which no other base is tried
 _TIE = 3e-4, 30_000  # of the objective, with so many samples: of what is as good, the plainest is taken
 _LOOKED = 40  # candidates, by what they gain alone
 _SHARE = 0.25  # of what the best candidate gains alone, that another that is tried with its copies gains
 _BATCH = 64
-_OWN, _ASKEW = 2, 0.9995  # directions of a piece, and the cosine to others that a new one has at most
-_ALIKE = 0.6  # IoU of a piece and what is drawn along it where no face says so
 _EVERY = 2  # samples that the search looks at
 _FINE, _SKIN = 1500, 3e-4  # triangles of a piece that keeps them all, and unit lengths
 _HOPELESS = 1.0  # of its price, that a feature can gain at most
@@ -96,7 +94,7 @@ class FeatureSearch:
         self._whole = self.weights[self.inside].sum(axis=0)
         directions = [frame[:, 2] for frame in self.frames]
         self.turns, self.mirrors = symmetries(self.body, directions, samples.surface, samples.measure)
-        self._of_piece: dict[tuple[float, ...], list[Candidate]] = {}
+        self.candidates_of = PieceCandidates(self.frames)
         self.mask = AskedOnce(self._mask)
         self._is_own = AskedOnce(partial(is_own_body, self))
         self._lines_a_hole = AskedOnce(lambda candidate: lines_a_hole(candidate.part, samples.measure))
@@ -277,7 +275,7 @@ class FeatureSearch:
         if chosen.sides > _FREE_SIDES:
             return 0
         own = next((p for p in pieces if any(c is chosen for c in self.candidates_of(p))), None)
-        if own is None or not _stands_for(chosen, own):
+        if own is None or not stands_for(chosen, own):
             return 0
         volume = own.volume()
         return sum(abs(piece.volume() - volume) <= _SAME_PIECE * volume for piece in pieces)
@@ -312,36 +310,6 @@ class FeatureSearch:
         pieces = [one for one in found if (np.abs(paying - one[0]) <= _SAME_PIECE * one[0]).any()]
         largest = [piece for _, piece in sorted(pieces, key=lambda one: -one[0])[:_PIECES]]
         return [piece if piece.num_tri() < _FINE else simplified(piece, _SKIN) for piece in largest]
-
-    def candidates_of(self, piece: Manifold) -> list[Candidate]:
-        low, high = np.reshape(piece.bounding_box(), (2, 3))
-        key = tuple(np.round([*low, *high, piece.volume()], 5).tolist())
-        if key not in self._of_piece:
-            if len(self._of_piece) >= _MOST_LOOKED:
-                return []
-            own, along = self._own_frames(piece)
-            slanted = candidates(piece, along, holes=True)
-            found = [
-                *candidates(piece, [*self.frames, *own], holes=True),
-                *(candidate for candidate in slanted if _stands_for(candidate, piece)),
-            ]
-            self._of_piece[key] = [candidate for candidate in found if not candidate.usual]
-        return self._of_piece[key]
-
-    def _own_frames(self, piece: Manifold) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
-        """The piece's own directions that are none of the whole's, of a hole askew, and that in which it is
-        long, of a slanted tooth."""
-        mesh = piece.to_mesh64()
-        surface = np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64)
-        known = [frame[:, 2] for frame in self.frames]
-
-        def news(found: Sequence[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-            return [f for f in found if np.abs(np.array(known) @ f[:, 2]).max() < _ASKEW]
-
-        own = news(frames(*surface)[:_OWN])
-        known += [frame[:, 2] for frame in own]
-        along = long_axis(*surface)
-        return own, news([along] if along is not None else [])
 
     def _mask(self, candidate: Candidate) -> NDArray[np.float32]:
         """(N,) 1 at the samples within."""
@@ -387,13 +355,6 @@ class FeatureSearch:
         """(2,) of what covers such samples (N,) and the shape: weights of both together, and of either."""
         sums = covered.astype(np.float64) @ self._in_and_out
         return sums[:2], self._whole + sums[2:]
-
-
-def _stands_for(candidate: Candidate, piece: Manifold) -> bool:
-    """Whether a candidate along no direction of a face is about the same body as the piece."""
-    body = candidate.make(0.0)
-    both = float((body ^ piece).volume())
-    return both > _ALIKE * (float(body.volume()) + float(piece.volume()) - both)
 
 
 def _weights(samples: FitSamples) -> NDArray[np.float64]:
