@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from partwright.assembly import Assembly
 from partwright.assembly.checks import MAX_NAME
+from partwright.blas import one_blas_thread
 from partwright.errors import CancelledError, SettingError
 from partwright.fitting.former import former
 from partwright.fitting.options import Clean, Start, Tolerance, check_able, suitable
@@ -184,9 +186,10 @@ class _Task:
 
     def result(self, listen: bool) -> Result:
         """The work. listen: Ctrl-C cancels it."""
-        if listen:
-            with interruptible(self.run.cancel):
-                return self.result(listen=False)
+        with interruptible(self.run.cancel) if listen else nullcontext(), one_blas_thread():
+            return self.done()
+
+    def done(self) -> Result:
         started = time.perf_counter()
         fitted = self.fitted(self.settings)
         assembly, seconds = self.assembled(fitted), {"reading": self.shape.reading_seconds} | _seconds(fitted)
