@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from partwright.errors import CancelledError
+from partwright.superfrusta.frontier import Frontier
 from partwright.superfrusta.growing import carve
 from partwright.superfrusta.hollows import with_hollows_filled
 from partwright.superfrusta.hull_start import convex_hull_start
@@ -24,6 +25,7 @@ _FIRST = 2  # rounds of the one that only adds, before another is begun beside i
 _PROMISING = 0.88  # of the objective at a usual price: where it has reached that by then, none is begun
 _GOOD = 0.93  # likewise, when it has ended: what is worse is tried again with parts to subtract
 _AHEAD = 0.05  # of the objective, at the same number of parts: what leads by so much is gone on with alone
+_TO_COME = 0.15  # of the objective: what growth that adds may gain yet after its first rounds
 _TELLING = 0.6  # of the objective: of a shape that so few parts explain less of, the lead says nothing
 _WORTH_CUTS = 0.01  # of the objective that parts to subtract must gain, for they are the harder to edit
 
@@ -47,21 +49,40 @@ class Carving:
 
     def contest(self) -> bool:
         """Growth that adds beside growth that subtracts, from nothing, the first to its end where the other
-        is not clearly ahead by then; says whether the growth of what is kept converged."""
+        is not clearly ahead by then, or has come to nothing good that the first may not reach yet; says
+        whether the growth of what is kept converged."""
         search = self.search
         rounds = search.settings.rounds
         rows, converged = search.growth(NOTHING, range(_FIRST))
         cut = self.opened() if search.best is not None and self.usual_objective <= _PROMISING else NOTHING
         if len(cut) and self.lead(cut) > _AHEAD and search.objective(cut) > _TELLING:
-            added = search.best
+            added, settings = search.best, search.settings
             carved = self.tried(cut)
             if search.best is not added:
-                return carved
+                assert added is not None
+                far = search.best_objective > search.objective(added) + _TO_COME
+                done = far or self.usual_objective > _GOOD
+                return carved if done else self.rejoined(rows, settings, carved)
             cut = NOTHING
         if not converged:
             rows, converged = search.growth(rows, range(_FIRST, rounds))
         search.thin(rows)
         return converged if search.best is None else self.tried(cut) and converged
+
+    def rejoined(self, rows: Rows, settings: Settings, converged: bool) -> bool:
+        """Growth that adds goes on after all, by its own settings, beside what was carved and converged or
+        not; says so of what is kept."""
+        search, carved = self.search, self.search.best
+        carving, search.settings = search.settings, settings
+        # What was carved has most of its parts from rounds that this growth has yet to come to.
+        search.reached, search.reached_before = Frontier(), Frontier()
+        try:
+            added = search.attempt(rows, _FIRST)
+        finally:
+            search.choose()
+            if search.best is carved:
+                search.settings = carving
+        return converged if search.best is carved else added
 
     def opened(self) -> Rows:
         """A few rounds that subtract, from nothing."""

@@ -11,10 +11,12 @@ from partwright.superfrusta import Settings, carving
 from partwright.superfrusta.carving import Carving
 from partwright.superfrusta.objective import volume_iou
 from partwright.superfrusta.resfit import ResidualFit
-from partwright.superfrusta.samples import NOTHING, FitSamples
+from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from tests.superfrusta.meshes import drilled_block, table
+from tests.superfrusta.rows import box
 
 SETTINGS = Settings(near=8000, uniform=8000, resolution=64, mends=0, symmetry=False)
+SLAB = box((1.8, 1.0, 0.2), (0.0, 0.0, 0.0))[None]
 
 
 def search_of(shape: Shape) -> ResidualFit:
@@ -36,6 +38,28 @@ def test_what_leads_by_far_is_gone_on_with_alone(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(carving, "_TELLING", 2.0)
     sceptical.run()
     assert rounds_that_add(sceptical) > 2
+
+
+def test_what_has_lost_its_lead_when_it_ends_is_not_kept_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = search_of(load_shape(table()))
+    led = []
+
+    def kept(carving: Carving, cut: Rows) -> bool:
+        led.append(cut)
+        search.settings = carving.settings
+        search.best, search.best_objective = cut, search.objective(cut)
+        return False
+
+    monkeypatch.setattr(carving, "_PROMISING", 2.0)
+    monkeypatch.setattr(Carving, "opened", lambda _: SLAB)
+    monkeypatch.setattr(Carving, "lead", lambda *_: 1.0)
+    monkeypatch.setattr(carving, "_TELLING", -1.0)
+    monkeypatch.setattr(Carving, "tried", kept)
+    assert Carving(search).contest()
+    assert led[0] is SLAB
+    assert search.best is not None
+    assert volume_iou(search.samples, search.best) > 0.98
+    assert search.settings is SETTINGS
 
 
 def test_what_is_far_behind_with_as_many_parts_is_not_gone_on_with(monkeypatch: pytest.MonkeyPatch) -> None:
