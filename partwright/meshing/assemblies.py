@@ -16,7 +16,7 @@ from partwright.fields.base import LIPSCHITZ
 from partwright.meshing.csg import check_count, has_exact_mesh, mesh_csg
 from partwright.meshing.marching import mesh_field
 from partwright.meshing.small_components import without_small_components
-from partwright.meshing.thin_parts import thin_solids, united
+from partwright.meshing.thin_parts import thin_solids, united, without_scraps
 from partwright.meshing.thin_walls import has_thin_walls
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ _FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin 
 _PART_CELLS = 120_000  # a part's surface is given at most this many cells
 _MOST = 1024.0  # cells along one axis of a part
 _LEAST = 24  # cells along the longest side of a thin part, or of what cuts it
+_SCRAP = 8  # what is nowhere nearer to the assembly than this part of a cell is none of it
 _CHORDS = 32  # a chord of an exact mesh is this part of a cell from its surface at most
 _ROOM = 1e-3  # of the longest side, around the bounds
 
@@ -59,6 +60,7 @@ def mesh_assembly(
     if learned is not None:
         return learned
     solids = thin_solids(assembly, lambda part: _is_thin(part, cell), partial(_alone, cell, sharp))
+    solids = without_scraps(solids, assembly.distance, cell / _SCRAP)
     if not solids:
         return _marched(assembly, cell, sharp)
     try:

@@ -2,7 +2,8 @@
 
 Marching cubes at any affordable resolution leaves holes in a plate of a five-hundredth of the longest side,
 or nothing of it. Such a part is meshed alone, cut by what cuts it, and united with the mesh of the whole. A
-blend only adds to what it joins, so nothing comes in that does not belong there.
+blend adds to what it joins, so nothing comes in that does not belong there, but for what the blend of a
+cut takes beyond the cut itself: of that, pieces by themselves are left out again.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from partwright.assembly import Part
 from partwright.assembly.tree import Node
 from partwright.errors import NoSurfaceError
-from partwright.meshing.manifolds import as_manifold, as_mesh
+from partwright.meshing.manifolds import as_manifold, as_mesh, surface_of
 
 if TYPE_CHECKING:
     import trimesh
@@ -25,6 +26,7 @@ _OF_WALL = 64  # a side of a thin part may move by this part of its wall where t
 
 Mesher = Callable[[Node], "trimesh.Trimesh"]
 Thin = Callable[[Part], bool]
+Distance = Callable[[np.ndarray], np.ndarray]
 
 
 def thin_solids(node: Node, thin: Thin, mesh: Mesher) -> list[Manifold]:
@@ -49,6 +51,13 @@ def thin_solids(node: Node, thin: Thin, mesh: Mesher) -> list[Manifold]:
         return found
     taken = [one for cutter in node.children[1:] for one in _solids(cutter, mesh)]
     return [_without(solid, taken) for solid in found]
+
+
+def without_scraps(solids: list[Manifold], distance: Distance, near: float) -> list[Manifold]:
+    """The connected pieces of solids that come as near to the assembly, whose signed distance (n,) at points
+    (n, 3) is given, or lie in it."""
+    pieces = [piece for solid in solids for piece in solid.decompose()]
+    return [piece for piece in pieces if distance(surface_of(piece)[0]).min() < near]
 
 
 def united(mesh: trimesh.Trimesh | None, solids: list[Manifold]) -> trimesh.Trimesh:

@@ -130,6 +130,19 @@ def test_a_sheet_is_whole_beside_thick_parts_and_is_cut_with_them() -> None:
     assert whole.volume == pytest.approx(0.4 * 0.3 + 0.6 * 0.002, rel=2e-3)
 
 
+def test_what_the_blend_of_a_cut_takes_of_a_sheet_is_not_left_as_a_scrap() -> None:
+    """A cut ends just before the sheet does, and its blend takes the rest."""
+    sheet = Part(SuperFrustum((2.0, 0.2, 0.004)))
+    block = Part(Box((0.4, 0.4, 0.4)), translation=(-1.0, 0.0, 0.0))
+    cut = Part(Box((0.78, 1.0, 1.0)), translation=(0.59, 0.0, 0.0), blend=0.2)
+    assembly = Assembly((Assembly((block, sheet)), cut), "difference")
+    assert assembly.distance(np.array([[0.995, 0.0, 0.0]], np.float32))[0] > 0.01
+    mesh = mesh_assembly(assembly, 64)
+    assert mesh.is_volume
+    assert mesh.body_count == 1
+    assert 0.1 < mesh.bounds[1, 0] < 0.21  # the sheet is there up to the cut
+
+
 def test_sheets_alone_and_copies_that_overlap() -> None:
     sheet = Part(SuperFrustum((1.0, 1.0, 0.002)), instances=(Similarity(translation=(0.5, 0.0, 0.001)),))
     mesh = mesh_assembly(sheet, 48)
