@@ -19,7 +19,7 @@ from partwright.assembly import Assembly
 from partwright.meshing.csg import solid_of
 from partwright.superfrusta.far_places import Solid, far_places, reach
 from partwright.superfrusta.feature_pruning import fold_of_masks, mask_of
-from partwright.superfrusta.feature_steps import Feature, FeatureTree
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, with_open_ends_everywhere
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
@@ -104,11 +104,14 @@ def _solid(whole: Assembly) -> Solid:
 
 
 class _Bodies:
-    """The features of a tree as bodies, whose folds are held against the shape."""
+    """The features of a tree as bodies, whose folds are held against the shape. Open ends go on outside, as
+    in what is made of them: a hole in a round wall that ends flat leaves a skin over its mouth."""
 
     def __init__(self, search: FeatureSearch, features: Sequence[Feature]) -> None:
-        self._search, self._features = search, features
-        self._wholes = [[solid_of(part, _CHORD) for part in feature.parts] for feature in features]
+        measure = search.samples.measure
+        rest = [with_open_ends_everywhere(feature, measure) for feature in features[1:]]
+        self._search, self._features = search, [*features[:1], *rest]
+        self._wholes = [[solid_of(part, _CHORD) for part in feature.parts] for feature in self._features]
 
     def off(self, kept: Sequence[int], around: Feature) -> float:
         """How far the fold of those kept and the shape are apart around a feature, unit lengths; 0 where that

@@ -361,6 +361,19 @@ def test_a_bore_through_two_walls_is_one_and_bolt_holes_are_copies() -> None:
     assert [len(hole.copies) for hole in merged_holes(pairs, in_the_way.distance)] == [4]
 
 
+def test_holes_that_were_turned_copies_of_one_are_one() -> None:
+    """Three set screws in a round wall point three ways; four are two bores through it."""
+    wall = Part(Tube(0.6, 0.1, 1.0))
+    across = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+    for count, bores, height in ((3, 3, 0.2), (4, 2, 1.3)):
+        turns = tuple(Similarity.turn((0, 0, 1), 2 * math.pi * k / count) for k in range(1, count))
+        screw = Part(Cylinder(0.05, 0.2), (0.55, 0.0, 0.1), across, instances=turns)
+        (hole,) = merged_holes([screw], Assembly((wall, screw), "difference").distance)
+        assert len(hole.copies) == bores
+        assert hole.field.height == pytest.approx(height)
+        assert {move.rotation for move in hole.instances} <= {move.rotation for move in turns}
+
+
 def test_what_stands_on_a_flat_end_of_a_turned_body_is_not_parted_from_it() -> None:
     """Chords are off along the radius only: around the body there is no skin over its flat ends."""
     disc = Manifold.cylinder(0.2, 0.9, 0.9, 64) + Manifold.cylinder(0.6, 0.3, 0.3, 64)

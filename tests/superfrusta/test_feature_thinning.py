@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
+
 import numpy as np
 import pytest
 
 import partwright as pw
-from partwright.assembly import Assembly, Part
-from partwright.fields import Box, Cylinder
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.fields import Box, Cylinder, Tube
 from partwright.meshing import mesh_assembly
 from partwright.superfrusta.feature_assembly import FeatureAssembly
 from partwright.superfrusta.feature_search import FeatureSearch
@@ -70,3 +73,14 @@ def test_what_holds_a_body_together_stays() -> None:
     web = Part(Box((0.1, 0.3, 0.1)))
     whole = Assembly((*halves, web))
     assert left([(halves[0], True), (halves[1], True), (web, True)], whole, 1.5) == [*halves, web]
+
+
+def test_holes_in_a_round_wall_stay() -> None:
+    """Their ends are flat and the wall is not: skins are left over their mouths, and no hole is seen."""
+    wall = Part(Tube(0.6, 0.06, 1.8))
+    around = tuple(Similarity.turn((0, 0, 1), angle) for angle in (2.0, 4.0))
+    across = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+    drilled = Part(Cylinder(0.04, 0.3), (0.57, 0.0, 0.4), across, instances=around)
+    flat = dataclasses.replace(drilled, field=Cylinder(0.04, 0.056), translation=(0.569, 0.0, 0.4))
+    whole = Assembly((wall, drilled), "difference")
+    assert left([(wall, True), (flat, False)], whole, 1.5) == [wall, flat]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -106,7 +108,8 @@ def _within(hole: Part) -> np.ndarray:
 
 
 def merged_holes(holes: Sequence[Part], distance: Callable[[np.ndarray], np.ndarray]) -> list[Part]:
-    """Drilled holes: those on one axis of one radius as a single one, those of one size as copies of one.
+    """Drilled holes: those on one axis of one radius as a single one, those of one size as copies of one, in
+    one direction, or in several where a hole as given has copies that are turned so.
 
     distance: (N,) of the shape at points (N, 3), unit lengths like the holes. Where the shape is solid
     between two holes they stay two, and so do others that are copies of such: a pattern stays one.
@@ -123,15 +126,16 @@ def merged_holes(holes: Sequence[Part], distance: Callable[[np.ndarray], np.ndar
             else:
                 drilled.append((one, [one.part()]))
     alone = [members[0] for _, members in drilled if len(members) == 1]
+    turns = [move for hole in holes for move in hole.instances]
     result: list[Part] = []
     for part in (part for whole, members in drilled for part in _of_pattern(whole.part(), members, alone)):
-        same = next((k for k, other in enumerate(result) if _is_copy(other, part)), None)
-        if same is None:
+        moves = ((k, move) for k, other in enumerate(result) if (move := _shift_to(other, part)) is not None)
+        turned = ((k, turn) for k, other in enumerate(result) for turn in turns if _is_at(other, turn, part))
+        same, move = next(chain(moves, turned), (len(result), None))
+        if move is None:
             result.append(part)
         else:
-            x, y, z = np.subtract(part.translation, result[same].translation).tolist()
-            moves = (*result[same].instances, Similarity(translation=(x, y, z)))
-            result[same] = dataclasses.replace(result[same], instances=moves)
+            result[same] = dataclasses.replace(result[same], instances=(*result[same].instances, move))
     return result
 
 
@@ -192,13 +196,36 @@ class _Drilled:
 
 def _is_copy(one: Part, other: Part) -> bool:
     """Whether a shift takes one hole to the other."""
+    return _is_alike(one, other) and _is_parallel(one, other)
+
+
+def _shift_to(one: Part, other: Part) -> Similarity | None:
+    """What takes one hole to the other, if a shift does."""
+    if not _is_copy(one, other):
+        return None
+    x, y, z = np.subtract(other.translation, one.translation).tolist()
+    return Similarity(translation=(x, y, z))
+
+
+def _is_at(one: Part, move: Similarity, other: Part) -> bool:
+    """Whether a move takes the first of a hole's copies to the other hole."""
+    if not _is_alike(one, other):
+        return False
+    moved = dataclasses.replace(one, instances=()).transformed(move)
+    return _is_parallel(moved, other) and math.dist(moved.translation, other.translation) < _ASIDE
+
+
+def _is_alike(one: Part, other: Part) -> bool:
+    """Whether they are of one size."""
     assert isinstance(one.field, Cylinder)
     assert isinstance(other.field, Cylinder)
-    own, axis = (rotation_matrix(part.rotation)[:, 2] for part in (one, other))
-    parallel = abs(float(own @ axis)) > 1 - _PARALLEL
     near = _SAME * one.field.radius
-    return bool(
-        parallel
-        and abs(one.field.radius - other.field.radius) < near
+    return (
+        abs(one.field.radius - other.field.radius) < near
         and abs(one.field.height - other.field.height) < _ASIDE
     )
+
+
+def _is_parallel(one: Part, other: Part) -> bool:
+    own, axis = (rotation_matrix(part.rotation)[:, 2] for part in (one, other))
+    return abs(float(own @ axis)) > 1 - _PARALLEL
