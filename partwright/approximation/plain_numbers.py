@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from partwright.assembly import Part, Similarity
+from partwright.assembly.instance_patterns import Circle, Grid, Pattern, Ring, Row, pattern, with_pattern
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import ParameterError
-from partwright.fields import Field, Revolution, Solid, Swept
+from partwright.fields import Field, Solid, Swept
 from partwright.fields.profile import Loop, Profile
 
 _ANGLES = ("taper", "angle")
-_ROUND = ("cylinder", "cone", "frustum", "sphere", "capsule", "tube", "torus", "hollow_frustum")
 _ALONG = 1e-9  # of a cosine
-_RING = 1e-6  # radians
+_MOVED = 3.0  # times as far as a number, that the numbers of a circle move a place together
 
 
 def plain(value: float, within: float) -> float:
@@ -44,37 +44,46 @@ def with_plain_numbers(part: Part, within: float) -> Part:
         field = _plain_field(part.field, within)
     except ParameterError:
         field = part.field
-    moves = tuple(plain_move(move, within) for move in _shifts_where_round(part))
-    plain_part = dataclasses.replace(part, field=field, translation=(x, y, z), instances=moves)
-    return _between_plain_ends(part, plain_part, within)
+    copies = _plain_copies(part, within)
+    if copies is None:
+        moves = tuple(plain_move(move, within) for move in part.instances)
+        copies = dataclasses.replace(part, translation=(x, y, z), instances=moves)
+    return _between_plain_ends(part, dataclasses.replace(copies, field=field), within)
 
 
-def _shifts_where_round(part: Part) -> tuple[Similarity, ...]:
-    """The moves to its copies, of what is round about its own axis as shifts where that keeps its direction:
-    then a turn only says where it goes. A ring of turns stays one."""
-    if not _is_round(part.field) or _is_ring(part.instances):
-        return part.instances
-    axis = rotation_matrix(part.rotation)[:, 2]
-    return tuple(_as_shift(move, part, axis) for move in part.instances)
+def _plain_copies(part: Part, within: float) -> Part | None:
+    """With copies exactly in a ring, on a circle, in rows, or at places, of plain numbers; None where they
+    are in none of these."""
+    wanted = _plain_pattern(pattern(part, within), within)
+    if wanted is None:
+        return None
+    if isinstance(wanted, Ring):
+        x, y, z = (plain(v, within) for v in part.translation)
+        return with_pattern(dataclasses.replace(part, translation=(x, y, z)), wanted)
+    made = with_pattern(part, wanted)
+    places, given = (np.array([copy.translation for copy in one.copies]) for one in (made, part))
+    off = np.linalg.norm(given[:, None] - places, axis=2).min(axis=1).max()
+    return made if off <= _MOVED * within else None
 
 
-def _as_shift(move: Similarity, part: Part, axis: np.ndarray) -> Similarity:
-    if move.turned(axis) @ axis < 1 - _ALONG:
-        return move
-    x, y, z = (move(np.array(part.translation)) - part.translation).tolist()
-    return Similarity(translation=(x, y, z))
+def _plain_pattern(found: Pattern | None, within: float) -> Ring | Circle | Grid | Row | None:
+    def near(values: tuple[float, float, float]) -> tuple[float, float, float]:
+        x, y, z = (plain(v, within) for v in values)
+        return x, y, z
 
-
-def _is_round(field: Field) -> bool:
-    return field.kind in _ROUND or (isinstance(field, Revolution) and field.full)
-
-
-def _is_ring(moves: tuple[Similarity, ...]) -> bool:
-    """Whether they are turns by all multiples of a whole turn's part, and a third of one at most."""
-    count = len(moves) + 1
-    turns = sorted(2 * math.acos(min(1.0, abs(move.rotation[0]))) for move in moves)
-    whole = sorted(min(k, count - k) * 2 * math.pi / count for k in range(1, count))
-    return count > 2 and np.allclose(turns, whole, atol=_RING)
+    if isinstance(found, Row):
+        return Row(tuple(map(near, found.places)))
+    if isinstance(found, Ring):
+        return dataclasses.replace(found, centre=near(found.centre))
+    if isinstance(found, Circle):
+        turn = math.degrees(2 * within / found.diameter)
+        diameter, start = plain(found.diameter, within), plain(found.start, turn)
+        return Circle(found.count, diameter, start, near(found.centre))
+    if isinstance(found, Grid):
+        # The outermost of a long row are no further off than the others.
+        a, b, c = (plain(v, 2 * within / n) for n, v in zip(found.count, found.spacing, strict=True))
+        return Grid(found.count, (a, b, c), near(found.middle))
+    return None
 
 
 def _between_plain_ends(given: Part, part: Part, within: float) -> Part:

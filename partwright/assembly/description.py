@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.assembly.instance_patterns import Circle, Grid, pattern
 from partwright.assembly.placed import placed_quadric
 from partwright.assembly.repeated_groups import children_once
 from partwright.fields import NormalForm, Profile, normal_form
@@ -52,10 +53,22 @@ def _leaf(part: Part, digits: int) -> str:
         shown = {f.name: getattr(part.field, f.name) for f in dataclasses.fields(part.field) if f.repr}  # type: ignore[arg-type]
         numbers = [f"{k} {_value(value, digits)}" for k, value in shown.items() if value or k not in RIMS]
         own = " ".join([part.field.kind, ", ".join(numbers), f"at {_numbers(part.translation, digits)}"])
-    copies = f", {len(part.copies)} copies" if part.instances else ""
+    copies = f", {_copies(part, digits)}" if part.instances else ""
     blend = f", blend {_number(part.blend, digits)}" if part.blend else ""
     thread = f", thread {part.metadata['thread']}" if "thread" in part.metadata else ""
     return f"{part.name + ': ' if part.name else ''}{own}{thread}{copies}{blend}"
+
+
+def _copies(part: Part, digits: int) -> str:
+    found = pattern(part)
+    if isinstance(found, Circle):
+        circle, at = _number(found.diameter, digits), _numbers(found.centre, digits)
+        return f"{found.count} copies on a circle of {circle} about {at}"
+    if isinstance(found, Grid):
+        rows = [(n, step) for n, step in zip(found.count, found.spacing, strict=True) if n > 1]
+        counts = " x ".join(str(n) for n, _ in rows)
+        return f"{counts} copies, {' x '.join(_number(step, digits) for _, step in rows)} apart"
+    return f"{len(part.copies)} copies"
 
 
 def _quadric(form: NormalForm, digits: int) -> str:

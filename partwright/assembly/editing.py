@@ -75,6 +75,8 @@ def _changed(
     shift = np.subtract(after.translation, before.translation)
     x, y, z = (np.array(own.translation) + shift).tolist() if shift.any() else own.translation
     made = dataclasses.replace(own, field=after.field, translation=(x, y, z))
+    if after.instances != before.instances:
+        made = dataclasses.replace(made, instances=after.instances)
     if after.rotation != before.rotation:  # of an image that begins where another ends
         made = dataclasses.replace(made, rotation=after.rotation)
     assembly = assembly.replace_part(name, made)

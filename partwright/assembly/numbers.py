@@ -5,11 +5,14 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from partwright.assembly.instance_patterns import Circle, Grid, Ring, pattern, with_pattern
 from partwright.assembly.tree import Part
+from partwright.errors import ParameterError
 
 
 def numbers_of(part: Part) -> dict[str, float]:
-    """The part's numbers by name: those of its field ("radius", "diameter", "size.x") and its place ("x")."""
+    """The part's numbers by name: those of its field ("radius", "diameter", "size.x"), of its place ("x") and
+    of the pattern of its copies ("count", "circle", "start"; "counts.x", "spacing.x")."""
     found: dict[str, float] = {}
     for entry in dataclasses.fields(part.field):  # type: ignore[arg-type]
         value = getattr(part.field, entry.name)
@@ -19,7 +22,20 @@ def numbers_of(part: Part) -> dict[str, float]:
                 found[entry.name.replace("radius", "diameter")] = 2 * value
         elif entry.name == "size":
             found |= {f"size.{axis}": v for axis, v in zip("xyz", value, strict=True)}
-    return found | dict(zip("xyz", part.translation, strict=True))
+    return found | dict(zip("xyz", part.translation, strict=True)) | _numbers_of_copies(part)
+
+
+def _numbers_of_copies(part: Part) -> dict[str, float]:
+    found = pattern(part)
+    if isinstance(found, Ring):
+        return {"count": found.count}
+    if isinstance(found, Circle):
+        return {"count": found.count, "circle": found.diameter, "start": found.start}
+    if isinstance(found, Grid):
+        rows = [k for k in range(3) if found.count[k] > 1]
+        counts = {f"counts.{'xyz'[k]}": float(found.count[k]) for k in rows}
+        return counts | {f"spacing.{'xyz'[k]}": found.spacing[k] for k in rows}
+    return {}
 
 
 def with_number(part: Part, number: str, value: float) -> Part:
@@ -28,6 +44,8 @@ def with_number(part: Part, number: str, value: float) -> Part:
         place = list(part.translation)
         place["xyz".index(number)] = value
         return dataclasses.replace(part, translation=(place[0], place[1], place[2]))
+    if number in _numbers_of_copies(part):
+        return _with_number_of_copies(part, number, value)
     if "diameter" in number:
         number, value = number.replace("diameter", "radius"), value / 2
     new: dict[str, Any] = {number: value}
@@ -36,3 +54,20 @@ def with_number(part: Part, number: str, value: float) -> Part:
         size["xyz".index(number[-1])] = value
         new = {"size": tuple(size)}
     return dataclasses.replace(part, field=dataclasses.replace(part.field, **new))  # type: ignore[type-var]
+
+
+def _with_number_of_copies(part: Part, number: str, value: float) -> Part:
+    found: Any = pattern(part)
+    name, _, axis = number.partition(".")
+    if name in ("count", "counts"):
+        if value != int(value) or value < 2:
+            raise ParameterError(f"{number}: expected a whole number, at least 2, got {value:g}")
+        value = int(value)
+    elif name in ("circle", "spacing") and value <= 0:
+        raise ParameterError(f"{number}: expected a positive number, got {value:g}")
+    name = {"circle": "diameter", "counts": "count"}.get(name, name)
+    if axis:
+        along = list(getattr(found, name))
+        along["xyz".index(axis)] = value
+        return with_pattern(part, dataclasses.replace(found, **{name: tuple(along)}))
+    return with_pattern(part, dataclasses.replace(found, **{name: value}))

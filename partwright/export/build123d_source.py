@@ -18,12 +18,12 @@ from partwright.approximation.nearest import Approximation, compared
 from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.euler_angles import own_axes_angles
+from partwright.assembly.instance_patterns import Circle, Grid, Poses, Row
 from partwright.assembly.repeated_groups import parts_once
 from partwright.atomic_io import write_bytes
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
-from partwright.export.instance_patterns import Poses, Row
 from partwright.export.profile_source import BUILD123D, BUILD123D_SOURCE, draws_loops, loops
 from partwright.export.solid_source import (
     SourcePart,
@@ -54,9 +54,26 @@ _SOLIDS = {
     "superfrustum": "superfrustum({size}, {roundness}, {dilation}, {taper}, {bulge}, {onion})",
 }
 _OPERATORS = {"union": "+", "difference": "-", "intersection": "&"}
-_RESERVED = (*keyword.kwlist, "bd", "math", "path", "assembly", "print", "superfrustum", "loop", "zip")
+_RESERVED = (
+    *keyword.kwlist,
+    "bd",
+    "math",
+    "path",
+    "assembly",
+    "print",
+    "superfrustum",
+    "loop",
+    "zip",
+    "grid",
+)
 _TIGHT = 0.99999  # of a rim's depth, where nothing else would be left between rims
 _NEARLY = 0.01  # of a frame's width
+_GRID = """\
+def grid(counts, spacing):
+    \"\"\"Places in rows along x, y and z about their middle: how many along each, and how far apart.\"\"\"
+    x, y, z = ([(i - (n - 1) / 2) * step for i in range(n)] for n, step in zip(counts, spacing))
+    return [(a, b, c) for a in x for b in y for c in z]
+"""
 
 
 def write(assembly: Assembly, path: str | Path) -> None:
@@ -86,6 +103,7 @@ def write(assembly: Assembly, path: str | Path) -> None:
         *(line for part in parts for line in _table(part, unit)),
         "",
         *([*drawing, "", ""] if drawing else []),
+        *([*_GRID.splitlines(), "", ""] if any(isinstance(part.copies, Grid) for part in parts) else []),
         *([*BUILD123D_SOURCE.splitlines(), "", ""] if draws_loops(swept) else []),
         *(line for part in parts for line in _function(part)),
         f"assembly = {_tree(plain, {p.part.name: p.function for p in parts}, '')}",
@@ -178,6 +196,15 @@ def _placed(part: SourcePart, names: dict[str, str]) -> str:
         return f"bd.Part() + [bd.Location(place{turned}) * solid for place in {names['places']}]"
     if isinstance(part.copies, Poses):
         return f"bd.Part() + [bd.Location(*pose) * solid for pose in {names['poses']}]"
+    if isinstance(part.copies, Grid):
+        one = f"bd.Pos(*{names['middle']}) * bd.Location(place{turned}) * solid"
+        return f"bd.Part() + [{one} for place in grid({names['counts']}, {names['spacing']})]"
+    if isinstance(part.copies, Circle):
+        start = f"{names['start']} + " if "start" in names else ""
+        one = f"bd.Rot(Z={start}360 / {names['count']} * i) * bd.Pos(X={names['circle']} / 2) * solid"
+        return (
+            f"bd.Location({names['centre']}{turned}) * (bd.Part() + [{one} for i in range({names['count']})])"
+        )
     first = f"bd.Location({names['place']}{turned}) * solid"
     if part.copies is None:
         return first

@@ -22,13 +22,13 @@ from partwright.approximation.nearest import Approximation
 from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.euler_angles import fixed_axes_angles
+from partwright.assembly.instance_patterns import Circle, Grid, Poses, Ring, Row
 from partwright.assembly.repeated_groups import parts_once
 from partwright.atomic_io import write_bytes
 from partwright.errors import ParameterError
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
-from partwright.export.instance_patterns import Poses, Ring, Row
 from partwright.export.profile_source import SCAD, SCAD_RIMS, SCAD_SOURCE, draws_loops, loops
 from partwright.export.solid_source import (
     SourcePart,
@@ -81,8 +81,15 @@ _RESERVED = (
     "intersection translate rotate scale mirror hull minkowski cube sphere cylinder polyhedron circle "
     "square polygon text color offset resize render children import projection surface linear_extrude "
     "rotate_extrude multmatrix intersection_for group version end superfrustum loop side_points "
-    "extrude_with_rims rim_slices rim_point"
+    "extrude_with_rims rim_slices rim_point grid"
 )
+_GRID = """\
+// Places in rows along x, y and z about their middle: how many along each, and how far apart.
+function grid(counts, spacing) = [
+    for (i = [0 : counts[0] - 1], j = [0 : counts[1] - 1], k = [0 : counts[2] - 1])
+        [for (axis = [0 : 2]) ([i, j, k][axis] - (counts[axis] - 1) / 2) * spacing[axis]]
+];
+"""
 
 
 def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
@@ -117,6 +124,7 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
         *(line for part in parts for line in _module(part, ball, facets)),
         *superfrustum_source(parts, "superfrustum.scad"),
         *(SCAD_RIMS.splitlines() if any(_has_rims(part.part.field) for part in parts) else []),
+        *(_GRID.splitlines() if any(isinstance(part.copies, Grid) for part in parts) else []),
         *(SCAD_SOURCE.splitlines() if draws_loops(_drawn_swept(parts)) else []),
     ]
     write_bytes(path, ("\n".join(lines).rstrip() + "\n").encode())
@@ -160,6 +168,13 @@ def _loop(part: SourcePart, names: dict[str, str]) -> Iterator[str]:
     turned = f" rotate({names['turn']})" if "turn" in names else ""
     if isinstance(part.copies, Row):
         yield f"for (place = {names['places']}) translate(place){turned}"
+    elif isinstance(part.copies, Grid):
+        yield f"for (place = grid({names['counts']}, {names['spacing']}))"
+        yield f"translate({names['middle']} + place){turned}"
+    elif isinstance(part.copies, Circle):
+        start = f"{names['start']} + " if "start" in names else ""
+        yield f"translate({names['centre']}){turned} for (i = [0 : {names['count']} - 1])"
+        yield f"rotate({start}360 / {names['count']} * i) translate([{names['circle']} / 2, 0, 0])"
     elif isinstance(part.copies, Poses):
         yield f"for (pose = {names['poses']}) translate(pose[0]) rotate(pose[1])"
     else:

@@ -14,11 +14,11 @@ import numpy as np
 from partwright.approximation.nearest import Approximation
 from partwright.approximation.recognise import SAME, exact_solid
 from partwright.assembly import Assembly, Node, Part
+from partwright.assembly.instance_patterns import Circle, Grid, Pattern, Poses, Row, pattern
 from partwright.assembly.motion import Motion
 from partwright.assembly.repeated_groups import children_once, repeats
 from partwright.assembly.similarity import rotation_matrix
 from partwright.export.identifiers import comment, identifiers
-from partwright.export.instance_patterns import Poses, Ring, Row, pattern
 from partwright.export.profile_source import meaning, swept_parameters
 from partwright.fields import Field, HollowBox, HollowFrustum, SuperFrustum, Swept
 from partwright.fields.extrusion import RIMS
@@ -42,15 +42,20 @@ MEANING = {
     "places": "where the origins of the copies lie",
     "poses": "where the origin of each copy lies, and its turn about x, y and z in degrees",
     "count": "copies, by equal turns",
+    "counts": "copies along x, y and z",
+    "spacing": "from one copy to the next along x, y and z",
+    "middle": "of the origins of the copies",
+    "circle": "diameter of the circle through the origins of the copies",
+    "start": "where on the circle the first is",
     "bottom_fillet": "radius of the fillet around the lower end",
     "top_fillet": "radius of the fillet around the upper end",
     "bottom_chamfer": "by which the edges of the lower end are cut off at 45 degrees",
     "top_chamfer": "by which the edges of the upper end are cut off at 45 degrees",
     "angle": "through which the profile is turned",
-    "centre": "through which the axis of these turns runs",
+    "centre": "about which these turns are",
 }
 _LEAN = "by which the walls lean inwards on their way up"
-_NO_UNIT = ("roundness", "taper", "bulge", "onion", "count", "poses")
+_NO_UNIT = ("roundness", "taper", "bulge", "onion", "count", "counts", "poses")
 _SHARED = (
     "radius",
     "height",
@@ -79,7 +84,7 @@ class Parameter:
 
     def line(self, brackets: str, unit: str | None) -> tuple[str, str]:
         """The value in the language's brackets, and what is said of it."""
-        angles = self.name in ("turn", "angle") or (self.name == "taper" and self.of_profile)
+        angles = self.name in ("turn", "angle", "start") or (self.name == "taper" and self.of_profile)
         measure = "degrees" if angles else None if self.name in _NO_UNIT else unit
         said = _LEAN if self.name == "taper" and self.of_profile else MEANING.get(self.name)
         said = said or meaning(self.name) or self.name
@@ -97,7 +102,7 @@ class SourcePart:
     function: str
     part: Part
     parameters: tuple[Parameter, ...]
-    copies: Ring | Row | Poses | None = None
+    copies: Pattern | None = None
 
     @property
     def title(self) -> str:
@@ -155,13 +160,21 @@ def _each_length_once(parts: list[SourcePart]) -> list[SourcePart]:
 
 
 def _placed(
-    part: Part, copies: Ring | Row | Poses | None, turn: Callable[[np.ndarray], tuple[float, ...]]
+    part: Part, copies: Pattern | None, turn: Callable[[np.ndarray], tuple[float, ...]]
 ) -> dict[str, Value]:
     """What says where the part and its copies are; no turn where there is none."""
     angles = turn(rotation_matrix(part.rotation))
     turned: dict[str, Value] = {"turn": angles} if any(angles) else {}
     if isinstance(copies, Row):
         return {"places": tuple(map(_tidy, copies.places)), **turned}
+    if isinstance(copies, Circle):
+        start = round(copies.start % (360 / copies.count), 9) % (360 / copies.count)
+        begins: dict[str, Value] = {"start": start} if start else {}
+        own = {"centre": _tidy(copies.centre), **turned, "count": copies.count, "circle": copies.diameter}
+        return own | begins
+    if isinstance(copies, Grid):
+        counts = tuple(map(float, copies.count))
+        return {"middle": _tidy(copies.middle), **turned, "counts": counts, "spacing": copies.spacing}
     if isinstance(copies, Poses):
         poses = ((_tidy(c.translation), turn(rotation_matrix(c.rotation))) for c in copies.copies)
         return {"poses": tuple(poses)}

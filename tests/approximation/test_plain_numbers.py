@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 
 from partwright.approximation.plain_numbers import plain, with_plain_numbers
 from partwright.assembly import Part, Similarity
-from partwright.fields import Box, Cone, Cylinder, Extrusion, Revolution
+from partwright.assembly.instance_patterns import Circle, Grid, Ring, Row, pattern, with_pattern
+from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Revolution
 from partwright.fields.profile import Profile, circle
 
 
@@ -57,19 +59,51 @@ def test_copies_of_what_is_round_are_shifts_to_plain_places() -> None:
     for field in (sunk, Cylinder(2.0, 3.0)):
         plain_part = with_plain_numbers(Part(field, (22.0, 8.0, 1.0), instances=moves), 1e-3)
         assert all(move.rotation == (1.0, 0.0, 0.0, 0.0) for move in plain_part.instances)
-        places = [copy.translation for copy in plain_part.copies]
-        assert places == [(22, 8, 1), (-22, 8, 1), (-22, -8, 1), (22, -8, 1)]
+        places = {copy.translation for copy in plain_part.copies}
+        assert places == {(22, 8, 1), (-22, 8, 1), (-22, -8, 1), (22, -8, 1)}
 
 
 def test_turns_that_mean_more_than_a_place_stay() -> None:
     ring = tuple(about(120 * k) for k in (1, 2))
     hole = Part(Cylinder(2.0, 3.0), (9.0, 0.0, 0.0), instances=ring)
-    assert with_plain_numbers(hole, 1e-3).instances == ring
+    rib = dataclasses.replace(hole, field=Box((3.0, 1.0, 3.0)))
+    assert pattern(with_plain_numbers(rib, 1e-3)) == Ring(3, "z", (0, 0, 0))
     square = dataclasses.replace(hole, field=Box((1.0, 2.0, 3.0)), instances=(about(40),))
     assert with_plain_numbers(square, 1e-3).instances == (about(40),)
     over = Similarity.turn((1, 0, 0), math.pi)  # a cone upside down
     cone = Part(Cone(2.0, 3.0), (9.0, 4.0, 0.0), instances=(over,))
     assert with_plain_numbers(cone, 1e-3).instances == (over,)
+
+
+@pytest.mark.parametrize(
+    ("field", "wanted"),
+    [
+        (Cylinder(2, 30), Circle(6, 34, 60, (3, 0, 5))),
+        (Cylinder(2, 30), Grid((2, 3, 1), (40, 25.5, 0), (3, 0, 5))),
+        (Box((2, 5, 3)), Grid((1, 9, 1), (0, 8, 0), (3, 0, 5))),
+    ],
+)
+def test_copies_that_are_nearly_in_a_pattern_are_in_it(field: Field, wanted: Circle | Grid) -> None:
+    """Places of which each was made plain by itself are on no circle any more: -14.72 and 14.725."""
+    exact = with_pattern(Part(field), wanted)
+    rng = np.random.default_rng(0)
+    places = np.array([copy.translation for copy in exact.copies]) + rng.uniform(
+        -6e-4, 6e-4, (len(exact.copies), 3)
+    )
+    rough = with_pattern(exact, Row(tuple(map(tuple, rng.permutation(places).tolist()))))
+    assert isinstance(pattern(rough), Row)
+    found = pattern(with_plain_numbers(rough, 1e-3))
+    if isinstance(wanted, Circle) and isinstance(found, Circle):
+        assert (found.start - wanted.start) % 60 == 0
+        found = dataclasses.replace(found, start=wanted.start)
+    assert found == wanted
+
+
+def test_boxes_turned_by_half_are_boxes_in_a_row() -> None:
+    slots = Part(
+        Box((2.0, 5.0, 3.0)), (9.0, 0.0, 0.0), instances=(about(180), Similarity(translation=(-9, 0, 0)))
+    )
+    assert pattern(with_plain_numbers(slots, 1e-3)) == Grid((3, 1, 1), (9, 0, 0), (0, 0, 0))
 
 
 def test_parts_that_meet_go_on_meeting() -> None:

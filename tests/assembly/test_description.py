@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.instance_patterns import Circle, Grid, with_pattern
 from partwright.fields import Cylinder, Quadric
 
 
@@ -24,6 +27,14 @@ def test_the_tree_is_readable() -> None:
             "│  ├─ top: plane (0, 0, 1) . p <= 2",
             "│  ├─ bore: outside of cylinder radius 0.5, centre (1, 0, 0), axis (0, 0, 1)",
             "│  └─ taper: cone slope 0.25, centre (0, 0, 3), axis (0, 0, 1)",
-            "└─ - pin: cylinder radius 0.3333, height 2 at (0, 1, 0), 2 copies",
+            "└─ - pin: cylinder radius 0.3333, height 2 at (0, 1, 0), 2 copies, 1 apart",
         ]
     )
+
+
+def test_copies_are_described_by_the_numbers_of_their_pattern() -> None:
+    hole = with_pattern(Part(Cylinder(1, 2), name="hole"), Circle(6, 34, 30, (0, 0, 5)))
+    assert hole.describe().endswith(", 6 copies on a circle of 34 about (0, 0, 5)")
+    post = with_pattern(Part(Cylinder(1, 2), name="post"), Grid((3, 2, 1), (20, 36, 0), (0, 0, 0)))
+    assert post.describe().endswith(", 3 x 2 copies, 20 x 36 apart")
+    assert dataclasses.replace(post, instances=post.instances[:-1]).describe().endswith(", 5 copies")

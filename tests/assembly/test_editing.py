@@ -9,7 +9,9 @@ import pytest
 
 from partwright.assembly import Assembly, Part, Similarity, load_assembly
 from partwright.assembly.editing import with_numbers
+from partwright.assembly.instance_patterns import Circle, Grid, Ring, pattern, with_pattern
 from partwright.assembly.numbers import numbers_of
+from partwright.assembly.repeated_groups import copies_of, line, ring
 from partwright.cli.main import main
 from partwright.errors import ParameterError
 from partwright.fields import Box, Cylinder
@@ -124,3 +126,30 @@ def test_the_command_takes_units_and_says_what_followed(tmp_path: Path, capsys: 
         assert main(["edit", str(source), "--set", bad, "-o", str(tmp_path / "c.json")]) == 2
     assert main(["edit", str(source), "--set", "hole.radius=1", "-o", str(tmp_path / "c.stl")]) == 2
     assert not (tmp_path / "c.json").exists()
+
+
+def test_patterns_have_numbers_to_set() -> None:
+    hole = with_pattern(Part(Cylinder(1, 20), name="hole"), Circle(6, 34, 30, (0, 0, 5)))
+    post = with_pattern(Part(Box((2, 2, 9)), name="post"), Grid((2, 2, 1), (50, 30, 0), (0, 0, 5)))
+    tooth = Part(Box((2, 3, 9)), (20, 0, 0), name="tooth", instances=ring(24))
+    part = Assembly((post, tooth)) - hole
+    values = {"hole.count": 8, "hole.circle": 40, "post.counts.x": 3, "post.spacing.y": 44, "tooth.count": 30}
+    edited = with_numbers(part, values).assembly
+    assert pattern(edited["hole"]) == Circle(8, 40, 30, (0, 0, 5))
+    assert pattern(edited["post"]) == Grid((3, 2, 1), (50, 44, 0), (0, 0, 5))
+    assert pattern(edited["tooth"]) == Ring(30, "z", (0, 0, 0))
+    assert edited["tooth"].translation == (20, 0, 0)
+    assert with_numbers(part, {"hole.start": 0}).assembly["hole"].translation == (17, 0, 5)
+    for wrong in ({"hole.count": 2.5}, {"tooth.count": 1}, {"hole.circle": -3}, {"post.spacing.x": 0}):
+        with pytest.raises(ParameterError, match="expected a"):
+            with_numbers(part, wrong)
+    with pytest.raises(ParameterError, match=r"has no number 'count'; it has .*spacing.x"):
+        with_numbers(part, {"post.count": 3})
+
+
+def test_patterns_within_groups_that_are_copies_change_alike() -> None:
+    hole = with_pattern(Part(Cylinder(1, 20), name="hole"), Circle(6, 34, 30, (0, 0, 5)))
+    flange = Assembly((Part(Box((50, 50, 4)), (0, 0, 5), name="flange"), hole), "difference")
+    pair = Assembly((flange, *copies_of(flange, line(2, (0, 0, 80)))))
+    edited = with_numbers(pair, {"hole.count": 8}).assembly
+    assert pattern(edited["hole_02"]) == Circle(8, 34, 30, (0, 0, 85))

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.instance_patterns import Circle, Grid, Poses, Ring, Row, pattern, with_pattern
 from partwright.assembly.similarity import rotation_matrix
 from partwright.export import export
-from partwright.export.instance_patterns import Poses, Ring, Row, pattern
 from partwright.fields import Box, Cylinder, HollowBox, HollowFrustum
 from tests.export.test_openscad import rendered
 
@@ -28,7 +28,8 @@ def about(axis: int, degrees: float, centre: tuple[float, ...] = (0, 0, 0)) -> S
 
 
 def machine() -> Assembly:
-    """A plate drilled around a circle and at its corners, with feet that are mirror images: 23 copies."""
+    """A plate drilled around a circle, at its corners, on a circle and anywhere, with feet that are mirror
+    images: 29 copies."""
     ring = tuple(about(2, 72 * k, (10, 0, 0)) for k in range(1, 5))
     corners = tuple(Similarity(translation=move) for move in ((-80, 0, 0), (-80, -60, 0), (0, -60, 0)))
     plate = Part(Box((100, 80, 10)), name="plate")
@@ -38,16 +39,22 @@ def machine() -> Assembly:
     foot = Part(Box((10, 10, 20)), (0, 30, -12), tilt, name="foot", instances=(about(2, 170),))
     cage = Part(HollowBox((10, 8, 20), 1), (0, 0, 10), name="cage", instances=(about(1, 180),))
     funnel = Part(HollowFrustum(6, 3, 1, 20), (-20, 0, 10), name="funnel")
-    return Assembly((Assembly((plate, foot, cage, funnel)), key, drill), operation="difference", unit="mm")
+    lying = (math.cos(0.4), math.sin(0.4), 0, 0)
+    bolt = with_pattern(Part(Cylinder(1.5, 8), rotation=lying, name="bolt"), Circle(5, 60, 50, (-8, 2, 0)))
+    pin = Part(Cylinder(1, 40), (-40, 0, 0), name="pin", instances=(Similarity(translation=(5, 9, 0)),))
+    bores = (key, drill, bolt, pin)
+    return Assembly((Assembly((plate, foot, cage, funnel)), *bores), operation="difference", unit="mm")
 
 
 def test_patterns_have_their_names() -> None:
     parts = {part.name: pattern(part) for part in machine().parts}
     assert parts["plate"] is None
     assert parts["key"] == Ring(5, "z", (10, 0, 0))
-    assert parts["drill"] == Row(((40, 30, 0), (-40, 30, 0), (-40, -30, 0), (40, -30, 0)))
+    assert parts["drill"] == Grid((2, 2, 1), (80, 60, 0), (0, 0, 0))
+    assert parts["bolt"] == Circle(5, 60, 50, (-8, 2, 0))
+    assert parts["pin"] == Row(((-40, 0, 0), (-35, 9, 0)))
     assert isinstance(parts["foot"], Poses)
-    assert parts["cage"] == Ring(2, "y", (0, 0, 0))
+    assert parts["cage"] == Grid((1, 1, 2), (0, 0, 20), (0, 0, 0))
 
 
 @given(
@@ -67,12 +74,65 @@ def test_a_ring_is_found_in_any_order(count: int, axis: int, centre: tuple[float
     assert np.allclose(found.centre, through, atol=1e-6)
 
 
+@given(
+    st.integers(3, 12),
+    st.tuples(st.floats(1, 100), st.floats(-180, 180)),
+    st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: sum(v * v for v in q) > 0.1),
+    st.randoms(use_true_random=False),
+)
+def test_a_circle_is_found_in_any_order(count: int, numbers, turn, order) -> None:  # type: ignore[no-untyped-def]
+    wanted = Circle(count, *numbers, (3, -20, 7))
+    part = with_pattern(Part(Cylinder(1, 2), rotation=turn), wanted)
+    places = [copy.translation for copy in part.copies]
+    order.shuffle(places)
+    found = pattern(with_pattern(part, Row(tuple(places))))
+    assert isinstance(found, Circle) or count == 4  # where it may be a square along the axes
+    if isinstance(found, Circle):
+        assert found.count == count
+        assert found.diameter == pytest.approx(numbers[0])
+        off = np.linalg.norm(np.array(places)[:, None] - found.places(part), axis=2).min(axis=1)
+        assert off.max() < 1e-6
+
+
+@given(
+    st.tuples(*[st.integers(1, 4)] * 3).filter(lambda n: math.prod(n) > 1),
+    st.tuples(*[st.floats(1, 50)] * 3),
+    st.randoms(use_true_random=False),
+)
+def test_a_grid_is_found_in_any_order(counts, spacing, order) -> None:  # type: ignore[no-untyped-def]
+    steps = tuple(step if n > 1 else 0.0 for n, step in zip(counts, spacing, strict=True))
+    part = with_pattern(Part(Box((1, 2, 3)), rotation=(1, 0.2, 0, 0)), Grid(counts, steps, (3, -20, 7)))
+    places = [copy.translation for copy in part.copies]
+    order.shuffle(places)
+    found = pattern(with_pattern(part, Row(tuple(places))))
+    assert isinstance(found, Grid)
+    assert found.count == counts
+    assert np.allclose(found.spacing, steps)
+    assert np.allclose(found.middle, (3, -20, 7))
+    if len(places) > 4:
+        assert isinstance(pattern(with_pattern(part, Row(tuple(places[1:])))), Row | Grid)
+
+
+def test_of_a_square_the_plainer_number_says_what_it_is() -> None:
+    """Four holes of a motor are 31 apart, those of a flange are on a circle of 31."""
+    hole = Part(Cylinder(1, 2))
+    assert pattern(with_pattern(hole, Grid((2, 2, 1), (31, 31, 0), (0, 0, 0)))) == Grid(
+        (2, 2, 1), (31, 31, 0), (0, 0, 0)
+    )
+    assert pattern(with_pattern(hole, Circle(4, 31, 45, (0, 0, 0)))) == Circle(4, 31, 45, (0, 0, 0))
+
+
 def test_openscad_builds_the_loops(tmp_path: Path) -> None:
     export(machine(), tmp_path / "a.scad")
     text = (tmp_path / "a.scad").read_text("ascii")
     assert "// drill, 4 times: cylinder\n" in text
-    assert "drill_places = [[40, 30, 0], [-40, 30, 0], [-40, -30, 0], [40, -30, 0]];  // mm: where" in text
-    assert "for (place = drill_places) translate(place)\n" in text
+    assert "drill_counts = [2, 2, 1];  // copies along x, y and z\n" in text
+    assert "drill_spacing = [80, 60, 0];  // mm: from one copy" in text
+    assert "bolt_count = 5;  // copies, by equal turns\n" in text
+    assert "bolt_circle = 60;  // mm: diameter of the circle" in text
+    assert "bolt_start = 50;  // degrees: where on the circle the first is\n" in text
+    assert "pin_places = [[-40, 0, 0], [-35, 9, 0]];  // mm: where" in text
+    assert "for (place = pin_places) translate(place)\n" in text
     assert "cage_thickness = 1;  // mm: thickness of the wall\n" in text
     assert "key_count = 5;  // copies, by equal turns\n" in text
     mesh = rendered(tmp_path / "a.scad")
