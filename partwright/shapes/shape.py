@@ -165,6 +165,14 @@ class Shape:
         """
         return self._source.exact(_checked(points))
 
+    def unit_away(self, points: ArrayLike, within: float = np.inf) -> NDArray[np.float32]:
+        """How far (N,) points (N, 3) are from the surface, both in the unit frame: `unit_distance` without
+        the sign, which takes longer to find than the distance. Anything greater than `within` where it is so.
+
+        Raises as `unit_distance` does.
+        """
+        return self._source.unsigned(_checked(points), within)
+
     def unit_nearest(self, points: ArrayLike) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Signed distance (N,) at points (N, 3), unit frame, and the row (N,) of `faces` that is nearest.
 

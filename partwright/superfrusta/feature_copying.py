@@ -117,7 +117,7 @@ def _nearest_first(search: FeatureSearch, part: Part, moves: Sequence[Similarity
         return list(moves)
 
     images = np.concatenate([move(points) for move in moves]).astype(np.float32)
-    away = np.minimum(np.abs(search.samples.measure(images)), _AROUND).reshape(len(moves), -1)
+    away = np.minimum(search.samples.away(images, _AROUND), _AROUND).reshape(len(moves), -1)
     off = np.round(away.mean(axis=1) / _EXACT)
     return [moves[i] for i in np.argsort(off, kind="stable")]
 

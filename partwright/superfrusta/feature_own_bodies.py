@@ -36,5 +36,5 @@ def _has_own_walls(search: FeatureSearch, candidate: Candidate) -> bool:
         return False
     vertices, faces = surface_of(walls)
     places, _ = sample_triangles(vertices, faces, _POINTS, seed=0)
-    near = np.abs(search.samples.measure(places.astype(np.float32))) < _NEAR
+    near = search.samples.away(places.astype(np.float32), _NEAR) < _NEAR
     return bool(near.mean() > _OWN)

@@ -93,7 +93,7 @@ class FeatureSearch:
         self._in_and_out = np.hstack([self.weights * inside, self.weights * ~inside])
         self._whole = self.weights[self.inside].sum(axis=0)
         directions = [frame[:, 2] for frame in self.frames]
-        self.turns, self.mirrors = symmetries(self.body, directions, samples.surface, samples.measure)
+        self.turns, self.mirrors = symmetries(self.body, directions, samples.surface, samples.away)
         self.candidates_of = PieceCandidates(self.frames)
         self.mask = AskedOnce(self._mask)
         self._is_own = AskedOnce(partial(is_own_body, self))

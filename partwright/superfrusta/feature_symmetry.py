@@ -17,7 +17,7 @@ from partwright.assembly import Similarity
 from partwright.assembly.motion import Motion
 
 Floats = NDArray[np.float64]
-Measure = Callable[[NDArray[np.float32]], NDArray[np.float32]]
+Away = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 _ORDERS = range(36, 1, -1)
 _MULTIPLES = range(2, 7)  # of the largest that is one, that are looked at, too
@@ -60,11 +60,11 @@ def symmetries(
     body: Manifold,
     directions: Sequence[Floats],
     surface: NDArray[np.float32],
-    measure: Measure,
+    away: Away,
 ) -> tuple[list[Similarity], list[Similarity]]:
     """Turns, and reflections as of `reflection`, that take a body to itself, about and along directions (3,).
 
-    surface: (N, 3) points on it. measure: signed distance (n,) at points. A body that is not quite symmetric,
+    surface: (N, 3) points on it. away: how far (n,) points are from it. A body that is not quite symmetric,
     as of holes that are askew, may be so about the middle of its box and not of its volume: both are tried.
     """
     mirrors: list[Similarity] = []
@@ -75,26 +75,26 @@ def symmetries(
     centre, middle = centre_of_volume(body), np.reshape(body.bounding_box(), (2, 3)).mean(axis=0)
     for axis in _distinct(directions):
         along = axis * float(axis @ (middle - centre))
-        turns.append(_turns(axis, centre, points, measure))
+        turns.append(_turns(axis, centre, points, away))
         planes = [reflection(axis, centre)]
         if _APART < float(np.linalg.norm(middle - centre - along)) < _NEAR:
-            turns.append(_turns(axis, middle, points, measure))
+            turns.append(_turns(axis, middle, points, away))
         if _APART < float(np.linalg.norm(along)) < _NEAR:
             planes.append(reflection(axis, middle))
-        mirrors += [one for one in planes if _error(reflected(one, points), measure) < _ERROR]
+        mirrors += [one for one in planes if _error(reflected(one, points), away) < _ERROR]
     most = max(_MOST, *map(len, turns))
     return [turn for own in turns for turn in own][:most], mirrors
 
 
-def _turns(axis: Floats, centre: Floats, points: Floats, measure: Measure) -> list[Similarity]:
-    errors = _errors(_ORDERS, axis, centre, points, measure)
+def _turns(axis: Floats, centre: Floats, points: Floats, away: Away) -> list[Similarity]:
+    errors = _errors(_ORDERS, axis, centre, points, away)
     limit = min(_ERROR, _RIVAL * min(errors.values()) + _NOISE)
     orders = [n for n, own in errors.items() if own < limit]
     if len(orders) == len(_ORDERS):
         orders = [n for n in orders if n <= _ROUND]
     elif orders:
         most = max(orders)
-        more = _errors([k * most for k in _MULTIPLES], axis, centre, points, measure)
+        more = _errors([k * most for k in _MULTIPLES], axis, centre, points, away)
         orders += [n for n, own in more.items() if own < errors[most] + _NOISE]
     largest = [n for n in orders if not any(other % n == 0 for other in orders if other > n)]
     turns = [_turn(axis, n, k, centre) for n in largest for k in range(1, n)]
@@ -102,20 +102,20 @@ def _turns(axis: Floats, centre: Floats, points: Floats, measure: Measure) -> li
 
 
 def _errors(
-    orders: Sequence[int], axis: Floats, centre: Floats, points: Floats, measure: Measure
+    orders: Sequence[int], axis: Floats, centre: Floats, points: Floats, away: Away
 ) -> dict[int, float]:
     """By how much a turn of each order misses on average, unit lengths."""
     images = np.concatenate([_turn(axis, n, 1, centre)(points) for n in orders])
-    means = _off(images, measure).reshape(len(orders), -1).mean(axis=1)
+    means = _off(images, away).reshape(len(orders), -1).mean(axis=1)
     return dict(zip(orders, means.tolist(), strict=True))
 
 
-def _error(image: Floats, measure: Measure) -> float:
-    return float(_off(image, measure).mean())
+def _error(image: Floats, away: Away) -> float:
+    return float(_off(image, away).mean())
 
 
-def _off(points: Floats, measure: Measure) -> NDArray[np.float32]:
-    return np.abs(measure(points.astype(np.float32)))
+def _off(points: Floats, away: Away) -> NDArray[np.float32]:
+    return away(points.astype(np.float32))
 
 
 def _distinct(directions: Sequence[Floats]) -> list[Floats]:

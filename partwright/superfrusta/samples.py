@@ -56,6 +56,8 @@ class FitSamples:
     kernel: Kernel
     measure: Callable[[NDArray[np.float32]], NDArray[np.float32]]
     """Signed distance (n,) of the shape at points (n, 3)."""
+    away: Callable[..., NDArray[np.float32]]
+    """How far (n,) points (n, 3) are from the shape's surface, as `Shape.unit_away`."""
     density: float
     """Of the samples in the box, per unit volume."""
     probes: NDArray[np.float32]
@@ -85,6 +87,7 @@ class FitSamples:
             run.device,
             backend(run.device, checkpoint),
             shape.unit_distance,
+            shape.unit_away,
             settings.uniform / float(np.prod(grid.spacing * np.array(grid.values.shape))),
             _probes(grid),
             shape.unit_surface(_SURFACE, run.seed).points.astype(np.float32),

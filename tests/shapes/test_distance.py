@@ -29,6 +29,10 @@ def test_unit_distance_of_a_box_is_exact(brick):
     np.testing.assert_allclose(brick.unit_distance(points), box_distance(points, HALF), atol=1e-6)
     assert brick.unit_distance(points).dtype == np.float32
     np.testing.assert_allclose(brick.unit_unsigned(points), np.abs(box_distance(points, HALF)), atol=1e-12)
+    np.testing.assert_array_equal(brick.unit_away(points), np.abs(brick.unit_distance(points)))
+    near = np.abs(brick.unit_distance(points)) < 0.1
+    np.testing.assert_array_equal(brick.unit_away(points, 0.1)[near], brick.unit_away(points)[near])
+    assert (brick.unit_away(points, 0.1)[~near] >= 0.1).all()
     few = load_shape(box(2 * HALF * 10, (5, -7, 100))).unit_distance(points[:50])  # without lattice of signs
     np.testing.assert_array_equal(few, brick.unit_distance(points)[:50])
     np.testing.assert_array_equal(few, brick.unit_distance(points[:50]))

@@ -164,7 +164,7 @@ def test_symmetries_are_exact_and_of_the_right_order(arms: int, mirrors_wanted: 
     vertices, faces = shape.unit_mesh
     body = Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
     surface = shape.unit_surface(2000, 0).points.astype(np.float32)
-    turns, mirrors = symmetries(body, [np.array([0.0, 0.0, 1.0])], surface, shape.unit_distance)
+    turns, mirrors = symmetries(body, [np.array([0.0, 0.0, 1.0])], surface, shape.unit_away)
     assert len(mirrors) == mirrors_wanted  # across z and y, and x; the others are turns of these
     angles = sorted(2 * np.arccos(abs(turn.rotation[0])) for turn in turns if abs(turn.rotation[3]) > 0.01)
     wanted = [2 * np.pi / arms * min(k, arms - k) for k in range(1, arms)]

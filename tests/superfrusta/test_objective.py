@@ -31,6 +31,7 @@ def samples(points: np.ndarray, inside: np.ndarray, weight: np.ndarray, near: in
         device="cpu",
         kernel=backend("cpu"),
         measure=lambda points: np.ones(len(points), np.float32),
+        away=lambda points: np.ones(len(points), np.float32),
         density=1.0,
         probes=np.empty((0, 3), np.float32),
         surface=np.empty((0, 3), np.float32),

@@ -68,13 +68,20 @@ class Axis:
         corners = [(0.0, -reach), (reach, -reach), (reach, reach), (0.0, reach)]
         return CrossSection([corners], FillRule.Positive)
 
+    def half(self, turn: float) -> CrossSection:
+        """The half section at an angle: distance from the axis, and height."""
+        return self._section(turn) ^ self.right
+
     def halves(self, turn: float) -> tuple[CrossSection, CrossSection]:
-        """Half sections at an angle and half a turn beyond: distance from the axis, and height."""
+        """Half sections at an angle and half a turn beyond."""
+        section = self._section(turn)
+        return section ^ self.right, section.mirror((1.0, 0.0)) ^ self.right
+
+    def _section(self, turn: float) -> CrossSection:
         c, s = math.cos(turn), math.sin(turn)
         # (x, y, z) to (distance along the plane, z, distance from it)
         plane = np.array([[c, s, 0, 0], [0, 0, 1, 0], [s, -c, 0, 0]], dtype=float)
-        section = self.body.transform(plane).slice(0.0)
-        return section ^ self.right, section.mirror((1.0, 0.0)) ^ self.right
+        return self.body.transform(plane).slice(0.0)
 
 
 def turned(view: View, centre: np.ndarray) -> Iterator[Candidate]:
@@ -126,7 +133,7 @@ def _in_many(halves: Sequence[CrossSection], least: int) -> CrossSection:
 def _mean(axis: Axis) -> CrossSection:
     """What most half sections have: of a thread, up to its mean diameter."""
     step = 2 * math.pi / 9
-    halves = [axis.halves(k * step + _OFFSET)[0] for k in range(9)]
+    halves = [axis.half(k * step + _OFFSET) for k in range(9)]
     thirds = [_most(*halves[k::3]) for k in range(3)]
     return _most(*thirds).simplify(_WAVES)
 
@@ -209,14 +216,14 @@ def _end(axis: Axis, piece: CrossSection, turn: float, step: float) -> float:
         near, far = start, stop
         for _ in range(_BISECTIONS):
             middle = (near + far) / 2
-            if _within(piece, axis.halves(middle)[0], same):
+            if _within(piece, axis.half(middle), same):
                 near = middle
             else:
                 far = middle
         return (near + far) / 2
 
     found = last(turn, turn + step, 2 * _SAME)
-    if _within(piece, axis.halves(found + step / 8)[0], _GRADUAL * 2 * _SAME):
+    if _within(piece, axis.half(found + step / 8), _GRADUAL * 2 * _SAME):
         earlier = last(found - 2 * step, found, _SAME / 2)
         smooth = 2 * earlier - found
         drawn = _DRAWN * round(smooth / _DRAWN)
