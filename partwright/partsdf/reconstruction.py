@@ -56,7 +56,9 @@ Told = Callable[[Step], None]
 
 
 LEAST = 1e-3
-_SCOUTED = 8  # of the iterations, the part that each start is given
+_SCOUTED = 8  # of the iterations, the part that a start is given which comes into question
+_BRIEF, _LIKELY = 32, 3  # the part that tells which ones do, where there are more than so many
+_KNOWN = 4  # starts of known parts
 
 
 @one_core_each()
@@ -165,10 +167,11 @@ def _found_by_part(
     """Of known parts, each begins with that one of a few closest training shapes' which a few iterations
     bring closest."""
     model = start.model
-    latents = latents_by_part(model, start.poses, target, settings.starts)
+    latents = latents_by_part(model, start.poses, target, min(settings.starts, _KNOWN))
     starts = [Start(replace(start, latents=one), UPRIGHT, target) for one in latents]
-    scouts = _Scouts(starts if len(starts) > 1 else [], settings, seed, told, checkpoint)
-    tried = [one.shape for one in scouts.sent() or starts]
+    rounds = [_Round(len(starts), _share(settings, _SCOUTED))] if len(starts) > 1 else []
+    scouts = _Scouts(rounds, settings, seed, told, checkpoint)
+    tried = [one.shape for one in scouts.sent(starts)]
     poses = PoseTensors(*(torch.stack(each) for each in zip(*(one.poses for one in tried), strict=True)))
     found = torch.stack([one.latents for one in tried])
     best = errors_by_part(model, found, poses, target).argmin(dim=0), torch.arange(len(model.parts))
@@ -184,11 +187,21 @@ def _scouted(
     checkpoint: Checkpoint | None = None,
 ) -> Start:
     """From the start that a few iterations bring closest: one that is close as it is may be a dead end, as a
-    tube with flanges is for one without. Then single parts are exchanged, and all are optimised."""
+    tube with flanges is for one without. Of many, a few iterations less tell which come into question. Then
+    single parts are exchanged, and all are optimised."""
+    brief, scouted = _share(settings, _BRIEF), _share(settings, _SCOUTED)
     # What an encoder saw goes a little of the way by itself, too: its poses are near, its forms are not yet.
     alone = len(starts) == 1 and not starts[0].encoded
-    scouts = _Scouts(starts if settings.iterations and not alone else [], settings, seed, told, checkpoint)
-    best = _closest(scouts.sent() or starts)
+    if not settings.iterations or alone:
+        rounds = []
+    elif len(starts) <= _LIKELY:
+        rounds = [_Round(len(starts), scouted)]
+    else:
+        rounds = [_Round(len(starts), brief), _Round(_LIKELY, max(1, scouted - brief))]
+    scouts = _Scouts(rounds, settings, seed, told, checkpoint)
+    while scouts.rounds and not scouts.stopped:
+        starts = _closest(scouts.sent(starts), scouts.rounds[0].starts if scouts.rounds else 1)
+    best = _closest(starts)[0]
     if scouts.stopped:
         return best
     if settings.exchange and settings.iterations:
@@ -196,28 +209,44 @@ def _scouted(
     return scouts.followed(best)
 
 
+class _Round(NamedTuple):
+    """So many starts, each given so many iterations."""
+
+    starts: int
+    iterations: int
+
+
+def _share(settings: ReconstructionSettings, part: int) -> int:
+    return max(1, settings.iterations // part)
+
+
 class _Scouts:
-    """Goes a few iterations from each start, and then all of them from one; tells of these as of one way."""
+    """Goes a few iterations from each start, in rounds, and then all of them from one; tells of these as of
+    one way."""
 
     def __init__(
         self,
-        starts: list[Start],
+        rounds: list[_Round],
         settings: ReconstructionSettings,
         seed: int,
         told: Told | None,
         checkpoint: Checkpoint | None,
     ) -> None:
-        self.starts, self.settings, self.seed = starts, settings, seed
-        self.told, self.checkpoint = told, checkpoint
-        self.few = replace(settings, iterations=max(1, settings.iterations // _SCOUTED), decay=1.0)
+        self.rounds = rounds
+        """That are still to come."""
+        self.settings, self.seed, self.told, self.checkpoint = settings, seed, told, checkpoint
         self.stopped = False
         """Whether it was cancelled on the way."""
+        self._done, self._of = 0, sum(r.starts * r.iterations for r in rounds) + settings.iterations
 
-    def sent(self) -> list[Start]:
-        """As they come back; fewer once cancelled."""
+    def sent(self, starts: list[Start]) -> list[Start]:
+        """As they come back from the next round; fewer once cancelled; as they are where none is to come."""
+        if not self.rounds:
+            return starts
+        few = replace(self.settings, iterations=self.rounds.pop(0).iterations, decay=1.0)
         back: list[Start] = []
-        for i, start in enumerate(self.starts):
-            shape, finished = self._go(start, self.few, i)
+        for start in starts:
+            shape, finished = self._go(start, few)
             back.append(replace(start, shape=shape))
             if not finished:
                 self.stopped = True
@@ -225,17 +254,16 @@ class _Scouts:
         return back
 
     def followed(self, start: Start) -> Start:
-        return replace(start, shape=self._go(start, self.settings, len(self.starts))[0])
+        return replace(start, shape=self._go(start, self.settings)[0])
 
-    def _go(self, start: Start, settings: ReconstructionSettings, scouts: int) -> tuple[NeuralShape, bool]:
-        """After so many scouts."""
-        done = scouts * self.few.iterations
-        steps = self.settings.iterations + len(self.starts) * self.few.iterations
+    def _go(self, start: Start, settings: ReconstructionSettings) -> tuple[NeuralShape, bool]:
+        done = self._done
 
         def ahead(step: Step) -> None:
             if self.told:
-                self.told(step._replace(number=done + step.number, of=steps, turn=start.turn))
+                self.told(step._replace(number=done + step.number, of=self._of, turn=start.turn))
 
+        self._done += settings.iterations
         poses = _posed(start.shape.model, settings)
         return _optimised(start.shape, start.target, settings, self.seed, ahead, self.checkpoint, poses)
 
@@ -245,8 +273,11 @@ def _posed(model: Model, settings: ReconstructionSettings) -> bool:
     return model.config.poses and settings.pose_rate > 0
 
 
-def _closest(starts: list[Start]) -> Start:
-    return starts[0] if len(starts) == 1 else min(starts, key=lambda one: mean_error(one.shape, one.target))
+def _closest(starts: list[Start], count: int = 1) -> list[Start]:
+    """The `count` closest ones, the closest first."""
+    if len(starts) == 1:
+        return starts
+    return sorted(starts, key=lambda one: mean_error(one.shape, one.target))[:count]
 
 
 @torch.no_grad()

@@ -27,9 +27,9 @@ class ReconstructionSettings:
     """From what the model's encoder sees in points of the surface, from the nearest training shapes, or from
     the mean of all; where poses are unknown only. "auto" tries what the encoder sees, where the model has
     one, as one of the `starts`, beside the nearest training shapes."""
-    starts: int = 4
-    """So many nearest shapes, or of known parts nearest ones each, are tried for an eighth of the iterations
-    each, and the best goes on."""
+    starts: int = 8
+    """So many nearest shapes are tried for a 32nd of the iterations each, the three best for an
+    eighth, and the best goes on. Of known parts up to four nearest ones each are, for an eighth."""
     exchange: bool = True
     """Single parts of the best start are exchanged for those of other training shapes where that comes
     closer. Known parts start as those of training shapes that are closest; else at the mean, as the

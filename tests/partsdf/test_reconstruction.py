@@ -193,6 +193,32 @@ def test_the_start_that_a_few_iterations_bring_closest_goes_on(model: Model, lam
     assert errors == sorted(errors)
 
 
+def test_of_many_starts_three_come_into_question_and_one_goes_all_the_way(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of four starts the third leads after a few iterations, then the second: that one goes on."""
+    target = Target(torch.zeros(1, 3), torch.zeros(1))
+    shapes = [NeuralShape.mean(model) for _ in range(4)]
+    starts = [Start(shape, UPRIGHT, target) for shape in shapes]
+    went: list[tuple[int, int]] = []
+
+    def number(shape: NeuralShape) -> int:
+        return next(i for i, one in enumerate(shapes) if one is shape)
+
+    def go(start: NeuralShape, _: Target, settings: ReconstructionSettings, *__: object) -> object:
+        went.append((number(start), settings.iterations))
+        return start, True
+
+    def error(shape: NeuralShape, _: Target) -> float:
+        return ([4, 2, 1, 3] if len(went) < 5 else [0, 1, 2, 3])[number(shape)]
+
+    monkeypatch.setattr(reconstruction, "_optimised", go)
+    monkeypatch.setattr(reconstruction, "mean_error", error)
+    found = _scouted(starts, ReconstructionSettings(iterations=64, exchange=False))
+    assert found.shape is shapes[1]
+    assert went == [*((i, 2) for i in range(4)), (2, 6), (1, 6), (3, 6), (1, 64)]
+
+
 def test_progress_counts_all_starts_and_a_cancellation_ends_at_once(
     model: Model, lamps: PreparedFamily
 ) -> None:
