@@ -10,7 +10,9 @@ import torch
 from partwright.partsdf.layout import layout_oddness
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.part_vectors import PartVectors
 from partwright.partsdf.targets import Target
+from partwright.partsdf.unknowns import Frame
 
 # Measured as by benchmarks/partsdf_familiarity.py: new shapes of a family come to 0.04 at most, real
 # ones of its kind to 0.38, and others to 0.5 at least, but for two vehicles of five by the model of chairs
@@ -72,7 +74,11 @@ def familiarity(shape: NeuralShape, target: Target) -> Familiarity:
     residual = float(target.error(whole, rows, losses).mean()) / losses.clamp
     present = np.flatnonzero(shape.present.numpy()).tolist()
     latents = {shape.model.parts[p]: oddness(shape.model, p, shape.latents[p]) for p in present}
-    return Familiarity(shape.model.name, residual, latents, layout_oddness(shape), target.low is not None)
+    of_points = target.low is not None
+    if of_points:  # perhaps of a piece, in whose frame the shape is larger and elsewhere
+        frame = Frame.of(PartVectors.of(shape.model), shape.poses)
+        shape = replace(shape, poses=frame.to_family(shape.poses))
+    return Familiarity(shape.model.name, residual, latents, layout_oddness(shape), of_points)
 
 
 def oddness(model: Model, part: int, latent: torch.Tensor) -> float:

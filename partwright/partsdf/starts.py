@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 import torch
@@ -25,6 +26,8 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors, local_points
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.targets import Target
+from partwright.partsdf.unknowns import Frame
+from partwright.shapes import LONGEST_SIDE
 
 Quaternion = tuple[float, float, float, float]
 UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -41,6 +44,8 @@ _FROM_Z: dict[str, Quaternion] = {
 }
 _CLEARLY = 0.85  # of the error as the shape stands: less is worth a turn
 _JUDGES, _TURNS = 32, 2  # training shapes that turns are judged by, and how many of these go on
+_MISSING = (0.15, 0.3, 0.5)  # of a shape's length along an axis, that a scan of a piece of it may lack
+_FRAMES = 4  # besides the scan's own, that go on
 _AT_ONCE = 16  # shapes that are decoded together
 _PART_SAMPLES = 2048  # of a target with known parts
 _OTHERS, _SAMPLES = 48, 512  # training shapes that parts are taken from, and samples they are judged at
@@ -98,7 +103,8 @@ def ways_to_stand(up: str | None) -> list[Quaternion]:
 
 @torch.no_grad()
 def best_starts(model: Model, target: Target, most: int, turns: list[Quaternion]) -> list[Start]:
-    """The `most` ways to stand and training shapes that come closest together, the closest first.
+    """The `most` ways to stand and training shapes that come closest together, the closest first. Points are
+    also looked at as those of a piece of a larger shape.
 
     Another way than the first has to be clearly better than that one.
     """
@@ -108,7 +114,12 @@ def best_starts(model: Model, target: Target, most: int, turns: list[Quaternion]
     least = [float(errors_of(model, model.latents[few], poses, seen, rows).min()) for seen in turned]
     better = sorted(range(1, len(turns)), key=lambda k: least[k])[:_TURNS]
     kept = [0, *(k for k in better if least[k] < _CLEARLY * least[0])]
-    found = [(error, k, shape) for k in kept for error, shape in nearest_trained(model, turned[k], most)]
+    found = [
+        (error, k, shape)
+        for k in kept
+        for frame in _frames(model, turned[k], rows)
+        for error, shape in nearest_trained(model, turned[k], most, frame=frame)
+    ]
     as_it_stands = min(error for error, k, _ in found if k == 0)
     good = [entry for entry in found if entry[1] == 0 or entry[0] < _CLEARLY * as_it_stands]
     good.sort(key=lambda entry: entry[0])
@@ -143,20 +154,44 @@ def encoded_start(encoder: Encoder, target: Target, turns: list[Quaternion]) -> 
 
 @torch.no_grad()
 def nearest_trained(
-    model: Model, target: Target, most: int = 1, count: int = _SAMPLES
+    model: Model, target: Target, most: int = 1, count: int = _SAMPLES, frame: Frame | None = None
 ) -> list[tuple[float, NeuralShape]]:
     """The `most` training shapes whose distances differ least from the target's, and by how much.
 
-    At `count` of its points; a quarter of these tells which shapes come into question at all.
+    At `count` of its points; a quarter of these tells which shapes come into question at all. frame: of the
+    family in the target's, if that is another.
     """
+    model_poses = model.poses if frame is None else frame.from_family(model.poses)
     rows = _rows(target, count)
     everyone = torch.arange(len(model.latents))
-    likely = errors_of(model, model.latents, model.poses, target, rows[::4]).argsort()
+    likely = errors_of(model, model.latents, model_poses, target, rows[::4]).argsort()
     likely = everyone[likely[: max(4 * most, len(likely) // 8)]]
-    poses = model.poses.map(lambda t: t[likely])
+    poses = model_poses.map(lambda t: t[likely])
     errors = errors_of(model, model.latents[likely], poses, target, rows)
     order = errors.argsort()[:most].tolist()
-    return [(float(errors[i]), NeuralShape.trained(model, str(int(likely[i])))) for i in order]
+    found = [(float(errors[i]), NeuralShape.trained(model, str(int(likely[i])))) for i in order]
+    if frame is None:
+        return found
+    return [(error, replace(shape, poses=frame.from_family(shape.poses))) for error, shape in found]
+
+
+def _frames(model: Model, target: Target, rows: Tensor) -> list[Frame | None]:
+    """Of the family in a target's frame: the same; and of points, which may be of a piece of the shape, those
+    which training shapes lie in best if one side is missing."""
+    if target.low is None:
+        return [None]
+    seen = target.points[target.sdf <= 0]
+    ends = torch.stack([seen.amin(dim=0), seen.amax(dim=0)])
+    frames = []
+    for axis, end, missing in product(range(3), range(2), _MISSING):
+        whole = ends.clone()
+        whole[end, axis] += (2 * end - 1) * (ends[1] - ends[0])[axis] * missing / (1 - missing)
+        longest = (whole[1] - whole[0]).amax()
+        frames.append(Frame(whole.mean(dim=0), (longest / LONGEST_SIDE).log()))
+    few = torch.linspace(0, len(model.latents) - 1, min(_JUDGES, len(model.latents))).long()
+    latents, poses = model.latents[few], model.poses.map(lambda t: t[few])
+    least = [float(errors_of(model, latents, one.from_family(poses), target, rows).min()) for one in frames]
+    return [None, *(frames[i] for i in np.argsort(least)[:_FRAMES])]
 
 
 @torch.no_grad()

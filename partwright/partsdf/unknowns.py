@@ -9,7 +9,7 @@ errors of these are Laplacian and the family's numbers normal.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import torch
 from torch import Tensor
@@ -23,6 +23,7 @@ from partwright.partsdf.targets import Target
 
 # Steps in the family's spread, over those of the numbers themselves.
 _LATENTS_FASTER, _POSES_FASTER = 10.0, 25.0
+_FRAME_FASTER = 2.5  # of a frame's place and the logarithm of its size, over poses
 
 
 class Unknowns(Protocol):
@@ -39,6 +40,39 @@ class Unknowns(Protocol):
     def prior(self, off: float, moved: bool) -> Tensor:
         """The loss of how unlikely they are. off: the mean error at points that are known to be on the
         surface. moved: whether poses are among what moves by now."""
+
+
+class Frame(NamedTuple):
+    """Where the family's unit frame lies in another one: its middle (3,), and the logarithm of its size."""
+
+    place: Tensor
+    size: Tensor
+
+    @classmethod
+    def identity(cls) -> Frame:
+        return cls(torch.zeros(3), torch.zeros(()))
+
+    @classmethod
+    def of(cls, vectors: PartVectors, poses: PoseTensors) -> Frame:
+        """In which poses (P, ...) lie as is usual: as large as the family's parts, then where these are."""
+        size = _mean(poses.scale.log() - vectors.pose_mean[:, 9:], vectors.pose_spread[:, 9:], (0, 1))
+        middle, spread = size.exp() * vectors.pose_mean[:, :3], vectors.pose_spread[:, :3]
+        return cls(_mean(poses.translation - middle, spread, (0,)), size)
+
+    def from_family(self, poses: PoseTensors) -> PoseTensors:
+        """Poses (..., P, ...) of the family's frame, in the other one."""
+        larger = self.size.exp()
+        return PoseTensors(larger * poses.translation + self.place, poses.rotation, larger * poses.scale)
+
+    def to_family(self, poses: PoseTensors) -> PoseTensors:
+        """Poses (..., P, ...) of the other frame, in the family's."""
+        smaller = (-self.size).exp()
+        return PoseTensors(smaller * (poses.translation - self.place), poses.rotation, smaller * poses.scale)
+
+
+def _mean(values: Tensor, spread: Tensor, over: tuple[int, ...]) -> Tensor:
+    weight = spread**-2
+    return (weight * values).sum(dim=over) / weight.sum(dim=over)
 
 
 class FreeUnknowns:
@@ -71,6 +105,7 @@ class FreeUnknowns:
 
 class FamilyUnknowns:
     """Along the family's principal directions, each in its spread there; what a start has beside these stays.
+    Where points are all that is known, they may be of a piece of the shape, so its frame moves, too.
 
     count: of the points that are known, each with an error of its own; 0 where a surface is, which leaves
     nothing open.
@@ -80,20 +115,30 @@ class FamilyUnknowns:
         self._start, self._move_poses, self._count = start, move_poses, count
         self._vectors = PartVectors.of(start.model)
         self._form = self._vectors.of_latents(start.latents).requires_grad_()
-        self._place = self._vectors.of_poses(start.poses).requires_grad_(move_poses)
+        self._frame = Frame.of(self._vectors, start.poses) if count else Frame.identity()
+        self._moves_frame = move_poses and count > 0
+        for tensor in self._frame:
+            tensor.requires_grad_(self._moves_frame)
+        placed = Frame(*(t.detach() for t in self._frame)).to_family(start.poses)
+        self._place = self._vectors.of_poses(placed).requires_grad_(move_poses)
         self._beside = start.latents - self._vectors.latents(self._form.detach())
 
     def groups(self, settings: ReconstructionSettings) -> list[dict[str, Any]]:
         groups: list[dict[str, Any]] = [{"params": [self._form], "lr": _LATENTS_FASTER * settings.rate}]
         if self._move_poses:
             groups.append({"params": [self._place], "lr": _POSES_FASTER * settings.pose_rate})
+        if self._moves_frame:
+            groups.append({"params": list(self._frame), "lr": _FRAME_FASTER * settings.pose_rate})
         return groups
 
     def latents(self) -> Tensor:
         return self._vectors.latents(self._form) + self._beside
 
     def poses(self) -> PoseTensors:
-        return self._vectors.poses(self._place) if self._move_poses else self._start.poses
+        if not self._move_poses:
+            return self._start.poses
+        placed = self._vectors.poses(self._place)
+        return self._frame.from_family(placed) if self._moves_frame else placed
 
     def prior(self, off: float, moved: bool) -> Tensor:
         if not self._count:

@@ -14,6 +14,7 @@ import trimesh
 import partwright as pw
 from partwright.assembly import Similarity
 from partwright.partsdf.familiarity import ODD, STRANGE, Familiarity, familiarity, oddness
+from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.starts import (
@@ -26,6 +27,7 @@ from partwright.partsdf.starts import (
     ways_to_stand,
 )
 from partwright.partsdf.targets import Target
+from partwright.partsdf.unknowns import Frame
 
 
 def target_of(shape: NeuralShape, count: int = 4000) -> Target:
@@ -55,6 +57,24 @@ def test_ways_to_stand_are_turns_about_the_up_axis_and_all_axes_where_it_is_unkn
         assert len({tuple(np.round(m, 6) + 0.0) for m in matrices}) == (4 if axis == "z" else 8)
     every = {tuple(np.round(Similarity(1.0, t)(np.eye(3)), 6).flatten() + 0.0) for t in ways_to_stand(None)}
     assert len(every) == 24
+
+
+def test_a_scan_of_a_piece_is_not_taken_for_all_of_its_shape(model: Model) -> None:
+    """Without two fifths of their height, in a frame of what is left: lamps start as large as they are (where
+    the scan's own frame was taken for theirs, at an IoU of .28)."""
+    ious = []
+    for name in ("lamp0", "lamp1", "lamp3"):
+        whole = NeuralShape.trained(model, name)
+        points = np.asarray(mesh_shape(whole, 32, parts=False).whole.sample(2000, seed=0))
+        low, high = points.min(axis=0), points.max(axis=0)
+        piece = points[points[:, 2] < low[2] + 0.6 * (high - low)[2]]
+        frame = pw.load_shape(piece).frame
+        (start,) = best_starts(model, Target.of_points(frame.to_unit(piece), 2000), 1, [UPRIGHT])
+        places = np.random.default_rng(0).uniform(low, high, (4000, 3))
+        true = whole.distances(places.astype(np.float32)) < 0
+        found = start.shape.distances(frame.to_unit(places).astype(np.float32)) < 0
+        ious.append(np.count_nonzero(found & true) / np.count_nonzero(found | true))
+    assert np.mean(ious) > 0.5
 
 
 @pytest.mark.parametrize("up", ["y", None])
@@ -147,6 +167,17 @@ def test_points_of_something_else_are_told_of_by_far_smaller_errors(model: Model
     assert told.warnings() == []
     assert replace(told, residual=0.04).warnings()
     assert replace(told, residual=0.04, of_points=False).warnings() == []
+
+
+def test_parts_in_points_of_a_piece_lie_as_in_their_own_frame(model: Model) -> None:
+    """A scan of a piece has a frame of its own, which makes no stranger of what is found in it; a surface has
+    its shape's."""
+    shape = NeuralShape.trained(model, "lamp0")
+    moved = Frame(torch.tensor([0.4, 0.0, -0.3]), torch.tensor(0.5)).from_family(shape.poses)
+    points = Target.of_points(trimesh.creation.icosphere(3).vertices, count=1000)
+    for target, alike in ((points, True), (target_of(shape, 100), False)):
+        here, there = (familiarity(replace(shape, poses=p), target).layout for p in (shape.poses, moved))
+        assert (there == pytest.approx(here, rel=1e-3)) == alike
 
 
 def test_oddness_is_one_at_the_farthest_training_shape(model: Model) -> None:

@@ -17,7 +17,7 @@ from partwright.partsdf.poses import rotation_matrices
 from partwright.partsdf.reconstruction import reconstruct_unknown
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.targets import NEAR, Target
-from partwright.partsdf.unknowns import FamilyUnknowns, FreeUnknowns, Unknowns, unknowns_of
+from partwright.partsdf.unknowns import FamilyUnknowns, Frame, FreeUnknowns, Unknowns, unknowns_of
 
 
 def test_both_begin_where_the_start_is(model: Model) -> None:
@@ -49,13 +49,36 @@ def test_the_prior_is_the_squared_distance_in_the_familys_spread(model: Model) -
     vectors = PartVectors.of(model)
     form, place = torch.zeros(3, vectors.width), torch.zeros(3, 12)
     form[0, 0], place[1, 2] = 2.0, 3.0
+    spread = vectors.pose_spread[:, 2]
+    place[0, 2] = -3.0 * spread[0] / spread[1]  # so that the whole is where it was
     off = NeuralShape(model, vectors.latents(form), vectors.poses(place), model.present[0])
     unknowns = FamilyUnknowns(off, True, 100)
     both, forms = (float(unknowns.prior(0.02, moved=moved).detach()) for moved in (True, False))
-    assert both == pytest.approx(0.5 * 0.02 / 100 * 13, rel=1e-3)
+    assert both == pytest.approx(0.5 * 0.02 / 100 * (4 + float(place.square().sum())), rel=1e-3)
     assert forms == pytest.approx(0.5 * 0.02 / 100 * 4, rel=1e-3)
     fewer = FamilyUnknowns(off, True, 50).prior(0.01, moved=True)
     torch.testing.assert_close(fewer, unknowns.prior(0.02, moved=True))
+
+
+def test_the_family_may_be_seen_anywhere_and_in_any_size(model: Model) -> None:
+    """Of a piece of a shape a scan's own frame says nothing: what is likely is so in any other, too."""
+    start, frame = (
+        NeuralShape.trained(model, "lamp0"),
+        Frame(torch.tensor([0.3, -0.2, 0.5]), torch.tensor(0.4)),
+    )
+    moved = frame.from_family(start.poses)
+    for back, was in zip(frame.to_family(moved), start.poses, strict=True):
+        torch.testing.assert_close(back, was, atol=1e-6, rtol=1e-5)
+    vectors = PartVectors.of(model)
+    usual = frame.from_family(vectors.poses(torch.zeros(3, 12)))
+    for found, known in zip(Frame.of(vectors, usual), frame, strict=True):
+        torch.testing.assert_close(found, known, atol=1e-5, rtol=1e-5)
+    here, there = (FamilyUnknowns(replace(start, poses=p), True, 100) for p in (start.poses, moved))
+    torch.testing.assert_close(here.prior(0.02, moved=True), there.prior(0.02, moved=True))
+    torch.testing.assert_close(there.poses().scale, moved.scale, atol=1e-5, rtol=1e-5)
+    # A surface is all of its shape, and stays in its frame.
+    kinds = [len(FamilyUnknowns(start, True, count).groups(ReconstructionSettings())) for count in (100, 0)]
+    assert kinds == [3, 2]
 
 
 def test_small_families_and_known_parts_move_freely(model: Model) -> None:
