@@ -21,10 +21,12 @@ _MOVED = 3.0  # times as far as a number, that the numbers of a circle move a pl
 
 
 def plain(value: float, within: float) -> float:
-    """The number of the fewest digits at most `within` away: multiples of 0.5 before further digits."""
+    """The number of the fewest digits at most `within` away: 0, or multiples of 0.5 before further digits."""
     if value == 0 or within <= 0:
         return value
-    digits = -math.floor(math.log10(max(abs(value), within)))
+    if abs(value) <= within:
+        return 0.0
+    digits = -math.floor(math.log10(abs(value)))
     for decimals in range(digits, 13):
         for halves in (1, 2):
             unit = 10.0**-decimals / halves
@@ -76,8 +78,8 @@ def _plain_pattern(found: Pattern | None, within: float) -> Ring | Circle | Grid
     if isinstance(found, Ring):
         return dataclasses.replace(found, centre=near(found.centre))
     if isinstance(found, Circle):
-        turn = math.degrees(2 * within / found.diameter)
-        diameter, start = plain(found.diameter, within), plain(found.start, turn)
+        turn, step = math.degrees(2 * within / found.diameter), 360 / found.count
+        diameter, start = plain(found.diameter, within), plain(found.start, turn) % step
         return Circle(found.count, diameter, start, near(found.centre))
     if isinstance(found, Grid):
         # The outermost of a long row are no further off than the others.
