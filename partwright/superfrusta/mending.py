@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from partwright.fields.columns import ROTATION, Column
 from partwright.fields.kernel import Target
 from partwright.superfrusta.deviations import Deviations, deviations
-from partwright.superfrusta.growing import Region, carve, finalists, grow
+from partwright.superfrusta.growing import Region, carve, finalists, fit_regions, grow
 from partwright.superfrusta.merging import Merger, carried_out, mergers, owners
 from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.pruning import cheapest_removal, neighbours
@@ -91,7 +91,7 @@ class Mending:
         slim = self.slimmed(self.joined(best))
         polished = self.trial(refine(self.samples, slim.rows, POLISH, self.settings, self.free(slim.rows)))
         better = polished.value > slim.value and self.allowed(polished.rows, slim.rows)
-        return polished.rows if better else slim.rows
+        return self.renewed(polished if better else slim).rows
 
     def trial(self, rows: Rows) -> Trial:
         off = deviations(self.samples, rows)
@@ -110,6 +110,31 @@ class Mending:
             return True
         least = min(settings.min_iou, volume_iou(self.samples, given))
         return len(trial) <= len(given) and volume_iou(self.samples, trial) >= least
+
+    def renewed(self, best: Trial) -> Trial:
+        """With parts fitted anew to what each stands for, all in one batch, where that is worth a part.
+
+        A small disc that has become a box is too near everywhere to be mended. What is worth less would only
+        make parts differ that are to be alike.
+        """
+        samples, rows = self.samples, best.rows
+        owner = owners(samples, rows)
+        parts = [part for part in range(self.locked, len(rows)) if (owner == part).any()]
+        regions = [
+            self.region(owner == one, np.delete(rows, one, 0), rows[one], _cut(rows, one)) for one in parts
+        ]
+        if not regions:
+            return best
+        found = fit_regions(samples, regions, self.settings, self.settings.overlap)
+        trials = [_with(rows, part, new) for part, new in zip(parts, found, strict=True)]
+        gains = np.array([score(samples, trial) for trial in trials]) - score(samples, rows)
+        for i in np.argsort(-gains, kind="stable"):
+            if gains[i] < _WORTH_A_TRY:
+                break
+            trial = self.trial(_with(best.rows, parts[i], found[i]))
+            if trial.value > best.value + self.settings.alpha and self.allowed(trial.rows, best.rows):
+                best = trial
+        return best
 
     def joined(self, best: Trial) -> Trial:
         """With pairs of parts as one where that pays: what mending added may make others vain.
@@ -211,7 +236,7 @@ class Mending:
         others, still = np.delete(rows, part, axis=0), np.delete(moving, part)
 
         # In the part's own place, what is new is cut by what cuts the part.
-        cut = bool((rows[part:, Column.SIGN] < rows[part, Column.SIGN]).any())
+        cut = _cut(rows, part)
 
         def instead(*new: Rows) -> tuple[Rows, Mask]:
             places = [part if cut else len(others)] * len(new)
@@ -257,11 +282,14 @@ class Mending:
     def fitted(self, voxels: Mask, others: Rows, like: NDArray[np.float32], under: bool = False) -> Rows:
         """The best part (1, 17) for the voxels, beside the others and before those that are subtracted if it
         goes `under` them; `like` gives a frame to start from."""
-        depth = float(np.abs(self.samples.grid.values.ravel()[voxels]).max())
-        sign, frames = float(like[Column.SIGN]), like[None, ROTATION]
-        region = Region(voxels, others, depth, 0.2, 0.3, frames, sign, under)
+        region = self.region(voxels, others, like, under)
         found, _, losses = finalists(self.samples, [region], self.settings, self.settings.overlap)
         return found[[int(losses.argmin())]]
+
+    def region(self, voxels: Mask, others: Rows, like: NDArray[np.float32], under: bool) -> Region:
+        """What `fitted` fits a part to."""
+        depth = float(np.abs(self.samples.grid.values.ravel()[voxels]).max())
+        return Region(voxels, others, depth, 0.2, 0.3, like[None, ROTATION], float(like[Column.SIGN]), under)
 
     def missed(self, rows: Rows, off: Deviations, worst: int) -> list[Mask]:
         """The connected voxels inside the shape that no part covers, about the worst point, and about others
@@ -299,6 +327,18 @@ def next_to_mend(best: Trial, given_up: list[tuple[NDArray[np.float32], float]])
 
 def _all(rows: Rows) -> Mask:
     return np.ones(len(rows), bool)
+
+
+def _cut(rows: Rows, part: int) -> bool:
+    """Whether others are subtracted from a part."""
+    return bool((rows[part:, Column.SIGN] < rows[part, Column.SIGN]).any())
+
+
+def _with(rows: Rows, part: int, new: NDArray[np.float32]) -> Rows:
+    """The rows with one more (17,) in a part's place."""
+    result = rows.copy()
+    result[part] = new
+    return result
 
 
 def _emphasis(off: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -174,6 +174,22 @@ def test_mending_takes_away_what_only_sticks_out(samples: FitSamples, exact: np.
     assert deviations(samples, mended).norm < 0.02
 
 
+def test_a_pin_that_has_become_a_box_is_round_again() -> None:
+    """It is nowhere so far off that it would be mended."""
+    radius, height, place = 0.05, 0.8, (0.1, 0.2, 0.0)
+    pin = trimesh.creation.cylinder(radius, height, sections=48).apply_translation(place)
+    samples = FitSamples.of(load_shape(union(box(*BODY), box(*ARM), pin)), SETTINGS)
+    block = box_row((1.77 * radius, 1.77 * radius, height), place)
+    mending, rows = Mending(samples, SETTINGS), np.array([box_row(*BODY), box_row(*ARM), block])
+    given = mending.trial(rows)
+    assert next_to_mend(given, []) is None
+    renewed = mending.renewed(given)
+    assert renewed.rows[2, Column.ROUNDNESS] > 0.9
+    assert np.array_equal(renewed.rows[:2], rows[:2])
+    assert renewed.value > given.value + 0.01
+    assert np.array_equal(dataclasses.replace(mending, locked=3).renewed(given).rows, rows)
+
+
 def test_mending_keeps_locked_parts_and_budgets(samples: FitSamples, exact: np.ndarray) -> None:
     tab = box_row((0.3, 0.3, 0.01), (-0.3, 0.55, 0.1))
     rows = np.vstack([tab, exact])
