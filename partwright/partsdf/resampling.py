@@ -68,7 +68,7 @@ def sound_samples(
         sample = judged(shape)
         while sample.soundness.breaks() and sample.tries < tries:
             new = judged(made(number, sample.tries))
-            least = min(sample, new, key=lambda one: one.soundness.badness)
+            least = min(sample, new, key=lambda one: one.soundness.rank)
             sample = replace(least, tries=sample.tries + 1)
         best.append(sample)
         if told is not None:
@@ -84,7 +84,7 @@ def _mended(sample: Sample, judge: Judge, keep: Sequence[str], keep_layout: bool
             break
         shape = drawn_back(sample.shape, free[0], move_pose=not keep_layout)
         new = replace(sample, shape=shape, soundness=judge(shape))
-        if new.soundness.badness >= sample.soundness.badness:
+        if new.soundness.rank >= sample.soundness.rank:
             break
         sample = new
     return sample

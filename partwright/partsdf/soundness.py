@@ -74,6 +74,12 @@ class Soundness:
         through = 1.0 + sum(tip.share for tip in self.through) if self.through else 0.0
         return 2.0 * len(self.empty) + max(self.gap / self.allowed, self.offset / OFFSET, through)
 
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """To order by, the best first: whatever is broken comes after all that is not, as what comes through
+        another part is no reason to have a broken shape in its place."""
+        return bool(self.breaks()), self.badness
+
 
 class Judge:
     """Tells how sound shapes of one model are. Its training shapes are looked at once, if need be."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 import trimesh
@@ -15,6 +16,7 @@ from partwright.partsdf.generator import Draw, GeneratorSettings
 from partwright.partsdf.generator_training import train_generator
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.piercing import Tip
 from partwright.partsdf.resampling import sound_samples
 from partwright.partsdf.soundness import GAP, OFFSET, Judge, Soundness, largest_offset, widest_gap
 
@@ -138,3 +140,15 @@ def test_each_try_has_noise_of_its_own(model: Model) -> None:
     assert len({float(one.latents.sum() + one.poses.translation.sum()) for one in every}) == len(every)
     (again,) = generator.generate([Draw(0, 1)], 5)
     torch.testing.assert_close(again.latents, made[2].latents)
+
+
+def test_what_comes_through_ranks_before_what_is_broken() -> None:
+    """However much of it: else a shape that is just apart was kept in place of a whole one."""
+    whole = Soundness((), 0.0, (), GAP, 0.0, ())
+    tip = Tip("knob", 0.09, 0.1, np.zeros((1, 3)), np.zeros((1, 3)))
+    through, apart = (
+        replace(whole, through=(tip,)),
+        replace(whole, gap=1.01 * GAP, gap_between=("plate", "ball")),
+    )
+    assert through.badness > apart.badness
+    assert sorted((apart, through, whole), key=lambda one: one.rank) == [whole, through, apart]
