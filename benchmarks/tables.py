@@ -87,6 +87,8 @@ TABLES = (
           "generate --family families/chairs --model chairs --fresh 140 --threads 1", 8, "families/"),
     Table("partsdf-generation-cars.md", "partsdf.py", None, 0,
           "generate --family families/cars --model cars --fresh 140 --threads 1", 5, "families/"),
+    Table("partsdf-soundness.md", "partsdf.py", None, 0,
+          "soundness --names chairs,mixers,vehicles,cars --count 48 --threads 1", 14),
     Table("partsdf-ablations-cars.md", "partsdf.py", None, 0,
           "ablations --family families/cars-small --epochs 84 --width 96 --shapes 4 --iterations 150 "
           "--points 1024 --resolution 128 --threads 1", 900, "families/"),
