@@ -161,7 +161,7 @@ def test_reconstruct(
     assert {part.name for part in pw.load_assembly("out/assembly.json").parts} >= {"plate", "ball"}
     assert report["scores"]["iou"] > 0.75
     assert report["learned"][0]["evaluations"]["meshing"] < report["learned"][0]["evaluations"]["dense grid"]
-    assert report["learned"][0]["starts"] == ["training shape"] * 4
+    assert report["learned"][0]["starts"] == ["training shape"] * 8
     surface = trimesh.load("out/surface.ply")
     assert surface.is_watertight
     np.testing.assert_allclose(surface.center_mass, mesh.center_mass, atol=0.15)  # of a size of 3.6
