@@ -5,9 +5,12 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from partwright.assembly.files import MAX_PARTS
 from partwright.assembly.instance_patterns import Circle, Grid, Ring, pattern, with_pattern
 from partwright.assembly.tree import Part
 from partwright.errors import ParameterError
+
+_OF_COPIES = ("count", "circle", "start", "counts", "spacing")
 
 
 def numbers_of(part: Part) -> dict[str, float]:
@@ -44,7 +47,7 @@ def with_number(part: Part, number: str, value: float) -> Part:
         place = list(part.translation)
         place["xyz".index(number)] = value
         return dataclasses.replace(part, translation=(place[0], place[1], place[2]))
-    if number in _numbers_of_copies(part):
+    if number.partition(".")[0] in _OF_COPIES:
         return _with_number_of_copies(part, number, value)
     if "diameter" in number:
         number, value = number.replace("diameter", "radius"), value / 2
@@ -60,8 +63,10 @@ def _with_number_of_copies(part: Part, number: str, value: float) -> Part:
     found: Any = pattern(part)
     name, _, axis = number.partition(".")
     if name in ("count", "counts"):
-        if value != int(value) or value < 2:
-            raise ParameterError(f"{number}: expected a whole number, at least 2, got {value:g}")
+        if not 2 <= value <= MAX_PARTS or value != int(value):
+            raise ParameterError(
+                f"{number}: expected a whole number, at least 2 and at most {MAX_PARTS:,}, got {value:g}"
+            )
         value = int(value)
     elif name in ("circle", "spacing") and value <= 0:
         raise ParameterError(f"{number}: expected a positive number, got {value:g}")

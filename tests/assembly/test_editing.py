@@ -140,7 +140,14 @@ def test_patterns_have_numbers_to_set() -> None:
     assert pattern(edited["tooth"]) == Ring(30, "z", (0, 0, 0))
     assert edited["tooth"].translation == (20, 0, 0)
     assert with_numbers(part, {"hole.start": 0}).assembly["hole"].translation == (17, 0, 5)
-    for wrong in ({"hole.count": 2.5}, {"tooth.count": 1}, {"hole.circle": -3}, {"post.spacing.x": 0}):
+    endless = {"hole.count": 1e9}, {"tooth.count": float("inf")}
+    for wrong in (
+        *endless,
+        {"hole.count": 2.5},
+        {"tooth.count": 1},
+        {"hole.circle": -3},
+        {"post.spacing.x": 0},
+    ):
         with pytest.raises(ParameterError, match="expected a"):
             with_numbers(part, wrong)
     with pytest.raises(ParameterError, match=r"has no number 'count'; it has .*spacing.x"):
