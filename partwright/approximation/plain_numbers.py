@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from partwright.assembly import Part, Similarity
+from partwright.assembly.checks import Vector
 from partwright.assembly.instance_patterns import Circle, Grid, Pattern, Ring, Row, pattern, with_pattern
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import ParameterError
@@ -41,7 +42,6 @@ def with_plain_numbers(part: Part, within: float) -> Part:
 
     A field that does not allow its plain numbers stays as it is.
     """
-    x, y, z = (plain(v, within) for v in part.translation)
     try:
         field = _plain_field(part.field, within)
     except ParameterError:
@@ -49,7 +49,8 @@ def with_plain_numbers(part: Part, within: float) -> Part:
     copies = _plain_copies(part, within)
     if copies is None:
         moves = tuple(plain_move(move, within) for move in part.instances)
-        copies = dataclasses.replace(part, translation=(x, y, z), instances=moves)
+        place = _plain_place(part.translation, within)
+        copies = dataclasses.replace(part, translation=place, instances=moves)
     return _between_plain_ends(part, dataclasses.replace(copies, field=field), within)
 
 
@@ -60,8 +61,8 @@ def _plain_copies(part: Part, within: float) -> Part | None:
     if wanted is None:
         return None
     if isinstance(wanted, Ring):
-        x, y, z = (plain(v, within) for v in part.translation)
-        return with_pattern(dataclasses.replace(part, translation=(x, y, z)), wanted)
+        place = _plain_place(part.translation, within)
+        return with_pattern(dataclasses.replace(part, translation=place), wanted)
     made = with_pattern(part, wanted)
     places, given = (np.array([copy.translation for copy in one.copies]) for one in (made, part))
     off = np.linalg.norm(given[:, None] - places, axis=2).min(axis=1).max()
@@ -69,23 +70,24 @@ def _plain_copies(part: Part, within: float) -> Part | None:
 
 
 def _plain_pattern(found: Pattern | None, within: float) -> Ring | Circle | Grid | Row | None:
-    def near(values: tuple[float, float, float]) -> tuple[float, float, float]:
-        x, y, z = (plain(v, within) for v in values)
-        return x, y, z
-
     if isinstance(found, Row):
-        return Row(tuple(map(near, found.places)))
+        return Row(tuple(_plain_place(place, within) for place in found.places))
     if isinstance(found, Ring):
-        return dataclasses.replace(found, centre=near(found.centre))
+        return dataclasses.replace(found, centre=_plain_place(found.centre, within))
     if isinstance(found, Circle):
         turn, step = math.degrees(2 * within / found.diameter), 360 / found.count
         diameter, start = plain(found.diameter, within), plain(found.start, turn) % step
-        return Circle(found.count, diameter, start, near(found.centre))
+        return Circle(found.count, diameter, start, _plain_place(found.centre, within))
     if isinstance(found, Grid):
         # The outermost of a long row are no further off than the others.
         a, b, c = (plain(v, 2 * within / n) for n, v in zip(found.count, found.spacing, strict=True))
-        return Grid(found.count, (a, b, c), near(found.middle))
+        return Grid(found.count, (a, b, c), _plain_place(found.middle, within))
     return None
+
+
+def _plain_place(place: Vector, within: float) -> Vector:
+    x, y, z = (plain(v, within) for v in place)
+    return x, y, z
 
 
 def _between_plain_ends(given: Part, part: Part, within: float) -> Part:
@@ -146,5 +148,4 @@ def plain_move(move: Similarity, within: float) -> Similarity:
     """A shift alone; the foot of a turn stays where the turn needs it."""
     if abs(move.rotation[0]) != 1.0:
         return move
-    x, y, z = (plain(v, within) for v in move.translation)
-    return dataclasses.replace(move, translation=(x, y, z))
+    return dataclasses.replace(move, translation=_plain_place(move.translation, within))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.assembly.checks import Vector
 from partwright.assembly.repeated_groups import ring
 from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.assembly.turned_fields import is_round, is_same_turned
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 _SAME = 1e-9  # of the lengths that occur, and of entries of rotations
 _TURNED = 5e-5  # radians, by which copies may be turned where places may be off, too
 _DIGITS = 10  # of numbers that are told apart by how plain they are
-
-Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -149,7 +148,7 @@ def _grid(places: np.ndarray, within: float) -> Grid | None:
     if math.prod(counts) != len(places) or len(np.unique(np.stack(steps), axis=1).T) != len(places):
         return None
     a, b, c = counts
-    return Grid((a, b, c), _vector(spacings, within), _vector(middles, within))
+    return Grid((a, b, c), _vector(spacings), _vector(middles))
 
 
 def _circle(part: Part, places: np.ndarray, within: float) -> Circle | None:
@@ -165,7 +164,7 @@ def _circle(part: Part, places: np.ndarray, within: float) -> Circle | None:
     nearest = np.rint(steps)
     # The mean of all, and not the first alone, says where they begin.
     start = float(np.degrees(angles[0] + ((steps - nearest) / count * 2 * np.pi).mean()))
-    found = Circle(count, float(f"{2 * radius:.12g}"), round(start, 9) + 0.0, _vector(centre, within))
+    found = Circle(count, float(f"{2 * radius:.12g}"), round(start, 9) + 0.0, _vector(centre))
     order = nearest.astype(int) % count
     if sorted(order.tolist()) != list(range(count)):
         return None
@@ -185,9 +184,9 @@ def _digits(value: float, within: float) -> int:
     )
 
 
-def _vector(values: np.ndarray | list[float], within: float) -> Vector:
-    """Without the dust of rounding about zero."""
-    x, y, z = (0.0 if abs(float(v)) <= min(within, _SAME) else float(f"{v:.12g}") for v in values)
+def _vector(values: np.ndarray | list[float], dust: float = _SAME) -> Vector:
+    """Without the dust of rounding, about zero and in the last digits."""
+    x, y, z = (0.0 if abs(v) <= dust else float(f"{v:.12g}") for v in values)
     return (x, y, z)
 
 
@@ -210,6 +209,5 @@ def _ring(part: Part) -> Ring | None:
         moved = np.array([centre - turn @ centre for turn in turns])
         if np.abs(moved - shifts).max() > 1e-6 * size:
             return None
-        x, y, z = (0.0 if abs(c) < 1e-9 * size else float(f"{c:.12g}") for c in centre)
-        return Ring(count, "xyz"[axis], (x, y, z))
+        return Ring(count, "xyz"[axis], _vector(centre, _SAME * size))
     return None

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from partwright.fields import Box, Extrusion, Field, HollowBox, Revolution
-from partwright.fields.profile import Loop, Profile
+from partwright.fields.profile import Profile, is_same_loop
 
 _ROUND = ("cylinder", "cone", "frustum", "sphere", "capsule", "tube", "torus", "hollow_frustum")
 
@@ -38,18 +38,13 @@ def is_same_turned(field: Field, turn: np.ndarray, within: float) -> bool:
 def _is_same(profile: Profile, turn: np.ndarray, within: float) -> bool:
     """Whether each loop of a profile lies on one of its loops when it is turned by (2, 2)."""
     near = within * profile.size
+    corners = [[np.array(loop) for loop in loops] for loops in ((profile.outline,), profile.holes)]
+
+    def turned(loop: np.ndarray) -> np.ndarray:
+        return np.column_stack([loop[:, :2] @ turn.T, loop[:, 2]])
+
     return all(
-        any(_lies_on(own, turn, other, near) for other in others)
-        for others in ((profile.outline,), profile.holes)
-        for own in others
+        any(is_same_loop(turned(own), other, near, near) for other in loops)
+        for loops in corners
+        for own in loops
     )
-
-
-def _lies_on(loop: Loop, turn: np.ndarray, other: Loop, near: float) -> bool:
-    """Whether a loop that is turned has the corners of another, begun at any of them."""
-    if len(loop) != len(other):
-        return False
-    own, wanted = np.array(loop), np.array(other)
-    own[:, :2] = own[:, :2] @ turn.T
-    firsts = np.flatnonzero(np.abs(wanted[:, :2] - own[0, :2]).max(axis=1) <= near)
-    return any(np.abs(np.roll(wanted, -first, axis=0) - own).max() <= near for first in firsts.tolist())

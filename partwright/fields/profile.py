@@ -215,6 +215,16 @@ def circle(radius: float, centre: Sequence[float] = (0.0, 0.0)) -> Loop:
     return ((x - radius, y, 1.0), (x + radius, y, 1.0))
 
 
+def is_same_loop(one: np.ndarray, other: np.ndarray, near: float, bulge: float) -> bool:
+    """Whether loops (K, 3) and (L, 3) have the same corners, whichever each begins with: places that differ
+    by less than `near` and bulges by less than `bulge`."""
+    if len(one) != len(other):
+        return False
+    firsts = np.flatnonzero(np.abs(other[:, :2] - one[0, :2]).max(axis=1) < near)
+    least = np.array([near, near, bulge])
+    return any((np.abs(np.roll(other, -first, axis=0) - one) < least).all() for first in firsts.tolist())
+
+
 def circle_of(loop: Loop) -> tuple[float, tuple[float, float]] | None:
     """Radius and centre of a loop that is a full circle."""
     sides = list(_sides(loop))

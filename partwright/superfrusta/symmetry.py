@@ -108,7 +108,7 @@ def symmetries(
         if image_error(grid, best, points) > 2 * tolerance:
             return None
         image = best(points[::_VERIFY_EVERY]).astype(np.float32)
-        error = float(np.abs(shape.unit_distance(image)).mean())
+        error = float(shape.unit_away(image).mean())
         if error > tolerance:
             return None
         found.append(Symmetry(kind, order, best, error))

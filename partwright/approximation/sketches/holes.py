@@ -15,9 +15,10 @@ from partwright.assembly import Part, Similarity
 from partwright.assembly.checks import Quaternion
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Cylinder, Extrusion
-from partwright.fields.profile import Loop, Profile, circle_of
+from partwright.fields.profile import Loop, Profile, circle_of, is_same_loop
 
 _SAME = 2e-3  # of its size, by which holes that are alike may differ
+_SAME_BULGE = 0.02  # and their bulges by this
 _PARALLEL = 1e-12  # of a cosine
 _ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and heights of copies differ
 _LATTICE = 12  # points along a side of what is no round hole
@@ -76,12 +77,10 @@ def _alike(one: Loop, other: Loop) -> bool:
     round_, also = circle_of(one), circle_of(other)
     if round_ is not None and also is not None:
         return abs(round_[0] - also[0]) < _SAME * round_[0]
-    if len(one) != len(other) or round_ is not None or also is not None:
+    if round_ is not None or also is not None:
         return False
     a, b = (np.array(loop) - (*_middle(loop), 0.0) for loop in (one, other))
-    near = _SAME * float(np.ptp(a[:, :2], axis=0).max())
-    scale = np.array([1.0, 1.0, near / 0.02])  # bulges may differ by 0.02
-    return any(np.abs((np.roll(b, k, axis=0) - a) * scale).max() < near for k in range(len(b)))
+    return is_same_loop(a, b, _SAME * float(np.ptp(a[:, :2], axis=0).max()), _SAME_BULGE)
 
 
 def _shift(frame: np.ndarray, offset: np.ndarray) -> Similarity:
