@@ -7,6 +7,7 @@ nearest solid, and blends sharp edges: FILE.report.json lists them.
 
 from __future__ import annotations
 
+import builtins
 import dataclasses
 import keyword
 import math
@@ -54,16 +55,17 @@ _SOLIDS = {
     "superfrustum": "superfrustum({size}, {roundness}, {dilation}, {taper}, {bulge}, {onion})",
 }
 _OPERATORS = {"union": "+", "difference": "-", "intersection": "&"}
+_LOOPS = ("pose", "flip")  # variables of loops in which functions of parts are called
 _RESERVED = (
     *keyword.kwlist,
+    *dir(builtins),
+    *_LOOPS,
     "bd",
     "math",
     "path",
     "assembly",
-    "print",
     "superfrustum",
     "loop",
-    "zip",
     "grid",
 )
 _TIGHT = 0.99999  # of a rim's depth, where nothing else would be left between rims

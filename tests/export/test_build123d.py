@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import ast
 import json
+import math
 import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.group_copies import GroupCopy
 from partwright.errors import NoSurfaceError, SettingError, UnsupportedFormatError
 from partwright.export import export
 from partwright.fields import Field, Sphere, SuperFrustum
@@ -66,6 +68,18 @@ def test_a_tree_with_hostile_names(tmp_path: Path) -> None:
     assembly, volume = flange()
     export(assembly, tmp_path / "flange.build123d.py")
     assert run(tmp_path / "flange.build123d.py").volume == pytest.approx(volume, rel=1e-6)
+
+
+def test_parts_called_as_what_the_source_calls(tmp_path: Path) -> None:
+    """A part called range, and one called as the variable of the loop that puts a group in its places."""
+    ball, turn = Sphere(0.1), Similarity.turn((0, 0, 1), math.radians(120))
+    names = "range", "zip", "enumerate", "len"
+    pins = [Part(ball, (x, 0, 0), name=name, instances=(turn,)) for x, name in enumerate(names, start=1)]
+    foot = Assembly((Part(ball, name="pose"), Part(ball, (0, 0, 0.5), name="flip")))
+    copy = GroupCopy(Similarity(translation=(0.0, 0.0, 1.0))).of(foot, 2)
+    export(Assembly((*pins, foot, copy), unit="mm"), tmp_path / "a.build123d.py")
+    solid = run(tmp_path / "a.build123d.py")
+    assert solid.volume == pytest.approx(12 * 4 / 3 * math.pi * 0.1**3, rel=1e-6)
 
 
 def test_the_source_reads_well(tmp_path: Path) -> None:
