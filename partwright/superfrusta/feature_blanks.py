@@ -20,6 +20,7 @@ BEHIND = 0.03
 """Of the objective, by which a tree is well behind another."""
 PERFECT = 0.985
 """R from which on a tree can hardly become better, but plainer."""
+_ENDED = 0.015  # of the objective, that a tree may gain where it is ended
 _FEW, _CHEAP = 1, 2.2  # features, and prices of plain ones, of which none is left to save
 _BLANKS, _PLAIN = 2, 4.0  # and prices of plain ones, with which but one is tried
 _PATIENT = 6  # steps after which a tree may be well behind, and no more than the best has, but for one
@@ -39,13 +40,16 @@ def cut_from_blanks(
     blanks = [blank for blank in silhouettes(search.body, search.frames) if blank.key not in tried]
     gains = search.gains(search.empty, blanks, True) if blanks else np.zeros(0)
     found, whole, highest = best, None, -math.inf
+    seen = [best]
     most = len(best.steps) if best.score > PERFECT else None
     patient = min(_PATIENT, len(best.steps) + 1)
     for index in np.argsort(-gains)[: _BLANKS if best.price > _PLAIN * search.alpha else 1]:
         start = search.extended(search.empty, blanks[index], True)
         tree = search.grown(start, others, best, patient=patient, most=most)
-        if tree.objective < best.objective - BEHIND:
+        hopeless = tree.objective < max(best.objective, highest) - _ENDED
+        if hopeless or any(_are_same(tree, other) for other in seen):
             continue
+        seen.append(tree)
         tree = search.ended(tree, others)
         if tree.off > best.off:
             continue  # skins where a cut runs along the blank's own walls, say, which freeform does not mend
@@ -56,6 +60,12 @@ def cut_from_blanks(
             if worth(rival) > _least(search, rival, whole) and _freeform(rival) <= _freeform(whole):
                 found, whole = tree, rival
     return found
+
+
+def _are_same(tree: FeatureTree, other: FeatureTree) -> bool:
+    """Whether two trees have the same steps, in whatever order: better bodies stand in place of a blank."""
+    one, two = (sorted(step.chosen.key for step in some.steps) for some in (tree, other))
+    return one == two
 
 
 def _least(search: FeatureSearch, tree: FeatureTree, whole: FeatureTree) -> float:

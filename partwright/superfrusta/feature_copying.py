@@ -80,16 +80,19 @@ def with_copies(
     if not chosen.cuts:  # of which there is but one
         inner, _ = chosen.bodies
         planes = [*search.mirrors, *(reflection(*plane) for plane in planes_between(inner, pieces))]
-        moves = [*search.turns, *(move for plane in planes if (move := as_move(part, plane)) is not None)]
+        flipped = image_of(part, Similarity())
+        flips = (as_move(part, flipped.transformed(plane)) for plane in planes)
+        moves = [*search.turns, *(move for move in flips if move is not None)]
         moves += moves_between(inner, pieces, search.frames, search.body)
         moves += shifts_between(chosen, others)
         moves += _shifts(part, search.turns, search.mirrors)
         found = ((move, part.transformed(move)) for move in moves)
         near = ((move, copy) for move, copy in found if within_box(few, *copy.bounds()).sum() > hits)
         may_pay = {move: (copy, hit) for move, copy in near if (hit := covers(copy, few)).sum() > hits}
-        kept = (move for move in _nearest_first(search, part, list(may_pay)) if joined(*may_pay[move]))
-        part = replace(part, instances=tuple(kept))
-        images = ((plane, image_of(part, plane)) for plane in planes)
+        kept = tuple(move for move in _nearest_first(search, part, list(may_pay)) if joined(*may_pay[move]))
+        part = replace(part, instances=kept)
+        flipped = image_of(part, Similarity()) if kept else flipped
+        images = ((plane, flipped.transformed(plane)) for plane in planes)
         image = next((p for p, one in images if joined(one, covers(one, few), len(part.copies))), None)
     objective = reached - tree.price - search.price(chosen.sides)
     return Step(chosen, added, part, covered, within, reached, objective, image)
@@ -122,28 +125,47 @@ def _nearest_first(search: FeatureSearch, part: Part, moves: Sequence[Similarity
     return [moves[i] for i in np.argsort(off, kind="stable")]
 
 
+class StepBodies:
+    """What a step adds to a search's shape or cuts from it, made once for the same candidate with the same
+    copies: trees that are replayed with another step have the rest again."""
+
+    def __init__(self, search: FeatureSearch) -> None:
+        self._search = search
+        self._known: dict[tuple[object, ...], tuple[Step, tuple[Part, Manifold, Manifold]]] = {}
+
+    def __call__(self, step: Step) -> tuple[Part, Manifold, Manifold]:
+        """The part, its sides in the open further out where it is cut; the body around it; and of the body
+        within it what is not the shape's where it is added, and what is where it is cut."""
+        key = id(step.chosen), step.added, step.part.instances, step.image
+        if key not in self._known:
+            self._known[key] = step, self._made(step)
+        return self._known[key][1]
+
+    def _made(self, step: Step) -> tuple[Part, Manifold, Manifold]:
+        search, chosen, image = self._search, step.chosen, step.image
+        part = step.part if step.added else with_open_sides(step.part, search.samples.measure)
+        inner, outer = chosen.bodies
+        moves = [_matrix(move) for move in step.part.instances]
+        if part is not step.part:
+            whole = solid_of(replace(part, instances=()), _CHORD)
+            inner, outer = inner + whole, outer + whole
+        inner, outer = (sum((body.transform(move) for move in moves), body) for body in (inner, outer))
+        if image is not None:
+            flip = _matrix(image) * [-1.0, 1.0, 1.0, 1.0]
+            inner, outer = (body + body.transform(flip) for body in (inner, outer))
+        return part, outer, inner - search.body if step.added else inner ^ search.body
+
+
 def joined_by(search: FeatureSearch, tree: FeatureTree, step: Step) -> FeatureTree:
     """The tree and a candidate with its copies."""
-    chosen, added, image = step.chosen, step.added, step.image
-    part = step.part if added else with_open_sides(step.part, search.samples.measure)
-    inner, outer = chosen.bodies
-    moves = [_matrix(move) for move in step.part.instances]
-    if part is not step.part:
-        whole = solid_of(replace(part, instances=()), _CHORD)
-        inner, outer = inner + whole, outer + whole
-    inner, outer = (sum((body.transform(move) for move in moves), body) for body in (inner, outer))
-    if image is not None:
-        flip = _matrix(image) * [-1.0, 1.0, 1.0, 1.0]
-        inner, outer = (body + body.transform(flip) for body in (inner, outer))
-    if added:
-        missed, excess = tree.missed - outer, tree.excess + (inner - search.body)
+    part, outer, own = search.step_bodies(step)
+    if step.added:
+        missed, excess = tree.missed - outer, tree.excess + own
     else:
-        missed, excess = tree.missed + (inner ^ search.body), tree.excess - outer
-    for body in (missed, excess):
-        body.num_tri()  # now, and not with every later step again
-    sides = chosen.sides - (_hole_corners(step.part) - _hole_corners(part))
-    feature = Feature(added, part, step.within, sides, image)
-    cuts = (Feature(False, cut, step.within, 0) for cut in chosen.cuts)
+        missed, excess = tree.missed + own, tree.excess - outer
+    sides = step.chosen.sides - (_hole_corners(step.part) - _hole_corners(part))
+    feature = Feature(step.added, part, step.within, sides, step.image)
+    cuts = (Feature(False, cut, step.within, 0) for cut in step.chosen.cuts)
     price = tree.price + search.price(sides)
     features, steps = [*tree.features, feature, *cuts], (*tree.steps, step)
     return FeatureTree(features, step.covered, missed, excess, step.score, price, steps)

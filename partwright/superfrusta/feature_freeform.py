@@ -27,7 +27,7 @@ from partwright.superfrusta.far_places import (
     reach,
 )
 from partwright.superfrusta.feature_mending import FAR
-from partwright.superfrusta.feature_steps import Feature, FeatureTree, as_move, covers
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, as_move, covers, image_of
 from partwright.superfrusta.feature_symmetry import reflected
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def _symmetric(
     for turn in search.turns:
         yield [turn] * len(parts), turn(point)
     for plane in search.mirrors:
-        moves = [move for part in parts if (move := as_move(part, plane)) is not None]
+        moves = [move for part in parts if (move := as_move(part, image_of(part, plane))) is not None]
         if len(moves) == len(parts):
             yield moves, reflected(plane, point[None])[0]
 

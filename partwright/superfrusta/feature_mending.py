@@ -6,6 +6,8 @@ at its corners, slivers between the samples included.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,13 +28,13 @@ _LOSS = 3e-4  # of R, that mending one place may cost
 
 
 def mended(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
-    """The tree with further features, the farthest place first, until nothing is far off or can be mended."""
+    """The tree with further features, the farthest place first, until nothing is far off or can be mended;
+    it knows how far it is off even so."""
     given_up: set[tuple[float, ...]] = set()
+    pieces = far_pieces(search, tree)
     for _ in range(_MENDS):
-        if len(tree.features) >= search.limit:
-            break
-        far = [one for one in far_pieces(search, tree) if _key(one[2]) not in given_up]
-        if not far:
+        far = [one for one in pieces if _key(one[2]) not in given_up]
+        if not far or len(tree.features) >= search.limit:
             break
         _, added, piece = max(far, key=lambda one: one[0])
         step = _with_best(search, tree, piece, added, [other for _, a, other in far if a is added])
@@ -40,7 +42,8 @@ def mended(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
             given_up.add(_key(piece))
         else:
             tree = step
-    return tree
+            pieces = far_pieces(search, tree)
+    return replace(tree, off=_farthest(search, tree, [reach for reach, _, _ in pieces]))
 
 
 def far_pieces(search: FeatureSearch, tree: FeatureTree) -> list[tuple[float, bool, Manifold]]:
@@ -56,8 +59,8 @@ def far_pieces(search: FeatureSearch, tree: FeatureTree) -> list[tuple[float, bo
     return found
 
 
-def farthest(search: FeatureSearch, tree: FeatureTree) -> float:
-    """How far the farthest piece reaches, unit lengths; 0 where none is further than `FAR`.
+def _farthest(search: FeatureSearch, tree: FeatureTree, reaches: Sequence[float]) -> float:
+    """How far the farthest of pieces reaches, unit lengths; 0 where none is further than `FAR`.
 
     Skins that a cut leaves of what it goes around are no pieces, and may be far off all the same; but over
     holes none is left, as those go on where they end in the open.
@@ -66,7 +69,6 @@ def farthest(search: FeatureSearch, tree: FeatureTree) -> float:
     features = [f if f.added else with_open_ends_everywhere(f, measure) for f in tree.features]
     corners = surface_of(FeatureTree(features).body())[0].astype(np.float32)
     skins = float(measure(corners).max()) if len(corners) else 0.0
-    reaches = [reach for reach, _, _ in far_pieces(search, tree)]
     return max([*reaches, *([skins] if skins > FAR else [])], default=0.0)
 
 

@@ -29,10 +29,10 @@ from partwright.shapes import Shape
 from partwright.superfrusta.feature_bases import bases, is_nearly_whole, various
 from partwright.superfrusta.feature_blanks import BEHIND, PERFECT, cut_from_blanks, worth
 from partwright.superfrusta.feature_bores import bores, bores_of
-from partwright.superfrusta.feature_copying import joined_by, with_copies
+from partwright.superfrusta.feature_copying import StepBodies, joined_by, with_copies
 from partwright.superfrusta.feature_exchange import exchanged
 from partwright.superfrusta.feature_linings import lines_a_hole
-from partwright.superfrusta.feature_mending import farthest, mended
+from partwright.superfrusta.feature_mending import mended
 from partwright.superfrusta.feature_own_bodies import is_own_body
 from partwright.superfrusta.feature_piece_candidates import PieceCandidates, stands_for
 from partwright.superfrusta.feature_recasting import recast
@@ -48,6 +48,7 @@ _THIN = 2.5e-3  # unit lengths: twice the volume over the area of a skin between
 _PIECES = 10  # of what is missed, and of what is too much, that are looked at in one step
 _RIVAL = 0.55  # of the best base's objective, that another has to have
 _PATIENT = 3  # steps after which a tree may be well behind
+_SLOW = 6  # the same of a tree of bodies of the shape's own, which begins with a smaller one
 _COMPLEX = 20_000  # triangles of a piece that is no feature
 _MOST = 24
 _FOR_MENDING = 10
@@ -99,6 +100,7 @@ class FeatureSearch:
         self._is_own = AskedOnce(partial(is_own_body, self))
         self._lines_a_hole = AskedOnce(lambda candidate: lines_a_hole(candidate.part, samples.measure))
         self._bores_of = AskedOnce(bores_of)
+        self.step_bodies = StepBodies(self)
 
     def run(self) -> FeatureTree | None:
         """The best tree; None where the surface encloses nothing to take sections of."""
@@ -139,8 +141,7 @@ class FeatureSearch:
 
     def ended(self, tree: FeatureTree, others: Sequence[Candidate]) -> FeatureTree:
         """A tree that has grown, recast and mended."""
-        whole = mended(self, recast(self, self.with_patterns(tree), others))
-        return replace(whole, off=farthest(self, whole))
+        return mended(self, recast(self, self.with_patterns(tree), others))
 
     @property
     def empty(self) -> FeatureTree:
@@ -162,7 +163,7 @@ class FeatureSearch:
         first = next((i for i in order if self._is_own(own[i])), None)
         if first is None:
             return []
-        tree = self.grown(self.extended(empty, own[first], True), others, None, True)
+        tree = self.grown(self.extended(empty, own[first], True), others, best, True, _SLOW)
         tree = self.grown(tree, others, best)
         better = tree.objective > best.objective + self.alpha
         return [tree] if tree.score >= _POOR and better else []
@@ -177,10 +178,12 @@ class FeatureSearch:
         most: int | None = None,
     ) -> FeatureTree:
         """Until nothing pays, it has the most steps, or is well behind where the best so far was after as
-        many; on from where better bodies stand in place of some.
+        many; on from where better bodies stand in place of some, but for a tree that is behind.
 
         only_own: of what is added, only bodies that are the shape's own."""
         tree = self._grown(tree, own, best, only_own, patient, most)
+        if best is not None and self.is_behind(tree, best, patient):
+            return tree
         other = exchanged(self, tree, own)
         return tree if other is tree else self._grown(other, own, best, only_own, patient, most)
 
@@ -200,7 +203,7 @@ class FeatureSearch:
             tree = step
             if self.told is not None:
                 self.told(tree)
-            if best is not None and len(tree.steps) > patient and self._behind(tree, best):
+            if best is not None and self.is_behind(tree, best, patient):
                 break
         return tree
 
@@ -214,10 +217,11 @@ class FeatureSearch:
         return tree
 
     @staticmethod
-    def _behind(tree: FeatureTree, best: FeatureTree) -> bool:
-        count = len(tree.steps) - 1
-        rival = best.steps[min(count, len(best.steps) - 1)].objective
-        return tree.objective < rival - BEHIND
+    def is_behind(tree: FeatureTree, best: FeatureTree, patient: int) -> bool:
+        """Whether it is well behind where the best was after as many steps, or far behind before."""
+        count = len(tree.steps)
+        rival = best.steps[min(count, len(best.steps)) - 1].objective
+        return count >= _PATIENT and tree.objective < rival - BEHIND * max(1, patient + 2 - count)
 
     def step(
         self,
@@ -232,31 +236,44 @@ class FeatureSearch:
         patterns: also what does so with its copies only."""
         if self.checkpoint is not None:
             self.checkpoint()
-        missed = self._pieces(tree.missed, self.inside & ~tree.covered, patterns)
-        excess = self._pieces(tree.excess, ~self.inside & tree.covered, patterns)
-        adding = [*own, *(c for piece in missed for c in self.candidates_of(piece))]
-        adding = [c for c in adding if not self._lines_a_hole(c) and (not only_own or self._is_own(c))]
-        cutting = [
-            *bores(tree.steps, self._bores_of),
-            *(c for piece in excess for c in self.candidates_of(piece)),
-        ]
-        if banned is not None:
-            adding, cutting = ([c for c in pool if c.key != banned] for pool in (adding, cutting))
-        rivals: list[tuple[float, Candidate, bool]] = []
-        for pool, added in ((adding, True), (cutting, False)):
-            if pool:
-                gains = self.gains(tree, pool, added)
-                rivals += [(float(gains[i]), pool[i], added) for i in np.argsort(-gains)[:_LOOKED]]
+        pieces = {
+            True: self._pieces(tree.missed, self.inside & ~tree.covered, patterns),
+            False: self._pieces(tree.excess, ~self.inside & tree.covered, patterns),
+        }
+        pools: dict[bool, list[Candidate]] = {True: [], False: []}
+        found: dict[bool, list[tuple[float, Candidate, bool]]] = {True: [], False: []}
+
+        def look_at(pool: Sequence[Candidate], added: bool) -> None:
+            if added:
+                pool = [c for c in pool if not self._lines_a_hole(c) and (not only_own or self._is_own(c))]
+            pool = [c for c in pool if c.key != banned]
+            pools[added] += pool
+            gains = self.gains(tree, pool, added).tolist() if pool else ()
+            found[added] += [(gain, c, added) for gain, c in zip(gains, pool, strict=True)]
+
+        def enough() -> float:
+            """What a candidate has to gain to be tried with its copies."""
+            return max(0.0, _SHARE * max((gain for own in found.values() for gain, *_ in own), default=0.0))
+
+        look_at(own, True)
+        look_at(bores(tree.steps, self._bores_of), False)
+        largest = sorted(((*one, added) for added, own in pieces.items() for one in own), key=lambda p: -p[0])
+        for most, piece, added in largest:
+            if patterns or most - self.alpha > enough():
+                look_at(self.candidates_of(piece), added)
+        rivals = [rival for own in found.values() for rival in sorted(own, key=lambda one: -one[0])[:_LOOKED]]
         rivals.sort(key=lambda rival: -rival[0])
+
+        alone = {added: [piece for _, piece in own] for added, own in pieces.items()}
 
         def may_pay(gain: float, chosen: Candidate, added: bool) -> bool:
             if not patterns:
-                return gain > max(0.0, _SHARE * rivals[0][0])
-            price, like_it = self.price(chosen.sides), self._alike(chosen, missed if added else excess)
+                return gain > enough()
+            price, like_it = self.price(chosen.sides), self._alike(chosen, alone[added])
             return (gain + price) * like_it > price
 
         steps = [
-            with_copies(self, tree, chosen, added, *((missed, adding) if added else (excess, cutting)))
+            with_copies(self, tree, chosen, added, alone[added], pools[added])
             for gain, chosen, added in various(rivals)
             if may_pay(gain, chosen, added)
         ]
@@ -290,9 +307,12 @@ class FeatureSearch:
         """Of a feature whose profile has so many sides, with all its copies."""
         return self.alpha * (1 + _SIDE_PRICE * max(0, sides - _FREE_SIDES))
 
-    def _pieces(self, residual: Manifold, wrong: NDArray[np.bool_], patterns: bool) -> list[Manifold]:
-        """Connected pieces that may pay and are no skin, the largest first. wrong: the samples in them.
-        patterns: may pay by a share, where others of their form do so, too."""
+    def _pieces(
+        self, residual: Manifold, wrong: NDArray[np.bool_], patterns: bool
+    ) -> list[tuple[float, Manifold]]:
+        """Connected pieces that may pay and are no skin, the largest first, each after what R it can bring
+        at most. wrong: the samples in them. patterns: may pay by a share, where others of their form do so,
+        too."""
         points, weight = self.points[wrong], self.weights[wrong]
         found = [
             (volume, piece)
@@ -301,15 +321,19 @@ class FeatureSearch:
         ]
         least = _HOPELESS * self.alpha * (_SHARE_OF_A_PATTERN if patterns else 1.0)
 
-        def pays(piece: Manifold) -> bool:
+        def most(piece: Manifold) -> float:
             within = within_box(points, *np.reshape(piece.bounding_box(), (2, 3)))
-            return float((weight[within].sum(axis=0) / self._whole).mean()) > least
+            return float((weight[within].sum(axis=0) / self._whole).mean())
 
-        paying = np.array([volume for volume, piece in found if pays(piece)])
+        known = [(volume, most(piece), piece) for volume, piece in found]
+        paying = np.array([volume for volume, gain, _ in known if gain > least])
         # One of a row may have few samples by chance: it is a copy of what pays.
-        pieces = [one for one in found if (np.abs(paying - one[0]) <= _SAME_PIECE * one[0]).any()]
-        largest = [piece for _, piece in sorted(pieces, key=lambda one: -one[0])[:_PIECES]]
-        return [piece if piece.num_tri() < _FINE else simplified(piece, _SKIN) for piece in largest]
+        pieces = [one for one in known if (np.abs(paying - one[0]) <= _SAME_PIECE * one[0]).any()]
+        largest = sorted(pieces, key=lambda one: -one[0])[:_PIECES]
+        return [
+            (gain, piece if piece.num_tri() < _FINE else simplified(piece, _SKIN))
+            for _, gain, piece in largest
+        ]
 
     def _mask(self, candidate: Candidate) -> NDArray[np.float32]:
         """(N,) 1 at the samples within."""

@@ -132,10 +132,9 @@ def with_open_ends_everywhere(feature: Feature, distance: Callable[[np.ndarray],
     return replace(feature, part=longer)
 
 
-def as_move(part: Part, plane: Similarity) -> Similarity | None:
-    """The rigid move that makes the same of a part as a mirror does, of a box, say, if there is one."""
-    alone = replace(part, instances=())
-    image = image_of(alone, plane)
+def as_move(part: Part, image: Part) -> Similarity | None:
+    """The rigid move that makes of a part its mirror image (as of `image_of`), of a box, say, if there is
+    one."""
     turn = Similarity()
     if (
         isinstance(part.field, Extrusion)
@@ -145,7 +144,7 @@ def as_move(part: Part, plane: Similarity) -> Similarity | None:
         turn = Similarity(rotation=(0.0, 1.0, 0.0, 0.0))  # upside down it is its own mirror image
     elif image.field != part.field:
         return None
-    return image.pose @ turn @ alone.pose.inverse()
+    return image.pose @ turn @ part.pose.inverse()
 
 
 def covers(part: Part, points: NDArray[np.float32]) -> NDArray[np.bool_]:

@@ -45,6 +45,7 @@ class FeaturedFit:
         self._request, self._samples, self._checkpoint = request, samples, checkpoint
         self._seen: list[FeatureTree] = []
         self._assemblies = FeatureAssembly(request.shape)
+        self._freeform: dict[int, tuple[FeatureTree, FeatureTree]] = {}
 
     def assembly(self, tree: FeatureTree) -> Assembly:
         return self._assemblies.named(tree)
@@ -113,8 +114,11 @@ class FeaturedFit:
         )
 
     def _with_freeform(self, tree: FeatureTree) -> FeatureTree:
-        most = self._request.settings.max_parts
-        return with_freeform(self._search, tree, self._assemblies.in_unit_frame, most)
+        if id(tree) not in self._freeform:
+            most = self._request.settings.max_parts
+            made = with_freeform(self._search, tree, self._assemblies.in_unit_frame, most)
+            self._freeform[id(tree)] = tree, made
+        return self._freeform[id(tree)][1]
 
     def _thinned(self, tree: FeatureTree) -> FeatureTree:
         return thinned(self._search, tree, self._assemblies.in_unit_frame)

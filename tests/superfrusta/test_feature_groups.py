@@ -141,13 +141,13 @@ def test_mirror_images_are_turns_where_they_can_be() -> None:
     prism = Part(Extrusion(skew, 0.4), (0.3, 0.2, 0), (0.9, 0.1, 0.3, 0.2))
     points = np.random.default_rng(1).uniform(-1, 1, (2000, 3))
     for part in (prism, Part(Box((0.2, 0.3, 0.4)), (0.3, 0, 0), prism.rotation)):
-        move = as_move(part, plane)
+        move = as_move(part, image_of(part, plane))
         assert move is not None
         np.testing.assert_allclose(
             part.transformed(move).distance(reflected(plane, points)), part.distance(points), atol=1e-6
         )
     tapered = Part(Extrusion(skew, 0.2, 8), prism.translation, prism.rotation)
-    assert as_move(tapered, plane) is None
+    assert as_move(tapered, image_of(tapered, plane)) is None
     np.testing.assert_allclose(
         image_of(tapered, plane).distance(reflected(plane, points)), tapered.distance(points), atol=1e-6
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from itertools import product
 
 import numpy as np
 
@@ -43,10 +42,11 @@ def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.
         if isinstance(field, Extrusion) and field.rims[side > 0].depth:
             return False
         end = high[2] if side > 0 else low[2]
-        for points, copy, step in product(looks, part.copies, STEPS):
-            there = np.column_stack([points, np.full(len(points), end + side * step)])
-            placed = there @ rotation_matrix(copy.rotation).T + copy.translation
-            if (sign * distance(placed) < 0).any():
+        for points in looks:
+            beyond = [np.column_stack([points, np.full(len(points), end + side * step)]) for step in STEPS]
+            there = np.concatenate(beyond)
+            placed = [there @ rotation_matrix(copy.rotation).T + copy.translation for copy in part.copies]
+            if (sign * distance(np.concatenate(placed)) < 0).any():
                 return False
         return True
 
