@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Frustum, Revolution, Sphere, Tube
-from partwright.fields.profile import Loop, Profile, circle_of
+from partwright.fields.profile import Loop, Profile, circle, circle_of
+from partwright.fields.profile_distance import profile_distance
 from partwright.fields.rims import Rim
 
 _SAME = 1e-5  # of the size: lengths that differ by less are equal
 _SQUARE = 0.01
+_TURNED = 1e-4  # of a frame's directions, that are equal
 
 
 def extruded_part(
@@ -65,6 +69,53 @@ def with_profile(part: Part, profile: Profile) -> Part:
     frame, half = rotation_matrix(part.rotation), part.field.height / 2
     x, y, z = (frame.T @ np.array(part.translation)).tolist()
     return extruded_part(profile.moved((x, y)), frame, z - half, z + half)
+
+
+def stacked(one: Part, other: Part, near: float) -> Part | None:
+    """Two extrusions of the same profile, one at the end of the other in the same frame, as one as long as
+    both: None of others. Copies and the name are those of the first; neither has rims.
+
+    near: lengths that differ by less are equal.
+    """
+    first, second = _drawn(one.field), _drawn(other.field)
+    if first is None or second is None:
+        return None
+    way = one.pose.inverse() @ other.pose
+    x, y, z = way.translation
+    (profile, height), (its, more) = first, second
+    apart = abs(z) - (height + more) / 2
+    if not np.allclose(rotation_matrix(way.rotation), np.eye(3), atol=_TURNED) or abs(apart) > near:
+        return None
+    rims = [f.rims for f in (one.field, other.field) if isinstance(f, Extrusion)]
+    if any(rim.depth for both in rims for rim in both):
+        return None
+    if not _are_same(profile, its.moved((x, y)), near):
+        return None
+    axis = rotation_matrix(one.rotation)[:, 2]
+    place = np.array(one.translation) + axis * np.copysign((more + apart) / 2, z)
+    assert isinstance(one.field, Extrusion | Cylinder | Tube)
+    field = dataclasses.replace(one.field, height=height + more + apart)
+    a, b, c = place.tolist()
+    return dataclasses.replace(one, field=field, translation=(a, b, c))
+
+
+def _are_same(one: Profile, other: Profile, near: float) -> bool:
+    """Whether the lines of each lie on those of the other, wherever their arcs are cut in two."""
+    lines = (np.concatenate(profile.polylines(near / 4)) for profile in (one, other))
+    off = (np.abs(profile_distance(p, line)).max() for p, line in zip((other, one), lines, strict=True))
+    return len(one.holes) == len(other.holes) and max(off) < near
+
+
+def _drawn(field: Field) -> tuple[Profile, float] | None:
+    """The profile that is extruded, without taper, and how far."""
+    if isinstance(field, Extrusion):
+        return (field.profile, field.height) if not field.taper else None
+    if isinstance(field, Cylinder):
+        return Profile(circle(field.radius)), field.height
+    if isinstance(field, Tube):
+        inner = circle(field.radius - field.thickness)
+        return Profile(circle(field.radius), (inner,)), field.height
+    return None
 
 
 def _rectangle(loop: Loop) -> tuple[tuple[float, float], np.ndarray, tuple[float, float]] | None:

@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from partwright.approximation.profile_parts import with_profile
+from partwright.approximation.profile_parts import stacked, with_profile
 from partwright.approximation.sketches.rims import SHARP
+from partwright.approximation.sketches.sections import FINE
 from partwright.approximation.sketches.teeth import Teeth, toothed
 from partwright.assembly import Similarity
 from partwright.fields import Extrusion, Profile
@@ -18,6 +19,7 @@ from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
 
+_NEAR = 2 * FINE  # unit lengths, by which what stands on another may be off it
 _LOSS = 1e-3  # of R: one tooth is not quite the next
 
 
@@ -48,12 +50,29 @@ def _rewritten(search: FeatureSearch, tree: FeatureTree) -> Iterator[list[Featur
         ):
             continue
         for teeth in toothed(field.profile):
+            base, tooth = _steps(search, feature, teeth)
+            if 2 * (base.sides + tooth.sides) >= len(field.profile.corners):
+                continue
+            before, after = tree.features[:i], tree.features[i + 1 :]
             if teeth.added or i == 0:  # what is cut from it would be cut from what is there before
-                base, tooth = _steps(search, feature, teeth)
-                if 2 * (base.sides + tooth.sides) >= len(field.profile.corners):
-                    continue
-                for steps in ((base, tooth), (tooth,)) if i else ((base, tooth),):  # it may stand on another
-                    yield [*tree.features[:i], *steps, *tree.features[i + 1 :]]
+                yield [*before, base, tooth, *after]
+            if teeth.added and i:  # it may stand on another
+                yield [*before, tooth, *after]
+            if not teeth.added:  # an engraved scale: gaps in the end of another
+                for j, other in enumerate(tree.features):
+                    whole = _stacked(search, other, base) if j != i else None
+                    if whole is not None:
+                        rest = {k: [one] for k, one in enumerate(tree.features)}
+                        rest |= {max(i, j): [], min(i, j): [whole]}
+                        rest[i] = [*rest[i], tooth]
+                        yield [one for k in sorted(rest) for one in rest[k]]
+
+
+def _stacked(search: FeatureSearch, one: Feature, other: Feature) -> Feature | None:
+    """Both as one feature, where both are added once and one stands on the other with the same profile."""
+    alone = all(f.added and f.image is None and not f.part.instances for f in (one, other))
+    part = stacked(one.part, other.part, _NEAR) if alone and not one.freeform else None
+    return replace(one, part=part, covers=covers(part, search.points)) if part is not None else None
 
 
 def _steps(search: FeatureSearch, feature: Feature, teeth: Teeth) -> tuple[Feature, Feature]:

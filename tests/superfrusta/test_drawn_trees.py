@@ -304,3 +304,32 @@ def test_teeth_on_a_shaft_stand_on_it() -> None:
     parts = in_unit_frame(shape, drawn).parts
     tree = FeatureTree([Feature(True, parts[0], none, 2), Feature(True, parts[1], none, 48)])
     assert kinds(with_teeth_apart(search, tree)) == [(True, "cylinder", 1), (True, "box", 12)]
+
+
+def test_an_engraved_scale_is_a_disc_with_slots() -> None:
+    """And not a disc, a lower one on it, and on that what stands between the slots."""
+    step, half = 2 * math.pi / 24, math.asin(0.4 / 18)
+    scale = Profile(
+        tuple(
+            (radius * math.cos(k * step + a), radius * math.sin(k * step + a), bulge)
+            for k in range(24)
+            for radius, a, bulge in (
+                (15, half * 18 / 15, 0),
+                (18, half, math.tan((step - 2 * half) / 4)),
+                (18, step - half, 0),
+                (15, step - half * 18 / 15, 0),
+            )
+        ),
+        (circle(3),),
+    )
+    drawn = Assembly((Part(Tube(18, 15, 7), (0, 0, 3.5)), Part(Extrusion(scale, 1), (0, 0, 7.5))))
+    shape, settings = pw.load_shape(mesh_assembly(drawn), unit="mm"), Settings.for_quality("draft")
+    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+    none = np.zeros(0, bool)
+    parts = in_unit_frame(shape, drawn).parts
+    features = [Feature(True, parts[0], none, 4), Feature(True, parts[1], none, 98)]
+    for order in (features, features[::-1]):
+        whole, slot = with_teeth_apart(search, FeatureTree(order)).features
+        assert (whole.added, whole.part.field.kind) == (True, "tube")
+        assert whole.part.field.height * 18 / 0.9 == pytest.approx(8, abs=1e-3)
+        assert (slot.added, len(slot.part.copies), slot.sides) == (False, 24, 4)
