@@ -10,7 +10,16 @@ import numpy as np
 
 from partwright.assembly import Part, Similarity
 from partwright.assembly.checks import Vector
-from partwright.assembly.instance_patterns import Circle, Grid, Pattern, Ring, Row, pattern, with_pattern
+from partwright.assembly.instance_patterns import (
+    Circle,
+    Grid,
+    Line,
+    Pattern,
+    Ring,
+    Row,
+    pattern,
+    with_pattern,
+)
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import ParameterError
 from partwright.fields import Field, Solid, Swept
@@ -69,7 +78,7 @@ def _plain_copies(part: Part, within: float) -> Part | None:
     return made if off <= _MOVED * within else None
 
 
-def _plain_pattern(found: Pattern | None, within: float) -> Ring | Circle | Grid | Row | None:
+def _plain_pattern(found: Pattern | None, within: float) -> Ring | Circle | Grid | Line | Row | None:
     if isinstance(found, Row):
         return Row(tuple(_plain_place(place, within) for place in found.places))
     if isinstance(found, Ring):
@@ -78,6 +87,9 @@ def _plain_pattern(found: Pattern | None, within: float) -> Ring | Circle | Grid
         turn, step = math.degrees(2 * within / found.diameter), 360 / found.count
         diameter, start = plain(found.diameter, within), plain(found.start, turn) % step
         return Circle(found.count, diameter, start, _plain_place(found.centre, within))
+    if isinstance(found, Line):
+        x, y, z = (plain(v, 2 * within / found.count) for v in found.step)
+        return Line(found.count, (x, y, z), _plain_place(found.place, within))
     if isinstance(found, Grid):
         # The outermost of a long row are no further off than the others.
         a, b, c = (plain(v, 2 * within / n) for n, v in zip(found.count, found.spacing, strict=True))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from partwright.assembly.instance_patterns import Circle, Grid, pattern
+from partwright.assembly.instance_patterns import Circle, Grid, Line, pattern
 from partwright.assembly.placed import placed_quadric
 from partwright.assembly.repeated_groups import children_once
 from partwright.fields import NormalForm, Profile, normal_form
@@ -64,6 +64,8 @@ def _copies(part: Part, digits: int) -> str:
     if isinstance(found, Circle):
         circle, at = _number(found.diameter, digits), _numbers(found.centre, digits)
         return f"{found.count} copies on a circle of {circle} about {at}"
+    if isinstance(found, Line):
+        return f"{found.count} copies, each {_numbers(found.step, digits)} from the last"
     if isinstance(found, Grid):
         rows = [(n, step) for n, step in zip(found.count, found.spacing, strict=True) if n > 1]
         counts = " x ".join(str(n) for n, _ in rows)

@@ -1,5 +1,6 @@
 """How the copies of a repeated part follow from the first, as a person would put it: so many around an axis,
-on a circle, in rows along the axes, at these places, or each placed and turned for itself."""
+on a circle, in rows along the axes, in a row that goes another way, at these places, or each placed and
+turned for itself."""
 
 from __future__ import annotations
 
@@ -74,6 +75,20 @@ class Grid:
 
 
 @dataclass(frozen=True)
+class Line:
+    """`count` copies turned alike in a row that goes anywhere: from the first, at `place`, on by equal steps
+    (3,)."""
+
+    count: int
+    step: Vector
+    place: Vector
+
+    def places(self, part: Part) -> np.ndarray:
+        """(count, 3) of the origins, the part's own first."""
+        return np.arange(self.count)[:, None] * np.array(self.step) + self.place
+
+
+@dataclass(frozen=True)
 class Row:
     """Copies turned alike at these places, the part's own first."""
 
@@ -87,7 +102,7 @@ class Poses:
     copies: tuple[Part, ...]
 
 
-Pattern = Ring | Circle | Grid | Row | Poses
+Pattern = Ring | Circle | Grid | Line | Row | Poses
 
 
 def pattern(part: Part, within: float = 0.0) -> Pattern | None:
@@ -104,10 +119,10 @@ def pattern(part: Part, within: float = 0.0) -> Pattern | None:
     grid, circle = _grid(places, least), _circle(part, places, least)
     if circle and grid:
         return circle if _plainer(circle, grid, within) else grid
-    return circle or grid or Row(tuple((x, y, z) for x, y, z in places.tolist()))
+    return circle or grid or _line(places, least) or Row(tuple((x, y, z) for x, y, z in places.tolist()))
 
 
-def with_pattern(part: Part, wanted: Ring | Circle | Grid | Row) -> Part:
+def with_pattern(part: Part, wanted: Ring | Circle | Grid | Line | Row) -> Part:
     """The part with its copies as a pattern has them, itself at the first place."""
     if isinstance(wanted, Ring):
         return dataclasses.replace(part, instances=ring(wanted.count, wanted.axis, wanted.centre))
@@ -149,6 +164,22 @@ def _grid(places: np.ndarray, within: float) -> Grid | None:
         return None
     a, b, c = counts
     return Grid((a, b, c), _vector(spacings), _vector(middles))
+
+
+def _line(places: np.ndarray, within: float) -> Line | None:
+    """Three places at least, in any order, from the end that the first is nearer to."""
+    count = len(places)
+    if count < 3:
+        return None
+    ways = places - places[0]
+    along = ways @ ways[np.linalg.norm(ways, axis=1).argmax()]
+    if along.max() < -along.min():
+        along = -along
+    index = np.arange(count) - (count - 1) / 2
+    middle, ordered = places.mean(axis=0), places[np.argsort(along)]
+    step = index @ (ordered - middle) / float(index @ index)
+    off = np.abs(middle + index[:, None] * step - ordered).max()
+    return Line(count, _vector(step), _vector(middle + index[0] * step)) if off <= 2 * within else None
 
 
 def _circle(part: Part, places: np.ndarray, within: float) -> Circle | None:

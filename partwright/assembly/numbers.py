@@ -6,16 +6,16 @@ import dataclasses
 from typing import Any
 
 from partwright.assembly.files import MAX_PARTS
-from partwright.assembly.instance_patterns import Circle, Grid, Ring, pattern, with_pattern
+from partwright.assembly.instance_patterns import Circle, Grid, Line, Ring, pattern, with_pattern
 from partwright.assembly.tree import Part
 from partwright.errors import ParameterError
 
-_OF_COPIES = ("count", "circle", "start", "counts", "spacing")
+_OF_COPIES = ("count", "circle", "start", "counts", "spacing", "step")
 
 
 def numbers_of(part: Part) -> dict[str, float]:
     """The part's numbers by name: those of its field ("radius", "diameter", "size.x"), of its place ("x") and
-    of the pattern of its copies ("count", "circle", "start"; "counts.x", "spacing.x")."""
+    of the pattern of its copies ("count", "circle", "start"; "counts.x", "spacing.x"; "count", "step.x")."""
     found: dict[str, float] = {}
     for entry in dataclasses.fields(part.field):  # type: ignore[arg-type]
         value = getattr(part.field, entry.name)
@@ -34,6 +34,9 @@ def _numbers_of_copies(part: Part) -> dict[str, float]:
         return {"count": found.count}
     if isinstance(found, Circle):
         return {"count": found.count, "circle": found.diameter, "start": found.start}
+    if isinstance(found, Line):
+        steps = {f"step.{axis}": step for axis, step in zip("xyz", found.step, strict=True) if step}
+        return {"count": float(found.count)} | steps
     if isinstance(found, Grid):
         rows = [k for k in range(3) if found.count[k] > 1]
         counts = {f"counts.{'xyz'[k]}": float(found.count[k]) for k in rows}

@@ -19,7 +19,7 @@ from partwright.approximation.nearest import Approximation, compared
 from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.euler_angles import own_axes_angles
-from partwright.assembly.instance_patterns import Circle, Grid, Poses, Row
+from partwright.assembly.instance_patterns import Circle, Grid, Line, Poses, Row
 from partwright.assembly.repeated_groups import parts_once
 from partwright.atomic_io import write_bytes
 from partwright.export.export_report import write_report
@@ -210,6 +210,9 @@ def _placed(part: SourcePart, names: dict[str, str]) -> str:
     first = f"bd.Location({names['place']}{turned}) * solid"
     if part.copies is None:
         return first
+    if isinstance(part.copies, Line):
+        further = f"bd.Pos(*(i * along for along in {names['step']}))"
+        return f"bd.Part() + [{further} * {first} for i in range({names['count']})]"
     turn = f"bd.Rot({part.copies.axis.upper()}=360 / {names['count']} * i)"
     if "centre" in names:
         centre = f"bd.Pos({names['centre']})"

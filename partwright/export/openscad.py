@@ -22,7 +22,7 @@ from partwright.approximation.nearest import Approximation
 from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.euler_angles import fixed_axes_angles
-from partwright.assembly.instance_patterns import Circle, Grid, Poses, Ring, Row
+from partwright.assembly.instance_patterns import Circle, Grid, Line, Poses, Ring, Row
 from partwright.assembly.repeated_groups import parts_once
 from partwright.atomic_io import write_bytes
 from partwright.errors import ParameterError
@@ -168,6 +168,9 @@ def _loop(part: SourcePart, names: dict[str, str]) -> Iterator[str]:
     turned = f" rotate({names['turn']})" if "turn" in names else ""
     if isinstance(part.copies, Row):
         yield f"for (place = {names['places']}) translate(place){turned}"
+    elif isinstance(part.copies, Line):
+        yield f"for (i = [0 : {names['count']} - 1])"
+        yield f"translate({names['place']} + i * {names['step']}){turned}"
     elif isinstance(part.copies, Grid):
         yield f"for (place = grid({names['counts']}, {names['spacing']}))"
         yield f"translate({names['middle']} + place){turned}"

@@ -14,7 +14,7 @@ import numpy as np
 from partwright.approximation.nearest import Approximation
 from partwright.approximation.recognise import SAME, exact_solid
 from partwright.assembly import Assembly, Node, Part
-from partwright.assembly.instance_patterns import Circle, Grid, Pattern, Poses, Row, pattern
+from partwright.assembly.instance_patterns import Circle, Grid, Line, Pattern, Poses, Row, pattern
 from partwright.assembly.motion import Motion
 from partwright.assembly.repeated_groups import children_once, repeats
 from partwright.assembly.similarity import rotation_matrix
@@ -41,9 +41,10 @@ MEANING = {
     "turn": "turned about x, y and z",
     "places": "where the origins of the copies lie",
     "poses": "where the origin of each copy lies, and its turn about x, y and z in degrees",
-    "count": "copies, by equal turns",
+    "count": "copies, by equal turns or steps",
     "counts": "copies along x, y and z",
     "spacing": "from one copy to the next along x, y and z",
+    "step": "from one copy to the next",
     "middle": "of the origins of the copies",
     "circle": "diameter of the circle through the origins of the copies",
     "start": "where on the circle the first is",
@@ -172,6 +173,8 @@ def _placed(
         begins: dict[str, Value] = {"start": start} if start else {}
         own = {"centre": _tidy(copies.centre), **turned, "count": copies.count, "circle": copies.diameter}
         return own | begins
+    if isinstance(copies, Line):
+        return {"place": _tidy(copies.place), **turned, "count": copies.count, "step": copies.step}
     if isinstance(copies, Grid):
         counts = tuple(map(float, copies.count))
         return {"middle": _tidy(copies.middle), **turned, "counts": counts, "spacing": copies.spacing}

@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.assembly.instance_patterns import Circle, Grid, Poses, Ring, Row, pattern, with_pattern
+from partwright.assembly.instance_patterns import Circle, Grid, Line, Poses, Ring, Row, pattern, with_pattern
+from partwright.assembly.numbers import with_number
 from partwright.assembly.similarity import rotation_matrix
 from partwright.export import export
 from partwright.fields import Box, Cylinder, HollowBox, HollowFrustum
@@ -113,6 +114,46 @@ def test_a_grid_is_found_in_any_order(counts, spacing, order) -> None:  # type: 
         assert isinstance(pattern(with_pattern(part, Row(tuple(places[1:])))), Row | Grid)
 
 
+@given(
+    st.integers(3, 12),
+    st.tuples(*[st.floats(-20, 20)] * 3).filter(lambda step: np.abs(step).max() > 0.1),
+    st.randoms(use_true_random=False),
+)
+def test_a_row_in_any_direction_is_found_in_any_order(count: int, step, order) -> None:  # type: ignore[no-untyped-def]
+    places = Line(count, step, (3, -20, 7)).places(Part(Box((1, 2, 3))))
+    rest = places[1:].tolist()
+    order.shuffle(rest)
+    found = pattern(with_pattern(Part(Box((1, 2, 3))), Row((tuple(places[0].tolist()), *map(tuple, rest)))))
+    assert isinstance(found, Line | Grid)  # where it is along one of the axes
+    if isinstance(found, Line):
+        assert found.count == count
+        assert np.allclose(found.step, step, atol=1e-7)
+        assert np.allclose(found.place, (3, -20, 7), atol=1e-7)
+        odd = with_pattern(Part(Box((1, 2, 3))), Row((*map(tuple, places.tolist()), (50, 90, -70))))
+        assert isinstance(pattern(odd), Row)
+
+
+def test_a_slanting_row_is_a_number_and_a_step(tmp_path: Path) -> None:
+    row = with_pattern(Part(Box((2, 2, 2)), name="vent"), Line(4, (5, 3, 0), (1, 0, 0)))
+    whole = Assembly((row,), unit="mm")
+    export(whole, tmp_path / "a.scad")
+    text = (tmp_path / "a.scad").read_text("ascii")
+    assert "vent_count = 4;  // copies, by equal turns or steps\n" in text
+    assert "vent_step = [5, 3, 0];  // mm: from one copy to the next\n" in text
+    assert "4 copies, each (5, 3, 0) from the last" in whole.describe()
+    more = with_number(row, "count", 6)
+    assert pattern(with_number(more, "step.y", -4)) == Line(6, (5, -4, 0), (1, 0, 0))
+    assert isinstance(pattern(with_number(more, "step.y", 0)), Grid)
+    pytest.importorskip("build123d", reason="build123d is missing: pip install build123d")
+    export(whole, tmp_path / "a.build123d.py")
+    solid = runpy.run_path(str(tmp_path / "a.build123d.py"))["assembly"]
+    assert np.abs(whole.distance(np.array([tuple(v) for v in solid.vertices()]))).max() < 1e-5
+    assert solid.volume == pytest.approx(4 * 8)
+    mesh = rendered(tmp_path / "a.scad")
+    assert np.abs(whole.distance(mesh.vertices)).max() < 1e-5
+    assert mesh.volume == pytest.approx(4 * 8)
+
+
 def test_of_a_square_the_plainer_number_says_what_it_is() -> None:
     """Four holes of a motor are 31 apart, those of a flange are on a circle of 31."""
     hole = Part(Cylinder(1, 2))
@@ -128,13 +169,13 @@ def test_openscad_builds_the_loops(tmp_path: Path) -> None:
     assert "// drill, 4 times: cylinder\n" in text
     assert "drill_counts = [2, 2, 1];  // copies along x, y and z\n" in text
     assert "drill_spacing = [80, 60, 0];  // mm: from one copy" in text
-    assert "bolt_count = 5;  // copies, by equal turns\n" in text
+    assert "bolt_count = 5;  // copies, by equal turns or steps\n" in text
     assert "bolt_circle = 60;  // mm: diameter of the circle" in text
     assert "bolt_start = 50;  // degrees: where on the circle the first is\n" in text
     assert "pin_places = [[-40, 0, 0], [-35, 9, 0]];  // mm: where" in text
     assert "for (place = pin_places) translate(place)\n" in text
     assert "cage_thickness = 1;  // mm: thickness of the wall\n" in text
-    assert "key_count = 5;  // copies, by equal turns\n" in text
+    assert "key_count = 5;  // copies, by equal turns or steps\n" in text
     mesh = rendered(tmp_path / "a.scad")
     assert mesh.is_watertight
     assert np.abs(machine().distance(mesh.vertices)).max() < 2e-3  # facets
