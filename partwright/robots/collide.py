@@ -15,7 +15,9 @@ import numpy as np
 from partwright.approximation.convex_fit import Mode
 from partwright.atomic_io import replacing_files
 from partwright.errors import RobotError, SettingError
+from partwright.meshing.manifolds import simplified
 from partwright.robots.containment import shape_solid, sticking_out
+from partwright.robots.keeping_apart import EnclosedLink, keep_apart
 from partwright.robots.model import Link, RobotFile, Shape
 from partwright.robots.opening import open_robot
 from partwright.robots.overlaps import Pair, overlaps, too_near
@@ -37,6 +39,7 @@ _EXTRA = 0.08  # of its volume: what the hulls of a link may add
 _WORTH = 0.7  # two chords for one save three quarters
 _FINER = 1  # times a link's tolerance is halved where it overlaps a neighbour more than its mesh did
 _MORE_OVERLAP = 1e-3  # of the smaller link's volume
+_COARSE = 0.002  # of a link's size: how far that is off which its neighbours are to keep out of
 _MOST_SPHERES = 1000
 Told = Callable[[str], None]
 
@@ -178,21 +181,26 @@ def collide(
     }
     shapes: dict[str, list[Shape]] = {}
     todo = {link.name for link in links}
+    near: list[Pair] = []
     for turn in range(1 + _FINER):
         for link in links:
             if link.name in todo:
-                shapes[link.name] = _shaped(link, wanted[link.name], wishes[link.name])
+                beside = _beside(link, links, near, wanted) if options.enclose else None
+                shapes[link.name] = _shaped(link, wanted[link.name], wishes[link.name], beside)
                 told(f"{link.name}: {counted(len(shapes[link.name]), 'shape')}")
         unions = {link.name: _union(shapes[link.name]) for link in links}
         pairs_after = overlaps(_bodies(colliding, unions))
+        if options.enclose:
+            more = [pair for pair, shared in pairs_after.items() if shared > pairs_before.get(pair, 0.0)]
+            shapes |= _kept_apart(links, shapes, wanted, more)
+            unions = {link.name: _union(shapes[link.name]) for link in links}
+            pairs_after = overlaps(_bodies(colliding, unions))
         near = too_near(pairs_before, pairs_after, volumes, _MORE_OVERLAP)
         neighbours = {frozenset((link.name, above)) for link in links for above in link.parents}
         todo = {name for pair in near if frozenset(pair) in neighbours for name in pair if name in shapes}
-        if options.enclose:  # nothing is left to be finer by
-            todo = {name for name in todo if len(shapes[name]) < options.max_parts}
         if not todo or turn == _FINER:
             break
-        for name in todo:
+        for name in () if options.enclose else todo:
             finer = dataclasses.replace(
                 wishes[name], tolerance=wishes[name].tolerance / 2, extra=wishes[name].extra / 2
             )
@@ -258,9 +266,44 @@ def kinds_of(robot: RobotFile, names: Sequence[str]) -> tuple[tuple[type[Field],
     return tuple(kind for name, kind in known.items() if name in names), HULL in names
 
 
-def _shaped(link: Link, target: Target, wishes: Wishes) -> list[Shape]:
+def _kept_apart(
+    links: Sequence[Link],
+    shapes: Mapping[str, Sequence[Shape]],
+    wanted: Mapping[str, Target],
+    pairs: Sequence[Pair],
+) -> dict[str, list[Shape]]:
+    """Shapes of the links of these pairs, held apart where they can be."""
+    bodies = {
+        link.name: EnclosedLink(
+            shapes[link.name], wanted[link.name].vertices[wanted[link.name].faces], link.pose
+        )
+        for link in links
+        if any(link.name in pair for pair in pairs)
+    }
+    for first, second in pairs:
+        if first in bodies and second in bodies:  # not of links that have native solids alone
+            keep_apart(bodies[first], bodies[second])
+    return {name: body.result() for name, body in bodies.items()}
+
+
+def _beside(
+    link: Link, links: Sequence[Link], near: Sequence[Pair], wanted: Mapping[str, Target]
+) -> Manifold | None:
+    """The links that overlap this one more than their meshes do, in its frame; None for none."""
+    from manifold3d import Manifold, OpType
+
+    names = {name for pair in near if link.name in pair for name in pair} - {link.name}
+    others = [one for one in links if one.name in names]
+    if not others:
+        return None
+    seen = [(one, wanted[one.name]) for one in others]
+    coarse = [_in_world(one, simplified(target.solid, _COARSE * target.size)) for one, target in seen]
+    return Manifold.batch_boolean(coarse, OpType.Add).transform(np.linalg.inv(link.pose)[:3])
+
+
+def _shaped(link: Link, target: Target, wishes: Wishes, beside: Manifold | None) -> list[Shape]:
     stem = "".join(c if c.isascii() and (c.isalnum() or c in "_-.") else "_" for c in link.name)
-    shapes = shapes_for(f"{stem}_collision", target, wishes)
+    shapes = shapes_for(f"{stem}_collision", target, wishes, beside)
     if not shapes:
         raise RobotError(f"link {link.name!r}: no shape lies inside of its mesh; it is too thin")
     return shapes

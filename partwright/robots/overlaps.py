@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 Pair = tuple[str, str]
-_LEAST = 1e-6  # of the smaller one's volume: less is touching
+_LEAST = 1e-5  # of the smaller one's volume: less is touching, as enclosing shapes are larger by rounding
 
 
 def overlaps(solids: Mapping[str, Manifold]) -> dict[Pair, float]:

@@ -48,6 +48,7 @@ _GRIDS = 2  # steps of the grid that files' hulls are moved to, likewise
 _POINTS = 50_000  # of the triangles, for the hulls of wrapped pieces
 _LEAST = 1e-3  # of a wrapped piece's volume: a hull of points below it is a sheet
 _FILLS = 2e-3  # of the link's volume: what each shape more within it has to gain
+_SPECK = 1e-6  # of the link's volume: what is smaller of a neighbour nothing keeps out of
 _CHOICE, _MOST_CHOICE = 4, 24  # pieces for each shape that may be within it, and in all, to choose from
 
 
@@ -69,15 +70,18 @@ class Wishes:
     worth: float | None = None
 
 
-def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
-    """The shapes, named NAME_1, NAME_2 ..., or NAME for one."""
+def shapes_for(name: str, target: Target, wishes: Wishes, beside: Manifold | None = None) -> list[Shape]:
+    """The shapes, named NAME_1, NAME_2 ..., or NAME for one.
+
+    beside: what enclosing shapes are to keep out of where the link does, in the link's frame.
+    """
     if wishes.mode != "around" and (convex := _convex(target, wishes)) is not None:
         return [dataclasses.replace(convex, name=name)]
     if wishes.mode == "within":
         chosen = _inside(target, wishes)
     else:
         solid = simplified(target.wrap if wishes.mode == "around" else target.solid, wishes.tolerance)
-        pieces = _pieces(solid, wishes)
+        pieces = _pieces(solid, wishes, _reachable(beside, solid) if beside is not None else ())
         if wishes.mode == "around":
             hulls = _enclosing(pieces, target, wishes)
         else:
@@ -87,8 +91,15 @@ def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
     return [Shape(each, shape.part, shape.mesh) for each, shape in zip(names, chosen, strict=True)]
 
 
-def _pieces(solid: Manifold, wishes: Wishes) -> list[Piece]:
-    pieces = convex_cover(solid, Limits(wishes.tolerance, wishes.extra, wishes.most, wishes.worth))
+def _reachable(beside: Manifold, solid: Manifold) -> tuple[Manifold, ...]:
+    """Bodies of what the hull of a solid, and so that of any piece of it, has of another one."""
+    bodies = ((beside ^ hull_of(surface_of(solid)[0])) - solid).decompose()
+    return tuple(body for body in bodies if body.volume() > _SPECK * solid.volume())
+
+
+def _pieces(solid: Manifold, wishes: Wishes, beside: tuple[Manifold, ...] = ()) -> list[Piece]:
+    limits = Limits(wishes.tolerance, wishes.extra, wishes.most, wishes.worth)
+    pieces = convex_cover(solid, limits, beside)
     return pieces if wishes.hulls else _fit_for_natives(pieces, wishes)
 
 
