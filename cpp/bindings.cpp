@@ -111,6 +111,24 @@ NB_MODULE(_kernel, m) {
   }, "rows"_a, "points"_a, "threads"_a,
      "Signed distances (M, N) of each part alone.");
 
+  m.def("covered", [](In<float> rows, In<float> points, int threads) {
+    auto out = array<bool>({rows.shape(0), points.shape(0)});
+    const auto parts = parts_of(rows);
+    nb::gil_scoped_release release;
+    covered(parts, points.data(), int64_t(points.shape(0)), reinterpret_cast<uint8_t*>(out.data()), threads);
+    return out;
+  }, "rows"_a, "points"_a, "threads"_a,
+     "Whether each part alone covers each point (M, N).");
+
+  m.def("occupancy_sums", [](In<uint8_t> occupied, In<uint8_t> inside, In<float> weight, int64_t split, int threads) {
+    auto out = array<double>({occupied.shape(0), size_t(2), size_t(2)});
+    nb::gil_scoped_release release;
+    occupancy_sums(occupied.data(), int64_t(occupied.shape(0)), inside.data(), weight.data(), int64_t(weight.shape(0)),
+                   split, out.data(), threads);
+    return out;
+  }, "occupied"_a, "inside"_a, "weight"_a, "split"_a, "threads"_a,
+     "Weighted intersection and union of occupancies (K, N) with one (N,), before and from `split` on: (K, 2, 2).");
+
   m.def("gradients", [](In<float> rows, In<float> points, In<float> upstream, int threads) {
     auto out = array<double>({rows.shape(0), size_t(DERIVATIVES)});
     const auto parts = parts_of(rows);
@@ -130,8 +148,9 @@ NB_MODULE(_kernel, m) {
       nb::gil_scoped_release release;
       const auto parts = parts_of(rows);
       const Samples samples = samples_of(points, distance, weight, background);
-      system = normal_equations(parts, flags(live), samples, beta, {overlap, blending}, threads,
-                                part_distances(parts, samples, threads));
+      PartDistances distances(parts.size(), samples);
+      measure(parts, samples, beta, threads, distances);
+      system = normal_equations(parts, flags(live), samples, beta, {overlap, blending}, threads, distances);
     }
     std::copy(system.gradient.begin(), system.gradient.end(), gradient.data());
     for (const auto& [pair, block] : system.blocks)
@@ -150,7 +169,7 @@ NB_MODULE(_kernel, m) {
     nb::gil_scoped_release release;
     const auto parts = parts_of(rows);
     const Samples samples = samples_of(points, distance, weight, background);
-    PartDistances distances(parts.size(), samples.count);
+    PartDistances distances(parts.size(), samples);
     return loss(parts, std::vector<char>(parts.size(), 1), samples, beta, {overlap, blending}, threads, distances);
   }, "rows"_a, "points"_a, "distance"_a, "weight"_a, "background"_a, "beta"_a, "overlap"_a, "blending"_a,
      "threads"_a,

@@ -52,6 +52,28 @@ int load(const float* points, int64_t first, int64_t count, Block& block) {
   return n;
 }
 
+PW_CLONES Ball around(const Block& block) {
+  const float* axes[3] = {block.x, block.y, block.z};
+  float middle[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const float* v = axes[axis];
+    float low[16], high[16];
+    for (int lane = 0; lane < 16; ++lane) low[lane] = high[lane] = v[lane];
+    for (int i = 16; i < BLOCK; i += 16)
+      for (int lane = 0; lane < 16; ++lane) {
+        low[lane] = std::min(low[lane], v[i + lane]);
+        high[lane] = std::max(high[lane], v[i + lane]);
+      }
+    middle[axis] = (*std::min_element(low, low + 16) + *std::max_element(high, high + 16)) / 2;
+  }
+  float squares[BLOCK];
+  for (int i = 0; i < BLOCK; ++i) {
+    const float x = block.x[i] - middle[0], y = block.y[i] - middle[1], z = block.z[i] - middle[2];
+    squares[i] = x * x + y * y + z * z;
+  }
+  return {middle[0], middle[1], middle[2], std::sqrt(largest(squares))};
+}
+
 PW_CLONES void values(const Part& p, const Block& b, float* __restrict out) {
   if (p.bent && p.hollow) {
     for (int i = 0; i < BLOCK; ++i) out[i] = value<true, true>(p, b.x[i], b.y[i], b.z[i]);
@@ -100,14 +122,19 @@ PW_CLONES float largest(const float* v) {
 }
 
 void fold_all(const std::vector<Part>& parts, const float* background, const float* g, Workspace& w) {
-  if (background) std::memcpy(w.field, background, sizeof w.field);
-  for (size_t m = 0; m < parts.size(); ++m) {
-    if (m == 0 && !background) {
-      begin(w.field, g, parts[m]);
-      std::fill_n(w.weight.data(), BLOCK, parts[m].sign > 0 ? 0.f : 1.f);
+  bool empty = !background;
+  if (background)
+    std::memcpy(w.field, background, sizeof w.field);
+  else if (w.folded.empty())
+    std::fill_n(w.field, BLOCK, FAR);
+  for (const size_t m : w.folded) {
+    if (empty) {
+      begin(w.field, g + m * BLOCK, parts[m]);
+      std::fill_n(&w.weight[m * BLOCK], BLOCK, parts[m].sign > 0 ? 0.f : 1.f);
     } else {
-      fold(w.field, g + m * BLOCK, parts[m], w.weight.data() + m * BLOCK);
+      fold(w.field, g + m * BLOCK, parts[m], &w.weight[m * BLOCK]);
     }
+    empty = false;
   }
 }
 
@@ -117,13 +144,18 @@ void forward(const std::vector<Part>& parts, Workspace& w) {
 }
 
 void backward(const std::vector<Part>& parts, Workspace& w) {
-  for (size_t m = parts.size(); m-- > 0;)
-    unfold(w.carried, &w.weight[m * BLOCK], parts[m].sign, &w.share[m * BLOCK], &w.blend[m * BLOCK]);
+  for (auto m = w.folded.rbegin(); m != w.folded.rend(); ++m)
+    unfold(w.carried, &w.weight[*m * BLOCK], parts[*m].sign, &w.share[*m * BLOCK], &w.blend[*m * BLOCK]);
 }
 
-std::pair<int64_t, int64_t> piece_range(int64_t count, int64_t piece) {
-  const int64_t blocks = (count + BLOCK - 1) / BLOCK;
-  return {blocks * piece / PIECES, blocks * (piece + 1) / PIECES};
+int64_t piece_count(int64_t points) {
+  const int64_t blocks = (points + BLOCK - 1) / BLOCK;
+  return std::clamp<int64_t>(blocks / LEAST_BLOCKS, 1, MOST_PIECES);
+}
+
+std::pair<int64_t, int64_t> piece_range(int64_t points, int64_t piece) {
+  const int64_t blocks = (points + BLOCK - 1) / BLOCK, pieces = piece_count(points);
+  return {blocks * piece / pieces, blocks * (piece + 1) / pieces};
 }
 
 }  // namespace partwright

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -18,8 +19,10 @@ namespace partwright {
 
 // Points are handled in blocks that stay in the first-level cache.
 constexpr int BLOCK = 128;
-// Sums run over this many fixed pieces whatever the number of threads, so that they always round alike.
-constexpr int PIECES = 16;
+// Sums run over pieces that only depend on the number of points, so that they round alike whatever the number of
+// threads. A piece costs its own buffers and sums, so that few points are few pieces.
+constexpr int MOST_PIECES = 16;
+constexpr int LEAST_BLOCKS = 8;  // of a piece, where there is more than one
 
 // The fold of no parts: farther than any point, and small enough for sums to stay finite.
 constexpr float FAR = 1e6f;
@@ -30,6 +33,18 @@ struct Block {
 
 // Missing points of the last block repeat the first one; callers ignore or zero-weight them.
 int load(const float* points, int64_t first, int64_t count, Block& block);
+
+// A ball that holds the points of a block.
+struct Ball {
+  float x, y, z, radius;
+};
+
+Ball around(const Block& block);
+
+// Whether some value of a part over the points in the ball may be below `bound`.
+inline bool reaches(const Part& part, const Ball& ball, float bound) {
+  return least_value(part, ball.x, ball.y, ball.z, ball.radius) < bound;
+}
 
 // Of one part over a block: its signed distance, and (DERIVATIVES, BLOCK) with its derivatives, of which only the
 // first `count` points are wanted.
@@ -48,24 +63,31 @@ void occupancy(const float* field, float beta, float* out);
 // The largest magnitude.
 float largest(const float* v);
 
-// Buffers of one thread for an assembly of M parts.
+// Buffers of one thread for an assembly of M parts; `folded` are those that count, all unless some are left out.
 struct Workspace {
-  explicit Workspace(size_t m) : g(m * BLOCK), weight(m * BLOCK), share(m * BLOCK), blend(m * BLOCK), occ(m * BLOCK) {}
+  explicit Workspace(size_t m)
+      : g(m * BLOCK), weight(m * BLOCK), share(m * BLOCK), blend(m * BLOCK), occ(m * BLOCK), folded(m) {
+    std::iota(folded.begin(), folded.end(), size_t(0));
+  }
   std::vector<float> g, weight, share, blend, occ;
+  std::vector<size_t> folded;
   Block block;
   alignas(64) float field[BLOCK], total[BLOCK], carried[BLOCK], assembled[BLOCK], weights[BLOCK];
 };
 
-// Fold of all parts over one block, from their distances g (M, BLOCK), keeping each part's fold weight.
+// Fold of the parts that count over one block, from the distances g (M, BLOCK) of all, keeping each one's fold
+// weight.
 void fold_all(const std::vector<Part>& parts, const float* background, const float* g, Workspace& w);
 
 // The same from the points of the block, keeping each part's value, too.
 void forward(const std::vector<Part>& parts, Workspace& w);
 
-// dF/dg and dF/dk of every part from the fold weights; `carried` starts as the upstream derivative.
+// dF/dg and dF/dk of every part that counts from the fold weights; `carried` starts as the upstream derivative.
 void backward(const std::vector<Part>& parts, Workspace& w);
 
-// Blocks first .. last of one of the fixed pieces.
-std::pair<int64_t, int64_t> piece_range(int64_t count, int64_t piece);
+int64_t piece_count(int64_t points);
+
+// Blocks first .. last of one of the pieces of so many points.
+std::pair<int64_t, int64_t> piece_range(int64_t points, int64_t piece);
 
 }  // namespace partwright

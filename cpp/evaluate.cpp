@@ -9,6 +9,8 @@
 namespace partwright {
 namespace {
 
+constexpr int64_t ENOUGH_FOR_THREADS = 1 << 20;  // bytes: less is summed before a thread is up
+
 PW_CLONES void scale_rows(const float* __restrict d, const float* __restrict by, int rows, int length, float* __restrict out) {
   for (int r = 0; r < rows; ++r)
     for (int i = 0; i < BLOCK; ++i) out[r * length + i] = d[r * BLOCK + i] * by[i];
@@ -20,6 +22,43 @@ PW_CLONES void count(const float* __restrict field, const float* __restrict insi
     const float in = field[i] < 0 ? 1.f : 0.f;
     both[i] = weight[i] * in * inside[i];
     either[i] = weight[i] * std::max(in, inside[i]);
+  }
+}
+
+PW_CLONES float highest(const float* v) {
+  float top[16];
+  for (int lane = 0; lane < 16; ++lane) top[lane] = v[lane];
+  for (int i = 16; i < BLOCK; i += 16)
+    for (int lane = 0; lane < 16; ++lane) top[lane] = std::max(top[lane], v[i + lane]);
+  return *std::max_element(top, top + 16);
+}
+
+PW_CLONES float lowest(const float* v) {
+  float least[16];
+  for (int lane = 0; lane < 16; ++lane) least[lane] = v[lane];
+  for (int i = 16; i < BLOCK; i += 16)
+    for (int lane = 0; lane < 16; ++lane) least[lane] = std::min(least[lane], v[i + lane]);
+  return *std::min_element(least, least + 16);
+}
+
+PW_CLONES void block_sums(const uint8_t* __restrict occupied, const uint8_t* __restrict inside, const float* __restrict weight, int n,
+                          double& both, double& either) {
+  constexpr int LANES = 16;
+  float in[LANES] = {}, any[LANES] = {};
+  int i = 0;
+  for (; i + LANES <= n; i += LANES)
+    for (int lane = 0; lane < LANES; ++lane) {
+      const float w = weight[i + lane];
+      in[lane] += occupied[i + lane] & inside[i + lane] ? w : 0.f;
+      any[lane] += occupied[i + lane] | inside[i + lane] ? w : 0.f;
+    }
+  for (; i < n; ++i) {
+    in[0] += occupied[i] & inside[i] ? weight[i] : 0.f;
+    any[0] += occupied[i] | inside[i] ? weight[i] : 0.f;
+  }
+  for (int lane = 0; lane < LANES; ++lane) {
+    both += in[lane];
+    either += any[lane];
   }
 }
 
@@ -38,12 +77,16 @@ void evaluate(const std::vector<Part>& parts, const float* points, int64_t count
     alignas(64) float field[BLOCK], g[BLOCK], weight[BLOCK];
     for (int64_t b = item * batch; b < std::min(blocks, (item + 1) * batch); ++b) {
       const int n = load(points, b * BLOCK, count, block);
+      const Ball ball = around(block);
       for (size_t m = 0; m < parts.size(); ++m) {
-        values(parts[m], block, g);
+        const Part& part = parts[m];
+        // From its blend on above the fold so far, or above the complement of it, a part leaves that as it is.
+        if (m && !reaches(part, ball, part.blend + (part.sign > 0 ? highest(field) : -lowest(field)))) continue;
+        values(part, block, g);
         if (m)
-          fold(field, g, parts[m], weight);
+          fold(field, g, part, weight);
         else
-          begin(field, g, parts[m]);
+          begin(field, g, part);
       }
       std::memcpy(out + b * BLOCK, field, size_t(n) * sizeof(float));
     }
@@ -65,11 +108,48 @@ void evaluate_parts(const std::vector<Part>& parts, const float* points, int64_t
   });
 }
 
+void covered(const std::vector<Part>& parts, const float* points, int64_t count, uint8_t* out, int threads) {
+  const int64_t blocks = (count + BLOCK - 1) / BLOCK, batch = 16;
+  parallel_for((blocks + batch - 1) / batch, threads, [&](int64_t item) {
+    Block block;
+    alignas(64) float g[BLOCK];
+    for (int64_t b = item * batch; b < std::min(blocks, (item + 1) * batch); ++b) {
+      const int n = load(points, b * BLOCK, count, block);
+      const Ball ball = around(block);
+      for (size_t m = 0; m < parts.size(); ++m) {
+        uint8_t* row = out + int64_t(m) * count + b * BLOCK;
+        if (!reaches(parts[m], ball, 0)) {
+          std::fill_n(row, n, uint8_t(0));
+          continue;
+        }
+        values(parts[m], block, g);
+        for (int i = 0; i < n; ++i) row[i] = g[i] < 0;
+      }
+    }
+  });
+}
+
+void occupancy_sums(const uint8_t* occupied, int64_t rows, const uint8_t* inside, const float* weight, int64_t count,
+                    int64_t split, double* out, int threads) {
+  if (rows * count < ENOUGH_FOR_THREADS) threads = 1;
+  const int64_t ends[3] = {0, split, count};
+  parallel_for(2 * rows, threads, [&](int64_t item) {
+    const uint8_t* mine = occupied + item / 2 * count;
+    const int64_t last = ends[item % 2 + 1];
+    double both = 0, either = 0;
+    for (int64_t at = ends[item % 2]; at < last; at += BLOCK)
+      block_sums(mine + at, inside + at, weight + at, int(std::min<int64_t>(BLOCK, last - at)), both, either);
+    out[2 * item] = both;
+    out[2 * item + 1] = either;
+  });
+}
+
 void gradients(const std::vector<Part>& parts, const float* points, const float* upstream, int64_t count, double* out,
                int threads) {
   const size_t size = parts.size() * DERIVATIVES;
-  std::vector<double> sums(PIECES * size, 0.0);
-  parallel_for(PIECES, threads, [&](int64_t piece) {
+  const int64_t pieces = piece_count(count);
+  std::vector<double> sums(size_t(pieces) * size, 0.0);
+  parallel_for(pieces, threads, [&](int64_t piece) {
     Workspace w(parts.size());
     std::vector<float> d(DERIVATIVES * BLOCK), scaled(DERIVATIVES * BLOCK);
     alignas(64) float ones[BLOCK];
@@ -92,16 +172,17 @@ void gradients(const std::vector<Part>& parts, const float* points, const float*
   });
   for (size_t i = 0; i < size; ++i) {
     out[i] = 0;
-    for (int piece = 0; piece < PIECES; ++piece) out[i] += sums[size_t(piece) * size + i];
+    for (int64_t piece = 0; piece < pieces; ++piece) out[i] += sums[size_t(piece) * size + i];
   }
 }
 
 void removal_counts(const std::vector<Part>& parts, const float* points, const uint8_t* inside, const float* weight,
                     int64_t total, double* out, int threads) {
   const size_t m = parts.size(), size = 2 * (m + 1);
-  std::vector<double> sums(PIECES * size, 0.0);
+  const int64_t pieces = piece_count(total);
+  std::vector<double> sums(size_t(pieces) * size, 0.0);
   const bool carved = std::any_of(parts.begin(), parts.end(), [](const Part& p) { return p.sign < 0; });
-  parallel_for(PIECES, threads, [&](int64_t piece) {
+  parallel_for(pieces, threads, [&](int64_t piece) {
     Workspace w(m);
     // Near the wall of a hole the field is that of the hole, and yet a part that holds the point matters.
     const auto matters = [&](size_t i) {
@@ -146,7 +227,7 @@ void removal_counts(const std::vector<Part>& parts, const float* points, const u
   });
   for (size_t i = 0; i < size; ++i) {
     out[i] = 0;
-    for (int piece = 0; piece < PIECES; ++piece) out[i] += sums[size_t(piece) * size + i];
+    for (int64_t piece = 0; piece < pieces; ++piece) out[i] += sums[size_t(piece) * size + i];
   }
 }
 

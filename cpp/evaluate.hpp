@@ -15,6 +15,14 @@ void evaluate(const std::vector<Part>& parts, const float* points, int64_t count
 // Signed distances of each part alone: (M, N).
 void evaluate_parts(const std::vector<Part>& parts, const float* points, int64_t count, float* out, int threads);
 
+// Which points each part alone covers: (M, N), 1 where its distance is below 0.
+void covered(const std::vector<Part>& parts, const float* points, int64_t count, uint8_t* out, int threads);
+
+// Weighted intersection and union of each of K occupancies (K, N) with `inside`: (K, 2, 2), first over the points
+// before `split`, then over the others.
+void occupancy_sums(const uint8_t* occupied, int64_t rows, const uint8_t* inside, const float* weight, int64_t count,
+                    int64_t split, double* out, int threads);
+
 // d(sum upstream * F)/d(parameters): (M, DERIVATIVES).
 void gradients(const std::vector<Part>& parts, const float* points, const float* upstream, int64_t count,
                double* out, int threads);

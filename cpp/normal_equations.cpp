@@ -49,7 +49,8 @@ PW_CLONES void add(float* __restrict total, const float* __restrict v) {
   for (int i = 0; i < BLOCK; ++i) total[i] += v[i];
 }
 
-// Residuals of the block of samples at which the parts' distances g (M, BLOCK) are; padding gets weight 0.
+// Residuals of the block of samples at which the distances g (M, BLOCK) of the parts that count are; padding gets
+// weight 0.
 double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t first, float beta, Penalties penalties,
                     const float* g, Workspace& w, Residuals& r) {
   alignas(64) float background[BLOCK], distance[BLOCK], target[BLOCK];
@@ -68,7 +69,7 @@ double sample_block(const std::vector<Part>& parts, const Samples& s, int64_t fi
       occupancy(background, beta, w.total);
     else
       std::fill_n(w.total, BLOCK, 0.f);
-    for (size_t m = 0; m < parts.size(); ++m) {
+    for (const size_t m : w.folded) {
       if (parts[m].sign < 0) continue;
       occupancy(g + m * BLOCK, beta, &w.occ[m * BLOCK]);
       add(w.total, &w.occ[m * BLOCK]);
@@ -133,23 +134,56 @@ PW_CLONES void keep_larger(float* __restrict size, const float* __restrict v) {
 
 }  // namespace
 
-PartDistances part_distances(const std::vector<Part>& parts, const Samples& samples, int threads) {
-  PartDistances out(parts.size(), samples.count);
-  parallel_for(PIECES, threads, [&](int64_t piece) {
+PartDistances::PartDistances(size_t parts, const Samples& samples) : parts_(parts) {
+  const auto blocks = size_t((samples.count + BLOCK - 1) / BLOCK);
+  values_.resize(blocks * parts * BLOCK);
+  felt_.resize(blocks * parts);
+  balls_.resize(blocks);
+  if (parts == 1) return;  // it is felt everywhere
+  Block block;
+  for (size_t b = 0; b < blocks; ++b) {
+    load(samples.points, int64_t(b) * BLOCK, samples.count, block);
+    balls_[b] = around(block);
+  }
+}
+
+void PartDistances::felt(int64_t b, std::vector<size_t>& parts) const {
+  parts.clear();
+  for (size_t m = 0; m < parts_; ++m)
+    if (felt_[size_t(b) * parts_ + m]) parts.push_back(m);
+}
+
+namespace {
+
+// From where on a part covers nothing that a float could tell from none: its occupancy is below exp(-SILENT), and
+// no blend reaches so far.
+constexpr float SILENT = 12;
+float unfelt_from(const Part& part, float beta) { return SILENT / beta + part.blend; }
+
+// The distances of a part in a block, if it is felt there; a single part always is.
+void update(const std::vector<Part>& parts, size_t m, float beta, const Block& block, int64_t b, PartDistances& distances) {
+  const bool felt = parts.size() == 1 || reaches(parts[m], distances.ball(b), unfelt_from(parts[m], beta));
+  distances.felt(b, m) = felt;
+  if (felt) values(parts[m], block, distances.block(b) + m * BLOCK);
+}
+
+}  // namespace
+
+void measure(const std::vector<Part>& parts, const Samples& samples, float beta, int threads, PartDistances& distances) {
+  parallel_for(piece_count(samples.count), threads, [&](int64_t piece) {
     Block block;
     const auto [first, last] = piece_range(samples.count, piece);
     for (int64_t b = first; b < last; ++b) {
       load(samples.points, b * BLOCK, samples.count, block);
-      for (size_t m = 0; m < parts.size(); ++m) values(parts[m], block, out.block(b) + m * BLOCK);
+      for (size_t m = 0; m < parts.size(); ++m) update(parts, m, beta, block, b, distances);
     }
   });
-  return out;
 }
 
 NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples,
                                  float beta, Penalties penalties, int threads, const PartDistances& distances) {
-  std::vector<NormalEquations> pieces(PIECES);
-  parallel_for(PIECES, threads, [&](int64_t piece) {
+  std::vector<NormalEquations> pieces(size_t(piece_count(samples.count)));
+  parallel_for(int64_t(pieces.size()), threads, [&](int64_t piece) {
     NormalEquations& sum = pieces[size_t(piece)];
     sum.gradient.assign(parts.size() * DERIVATIVES, 0.0);
     Workspace w(parts.size());
@@ -160,6 +194,7 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
     std::vector<int> active;
     const auto [first, last] = piece_range(samples.count, piece);
     for (int64_t b = first; b < last; ++b) {
+      distances.felt(b, w.folded);
       sum.loss += sample_block(parts, samples, b * BLOCK, beta, penalties, distances.block(b), w, r);
       std::fill_n(w.carried, BLOCK, 1.f);
       backward(parts, w);
@@ -174,7 +209,7 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
       alignas(64) float size[KINDS][BLOCK] = {}, any[BLOCK] = {};
       active.clear();
       coefficients.clear();
-      for (size_t m = 0; m < parts.size(); ++m) {
+      for (const size_t m : w.folded) {
         if (!live[m]) continue;
         coefficients.resize((active.size() + 1) * KINDS * BLOCK);
         float* c = &coefficients[active.size() * KINDS * BLOCK];
@@ -236,8 +271,8 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
     }
   });
   NormalEquations total = std::move(pieces[0]);
-  for (int piece = 1; piece < PIECES; ++piece) {
-    const NormalEquations& part = pieces[size_t(piece)];
+  for (size_t piece = 1; piece < pieces.size(); ++piece) {
+    const NormalEquations& part = pieces[piece];
     total.loss += part.loss;
     for (size_t i = 0; i < total.gradient.size(); ++i) total.gradient[i] += part.gradient[i];
     for (const auto& [key, block] : part.blocks) {
@@ -253,17 +288,17 @@ NormalEquations normal_equations(const std::vector<Part>& parts, const std::vect
 
 double loss(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples, float beta,
             Penalties penalties, int threads, PartDistances& distances) {
-  double sums[PIECES] = {};
-  parallel_for(PIECES, threads, [&](int64_t piece) {
+  double sums[MOST_PIECES] = {};
+  parallel_for(piece_count(samples.count), threads, [&](int64_t piece) {
     Workspace w(parts.size());
     Residuals r;
     const auto [first, last] = piece_range(samples.count, piece);
     for (int64_t b = first; b < last; ++b) {
-      float* g = distances.block(b);
       load(samples.points, b * BLOCK, samples.count, w.block);
       for (size_t m = 0; m < parts.size(); ++m)
-        if (live[m]) values(parts[m], w.block, g + m * BLOCK);
-      sums[piece] += sample_block(parts, samples, b * BLOCK, beta, penalties, g, w, r);
+        if (live[m]) update(parts, m, beta, w.block, b, distances);
+      distances.felt(b, w.folded);
+      sums[piece] += sample_block(parts, samples, b * BLOCK, beta, penalties, distances.block(b), w, r);
     }
   });
   double total = 0;

@@ -36,19 +36,27 @@ struct NormalEquations {
 };
 
 // Distances of each part alone at all samples, by blocks. The search for a step asks for the same ones again and
-// again, and those of parts that stay never change.
+// again, and those of parts that stay never change. Where a part is too far from all of a block to be felt there
+// at this sharpness, it has none: most parts are far from most blocks.
 class PartDistances {
  public:
-  PartDistances(size_t parts, int64_t count) : row_(parts * BLOCK), values_(size_t((count + BLOCK - 1) / BLOCK) * row_) {}
-  float* block(int64_t b) { return values_.data() + size_t(b) * row_; }
-  const float* block(int64_t b) const { return values_.data() + size_t(b) * row_; }
+  PartDistances(size_t parts, const Samples& samples);
+  const Ball& ball(int64_t b) const { return balls_[size_t(b)]; }
+  float* block(int64_t b) { return values_.data() + size_t(b) * parts_ * BLOCK; }
+  const float* block(int64_t b) const { return values_.data() + size_t(b) * parts_ * BLOCK; }
+  char& felt(int64_t b, size_t part) { return felt_[size_t(b) * parts_ + part]; }
+  // The parts with distances in a block, in their order.
+  void felt(int64_t b, std::vector<size_t>& parts) const;
 
  private:
-  size_t row_;
+  size_t parts_;
   std::vector<float> values_;
+  std::vector<char> felt_;
+  std::vector<Ball> balls_;
 };
 
-PartDistances part_distances(const std::vector<Part>& parts, const Samples& samples, int threads);
+// Brings the distances of all parts up to date, for calls at the sharpness `beta`.
+void measure(const std::vector<Part>& parts, const Samples& samples, float beta, int threads, PartDistances& distances);
 
 // `live[i]` says whether part i moves; blocks and gradients of the others are not formed.
 NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples,

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "compact_samples.hpp"
 #include "parallel.hpp"
 
 namespace partwright {
@@ -173,11 +174,9 @@ void tie(NormalEquations& system, const std::vector<char>& tied) {
   }
 }
 
-}  // namespace
-
-Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied,
-                            const Samples& samples, const std::vector<Stage>& stages, Penalties penalties,
-                            const Limits& limits, int threads) {
+Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied,
+                  const Samples& samples, const std::vector<Stage>& stages, Penalties penalties, const Limits& limits,
+                  int threads) {
   const int parts = int(rows.size() / COLUMNS);
   std::vector<char> live(size_t(parts), 0);
   for (int i = 0; i < parts; ++i)
@@ -185,9 +184,11 @@ Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& fr
   Outcome out{std::move(rows), 0, 0};
   std::vector<char> moving(size_t(parts) * DERIVATIVES);
   std::vector<double> step;
-  PartDistances distances = part_distances(prepared(out.rows), samples, threads), tried = distances;
+  PartDistances distances(size_t(parts), samples), tried(distances);
   for (const Stage& stage : stages) {
     double damping = 1e-2;
+    measure(prepared(out.rows), samples, stage.beta, threads, distances);
+    tried = distances;
     NormalEquations system = normal_equations(prepared(out.rows), live, samples, stage.beta, penalties, threads, distances);
     tie(system, tied);
     for (int iteration = 0; iteration < stage.iterations; ++iteration) {
@@ -230,6 +231,18 @@ Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& fr
     out.loss = system.loss;
   }
   return out;
+}
+
+}  // namespace
+
+Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied,
+                            const Samples& samples, const std::vector<Stage>& stages, Penalties penalties,
+                            const Limits& limits, int threads) {
+  if (rows.size() > COLUMNS) {
+    const CompactSamples compact(samples);
+    return minimised(std::move(rows), free, tied, compact.samples(), stages, penalties, limits, threads);
+  }
+  return minimised(std::move(rows), free, tied, samples, stages, penalties, limits, threads);
 }
 
 std::vector<Outcome> fit_starts(const std::vector<float>& starts, const std::vector<int64_t>& first,

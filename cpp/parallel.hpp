@@ -11,8 +11,10 @@
 namespace partwright {
 
 inline int thread_count(int requested) {
-  const int hardware = std::max(1, int(std::thread::hardware_concurrency()));
-  return requested > 0 ? requested : hardware;
+  if (requested > 0) return requested;
+  // Asked once: the answer is read from a file, which takes as long as many a loop.
+  static const int hardware = std::max(1, int(std::thread::hardware_concurrency()));
+  return hardware;
 }
 
 // Calls work(item) for every item, each on one thread, in no particular order.

@@ -53,6 +53,7 @@ struct Part {
   float e, inner_top, inner_bottom;
   float outer_inverse, inner_inverse, outer_length_inverse, inner_length_inverse, inner_run;
   float share_x, share_y;  // dm/dsx and dm/dsy
+  float low[3], high[3];   // corners of a box that holds the part, in its frame, but for the dilation
   float blend, sign;
   bool bent, hollow;
 };
@@ -97,6 +98,14 @@ inline Part prepare(const float* row) {
   const double run = (t - 1) * m, inner_run = m * o * (t - 1);
   const double outer2 = run * run + sz * sz, inner2 = inner_run * inner_run + sz * sz;
   p.inner_run = float(inner_run);
+  // A bend's ends stay where they are, but for their turn; its middle goes towards -x.
+  const double wider = std::max(double(p.e), 0.0), x_most = sx / 2 + wider, y_most = sy / 2 + wider;
+  const double aside = p.bent ? h * std::tan(theta / 2) : 0, along = p.bent ? h + x_most * s : h;
+  const double low[3] = {-x_most - aside, -y_most, -along}, high[3] = {x_most, y_most, along};
+  for (int i = 0; i < 3; ++i) {
+    p.low[i] = float(low[i]);
+    p.high[i] = float(high[i]);
+  }
   p.outer_inverse = float(1 / std::max(outer2, 1e-30));
   p.inner_inverse = float(1 / std::max(inner2, 1e-30));
   p.outer_length_inverse = float(1 / std::sqrt(std::max(outer2, 1e-30)));
@@ -193,6 +202,20 @@ PW_INLINE float value(const Part& p, float px, float py, float pz) {
     z = std::copysign(1.f, z) * (arc ? arc_z : line_z);
   }
   return profile<HOLLOW>(p, cross_section(p, x, y), z) - p.dilation;
+}
+
+// A bound from below on the values at points no further than `reach` from a place. Unbent, they fall by no more
+// than the way; bent, they are no less than the distance from the box.
+inline float least_value(const Part& p, float px, float py, float pz, float reach) {
+  if (!p.bent) return (p.hollow ? value<false, true>(p, px, py, pz) : value<false, false>(p, px, py, pz)) - reach;
+  float local[3], square = 0;
+  to_local(p, px, py, pz, local[0], local[1], local[2]);
+  for (int i = 0; i < 3; ++i) {
+    const float beyond = std::max(std::max(p.low[i] - local[i], local[i] - p.high[i]), 0.f);
+    square += beyond * beyond;
+  }
+  const float outside = std::sqrt(square) - p.dilation - reach;
+  return outside > 0 ? outside : -std::numeric_limits<float>::infinity();
 }
 
 // The derivatives come in three steps, each a loop of its own over a block of points: one loop with all of it has

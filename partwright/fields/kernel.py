@@ -57,6 +57,31 @@ def evaluate_parts(parameters: ArrayLike, points: ArrayLike, threads: int = 0) -
     return _kernel.evaluate_parts(_rows(parameters), _points(points), threads)
 
 
+def covered(parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> NDArray[np.bool_]:
+    """Whether each part alone covers each point (M, N): where its distance is below 0."""
+    return _kernel.covered(_rows(parameters), _points(points), threads)
+
+
+def occupancy_sums(
+    occupied: NDArray[np.bool_],
+    inside: NDArray[np.bool_],
+    weight: ArrayLike,
+    split: int,
+    threads: int = 0,
+) -> NDArray[np.float64]:
+    """Weighted intersection and union of occupancies (K, N) with `inside` (N,).
+
+    Returns (K, 2, 2): those over the points before `split`, then over the others.
+    """
+    weights = np.ascontiguousarray(weight, np.float32)
+    if occupied.ndim != 2 or not occupied.shape[1:] == inside.shape == weights.shape:
+        raise ValueError(f"shapes {occupied.shape}, {inside.shape}, {weights.shape} do not go together")
+    if not 0 <= split <= len(weights):
+        raise ValueError(f"split: expected 0 to {len(weights)}, got {split}")
+    covered, true = (np.ascontiguousarray(one, dtype=bool).view(np.uint8) for one in (occupied, inside))
+    return _kernel.occupancy_sums(covered, true, weights, split, threads)
+
+
 def gradients(
     parameters: ArrayLike, points: ArrayLike, upstream: ArrayLike, threads: int = 0
 ) -> NDArray[np.float64]:

@@ -23,6 +23,8 @@ class Kernel(Protocol):
         self, parameters: ArrayLike, points: ArrayLike, threads: int = 0
     ) -> NDArray[np.float32]: ...
 
+    def covered(self, parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> NDArray[np.bool_]: ...
+
     def normal_equations(
         self,
         parameters: ArrayLike,

@@ -150,7 +150,7 @@ def _view(samples: FitSamples, region: Region) -> View:
     weight[wrong & missed & ~region.voxels[samples.voxel[index]]] *= region.elsewhere
     if region.under:
         cuts = region.others[region.others[:, Column.SIGN] < 0]
-        weight[(samples.parts_of(cuts, samples.points[index]) < 0).any(axis=0)] = 0
+        weight[samples.covered_by(cuts, samples.points[index]).any(axis=0)] = 0
     if region.hull is not None:
         within = (samples.points[index] @ region.hull[:, :3].T + region.hull[:, 3] < 0).all(axis=1)
         weight[within & ~samples.inside[index]] *= _CARVABLE_WEIGHT
@@ -256,9 +256,9 @@ def _select(samples: FitSamples, candidates: Rows, rows: Rows, price: float, mos
 
     What is added may join before the parts that are subtracted, or after them.
     """
-    occupied = samples.parts_of(candidates, samples.points) < 0
+    occupied = samples.covered_by(candidates, samples.points)
     added, cuts = candidates[:, Column.SIGN] > 0, rows[rows[:, Column.SIGN] < 0]
-    carved = (samples.parts_of(cuts, samples.points) < 0).any(axis=0) if len(cuts) else None
+    carved = samples.covered_by(cuts, samples.points).any(axis=0) if len(cuts) else None
     covered = samples.field(rows) < 0
     chosen: list[tuple[bool, int]] = []
     current = float(occupancy_score(samples, covered))

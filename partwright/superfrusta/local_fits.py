@@ -142,7 +142,7 @@ class LocalFit:
         one = fit_regions(samples, [region], self.settings)
         rows = np.concatenate([self.rows, one])
         rows = self._refined(samples, rows, [len(rows) - 1])
-        filled = samples.parts_of(rows[-1:], samples.grid_points[missing])[0] < 0
+        filled = samples.covered_by(rows[-1:], samples.grid_points[missing])[0]
         if filled.mean() < _FILLED:
             raise SettingError("what is missing in the box is too thin, or too much in pieces, for one part")
         (part,) = self._parts(rows[-1:], None)
@@ -242,6 +242,6 @@ def _partitions(
     axes = np.linalg.eigh(local.T @ local)[1]
     ways = [along < np.median(along) for along in (local @ axes).T]
     ways.append(kmeans2(local, 2, seed=0, minit="++")[1] == 0)
-    ways.append(samples.parts_of(row[None], samples.grid_points[mine])[0] < 0)
+    ways.append(samples.covered_by(row[None], samples.grid_points[mine])[0])
     enough = [way for way in ways if _SMALLEST_SHARE < way.mean() < 1 - _SMALLEST_SHARE]
     return enough or ways[:1]

@@ -137,7 +137,7 @@ class _Forms:
         samples, there = self.samples, self.rows[[other]]
         points = samples.points[samples.parts_of(there, samples.points)[0] < _NEAR]
         images = np.stack([image(self.rows[base], way) for way in ways])
-        covered = samples.parts_of(np.concatenate([there, images]), points) < 0
+        covered = samples.covered_by(np.concatenate([there, images]), points)
         both, either = (covered[1:] & covered[0]).sum(axis=1), (covered[1:] | covered[0]).sum(axis=1)
         iou = both / np.maximum(either, 1)
         best, least = None, self.tolerance

@@ -108,8 +108,8 @@ def mergers(
         for pair in pairs
     ]
     merged = fit_regions(samples, regions, settings, settings.overlap)
-    occupied = samples.parts_of(rows, samples.points) < 0
-    single = samples.parts_of(merged, samples.points) < 0
+    occupied = samples.covered_by(rows, samples.points)
+    single = samples.covered_by(merged, samples.points)
     added = rows[:, Column.SIGN] > 0
     trials = [
         folded(_replaced(occupied, *pair, one), np.delete(added, pair[1]))
@@ -152,7 +152,7 @@ def owners(samples: FitSamples, rows: Rows) -> NDArray[np.int64]:
         voxels = np.flatnonzero(~inside)
         # With its blends the union of what is added covers no less than its parts do.
         voxels = voxels[samples.distance_of(rows[added], samples.grid_points[voxels]) < 0]
-        covered = (samples.parts_of(rows[added], samples.grid_points[voxels]) < 0).any(axis=0)
+        covered = samples.covered_by(rows[added], samples.grid_points[voxels]).any(axis=0)
         voxels = voxels[covered]
         owner[voxels] = _nearest(samples, rows, np.flatnonzero(~added), samples.grid_points[voxels])
     return owner

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.fields import kernel
 from partwright.superfrusta.samples import FitSamples, Rows
 
 _MISSED = 5.0  # in units of R per unit length
@@ -17,12 +18,10 @@ def occupancy_score(samples: FitSamples, occupied: NDArray[np.bool_]) -> NDArray
     its weight 1 + sigmoid(curvature), and over the uniform samples in and around the bounding box. The
     paper's R is the first alone; the second keeps deep, smooth volume from being given away.
     """
-    weight, near = samples.weight.astype(np.float64), samples.near
-    both = (occupied & samples.inside) * weight
-    either = (occupied | samples.inside) * weight
-    surface = both[..., :near].sum(-1) / np.maximum(either[..., :near].sum(-1), 1e-9)
-    volume = both[..., near:].sum(-1) / np.maximum(either[..., near:].sum(-1), 1e-9)
-    return np.asarray(0.5 * (surface + volume), dtype=np.float64)
+    flat = occupied.reshape(-1, occupied.shape[-1])
+    sums = kernel.occupancy_sums(flat, samples.inside, samples.weight, samples.near, samples.threads)
+    ious = sums[..., 0] / np.maximum(sums[..., 1], 1e-9)
+    return ious.mean(axis=1).reshape(occupied.shape[:-1])
 
 
 def score(samples: FitSamples, rows: Rows) -> float:

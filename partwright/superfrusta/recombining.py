@@ -86,7 +86,7 @@ def exchanges(
     samples: FitSamples, rows: Rows, other: Rows, settings: Settings, locked: int
 ) -> list[Exchange]:
     """Those that may pay, best first."""
-    mine, theirs = (samples.parts_of(each, samples.points) < 0 for each in (rows, other))
+    mine, theirs = (samples.covered_by(each, samples.points) for each in (rows, other))
     added = np.concatenate([rows[:, Column.SIGN], other[:, Column.SIGN]]) > 0
     occupied = np.concatenate([mine, theirs])
     whole = float(occupancy_score(samples, folded(mine, added[: len(rows)])))

@@ -72,13 +72,13 @@ class Occupancies:
     @classmethod
     def of(cls, samples: FitSamples, rows: Rows) -> Occupancies:
         points = samples.points[::_EVERY]
-        parts = samples.parts_of(rows, points) < 0
+        parts = samples.covered_by(rows, points)
         covered = parts.any(axis=0)
         return cls(samples, rows, points[covered], parts[:, covered])
 
     def candidates(self, group: Sequence[Isometry], bases: Iterable[int], locked: int) -> Iterator[Repeat]:
         """Repeats under the isometries of a group, of each of the bases by itself and with others."""
-        images = np.stack([self.samples.parts_of(_images(self.rows, one), self.points) < 0 for one in group])
+        images = np.stack([self.samples.covered_by(_images(self.rows, one), self.points) for one in group])
         meeting = _meeting(self.rows, self.parts, images)
         for base in bases:
             for one in (

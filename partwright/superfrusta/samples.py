@@ -137,7 +137,7 @@ class FitSamples:
 
     def stray_weight(self, rows: Rows) -> NDArray[np.float64]:
         """Weight (M,) of the probes that each part alone covers, as they would have it as samples."""
-        hits = (self.parts_of(rows, self.probes) < 0).sum(axis=1)
+        hits = np.count_nonzero(self.covered_by(rows, self.probes), axis=1)
         return np.asarray(hits * self._probe_weight, dtype=np.float64)
 
     @property
@@ -241,6 +241,10 @@ class FitSamples:
         """Distance (M, N) of each part alone."""
         return self.kernel.evaluate_parts(rows, points, self.threads)
 
+    def covered_by(self, rows: Rows, points: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Whether each part alone covers each point (M, N)."""
+        return self.kernel.covered(rows, points, self.threads)
+
 
 def padding(grid: DistanceGrid, uniform: int, seed: int) -> tuple[NDArray[np.float32], float]:
     """Points (G, 3) around the box that the uniform samples fill, and the weight of each.
@@ -267,7 +271,8 @@ def _probes(grid: DistanceGrid) -> NDArray[np.float32]:
     points = (cell * (corner + within) - _HALF_SIDE).astype(np.float32)
     voxel = _voxel_of(grid, points)
     values, nearest = grid.values.ravel()[voxel], grid.points()[voxel].astype(np.float32)
-    return points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]
+    points = points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]
+    return points[morton_order(points)]
 
 
 def _voxel_of(grid: DistanceGrid, points: NDArray[np.float32]) -> NDArray[np.int64]:

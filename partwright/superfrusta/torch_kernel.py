@@ -69,6 +69,10 @@ class TorchKernel:
         rows = self._tensor(_rows(parameters))[None]
         return _numpy(torch.cat([g[0] for g in self._distances(rows, points)], 1))
 
+    def covered(self, parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> NDArray[np.bool_]:
+        """Whether each part alone covers each point (M, N): where its distance is below 0."""
+        return np.asarray(self.evaluate_parts(parameters, points) < 0)
+
     @torch.no_grad()
     def removal_counts(
         self,
