@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "superfrustum.hpp"
+#include "reach.hpp"
 
 // One binary carries code for several instruction sets; the loader picks at start.
 #if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__)
@@ -35,16 +35,7 @@ struct Block {
 int load(const float* points, int64_t first, int64_t count, Block& block);
 
 // A ball that holds the points of a block.
-struct Ball {
-  float x, y, z, radius;
-};
-
 Ball around(const Block& block);
-
-// Whether some value of a part over the points in the ball may be below `bound`.
-inline bool reaches(const Part& part, const Ball& ball, float bound) {
-  return least_value(part, ball.x, ball.y, ball.z, ball.radius) < bound;
-}
 
 // Of one part over a block: its signed distance, and (DERIVATIVES, BLOCK) with its derivatives, of which only the
 // first `count` points are wanted.

@@ -204,20 +204,6 @@ PW_INLINE float value(const Part& p, float px, float py, float pz) {
   return profile<HOLLOW>(p, cross_section(p, x, y), z) - p.dilation;
 }
 
-// A bound from below on the values at points no further than `reach` from a place. Unbent, they fall by no more
-// than the way; bent, they are no less than the distance from the box.
-inline float least_value(const Part& p, float px, float py, float pz, float reach) {
-  if (!p.bent) return (p.hollow ? value<false, true>(p, px, py, pz) : value<false, false>(p, px, py, pz)) - reach;
-  float local[3], square = 0;
-  to_local(p, px, py, pz, local[0], local[1], local[2]);
-  for (int i = 0; i < 3; ++i) {
-    const float beyond = std::max(std::max(p.low[i] - local[i], local[i] - p.high[i]), 0.f);
-    square += beyond * beyond;
-  }
-  const float outside = std::sqrt(square) - p.dilation - reach;
-  return outside > 0 ? outside : -std::numeric_limits<float>::infinity();
-}
-
 // The derivatives come in three steps, each a loop of its own over a block of points: one loop with all of it has
 // more control flow than compilers turn into selects. Steps hand over through rows of a scratch array in which
 // neighbouring points are STRIDE-1 and rows are `stride` apart.
