@@ -55,17 +55,7 @@ int load(const float* points, int64_t first, int64_t count, Block& block) {
 PW_CLONES Ball around(const Block& block) {
   const float* axes[3] = {block.x, block.y, block.z};
   float middle[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    const float* v = axes[axis];
-    float low[16], high[16];
-    for (int lane = 0; lane < 16; ++lane) low[lane] = high[lane] = v[lane];
-    for (int i = 16; i < BLOCK; i += 16)
-      for (int lane = 0; lane < 16; ++lane) {
-        low[lane] = std::min(low[lane], v[i + lane]);
-        high[lane] = std::max(high[lane], v[i + lane]);
-      }
-    middle[axis] = (*std::min_element(low, low + 16) + *std::max_element(high, high + 16)) / 2;
-  }
+  for (int axis = 0; axis < 3; ++axis) middle[axis] = (lowest(axes[axis]) + highest(axes[axis])) / 2;
   float squares[BLOCK];
   for (int i = 0; i < BLOCK; ++i) {
     const float x = block.x[i] - middle[0], y = block.y[i] - middle[1], z = block.z[i] - middle[2];
@@ -119,6 +109,22 @@ PW_CLONES float largest(const float* v) {
   for (int i = 0; i < BLOCK; i += 16)
     for (int lane = 0; lane < 16; ++lane) top[lane] = std::max(top[lane], std::fabs(v[i + lane]));
   return *std::max_element(top, top + 16);
+}
+
+PW_CLONES float highest(const float* v) {
+  float top[16];
+  for (int lane = 0; lane < 16; ++lane) top[lane] = v[lane];
+  for (int i = 16; i < BLOCK; i += 16)
+    for (int lane = 0; lane < 16; ++lane) top[lane] = std::max(top[lane], v[i + lane]);
+  return *std::max_element(top, top + 16);
+}
+
+PW_CLONES float lowest(const float* v) {
+  float least[16];
+  for (int lane = 0; lane < 16; ++lane) least[lane] = v[lane];
+  for (int i = 16; i < BLOCK; i += 16)
+    for (int lane = 0; lane < 16; ++lane) least[lane] = std::min(least[lane], v[i + lane]);
+  return *std::min_element(least, least + 16);
 }
 
 void fold_all(const std::vector<Part>& parts, const float* background, const float* g, Workspace& w) {

@@ -51,8 +51,10 @@ void fold(float* field, const float* g, const Part& part, float* weight);
 // 1 / (1 + exp(beta field)).
 void occupancy(const float* field, float beta, float* out);
 
-// The largest magnitude.
+// The largest magnitude, and the highest and lowest values.
 float largest(const float* v);
+float highest(const float* v);
+float lowest(const float* v);
 
 // Buffers of one thread for an assembly of M parts; `folded` are those that count, all unless some are left out.
 struct Workspace {

@@ -25,22 +25,6 @@ PW_CLONES void count(const float* __restrict field, const float* __restrict insi
   }
 }
 
-PW_CLONES float highest(const float* v) {
-  float top[16];
-  for (int lane = 0; lane < 16; ++lane) top[lane] = v[lane];
-  for (int i = 16; i < BLOCK; i += 16)
-    for (int lane = 0; lane < 16; ++lane) top[lane] = std::max(top[lane], v[i + lane]);
-  return *std::max_element(top, top + 16);
-}
-
-PW_CLONES float lowest(const float* v) {
-  float least[16];
-  for (int lane = 0; lane < 16; ++lane) least[lane] = v[lane];
-  for (int i = 16; i < BLOCK; i += 16)
-    for (int lane = 0; lane < 16; ++lane) least[lane] = std::min(least[lane], v[i + lane]);
-  return *std::min_element(least, least + 16);
-}
-
 PW_CLONES void block_sums(const uint8_t* __restrict occupied, const uint8_t* __restrict inside, const float* __restrict weight, int n,
                           double& both, double& either) {
   constexpr int LANES = 16;

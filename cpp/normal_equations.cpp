@@ -155,8 +155,8 @@ void PartDistances::felt(int64_t b, std::vector<size_t>& parts) const {
 
 namespace {
 
-// From where on a part covers nothing that a float could tell from none: its occupancy is below exp(-SILENT), and
-// no blend reaches so far.
+// From where on a part is not felt: its occupancy is below exp(-SILENT), six millionths, and no blend reaches so
+// far.
 constexpr float SILENT = 12;
 float unfelt_from(const Part& part, float beta) { return SILENT / beta + part.blend; }
 

@@ -94,18 +94,20 @@ def refine(
     moving = np.ones(len(rows), bool) if moving is None else moving
     if not moving.any():
         return rows
-    thinned = target is None and len(stages) > 1
+    coarse_first = target is None and len(stages) > 1
     target = samples.target(samples.optimised_indices) if target is None else target
     if not moving.all():
         target = _about(samples, rows[moving], target)
     free, tied = freedom(rows, moving, settings), ties(rows, settings)
     sharper = sharpened(stages, samples.thickness)
-    coarse = _every(target, max(1, len(target.points) // _COARSE)) if thinned else target
-    for which, on in ((sharper[:1], coarse), (sharper[1:], target)):
+    runs = [(sharper, target)]
+    if coarse_first:
+        runs = [(sharper[:1], _every(target, max(1, len(target.points) // _COARSE))), (sharper[1:], target)]
+    for some, seen in runs:
         rows, _, _ = samples.kernel.levenberg_marquardt(
             rows,
-            on,
-            which,
+            seen,
+            some,
             LIMITS,
             free=free,
             tied=tied,
