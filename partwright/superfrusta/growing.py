@@ -25,7 +25,7 @@ _LEAST_VOLUME = 2e-4  # of the shape
 _LARGEST = 2  # connected pieces of the residual that are also seeded whole
 _PRICE_DIVISOR = 3  # of a part's price while growing: the thinning finds what is worth the whole
 _MOST_SAMPLES = 3000  # samples that one part is fitted to
-_SCREENED_SAMPLES = 400  # about so many of them tell the best starts as well as a thousand
+_SCREEN_EVERY = 3  # screening uses every third of them
 _SCREENED_STARTS = 4  # starts that survive screening
 _CARVABLE_WEIGHT = 0.1  # weight of too much where it can be carved away again
 _SCREEN = ((15.0, 5),)
@@ -185,14 +185,14 @@ def finalists(
         np.concatenate(guesses),
         owner,
         views,
-        _SCREENED_SAMPLES,
+        _SCREEN_EVERY,
         sharpened(_SCREEN, depth),
         overlap,
         settings,
     )
     kept = np.concatenate([_best(losses, owner, i, _SCREENED_STARTS) for i in range(len(wanted))])
     fitted, losses = _run(
-        samples, screened[kept], owner[kept], views, _MOST_SAMPLES, sharpened(_FIT, depth), overlap, settings
+        samples, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings
     )
     # A thin part that shoots out of the shape passes between the few samples out there.
     astray = samples.stray_weight(fitted) * (fitted[:, Column.SIGN] > 0)
@@ -223,21 +223,20 @@ def _run(
     rows: Rows,
     owner: NDArray[np.int64],
     views: list[View],
-    most: int,
+    every: int,
     stages: NDArray[np.float32],
     overlap: float,
     settings: Settings,
 ) -> tuple[Rows, NDArray[np.float64]]:
-    """Single-part fits of all rows, each to about `most` samples of the view that `owner` names."""
-    every = [slice(None, None, max(1, len(view.index) // most)) for view in views]
-    index = np.concatenate([view.index[some] for view, some in zip(views, every, strict=True)])
-    counts = np.array([len(view.index[some]) for view, some in zip(views, every, strict=True)])
+    """Single-part fits of all rows, each to every n-th sample of the view that `owner` names."""
+    index = np.concatenate([view.index[::every] for view in views])
+    counts = np.array([len(view.index[::every]) for view in views])
     ends = np.cumsum(counts)
     target = kernel.Target(
         samples.points[index],
         samples.distance[index],
-        np.concatenate([view.weight[some] for view, some in zip(views, every, strict=True)]),
-        np.concatenate([view.background[some] for view, some in zip(views, every, strict=True)]),
+        np.concatenate([view.weight[::every] for view in views]),
+        np.concatenate([view.background[::every] for view in views]),
     )
     return samples.kernel.fit_starts(
         rows,
