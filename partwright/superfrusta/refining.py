@@ -23,9 +23,6 @@ POLISH = ((40.0, 6), (100.0, 12), (200.0, 10))
 
 _FELT = 0.15  # unit lengths from a part within which its samples lie
 _FAR_EVERY = 8
-_COARSE = (
-    6000  # about so many samples are enough for the first stage: what those after it end with is as good
-)
 
 Stages = tuple[tuple[float, int], ...]
 
@@ -94,34 +91,20 @@ def refine(
     moving = np.ones(len(rows), bool) if moving is None else moving
     if not moving.any():
         return rows
-    coarse_first = target is None and len(stages) > 1
     target = samples.target(samples.optimised_indices) if target is None else target
     if not moving.all():
         target = _about(samples, rows[moving], target)
-    free, tied = freedom(rows, moving, settings), ties(rows, settings)
-    sharper = sharpened(stages, samples.thickness)
-    runs = [(sharper, target)]
-    if coarse_first:
-        runs = [(sharper[:1], _every(target, max(1, len(target.points) // _COARSE))), (sharper[1:], target)]
-    for some, seen in runs:
-        rows, _, _ = samples.kernel.levenberg_marquardt(
-            rows,
-            seen,
-            some,
-            LIMITS,
-            free=free,
-            tied=tied,
-            penalties=penalties(settings),
-            threads=samples.threads,
-        )
-    return rows
-
-
-def _every(target: kernel.Target, step: int) -> kernel.Target:
-    weight = target.weight[::step]
-    return kernel.Target(
-        target.points[::step], target.distance[::step], weight / max(float(weight.sum()), 1e-9)
+    refined, _, _ = samples.kernel.levenberg_marquardt(
+        rows,
+        target,
+        sharpened(stages, samples.thickness),
+        LIMITS,
+        free=freedom(rows, moving, settings),
+        tied=ties(rows, settings),
+        penalties=penalties(settings),
+        threads=samples.threads,
     )
+    return refined
 
 
 def _about(samples: FitSamples, moving: Rows, target: kernel.Target) -> kernel.Target:

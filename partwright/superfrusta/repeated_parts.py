@@ -25,7 +25,6 @@ _UNREFITTED_OFF = 0.03  # unit lengths: so much more than before a part may be o
 _GRID_EVERY = 3
 _HOPELESS = 0.004  # of the value: what is so much worse after a brief refit gets no longer one
 _FURTHER = 0.0045  # unit lengths, a quarter percent of the longest side: likewise, after it
-_NEAR_ENOUGH = 0.04  # unit lengths off, 2 % of the longest side: nearer is no reason against repeats
 _LOOSER = (
     2.0  # times the median distance from the surface to the assembly, which what is missing hardly moves
 )
@@ -55,15 +54,13 @@ def repeat(
 
     Repeats are taken that are worth the most: the parts that they save, less what they cost of R. The copies
     of each leaf are refitted as one. Together they may not lower the objective, nor leave a part further off
-    than 2 % of the longest side and, by over a quarter percent, than any was; where they do, they are given
-    up one by one.
+    than any was, by over a quarter percent of the longest side; where they do, they are given up one by one.
     An IoU that the settings ask for is kept. The first `locked` rows stay leaves of their own.
     """
     whole = _measured(samples, _leaves(rows, []), settings)
-    furthest = max(whole.off + _FURTHER, _NEAR_ENOUGH)
 
     def good(trial: _Trial) -> bool:
-        if trial.off > furthest or trial.value < whole.value:
+        if trial.off > whole.off + _FURTHER or trial.value < whole.value:
             return False
         if settings.min_iou is None:
             return True
@@ -80,7 +77,7 @@ def repeat(
             for stages in _REFITS:
                 leaves = refit(samples, trials[0].leaves, stages, settings, locked)
                 trials.append(_measured(samples, leaves, settings))
-                nearer = trials[-1].off <= furthest + _FURTHER
+                nearer = trials[-1].off <= whole.off + 2 * _FURTHER
                 if not nearer or trials[-1].value < whole.value - _HOPELESS:
                     break
             better = [trial for trial in trials if good(trial)]
