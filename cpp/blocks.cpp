@@ -39,6 +39,18 @@ PW_INLINE float exponential(float v) {
   return p * scale;
 }
 
+// One of a block's values, lane by lane and then of the lanes.
+template <typename Pick>
+PW_INLINE float reduced(const float* v, Pick pick) {
+  float best[16];
+  for (int lane = 0; lane < 16; ++lane) best[lane] = v[lane];
+  for (int i = 16; i < BLOCK; i += 16)
+    for (int lane = 0; lane < 16; ++lane) best[lane] = pick(best[lane], v[i + lane]);
+  float result = best[0];
+  for (int lane = 1; lane < 16; ++lane) result = pick(result, best[lane]);
+  return result;
+}
+
 }  // namespace
 
 int load(const float* points, int64_t first, int64_t count, Block& block) {
@@ -112,19 +124,11 @@ PW_CLONES float largest(const float* v) {
 }
 
 PW_CLONES float highest(const float* v) {
-  float top[16];
-  for (int lane = 0; lane < 16; ++lane) top[lane] = v[lane];
-  for (int i = 16; i < BLOCK; i += 16)
-    for (int lane = 0; lane < 16; ++lane) top[lane] = std::max(top[lane], v[i + lane]);
-  return *std::max_element(top, top + 16);
+  return reduced(v, [](float a, float b) { return std::max(a, b); });
 }
 
 PW_CLONES float lowest(const float* v) {
-  float least[16];
-  for (int lane = 0; lane < 16; ++lane) least[lane] = v[lane];
-  for (int i = 16; i < BLOCK; i += 16)
-    for (int lane = 0; lane < 16; ++lane) least[lane] = std::min(least[lane], v[i + lane]);
-  return *std::min_element(least, least + 16);
+  return reduced(v, [](float a, float b) { return std::min(a, b); });
 }
 
 void fold_all(const std::vector<Part>& parts, const float* background, const float* g, Workspace& w) {

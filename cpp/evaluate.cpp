@@ -46,6 +46,19 @@ PW_CLONES void block_sums(const uint8_t* __restrict occupied, const uint8_t* __r
   }
 }
 
+// Calls work(block, first, n) for all points, each time with the next n of them, some blocks a thread at once.
+template <typename Work>
+void over_blocks(const float* points, int64_t count, int threads, Work work) {
+  const int64_t blocks = (count + BLOCK - 1) / BLOCK, batch = 16;
+  parallel_for((blocks + batch - 1) / batch, threads, [&](int64_t item) {
+    Block block;
+    for (int64_t b = item * batch; b < std::min(blocks, (item + 1) * batch); ++b) {
+      const int n = load(points, b * BLOCK, count, block);
+      work(block, b * BLOCK, n);
+    }
+  });
+}
+
 double sum(const float* v) {
   double total = 0;
   for (int i = 0; i < BLOCK; ++i) total += v[i];
@@ -55,60 +68,45 @@ double sum(const float* v) {
 }  // namespace
 
 void evaluate(const std::vector<Part>& parts, const float* points, int64_t count, float* out, int threads) {
-  const int64_t blocks = (count + BLOCK - 1) / BLOCK, batch = 16;
-  parallel_for((blocks + batch - 1) / batch, threads, [&](int64_t item) {
-    Block block;
+  over_blocks(points, count, threads, [&](const Block& block, int64_t first, int n) {
     alignas(64) float field[BLOCK], g[BLOCK], weight[BLOCK];
-    for (int64_t b = item * batch; b < std::min(blocks, (item + 1) * batch); ++b) {
-      const int n = load(points, b * BLOCK, count, block);
-      const Ball ball = around(block);
-      for (size_t m = 0; m < parts.size(); ++m) {
-        const Part& part = parts[m];
-        // From its blend on above the fold so far, or above the complement of it, a part leaves that as it is.
-        if (m && !reaches(part, ball, part.blend + (part.sign > 0 ? highest(field) : -lowest(field)))) continue;
-        values(part, block, g);
-        if (m)
-          fold(field, g, part, weight);
-        else
-          begin(field, g, part);
-      }
-      std::memcpy(out + b * BLOCK, field, size_t(n) * sizeof(float));
+    const Ball ball = around(block);
+    for (size_t m = 0; m < parts.size(); ++m) {
+      const Part& part = parts[m];
+      // From its blend on above the fold so far, or above the complement of it, a part leaves that as it is.
+      if (m && !reaches(part, ball, part.blend + (part.sign > 0 ? highest(field) : -lowest(field)))) continue;
+      values(part, block, g);
+      if (m)
+        fold(field, g, part, weight);
+      else
+        begin(field, g, part);
     }
+    std::memcpy(out + first, field, size_t(n) * sizeof(float));
   });
 }
 
 void evaluate_parts(const std::vector<Part>& parts, const float* points, int64_t count, float* out, int threads) {
-  const int64_t blocks = (count + BLOCK - 1) / BLOCK, batch = 16;
-  parallel_for((blocks + batch - 1) / batch, threads, [&](int64_t item) {
-    Block block;
+  over_blocks(points, count, threads, [&](const Block& block, int64_t first, int n) {
     alignas(64) float g[BLOCK];
-    for (int64_t b = item * batch; b < std::min(blocks, (item + 1) * batch); ++b) {
-      const int n = load(points, b * BLOCK, count, block);
-      for (size_t m = 0; m < parts.size(); ++m) {
-        values(parts[m], block, g);
-        std::memcpy(out + int64_t(m) * count + b * BLOCK, g, size_t(n) * sizeof(float));
-      }
+    for (size_t m = 0; m < parts.size(); ++m) {
+      values(parts[m], block, g);
+      std::memcpy(out + int64_t(m) * count + first, g, size_t(n) * sizeof(float));
     }
   });
 }
 
 void covered(const std::vector<Part>& parts, const float* points, int64_t count, uint8_t* out, int threads) {
-  const int64_t blocks = (count + BLOCK - 1) / BLOCK, batch = 16;
-  parallel_for((blocks + batch - 1) / batch, threads, [&](int64_t item) {
-    Block block;
+  over_blocks(points, count, threads, [&](const Block& block, int64_t first, int n) {
     alignas(64) float g[BLOCK];
-    for (int64_t b = item * batch; b < std::min(blocks, (item + 1) * batch); ++b) {
-      const int n = load(points, b * BLOCK, count, block);
-      const Ball ball = around(block);
-      for (size_t m = 0; m < parts.size(); ++m) {
-        uint8_t* row = out + int64_t(m) * count + b * BLOCK;
-        if (!reaches(parts[m], ball, 0)) {
-          std::fill_n(row, n, uint8_t(0));
-          continue;
-        }
-        values(parts[m], block, g);
-        for (int i = 0; i < n; ++i) row[i] = g[i] < 0;
+    const Ball ball = around(block);
+    for (size_t m = 0; m < parts.size(); ++m) {
+      uint8_t* row = out + int64_t(m) * count + first;
+      if (!reaches(parts[m], ball, 0)) {
+        std::fill_n(row, n, uint8_t(0));
+        continue;
       }
+      values(parts[m], block, g);
+      for (int i = 0; i < n; ++i) row[i] = g[i] < 0;
     }
   });
 }
