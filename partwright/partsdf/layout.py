@@ -8,7 +8,7 @@ from torch import Tensor
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import PartVectors
 
-_RIDGE = 0.1  # of a number's own variance, added to it: what few training shapes leave open
+RIDGE = 0.1  # of a number's own variance, added to it: what few training shapes leave open
 
 
 @torch.no_grad()
@@ -26,7 +26,7 @@ def layout_oddness(shape: NeuralShape) -> float:
         return 0.0
     vectors = PartVectors.of(model)
     known = _together(vectors.of_poses(model.poses), model.present)
-    spread = known.T @ known / count + _RIDGE * torch.eye(known.shape[1], dtype=known.dtype)
+    spread = known.T @ known / count + RIDGE * torch.eye(known.shape[1], dtype=known.dtype)
     factor = torch.linalg.cholesky(spread)
 
     def squared(rows: Tensor) -> Tensor:

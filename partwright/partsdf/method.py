@@ -16,6 +16,7 @@ from partwright.partsdf.reconstruction import Step, mean_error, reconstruct_from
 from partwright.partsdf.settings import Settings
 from partwright.partsdf.starts import UPRIGHT, Start, find_starts, ways_to_stand
 from partwright.partsdf.targets import Target
+from partwright.partsdf.unseen import with_unseen
 
 _PRESETS: dict[str, dict[str, Any]] = {
     "draft": {"iterations": 100, "starts": 2},
@@ -87,17 +88,21 @@ class LearnedParts(Method[Settings]):
         told(Step(0, max(1, settings.iterations), loss, lambda: first.shape, first.turn))
         with timed(seconds, "optimise"):
             found, turn = reconstruct_from(starts, settings, run.seed, told, checkpoint)
+            seen = found
+            found = with_unseen(seen, target.turned(turn))
+        unseen = [name for name in found.names() if name not in seen.names()]
         with timed(seconds, "mesh"):
             meshed = mesh_shape(found, settings.resolution)  # with the parts, which files ask for
         assembly = to_assembly(found, shape.frame, shape.unit, shape.up, turn=turn)
         remember_meshes(assembly, meshed)
         surface = meshed.whole
         surface.vertices = shape.frame.from_unit(Similarity(1.0, turn)(surface.vertices))
-        known = familiarity(found, target.turned(turn))
+        known = familiarity(seen, target.turned(turn))
         learned = {
             "model": {"name": model.name, "hash": model.hash},
             "starts": [_origin(s, settings) for s in starts],
             "absent": [name for name in model.parts if name not in found.names()],
+            "unseen": unseen,
             "turn": list(turn),
             "residual": known.residual,
             "layout": known.layout,
@@ -113,12 +118,18 @@ class LearnedParts(Method[Settings]):
             details={"learned": learned},
             surface=surface,
             of_points=target.low is not None,
-            warnings=tuple(known.warnings()),
+            warnings=(*known.warnings(), *_guesses(unseen)),
         )
 
 
 def _origin(start: Start, settings: Settings) -> str:
     return "encoder" if start.encoded else "mean" if settings.start == "mean" else "training shape"
+
+
+def _guesses(unseen: list[str]) -> list[str]:
+    if not unseen:
+        return []
+    return [f"not in the points, and added as is usual in the family: {', '.join(unseen)}"]
 
 
 METHOD = LearnedParts()

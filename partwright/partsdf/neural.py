@@ -94,7 +94,7 @@ class NeuralShape:
         the depth of most, as in a tube with flanges, what most of it is thick. Infinite where no place inside
         is found."""
         names = self.names()
-        places = np.concatenate([self._places(name) for name in names] or [np.zeros((0, 3), np.float32)])
+        places = np.concatenate([self.places(name) for name in names] or [np.zeros((0, 3), np.float32)])
         depths = -self.part_distances(places).reshape(len(names), len(names), _WALL_PLACES)
         return np.array([_wall(depths[i, i]) for i in range(len(names))])
 
@@ -105,12 +105,12 @@ class NeuralShape:
 
     def wall(self, name: str) -> float:
         """About how thin one part is, as in `walls`."""
-        return _wall(-self.part_distances(self._places(name))[self.names().index(name)])
+        return _wall(-self.part_distances(self.places(name))[self.names().index(name)])
 
-    def _places(self, name: str) -> np.ndarray:
-        """(W, 3) float32 in and around the part's cuboid."""
+    def places(self, name: str, count: int = _WALL_PLACES) -> np.ndarray:
+        """(count, 3) float32 in and a little around a part's cuboid, the same ones each time."""
         rng = np.random.default_rng(0)
-        within = rng.uniform(-_CUBOID_MARGIN, _CUBOID_MARGIN, (_WALL_PLACES, 3)).astype(np.float32)
+        within = rng.uniform(-_CUBOID_MARGIN, _CUBOID_MARGIN, (count, 3)).astype(np.float32)
         pose = self.poses.map(lambda t: t[self.model.index(name)]).numpy()
         turned = Similarity(1.0, tuple(pose.rotation.tolist()), tuple(pose.translation.tolist()))
         return turned(within * pose.scale).astype(np.float32)

@@ -37,6 +37,7 @@ from partwright.partsdf.starts import (
 )
 from partwright.partsdf.targets import Target
 from partwright.partsdf.unknowns import Unknowns, unknowns_of
+from partwright.partsdf.unseen import with_unseen
 from partwright.shapes import Shape
 
 
@@ -125,10 +126,12 @@ def reconstruct_standing(
     told: Told | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> tuple[NeuralShape, Quaternion]:
-    """The shape as its family stands, and that one of the `turns` which brings it to where the target is."""
+    """The shape as its family stands, with parts that points do not show, and that one of the `turns` which
+    brings it to where the target is."""
     settings = settings or ReconstructionSettings()
     starts = find_starts(model, target, turns, settings)
-    return reconstruct_from(starts, settings, seed, told, checkpoint)
+    found, turn = reconstruct_from(starts, settings, seed, told, checkpoint)
+    return with_unseen(found, target.turned(turn)), turn
 
 
 def reconstruct_from(
@@ -138,7 +141,8 @@ def reconstruct_from(
     told: Told | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> tuple[NeuralShape, Quaternion]:
-    """As `reconstruct_standing`, from given starts, one of which a few iterations choose."""
+    """As `reconstruct_standing`, from given starts, one of which a few iterations choose; of parts, those
+    that the target shows."""
     starts = [replace(s, shape=replace(s.shape, present=torch.ones_like(s.shape.present))) for s in starts]
     found = _scouted(starts, settings, seed, told, checkpoint)
     return replace(found.shape, present=_filling(found.shape, found.target)), found.turn
