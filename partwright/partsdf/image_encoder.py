@@ -125,15 +125,20 @@ class ImageEncoder:
 
     @torch.no_grad()
     def see(self, pictures: Tensor) -> list[Sight]:
-        """What is in pictures (B, 3, SIDE, SIDE), 0 to 1, that a shape nearly fills."""
+        """What is in pictures (B, 3, SIDE, SIDE), 0 to 1, that a shape nearly fills.
+
+        The form of each part is that of the training shapes' which is most like what is seen. Of forms that
+        come into question the network tells the mean, which may be none: an arm in three crumbs.
+        """
         found, silhouette, camera = self.network(pictures)
-        shapes = shapes_of(self.model, *self.vectors.split(found))
-        poses = found[..., self.vectors.width : -1]
+        forms, poses, logits = self.vectors.split(found)
+        shapes = shapes_of(self.model, self.vectors.nearest_trained(self.model, forms), poses, logits)
+        places = found[..., self.vectors.width : -1]
         numbers = (
             torch.rad2deg(torch.atan2(camera[:, 1], camera[:, 0])),
             torch.rad2deg(camera[:, 2]),
             camera[:, :2].norm(dim=1),  # the mean of unit vectors is shorter, the more they differ
-            poses.square().mean(dim=(1, 2)).sqrt(),
+            places.square().mean(dim=(1, 2)).sqrt(),
         )
         rows = zip(shapes, silhouette.sigmoid(), *(n.tolist() for n in numbers), strict=True)
         return [Sight(*row) for row in rows]

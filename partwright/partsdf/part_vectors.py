@@ -68,6 +68,15 @@ class PartVectors:
         """(..., P, Z) of vectors (..., P, K)."""
         return self.mean + torch.einsum("...pk,pkz->...pz", vectors * self.spread, self.directions)
 
+    def nearest_trained(self, model: Model, latents: Tensor) -> Tensor:
+        """(B, P, Z): those of the model's training shapes that have the part which are nearest, part by part,
+        to `latents` (B, P, Z), along the directions and each in its spread."""
+        apart = torch.cdist(
+            self.of_latents(latents).transpose(0, 1), self.of_latents(model.latents).transpose(0, 1)
+        )
+        nearest = apart.masked_fill(~model.present.T[:, None], torch.inf).argmin(dim=2).T
+        return model.latents[nearest, torch.arange(len(model.parts))]
+
     def of_poses(self, poses: PoseTensors) -> Tensor:
         """(..., P, 12) of poses (..., P, ...)."""
         return (pose_numbers(poses) - self.pose_mean) / self.pose_spread

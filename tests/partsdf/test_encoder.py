@@ -59,6 +59,10 @@ def test_vectors_hold_latents_and_poses(model: Model) -> None:
     there = model.present
     again = vectors.latents(vectors.of_latents(model.latents))
     torch.testing.assert_close(again[there], model.latents[there], atol=1e-4, rtol=0)
+    nearly = model.latents + 0.01 * model.latents.std() * torch.randn(
+        model.latents.shape, generator=torch.Generator().manual_seed(1)
+    )
+    assert vectors.nearest_trained(model, nearly)[there].equal(model.latents[there])
     poses = vectors.poses(vectors.of_poses(model.poses))
     for mine, theirs in zip(poses[::2], model.poses[::2], strict=True):
         torch.testing.assert_close(mine, theirs, atol=1e-5, rtol=0)

@@ -149,6 +149,9 @@ def test_it_learns_and_sees_a_held_out_lamp(
     off = np.abs(found.shape.poses.translation.numpy() - held.translation)[there]
     assert off[:2].max() < 0.35
     assert found.assembly.up == "z"
+    model = encoder.model
+    for p in np.flatnonzero(there):  # forms that were trained on, not means of several
+        assert (model.latents[model.present[:, p], p] == found.shape.latents[p]).all(dim=1).any()
 
 
 def test_a_standpoint_is_found_again(lamps: PreparedFamily) -> None:
