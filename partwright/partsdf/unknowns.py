@@ -3,8 +3,9 @@
 Of known parts every number moves by itself, as the paper has it. Where parts are unknown, numbers move along
 the principal directions of the training shapes', each in its spread: that takes a quarter of the steps, as
 what varies most moves most. And where points are all that is known, which leave open what noise and what is
-not seen hide, they are drawn towards the family's means: to the most likely shape, given the points, if
-errors of these are Laplacian and the family's numbers normal.
+not seen hide, they are drawn to what is likely in the family: to the most likely shape, given the points, if
+errors of these are Laplacian and the family's numbers normal, all parts' together: where one leg ends tells
+where the next one does.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from typing import Any, NamedTuple, Protocol
 import torch
 from torch import Tensor
 
+from partwright.partsdf.layout import RIDGE
 from partwright.partsdf.losses import latent_penalty
+from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import MOST, PartVectors
 from partwright.partsdf.poses import PoseTensors
@@ -121,6 +124,7 @@ class FamilyUnknowns:
             tensor.requires_grad_(self._moves_frame)
         placed = Frame(*(t.detach() for t in self._frame)).to_family(start.poses)
         self._place = self._vectors.of_poses(placed).requires_grad_(move_poses)
+        self._precision = precision(start.model, self._vectors) if count else None
         self._beside = start.latents - self._vectors.latents(self._form.detach())
 
     def groups(self, settings: ReconstructionSettings) -> list[dict[str, Any]]:
@@ -141,13 +145,26 @@ class FamilyUnknowns:
         return self._frame.from_family(placed) if self._moves_frame else placed
 
     def prior(self, off: float, moved: bool) -> Tensor:
-        if not self._count:
+        if self._precision is None:
             return torch.zeros(())
-        unlikely = self._form.square().sum()
-        if moved:
-            unlikely = unlikely + self._place.square().sum()
+        numbers = _together(self._place if moved else self._place.detach(), self._form)
         # Of sum |d| / off + unlikely / 2, what is minimised is the mean of the first.
-        return torch.as_tensor(0.5 * off / self._count) * unlikely
+        return torch.as_tensor(0.5 * off / self._count) * (numbers @ self._precision @ numbers)
+
+
+def precision(model: Model, vectors: PartVectors) -> Tensor:
+    """(D, D) of all numbers of a shape, D = P (12 + K), each in its spread, as normal ones with the training
+    shapes' covariance; a part that is not there has the mean's. With a ridge, after which each number by
+    itself has a variance of 1 still."""
+    there = model.present[..., None].double()
+    known = _together(vectors.of_poses(model.poses) * there, vectors.of_latents(model.latents) * there)
+    spread = known.T @ known / len(known) + RIDGE * torch.eye(known.shape[1], dtype=known.dtype)
+    return torch.linalg.inv(spread / (1 + RIDGE)).float()
+
+
+def _together(place: Tensor, form: Tensor) -> Tensor:
+    """(..., P (12 + K)) of (..., P, 12) and (..., P, K)."""
+    return torch.cat([place, form], dim=-1).flatten(-2)
 
 
 def unknowns_of(start: NeuralShape, move_poses: bool, target: Target) -> Unknowns:

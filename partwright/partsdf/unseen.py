@@ -29,6 +29,7 @@ _SHOWS = 3.0  # logarithm of how much less likely a part is that would lie besid
 _BARE = 0.02  # of the seen parts' surface that has no points, where a piece is missing, at least
 _PLACES = 4000  # in and around each part's cuboid
 _ON = 0.02  # unit lengths from the surface, that places on it are at most
+_NOISE = 3.0  # mean distances of points from the parts' surface
 _COVERED = 2.0  # sides of the square that a point stands for: of random ones 3 in a million are farther apart
 
 
@@ -98,7 +99,8 @@ def _beside_points(shape: NeuralShape, seen: Tensor, parts: Tensor, target: Targ
         return None
     cloud, surface = cKDTree(points), cKDTree(places)
     side = 2 * float(cloud.query(points, k=2)[0][:, 1].mean())  # twice the mean distance of random ones
-    covered = cloud.query(places)[0] <= _COVERED * side + _ON
+    noise = float(np.abs(visible.distances(points.astype(np.float32))).mean())
+    covered = cloud.query(places)[0] <= _COVERED * side + _ON + _NOISE * noise
     if covered.mean() > 1 - _BARE:
         return None
     shares = []
