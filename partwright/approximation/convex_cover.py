@@ -44,18 +44,16 @@ _SLIVER = 1e-5  # of the whole volume: pieces below it are left out
 _COARSE = 0.05  # of the tolerance: how far the copy that is searched may lie from the solid
 
 
-def convex_cover(solid: Manifold, limits: Limits, beside: tuple[Manifold, ...] = ()) -> list[Piece]:
+def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
     """Pieces whose hulls together cover the solid: as few as keep the limits, as far as they are found.
 
     solid: closed, of any number of bodies. Slivers are left out, but none that reaches farther than the
     allowed deviation from all the rest: a speck may be all that there is at its place.
-
-    beside: solids that have nothing in common with this one, which hulls are to keep out of.
     """
-    pieces = _cut_up(Piece(solid, beside), limits)
+    pieces = _cut_up(solid, limits)
     pieces += _far_off(solid, pieces, limits.deviation)
     least = _SLIVER * solid.volume()
-    bridged = sum(body.extra for body in _components(Piece(solid, beside), least))
+    bridged = sum(body.extra for body in _components(solid, least))
     pieces = joined(pieces, solid.volume(), bridged, limits)
 
     @cache
@@ -125,10 +123,10 @@ def halved(piece: Piece) -> list[list[Piece]]:
     return [parts for parts in cut if len(parts) > 1]
 
 
-def _cut_up(whole: Piece, limits: Limits) -> list[Piece]:
+def _cut_up(solid: Manifold, limits: Limits) -> list[Piece]:
     """Pieces that are cut, the worst one first, until all hulls keep the limits."""
-    least = _SLIVER * whole.solid.volume()
-    allowed = limits.extra * whole.solid.volume()
+    least = _SLIVER * solid.volume()
+    allowed = limits.extra * solid.volume()
     done: list[Piece] = []
     open_: list[tuple[float, int, Piece]] = []
     count = 0
@@ -141,7 +139,7 @@ def _cut_up(whole: Piece, limits: Limits) -> list[Piece]:
         else:
             heapq.heappush(open_, (-piece.extra, count, piece))
 
-    for part in _components(whole, least):
+    for part in _components(solid, least):
         take(part)
     most = 2 * limits.most  # joining comes after
     while open_ and len(done) + len(open_) < most:
@@ -159,8 +157,8 @@ def _cut_up(whole: Piece, limits: Limits) -> list[Piece]:
     return done + [entry[2] for entry in open_]
 
 
-def _components(piece: Piece, least: float) -> list[Piece]:
-    return [Piece(part, piece.beside) for part in piece.solid.decompose() if part.volume() > least]
+def _components(solid: Manifold, least: float) -> list[Piece]:
+    return [Piece(part) for part in solid.decompose() if part.volume() > least]
 
 
 def _best_cut(piece: Piece, least: float) -> list[Piece]:
@@ -177,7 +175,7 @@ def _best_cut(piece: Piece, least: float) -> list[Piece]:
     best, parts = _GAIN * piece.extra, [piece]
     for normal, offset in chosen:
         made = _cut(piece, normal, offset, least)
-        gain = (piece.weight - sum(one.weight for one in made)) / max(len(made) - 1, 1)
+        gain = (whole - sum(one.hull.volume() for one in made)) / max(len(made) - 1, 1)
         if len(made) > 1 and gain > best + 1e-6 * whole:
             best, parts = gain, made
     if len(parts) > 1:
@@ -213,6 +211,5 @@ def _few(corners: Corners) -> list[Plane]:
 
 
 def _cut(piece: Piece, normal: np.ndarray, offset: float, least: float) -> list[Piece]:
-    halves = piece.solid.split_by_plane(tuple(normal.tolist()), float(offset))
-    sides = [Piece(half, piece.beside) for half in halves if not half.is_empty()]
-    return [one for side in sides for one in _components(side, least)]
+    sides = piece.solid.split_by_plane(tuple(normal.tolist()), float(offset))
+    return [one for side in sides if not side.is_empty() for one in _components(side, least)]

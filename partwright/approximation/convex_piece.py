@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.cutting_planes import Corners
-from partwright.meshing.hulls import hull_of, hull_volume
+from partwright.meshing.hulls import hull_of
 from partwright.meshing.manifolds import surface_of
 from partwright.shapes import MeshDistance
 
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 MOST = 64  # pieces at most, where nobody asked for fewer
-_BESIDE = 100  # times that volume within another solid counts
 _SAMPLES = 0.5  # of the tolerance: spacing of points on a hull
 _FEWEST, _DENSEST = 12.0, 60.0  # points along the longest side of a hull, whatever the tolerance
 
@@ -36,26 +34,11 @@ class Limits:
     worth: float | None = None
 
 
-def weight_of(corners: np.ndarray, beside: Sequence[Manifold]) -> float:
-    """Volume of the hull of corners (N, 3); what it has of solids beside counts many times."""
-    lower, upper = corners.min(axis=0), corners.max(axis=0)
-    boxes = [(body, np.reshape(body.bounding_box(), (2, 3))) for body in beside]
-    near = [body for body, box in boxes if (box[0] < upper).all() and (box[1] > lower).all()]
-    if not near:
-        return hull_volume(corners)
-    hull = hull_of(corners)
-    return float(hull.volume()) + _BESIDE * sum(float((hull ^ body).volume()) for body in near)
-
-
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A part of the solid, and the least convex solid around it.
-
-    beside: other solids, which the hull had better keep out of: what it has of them counts many times.
-    """
+    """A part of the solid, and the least convex solid around it."""
 
     solid: Manifold
-    beside: tuple[Manifold, ...] = ()
 
     @cached_property
     def hull(self) -> Manifold:
@@ -72,14 +55,9 @@ class Piece:
         return np.reshape(self.solid.bounding_box(), (2, 3))
 
     @cached_property
-    def weight(self) -> float:
-        """Volume of the hull, and what of it counts many times."""
-        return weight_of(self.hull_corners, self.beside) if self.beside else float(self.hull.volume())
-
-    @cached_property
     def extra(self) -> float:
-        """Volume that the hull adds, weighed."""
-        return max(self.weight - self.solid.volume(), 0.0)
+        """Volume that the hull adds."""
+        return max(self.hull.volume() - self.solid.volume(), 0.0)
 
     @cached_property
     def corners(self) -> Corners:

@@ -11,7 +11,8 @@ from itertools import combinations
 
 import numpy as np
 
-from partwright.approximation.convex_piece import Limits, Piece, weight_of
+from partwright.approximation.convex_piece import Limits, Piece
+from partwright.meshing.hulls import hull_volume
 
 _SAVED = 1.6e-3  # of what the hulls of whole bodies would add: what one piece more has to save
 _MANY = 24  # beyond so many pieces each has to, whatever the deviation is
@@ -119,15 +120,15 @@ def _price(bridged: float, pieces: int) -> float:
 def _both(a: Piece, b: Piece) -> Piece:
     from manifold3d import Manifold, OpType
 
-    return Piece(Manifold.batch_boolean([a.solid, b.solid], OpType.Add), a.beside)
+    return Piece(Manifold.batch_boolean([a.solid, b.solid], OpType.Add))
 
 
 def _cost(a: Piece, b: Piece) -> float:
     """Volume that the hull of both adds; infinite for those that lie apart."""
     if not boxes_touch(a.box, b.box, _ROOM):
         return np.inf
-    corners = np.concatenate([a.hull_corners, b.hull_corners])
-    return weight_of(corners, a.beside) - a.weight - b.weight
+    both = hull_volume(np.concatenate([a.hull_corners, b.hull_corners]))
+    return both - a.hull.volume() - b.hull.volume()
 
 
 def boxes_touch(a: np.ndarray, b: np.ndarray, share: float = 0.0) -> bool:

@@ -12,18 +12,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.approximation.convex_cover import simplified
 from partwright.approximation.convex_fit import Mode
 from partwright.atomic_io import replacing_files
 from partwright.errors import RobotError, SettingError
-from partwright.meshing.manifolds import simplified
 from partwright.robots.containment import shape_solid, sticking_out
-from partwright.robots.keeping_apart import EnclosedLink, keep_apart
+from partwright.robots.enclosed_link import EnclosedLink
+from partwright.robots.keeping_apart import keep_apart
 from partwright.robots.model import Link, RobotFile, Shape
 from partwright.robots.opening import open_robot
 from partwright.robots.overlaps import Pair, overlaps, too_near
 from partwright.robots.picture import picture
 from partwright.robots.report import LinkReport, report
-from partwright.robots.shaping import Wishes, shapes_for
+from partwright.robots.shaping import LIGHT, Wishes, numbered, shapes_for
 from partwright.robots.solids import Solids, Target, largest_deviation
 from partwright.robots.spheres import LinkSpheres, as_json, curobo, spheres_for
 from partwright.shapes.cleaning import counted
@@ -39,7 +40,6 @@ _EXTRA = 0.08  # of its volume: what the hulls of a link may add
 _WORTH = 0.7  # two chords for one save three quarters
 _FINER = 1  # times a link's tolerance is halved where it overlaps a neighbour more than its mesh did
 _MORE_OVERLAP = 1e-3  # of the smaller link's volume
-_COARSE = 0.002  # of a link's size: how far that is off which its neighbours are to keep out of
 _MOST_SPHERES = 1000
 Told = Callable[[str], None]
 
@@ -181,26 +181,24 @@ def collide(
     }
     shapes: dict[str, list[Shape]] = {}
     todo = {link.name for link in links}
-    near: list[Pair] = []
     for turn in range(1 + _FINER):
         for link in links:
             if link.name in todo:
-                beside = _beside(link, links, near, wanted) if options.enclose else None
-                shapes[link.name] = _shaped(link, wanted[link.name], wishes[link.name], beside)
+                shapes[link.name] = _shaped(link, wanted[link.name], wishes[link.name])
                 told(f"{link.name}: {counted(len(shapes[link.name]), 'shape')}")
+        if options.enclose:
+            apart = _kept_apart(links, shapes, wanted, wishes, pairs_before)
+            for name in (name for name in apart if len(apart[name]) != len(shapes[name])):
+                told(f"{name}: {counted(len(apart[name]), 'shape')}, apart from its neighbours'")
+            shapes = apart
         unions = {link.name: _union(shapes[link.name]) for link in links}
         pairs_after = overlaps(_bodies(colliding, unions))
-        if options.enclose:
-            more = [pair for pair, shared in pairs_after.items() if shared > pairs_before.get(pair, 0.0)]
-            shapes |= _kept_apart(links, shapes, wanted, more)
-            unions = {link.name: _union(shapes[link.name]) for link in links}
-            pairs_after = overlaps(_bodies(colliding, unions))
         near = too_near(pairs_before, pairs_after, volumes, _MORE_OVERLAP)
         neighbours = {frozenset((link.name, above)) for link in links for above in link.parents}
         todo = {name for pair in near if frozenset(pair) in neighbours for name in pair if name in shapes}
-        if not todo or turn == _FINER:
+        if not todo or turn == _FINER or options.enclose:
             break
-        for name in () if options.enclose else todo:
+        for name in todo:
             finer = dataclasses.replace(
                 wishes[name], tolerance=wishes[name].tolerance / 2, extra=wishes[name].extra / 2
             )
@@ -270,40 +268,29 @@ def _kept_apart(
     links: Sequence[Link],
     shapes: Mapping[str, Sequence[Shape]],
     wanted: Mapping[str, Target],
-    pairs: Sequence[Pair],
+    wishes: Mapping[str, Wishes],
+    allowed: Mapping[Pair, float],
 ) -> dict[str, list[Shape]]:
-    """Shapes of the links of these pairs, held apart where they can be."""
-    bodies = {
-        link.name: EnclosedLink(
-            shapes[link.name], wanted[link.name].vertices[wanted[link.name].faces], link.pose
-        )
-        for link in links
-        if any(link.name in pair for pair in pairs)
-    }
-    for first, second in pairs:
-        if first in bodies and second in bodies:  # not of links that have native solids alone
-            keep_apart(bodies[first], bodies[second])
-    return {name: body.result() for name, body in bodies.items()}
+    """The shapes of all links, held apart where they contain what is wanted.
+
+    allowed: volume that links may share."""
+    bodies: dict[str, EnclosedLink] = {}
+    for link in links:
+        target, name = wanted[link.name], link.name
+        triangles, solid = target.vertices[target.faces], simplified(target.solid, wishes[name].tolerance)
+        fine = LIGHT * wishes[name].tolerance
+        bodies[name] = EnclosedLink(shapes[name], triangles, solid, link.pose, fine)
+    keep_apart(bodies, allowed, max((each.most for each in wishes.values()), default=1))
+    return {name: numbered(_stem(name), body.result()) for name, body in bodies.items()}
 
 
-def _beside(
-    link: Link, links: Sequence[Link], near: Sequence[Pair], wanted: Mapping[str, Target]
-) -> Manifold | None:
-    """The links that overlap this one more than their meshes do, in its frame; None for none."""
-    from manifold3d import Manifold, OpType
-
-    names = {name for pair in near if link.name in pair for name in pair} - {link.name}
-    others = [one for one in links if one.name in names]
-    if not others:
-        return None
-    seen = [(one, wanted[one.name]) for one in others]
-    coarse = [_in_world(one, simplified(target.solid, _COARSE * target.size)) for one, target in seen]
-    return Manifold.batch_boolean(coarse, OpType.Add).transform(np.linalg.inv(link.pose)[:3])
+def _stem(link: str) -> str:
+    """What the names of a link's shapes start with."""
+    return "".join(c if c.isascii() and (c.isalnum() or c in "_-.") else "_" for c in link) + "_collision"
 
 
-def _shaped(link: Link, target: Target, wishes: Wishes, beside: Manifold | None) -> list[Shape]:
-    stem = "".join(c if c.isascii() and (c.isalnum() or c in "_-.") else "_" for c in link.name)
-    shapes = shapes_for(f"{stem}_collision", target, wishes, beside)
+def _shaped(link: Link, target: Target, wishes: Wishes) -> list[Shape]:
+    shapes = shapes_for(_stem(link.name), target, wishes)
     if not shapes:
         raise RobotError(f"link {link.name!r}: no shape lies inside of its mesh; it is too thin")
     return shapes

@@ -20,7 +20,7 @@ from partwright.meshing.manifolds import surface_of
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-Planes = tuple[np.ndarray, np.ndarray]  # normals (F, 3) and offsets (F,)
+_Planes = tuple[np.ndarray, np.ndarray]  # normals (F, 3) and offsets (F,)
 _FINEST = 4  # times `fine`: edges of pieces that join the nearest solid however far it is
 _ASKED = 32  # planes whose distances are measured at once
 _AROUND = np.array([way for way in np.ndindex(3, 3, 3) if way != (1, 1, 1)], float) - 1
@@ -38,7 +38,7 @@ def containing(hulls: Sequence[Manifold], triangles: np.ndarray, fine: float) ->
     joining: list[list[np.ndarray]] = [[surface_of(hull)[0]] for hull in hulls]
     changed = np.zeros(len(hulls), bool)
     left = triangles
-    while len(left := left[~within_one(planes, boxes, left)]):
+    while len(left := left[~_within_one(planes, boxes, left)]):
         owner, beyond = nearest_hulls(planes, left)
         edges = np.linalg.norm(left - np.roll(left, 1, axis=1), axis=2)
         small = (edges.max(axis=1) <= _FINEST * fine) | (len(left) > _MOST)
@@ -83,7 +83,7 @@ def outer_hull(hull: Manifold, by: float, most: int, room: float, farthest: floa
     return result
 
 
-def nearest_hulls(planes: Sequence[Planes], triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def nearest_hulls(planes: Sequence[_Planes], triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(T,) the hull that each triangle is least outside of, and by how much; some planes of a hull tell
     whether all of them need to be asked."""
     least = np.stack([corners_beyond(_some(each), triangles).max(axis=1) for each in planes])
@@ -98,15 +98,15 @@ def nearest_hulls(planes: Sequence[Planes], triangles: np.ndarray) -> tuple[np.n
     return owner, beyond
 
 
-def _some(planes: Planes) -> Planes:
+def _some(planes: _Planes) -> _Planes:
     """Those that face most into each direction of a lattice."""
     normals, offsets = planes
     chosen = np.unique((normals @ _AROUND.T).argmax(axis=0))
     return normals[chosen], offsets[chosen]
 
 
-def within_one(planes: Sequence[Planes], boxes: Sequence[np.ndarray], triangles: np.ndarray) -> np.ndarray:
-    """(T,) whether one of the hulls, of these planes and boxes (2, 3), contains the triangle (T, 3, 3)."""
+def _within_one(planes: Sequence[_Planes], boxes: Sequence[np.ndarray], triangles: np.ndarray) -> np.ndarray:
+    """(T,) whether one of the hulls contains the triangle."""
     within = np.zeros(len(triangles), bool)
     lower, upper = triangles.min(axis=1), triangles.max(axis=1)
     for each, box in zip(planes, boxes, strict=True):
@@ -115,7 +115,7 @@ def within_one(planes: Sequence[Planes], boxes: Sequence[np.ndarray], triangles:
     return within
 
 
-def corners_beyond(planes: Planes, triangles: np.ndarray) -> np.ndarray:
+def corners_beyond(planes: _Planes, triangles: np.ndarray) -> np.ndarray:
     """(T, 3) how far each corner is outside of a hull; not positive inside."""
     return beyond_faces(triangles.reshape(-1, 3), *planes).reshape(-1, 3)
 

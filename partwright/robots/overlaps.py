@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 Pair = tuple[str, str]
-_LEAST = 1e-5  # of the smaller one's volume: less is touching, as enclosing shapes are larger by rounding
+LEAST_SHARED = (
+    1e-5  # of the smaller one's volume: less is touching, as enclosing shapes are larger by rounding
+)
 
 
 def overlaps(solids: Mapping[str, Manifold]) -> dict[Pair, float]:
@@ -23,7 +25,7 @@ def overlaps(solids: Mapping[str, Manifold]) -> dict[Pair, float]:
     for a, b in combinations(solids, 2):
         if (boxes[a][0] < boxes[b][1]).all() and (boxes[b][0] < boxes[a][1]).all():
             common = (solids[a] ^ solids[b]).volume()
-            if common > _LEAST * min(volumes[a], volumes[b]):
+            if common > LEAST_SHARED * min(volumes[a], volumes[b]):
                 found[a, b] = float(common)
     return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 NATIVE_FOR = 0.03  # of its volume, or `extra`: by how much a native solid may be worse than the hull it saves
 _NATIVE_PIECE = 5e-4  # of the link's volume: the same for one of several, which are as near as this
 _SAVED = 2e-3  # of the link's volume: what each native solid more has to save where there are no hulls
-_LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners, or add for fewer faces
+LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners, or add for fewer faces
 _LOST, _MOST_LOST = 1e-5, 0.01  # of the link's volume, and of its own: what a hull of fewer corners may lack
 _FLAWS = 1e-3  # of its volume: what a hull may add to a convex link
 _ROUNDING = 1e-9  # of its volume: what a hull adds to a link without a dent
@@ -48,7 +49,6 @@ _GRIDS = 2  # steps of the grid that files' hulls are moved to, likewise
 _POINTS = 50_000  # of the triangles, for the hulls of wrapped pieces
 _LEAST = 1e-3  # of a wrapped piece's volume: a hull of points below it is a sheet
 _FILLS = 2e-3  # of the link's volume: what each shape more within it has to gain
-_SPECK = 1e-6  # of the link's volume: what is smaller of a neighbour nothing keeps out of
 _CHOICE, _MOST_CHOICE = 4, 24  # pieces for each shape that may be within it, and in all, to choose from
 
 
@@ -70,36 +70,31 @@ class Wishes:
     worth: float | None = None
 
 
-def shapes_for(name: str, target: Target, wishes: Wishes, beside: Manifold | None = None) -> list[Shape]:
-    """The shapes, named NAME_1, NAME_2 ..., or NAME for one.
-
-    beside: what enclosing shapes are to keep out of where the link does, in the link's frame.
-    """
+def shapes_for(name: str, target: Target, wishes: Wishes) -> list[Shape]:
+    """The shapes, named NAME_1, NAME_2 ..., or NAME for one."""
     if wishes.mode != "around" and (convex := _convex(target, wishes)) is not None:
         return [dataclasses.replace(convex, name=name)]
     if wishes.mode == "within":
         chosen = _inside(target, wishes)
     else:
         solid = simplified(target.wrap if wishes.mode == "around" else target.solid, wishes.tolerance)
-        pieces = _pieces(solid, wishes, _reachable(beside, solid) if beside is not None else ())
+        pieces = _pieces(solid, wishes)
         if wishes.mode == "around":
             hulls = _enclosing(pieces, target, wishes)
         else:
             hulls = balanced_hulls(pieces, solid, wishes.tolerance)
         chosen = [_chosen(hull, len(hulls) == 1, target, wishes) for hull in hulls]
-    names = [name] if len(chosen) == 1 else [f"{name}_{i}" for i in range(1, len(chosen) + 1)]
-    return [Shape(each, shape.part, shape.mesh) for each, shape in zip(names, chosen, strict=True)]
+    return numbered(name, chosen)
 
 
-def _reachable(beside: Manifold, solid: Manifold) -> tuple[Manifold, ...]:
-    """Bodies of what the hull of a solid, and so that of any piece of it, has of another one."""
-    bodies = ((beside ^ hull_of(surface_of(solid)[0])) - solid).decompose()
-    return tuple(body for body in bodies if body.volume() > _SPECK * solid.volume())
+def numbered(name: str, shapes: Sequence[Shape]) -> list[Shape]:
+    """The shapes, named NAME_1, NAME_2 ..., or NAME for one."""
+    names = [name] if len(shapes) == 1 else [f"{name}_{i}" for i in range(1, len(shapes) + 1)]
+    return [Shape(each, shape.part, shape.mesh) for each, shape in zip(names, shapes, strict=True)]
 
 
-def _pieces(solid: Manifold, wishes: Wishes, beside: tuple[Manifold, ...] = ()) -> list[Piece]:
-    limits = Limits(wishes.tolerance, wishes.extra, wishes.most, wishes.worth)
-    pieces = convex_cover(solid, limits, beside)
+def _pieces(solid: Manifold, wishes: Wishes) -> list[Piece]:
+    pieces = convex_cover(solid, Limits(wishes.tolerance, wishes.extra, wishes.most, wishes.worth))
     return pieces if wishes.hulls else _fit_for_natives(pieces, wishes)
 
 
@@ -147,7 +142,7 @@ def _near(hull: Manifold, wishes: Wishes, worse: float) -> ConvexFit | None:
 def _enclosing(pieces: list[Piece], target: Target, wishes: Wishes) -> list[Manifold]:
     """Hulls of the pieces, of few faces, and of all triangles that stick out of them: these contain every
     triangle."""
-    fine, room = _LIGHT * wishes.tolerance, _room(target)
+    fine, room = LIGHT * wishes.tolerance, _room(target)
     hulls = _tight(pieces, target, fine) if target.loose else [piece.hull for piece in pieces]
 
     def plain(hull: Manifold) -> Manifold:
@@ -165,7 +160,7 @@ def _chosen(hull: Manifold, alone: bool, target: Target, wishes: Wishes) -> Shap
         return _native(convex_fits(hull, wishes.kinds, wishes.mode)[0].part, target, wishes)
     share = target.solid.volume() / hull.volume()
     if wishes.mode != "around":
-        hull = light_hull(hull, _LIGHT * wishes.tolerance, lost=min(_LOST * share, _MOST_LOST))[0]
+        hull = light_hull(hull, LIGHT * wishes.tolerance, lost=min(_LOST * share, _MOST_LOST))[0]
     worse = NATIVE_FOR if alone else min(NATIVE_FOR, _NATIVE_PIECE * share)
     near = _near(hull, wishes, worse)
     return _native(near.part, target, wishes) if near is not None else _hull(hull)
