@@ -26,6 +26,7 @@ from partwright.approximation.cutting_planes import (
 )
 from partwright.approximation.hull_faces import beyond_faces, faces_of
 from partwright.approximation.light_hull import plain_hull
+from partwright.approximation.piece_boundaries import with_moved_boundaries
 from partwright.approximation.piece_joining import exchanged, joined, spent
 from partwright.meshing.manifolds import surface_of
 from partwright.shapes import MeshDistance
@@ -60,7 +61,8 @@ def convex_cover(solid: Manifold, limits: Limits) -> list[Piece]:
     def cut(piece: Piece) -> list[Piece]:
         return _best_cut(piece, least)
 
-    return exchanged(spent(pieces, bridged, limits, cut), limits, cut)
+    pieces = exchanged(spent(pieces, bridged, limits, cut), limits, cut)
+    return with_moved_boundaries(pieces, solid.volume())
 
 
 def simplified(solid: Manifold, deviation: float) -> Manifold:
