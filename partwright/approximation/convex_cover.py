@@ -40,6 +40,8 @@ _LOOKED_AT, _MADE = 6, 3  # planes of faces that are tried and really cut along,
 _TRIES, _CHANGED = 7, 0.005  # of simplifying, and the share of the volume that it may change
 _FINER = 2  # times, from one try to the next
 _CHEAP = 5000  # triangles: a copy with no more of them is finer than it need be
+_FEW_PLANES = 8  # beside concave edges: a solid of no more flat walls is taken apart by them
+_ASIDE = 1e-10  # of the size: what is left begins beside a face, of which a cut in its plane may leave a film
 _GAIN = 0.03  # of what a hull adds: a cut that takes less off it looks one cut ahead
 _SLIVER = 1e-5  # of the whole volume: pieces below it are left out
 _COARSE = 0.05  # of the tolerance: how far the copy that is searched may lie from the solid
@@ -182,7 +184,26 @@ def _best_cut(piece: Piece, least: float) -> list[Piece]:
             best, parts = gain, made
     if len(parts) > 1:
         return parts
-    return _ahead(piece, least) or [piece]
+    return _largest_taken_off(piece, least) or _ahead(piece, least) or [piece]
+
+
+def _largest_taken_off(piece: Piece, least: float) -> list[Piece]:
+    """The cut along a face beside concave edges that takes off most of what is convex as it is, where few
+    faces are beside any: of an open box wall by wall, though no hull is less before the third is off."""
+    planes = beside_concave_edges(piece.corners)
+    aside = _ASIDE * piece.corners.size
+    best, chosen = 0.0, []
+    for normal, offset in planes if len(planes) <= _FEW_PLANES else ():
+        convex, rest = [], []
+        for side in (1, -1):
+            inward, place = tuple((-side * normal).tolist()), -side * offset
+            half, less = (piece.solid.trim_by_plane(inward, place + by) for by in (0.0, aside))
+            convex += [one for one in _components(half, least) if one.extra <= least]
+            rest += [one for one in _components(less, least) if one.extra > least]
+        taken = sum(one.solid.volume() for one in convex)
+        if len(convex) + len(rest) > 1 and taken > best:
+            best, chosen = taken, [*rest, *convex]
+    return chosen
 
 
 def _ahead(piece: Piece, least: float) -> list[Piece]:
