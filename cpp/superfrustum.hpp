@@ -391,6 +391,10 @@ inline float sharpness(float k) { return k > 1e-9f ? 0.5f / k : 1e30f; }
 
 PW_INLINE float smooth_weight(float a, float b, float sharpness) { return clamp01(0.5f + (b - a) * sharpness); }
 
-PW_INLINE float smooth_minimum(float a, float b, float k, float w) { return b + (a - b) * w - k * w * (1 - w); }
+// Where b is no nearer than the blend, a itself and not its roundings: a part that is too far to be felt may then be
+// left out to the bit.
+PW_INLINE float smooth_minimum(float a, float b, float k, float w) {
+  return w < 1 ? b + (a - b) * w - k * w * (1 - w) : a;
+}
 
 }  // namespace partwright

@@ -99,11 +99,11 @@ def test_a_disturbed_assembly_is_found_again() -> None:
     assert found[1, Column.BLEND] == pytest.approx(0.1, abs=5e-3)
 
 
-def test_a_perfect_start_stays() -> None:
+def test_a_perfect_start_stays_bit_for_bit() -> None:
     rows = random_rows(2, 3)
     found, loss, _ = kernel.levenberg_marquardt(rows, exact_target(rows), STAGES, LIMITS)
-    assert loss < 1e-15
-    np.testing.assert_allclose(found, rows, atol=1e-5)
+    assert loss < 1e-30  # where a part is too far to be felt, occupancies of less than 1e-15 are taken for none
+    np.testing.assert_array_equal(found, rows)
 
 
 @pytest.mark.parametrize("minus", [(), (2,), (1,)], ids=["added", "subtracted", "nested"])
@@ -131,7 +131,7 @@ def test_the_matrix_is_the_curvature_of_the_loss_where_it_fits() -> None:
     rows, beta = random_rows(2, 5), 10.0
     target = exact_target(rows)
     loss, gradient, matrix = kernel.normal_equations(rows, target, beta)
-    assert loss == 0
+    assert loss < 1e-30
     assert np.abs(gradient).max() == 0
     generator = np.random.default_rng(0)
     for _ in range(5):
