@@ -23,6 +23,8 @@ from partwright.superfrusta.solid_kinds import plainness
 _LEAST_DEPTH = 0.15  # voxels: thinner regions are noise (half a voxel would lose thin walls)
 _LEAST_VOLUME = 2e-4  # of the shape
 _LARGEST = 2  # connected pieces of the residual that are also seeded whole
+_BESIDE = 0.5  # voxels: of what is thinner than a voxel, those that lie no further from it are taken for it
+_TOUCHING = np.ones((3, 3, 3))
 _PRICE_DIVISOR = 3  # of a part's price while growing: the thinning finds what is worth the whole
 _MOST_SAMPLES = 3000  # samples that one part is fitted to
 _SCREEN_EVERY = 3  # screening uses every third of them
@@ -81,40 +83,61 @@ class View:
 def regions(samples: FitSamples, rows: Rows, settings: Settings) -> list[Region]:
     """Pieces of the residual max(S, -F), to add, and, where settings allow, of max(F, -S), to subtract."""
     field = samples.grid_field(rows)
-    found = _pieces(samples, np.maximum(samples.grid.values, -field), rows, settings, 1.0)
+    found = _pieces(samples, samples.grid.values, field, rows, settings, 1.0)
     if settings.subtract and len(rows):
         found += _excess(samples, field, rows, settings)
     return found
 
 
 def _excess(samples: FitSamples, field: NDArray[np.float32], rows: Rows, settings: Settings) -> list[Region]:
-    return _pieces(samples, np.maximum(field, -samples.grid.values), rows, settings, -1.0)
+    return _pieces(samples, field, samples.grid.values, rows, settings, -1.0)
 
 
 def _pieces(
-    samples: FitSamples, residual: NDArray[np.float32], rows: Rows, settings: Settings, sign: float
+    samples: FitSamples,
+    wanted: NDArray[np.float32],
+    found: NDArray[np.float32],
+    rows: Rows,
+    settings: Settings,
+    sign: float,
 ) -> list[Region]:
-    """Morphological decomposition of the residual, and its largest connected pieces whole."""
+    """Of what is inside by one field (X, Y, Z) and not by another: the morphological decomposition, and the
+    largest connected pieces whole.
+
+    Of a ring or a skin thinner than a voxel the residual holds voxels here and there. It is whole where the
+    fields differ, which they do by its thickness, across it and beside it.
+    """
     grid = samples.grid
+    residual = np.maximum(wanted, -found)
     carved = sign > 0 and bool((rows[:, Column.SIGN] < 0).any())
     least_depth, least = _LEAST_DEPTH * grid.spacing, _LEAST_VOLUME * samples.inside_voxels
     labels, depths = samples.kernel.decompose(
         residual, grid.spacing, settings.regions, settings.kappa, least_depth, least
     )
-    found = []
+    pieces = []
     for label, depth in enumerate(depths):
         voxels = (labels == label).ravel()
-        found.append(Region(voxels, rows, depth, 0.2, 0.15, sign=sign))
-        found.append(Region(voxels, rows, depth, 0.5, 1.0, sign=sign, under=carved))
+        pieces.append(Region(voxels, rows, depth, 0.2, 0.15, sign=sign))
+        pieces.append(Region(voxels, rows, depth, 0.5, 1.0, sign=sign, under=carved))
+    whole = []
+    if len(rows):
+        thin = (found - wanted > least_depth) & (residual < _BESIDE * grid.spacing)
+        whole += _largest(thin, _TOUCHING, 1, least)
     if len(depths) > 1:
-        pieces, _ = ndimage.label(residual < -least_depth)
-        sizes = np.bincount(pieces.ravel())
-        sizes[0] = 0
-        for piece in np.argsort(-sizes, kind="stable")[:_LARGEST]:
-            if sizes[piece] > least:
-                voxels, depth = (pieces == piece).ravel(), float(np.median(depths))
-                found.append(Region(voxels, rows, depth, 0.1, 0.3, sign=sign))
-    return found
+        whole += _largest(residual < -least_depth, None, _LARGEST, least)
+    depth = float(np.median(depths)) if len(depths) else _BESIDE * grid.spacing
+    return pieces + [Region(voxels, rows, depth, 0.1, 0.3, sign=sign) for voxels in whole]
+
+
+def _largest(
+    voxels: NDArray[np.bool_], touching: NDArray[np.float64] | None, count: int, least: float
+) -> list[NDArray[np.bool_]]:
+    """Voxels (X * Y * Z,) of the largest connected pieces, if they are of more than the least size."""
+    pieces, _ = ndimage.label(voxels, touching)
+    sizes = np.bincount(pieces.ravel())
+    sizes[0] = 0
+    order = np.argsort(-sizes, kind="stable")[:count]
+    return [(pieces == piece).ravel() for piece in order if sizes[piece] > least]
 
 
 def grow(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Grown:

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from partwright.fields.columns import WIDTH
+from partwright.fields.columns import WIDTH, Column
 from partwright.fields.kernel import Target
 from partwright.methods import Checkpoint, Run
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid, grid_indices
 from partwright.shapes.sampling import morton_order
 from partwright.superfrusta.backend import Kernel, backend, watched
+from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.settings import Settings
 
 Rows = NDArray[np.float32]
@@ -25,6 +26,8 @@ NOTHING: Rows = np.empty((0, WIDTH), np.float32)
 _HALF_SIDE = 1.2  # unit lengths: half the side of the cube that padding and probes fill
 _MOST_PADDING_WEIGHT = 3.0  # of one point, where the weight of a sample in the box is 1
 _PROBES = 48  # along a side of that cube
+_CELL = 2 * _HALF_SIDE / _PROBES
+_FURTHEST = 2.4  # unit lengths from the middle: how far parts are followed
 _SURFACE = 8000  # points of the shape's surface
 _STRAY = 0.05  # unit lengths: what an assembly covers further than this from the shape is astray
 _LOCAL_CELLS = 40  # of a local grid, along the longest side
@@ -103,18 +106,34 @@ class FitSamples:
         A thin part that shoots out of the shape passes between random samples. The probes are a lattice fine
         enough to meet it; those that do become samples, with the weight of the volume that they stand for.
         """
-        hit = np.flatnonzero(self.distance_of(rows, self.probes) < 0)
-        distance = self.measure(self.probes[hit])
+        probes = np.concatenate([self.probes, self._probes_beyond(rows)])
+        hit = np.flatnonzero(self.distance_of(rows, probes) < 0)
+        distance = self.measure(probes[hit])
         hit, distance = hit[distance > _STRAY], distance[distance > _STRAY]
         if len(hit) == 0:
             return self
         return replace(
             self,
-            points=np.concatenate([self.points, self.probes[hit]]),
+            points=np.concatenate([self.points, probes[hit]]),
             distance=np.concatenate([self.distance, distance.astype(np.float32)]),
             weight=np.concatenate([self.weight, np.full(len(hit), self._probe_weight, np.float32)]),
-            probes=np.delete(self.probes, hit, axis=0),
+            probes=np.delete(self.probes, hit[hit < len(self.probes)], axis=0),
         )
+
+    def _probes_beyond(self, rows: Rows) -> NDArray[np.float32]:
+        """Probes (n, 3) as dense as the others, about parts that reach out of the cube that those fill: of a
+        body that is mostly cut away a chip may be left there. None that are samples already."""
+        added = surface_points(rows[rows[:, Column.SIGN] > 0]).reshape(-1, 3)
+        if len(added) == 0 or np.abs(added).max() <= _HALF_SIDE:
+            return NOTHING[:, :3]
+        first, last = (_cell(np.clip(end, -_FURTHEST, _FURTHEST)) for end in (added.min(0), added.max(0)))
+        counts = last - first + 1
+        cells = first + np.asarray(grid_indices(tuple(counts)))
+        known = _cell(self.points[np.abs(self.points).max(axis=1) > _HALF_SIDE]) - first
+        known = known[((known >= 0) & (known < counts)).all(axis=1)]
+        wanted = (np.abs(cells + 0.5).max(axis=1) > _PROBES / 2).reshape(counts)
+        wanted[tuple(known.T)] = False
+        return (_CELL * (cells[wanted.ravel()] + 0.5)).astype(np.float32)
 
     def about(self, low: NDArray[np.floating], high: NDArray[np.floating]) -> FitSamples:
         """These and more, with another grid, a little beyond the box between two corners (3,)."""
@@ -142,7 +161,7 @@ class FitSamples:
 
     @property
     def _probe_weight(self) -> float:
-        return self.density * (2 * _HALF_SIDE / _PROBES) ** 3
+        return self.density * _CELL**3
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
@@ -263,12 +282,16 @@ def padding(grid: DistanceGrid, uniform: int, seed: int) -> tuple[NDArray[np.flo
     return points, min(density, _MOST_PADDING_WEIGHT)
 
 
+def _cell(points: NDArray[np.floating]) -> NDArray[np.int64]:
+    """The cell of the lattice of probes that each point lies in, as whole numbers from the middle."""
+    return np.floor(points / _CELL).astype(np.int64)
+
+
 def _probes(grid: DistanceGrid) -> NDArray[np.float32]:
     """Lattice points (n, 3), each moved within its cell, that may lie well outside the shape."""
-    cell = 2 * _HALF_SIDE / _PROBES
     corner = np.stack(np.meshgrid(*[np.arange(_PROBES)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     within = np.random.default_rng(0).uniform(0.1, 0.9, corner.shape)
-    points = (cell * (corner + within) - _HALF_SIDE).astype(np.float32)
+    points = (_CELL * (corner + within) - _HALF_SIDE).astype(np.float32)
     voxel = _voxel_of(grid, points)
     values, nearest = grid.values.ravel()[voxel], grid.points()[voxel].astype(np.float32)
     points = points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]

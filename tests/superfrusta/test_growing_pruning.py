@@ -6,9 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+import trimesh
 
 from partwright.fields import kernel
-from partwright.fields.columns import WIDTH, Column
+from partwright.fields.columns import SIZE, WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
 from partwright.superfrusta.growing import grow
@@ -19,6 +20,7 @@ from partwright.superfrusta.refining import POLISH, refine
 from partwright.superfrusta.samples import FitSamples
 from tests.superfrusta.meshes import box, union
 from tests.superfrusta.rows import box as box_row
+from tests.superfrusta.rows import row
 
 SETTINGS = Settings.for_quality("draft")
 NONE = np.empty((0, WIDTH), np.float32)
@@ -57,6 +59,19 @@ def test_the_other_block_grows_where_one_is_missing(pair: FitSamples, exact: np.
         points = pair.points[pair.near :]
         occupied, wanted = (kernel.evaluate(r, points) < 0 for r in (grown, exact[[missing]]))
         assert np.count_nonzero(occupied & wanted) > 0.95 * np.count_nonzero(occupied | wanted)
+
+
+@pytest.mark.parametrize("thickness", [0.012, 0.02])  # of a voxel: 0.4 and 0.7
+def test_a_collar_thinner_than_a_voxel_grows_as_one_ring(thickness: float) -> None:
+    """Its voxels lie here and there, and were found as four or five pieces of a ring, or not at all."""
+    inner = 2 * (0.9 - thickness)
+    drum, collar = (trimesh.creation.cylinder(d / 2, h, sections=180) for d, h in ((inner, 1.0), (1.8, 0.2)))
+    samples = FitSamples.of(load_shape(union(drum, collar)), SETTINGS)
+    rows = row(size=(inner, inner, 1.0), roundness=1.0)[None]
+    grown = grow(samples, rows, SETTINGS, most=5).last
+    assert len(grown) == 1
+    np.testing.assert_allclose(grown[0, SIZE], (1.8, 1.8, 0.2), atol=0.02)
+    assert score(samples, np.concatenate([rows, grown])) > 0.996
 
 
 def test_no_more_than_wanted_grow_and_the_best_comes_first(pair: FitSamples) -> None:

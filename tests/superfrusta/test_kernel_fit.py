@@ -102,7 +102,9 @@ def test_a_disturbed_assembly_is_found_again() -> None:
 def test_a_perfect_start_stays_bit_for_bit() -> None:
     rows = random_rows(2, 3)
     found, loss, _ = kernel.levenberg_marquardt(rows, exact_target(rows), STAGES, LIMITS)
-    assert loss < 1e-30  # where a part is too far to be felt, occupancies of less than 1e-15 are taken for none
+    assert (
+        loss < 1e-30
+    )  # where a part is too far to be felt, occupancies of less than 1e-15 are taken for none
     np.testing.assert_array_equal(found, rows)
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from partwright.fields.columns import SIZE, UNSIGNED, Column
+from partwright.fields import kernel
+from partwright.fields.columns import SIZE, WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.samples import FitSamples
@@ -24,8 +25,8 @@ def box() -> FitSamples:
 
 def bar(reach: float, radius: float = 0.04) -> np.ndarray:
     """The box, and a thin bar along z that ends `reach` above its middle."""
-    row = np.zeros((2, UNSIGNED), np.float32)
-    row[:, Column.QW], row[:, Column.TAPER] = 1.0, 1.0
+    row = np.zeros((2, WIDTH), np.float32)
+    row[:, [Column.QW, Column.TAPER, Column.SIGN]] = 1.0
     row[0, SIZE] = 1.8, 0.9, 0.9
     row[1, SIZE] = 2 * radius, 2 * radius, 2 * reach
     return row
@@ -63,3 +64,17 @@ def test_what_is_known_is_not_sampled_again(box: FitSamples) -> None:
     more = box.with_stray_samples(bar(1.0))
     assert len(more.points) > len(box.points)
     assert more.with_stray_samples(bar(1.0)) is more
+
+
+def test_a_chip_that_cuts_leave_beyond_all_probes_becomes_samples(box: FitSamples) -> None:
+    """A bar whose end lies 1.6 above the middle is cut off between 0.45 and 1.3."""
+    chip = np.append(bar(0.8, radius=0.05), bar(0.8)[[0]], axis=0)
+    chip[1, Column.TZ] = 0.8
+    chip[2, [Column.TZ, Column.SZ, Column.SIGN]] = 0.875, 0.85, -1
+    assert (kernel.evaluate(chip, box.probes) > 0).all()
+    more = box.with_stray_samples(chip)
+    added = more.points[len(box.points) :]
+    assert ((added[:, 2] > 1.3) & (added[:, 2] < 1.6)).all()
+    volume = more.weight[len(box.points) :].sum() / box.density
+    assert volume == pytest.approx(0.3 * 0.1**2, rel=0.2)
+    assert more.with_stray_samples(chip) is more
