@@ -13,7 +13,7 @@ from partwright.partsdf.piercing import drawn_back
 from partwright.partsdf.soundness import Judge, Soundness
 
 TRIES = 8  # with half of the shapes unsound, one of 256 stays so
-_DRAWN_BACK = 3  # times at most, each of one part
+_DRAWN_BACK = 6  # times at most, each of one part
 _CHANGES = (0.6, 0.7, 0.8, 0.9)  # of the first one, in the tries after it; then nothing of it is left
 ShareDone = Callable[[float], None]  # told how much is done, from 0 to 1, at most
 
@@ -77,14 +77,17 @@ def sound_samples(
 
 
 def _mended(sample: Sample, judge: Judge, keep: Sequence[str], keep_layout: bool) -> Sample:
-    """The sample with parts that came through others drawn back, one by one, as long as that helps."""
+    """The sample with parts that came through others drawn back, one by one; one for which that does not help
+    stays, and the others have their turn."""
+    kept = set(keep)
     for _ in range(_DRAWN_BACK):
-        free = [tip for tip in sample.soundness.through if tip.part not in keep]
+        free = [tip for tip in sample.soundness.through if tip.part not in kept]
         if not free:
             break
         shape = drawn_back(sample.shape, free[0], move_pose=not keep_layout)
         new = replace(sample, shape=shape, soundness=judge(shape))
-        if new.soundness.rank >= sample.soundness.rank:
-            break
-        sample = new
+        if new.soundness.rank < sample.soundness.rank:
+            sample = new
+        else:
+            kept.add(free[0].part)
     return sample

@@ -14,9 +14,9 @@ import trimesh
 from partwright.partsdf.editing import moved
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.piercing import drawn_back, tips
+from partwright.partsdf.piercing import Tip, drawn_back, tips
 from partwright.partsdf.resampling import Sample, _mended, sound_samples
-from partwright.partsdf.soundness import THROUGH, Judge
+from partwright.partsdf.soundness import THROUGH, Judge, Soundness
 
 RADIUS, LENGTH, THIN = 0.1, 1.0, 0.02
 
@@ -95,3 +95,29 @@ def test_a_ball_that_came_through_its_plate_is_drawn_back(
     assert not torch.equal(formed.latents[1], broken.latents[1])
     made: Any = SimpleNamespace(model=model, generate=lambda *_, **__: [broken])
     assert sound_samples(made, 1, tries=1)[0].shape is broken
+
+
+def test_a_part_that_cannot_be_drawn_back_does_not_keep_others_from_it(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The knob stays as it is, whatever is done; the ball comes back at once."""
+    shape, none = NeuralShape.trained(model, "lamp0"), np.zeros((0, 3), np.float32)
+
+    def judge(found: NeuralShape) -> Soundness:
+        out = [part for part in ("knob", "ball") if part == "knob" or found.latents[1, 0] < 100]
+        through = tuple(Tip(part, 0.1, 0.1, none, none) for part in out)
+        return Soundness((), 0.0, (), 1.0, 0.0, (), through)
+
+    asked: list[str] = []
+
+    def back(found: NeuralShape, tip: Tip, move_pose: bool) -> NeuralShape:
+        asked.append(tip.part)
+        latents = found.latents.clone()
+        latents[model.index(tip.part), 0] = 100.0
+        return replace(found, latents=latents)
+
+    monkeypatch.setattr("partwright.partsdf.resampling.drawn_back", back)
+    mended = _mended(Sample(shape, judge(shape), 1), judge, [], keep_layout=False)  # type: ignore[arg-type]
+    assert asked == ["knob", "ball"]
+    assert [tip.part for tip in mended.soundness.through] == ["knob"]
+    assert mended.shape.latents[2].equal(shape.latents[2])  # nor is the knob changed for nothing
