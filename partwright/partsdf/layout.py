@@ -6,9 +6,7 @@ import torch
 from torch import Tensor
 
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.part_vectors import PartVectors
-
-RIDGE = 0.1  # of a number's own variance, added to it: what few training shapes leave open
+from partwright.partsdf.part_vectors import PartVectors, covariance
 
 
 @torch.no_grad()
@@ -26,8 +24,7 @@ def layout_oddness(shape: NeuralShape) -> float:
         return 0.0
     vectors = PartVectors.of(model)
     known = _together(vectors.of_poses(model.poses), model.present)
-    spread = known.T @ known / count + RIDGE * torch.eye(known.shape[1], dtype=known.dtype)
-    factor = torch.linalg.cholesky(spread)
+    factor = torch.linalg.cholesky(covariance(known))
 
     def squared(rows: Tensor) -> Tensor:
         return torch.linalg.solve_triangular(factor, rows.T, upper=False).square().sum(dim=0)

@@ -17,6 +17,7 @@ from partwright.partsdf.poses import PoseTensors, rotation_matrices
 
 POSE = 3 + 6 + 3
 MOST = 32  # principal directions
+RIDGE = 0.1  # of a number's own variance, added to it: what few training shapes leave open
 _LEAST = 0.05  # spread of a pose's number, unit lengths or radians, that counts as one
 
 
@@ -95,6 +96,11 @@ class PartVectors:
         vectors (..., P, K + 12 + 1)."""
         latents, poses, logits = found.split((self.width, POSE, 1), dim=-1)
         return self.latents(latents), self.poses(poses), logits.squeeze(-1)
+
+
+def covariance(rows: Tensor) -> Tensor:
+    """(D, D) of numbers (S, D) that are each in its spread about the mean, with a ridge."""
+    return rows.T @ rows / len(rows) + RIDGE * torch.eye(rows.shape[1], dtype=rows.dtype)
 
 
 def pose_numbers(poses: PoseTensors) -> Tensor:

@@ -15,11 +15,10 @@ from typing import Any, NamedTuple, Protocol
 import torch
 from torch import Tensor
 
-from partwright.partsdf.layout import RIDGE
 from partwright.partsdf.losses import latent_penalty
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.part_vectors import MOST, PartVectors
+from partwright.partsdf.part_vectors import MOST, RIDGE, PartVectors, covariance
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.targets import Target
@@ -158,8 +157,7 @@ def precision(model: Model, vectors: PartVectors) -> Tensor:
     itself has a variance of 1 still."""
     there = model.present[..., None].double()
     known = _together(vectors.of_poses(model.poses) * there, vectors.of_latents(model.latents) * there)
-    spread = known.T @ known / len(known) + RIDGE * torch.eye(known.shape[1], dtype=known.dtype)
-    return torch.linalg.inv(spread / (1 + RIDGE)).float()
+    return torch.linalg.inv(covariance(known) / (1 + RIDGE)).float()
 
 
 def _together(place: Tensor, form: Tensor) -> Tensor:

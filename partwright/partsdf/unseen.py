@@ -17,9 +17,8 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from partwright.partsdf.layout import RIDGE
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.part_vectors import PartVectors
+from partwright.partsdf.part_vectors import PartVectors, covariance
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.targets import Target
 from partwright.partsdf.unknowns import Frame
@@ -82,8 +81,7 @@ def _told_by(given: Tensor, wanted: Tensor, seen: Tensor) -> Tensor:
     given, wanted, seen = given.double(), wanted.double(), seen.double()
     middle, mean = given.mean(dim=0), wanted.mean(dim=0)
     off = given - middle
-    spread = off.T @ off / len(off) + RIDGE * torch.eye(off.shape[1], dtype=off.dtype)
-    weights = torch.linalg.solve(spread, off.T @ (wanted - mean) / len(off))
+    weights = torch.linalg.solve(covariance(off), off.T @ (wanted - mean) / len(off))
     return (mean + (seen - middle) @ weights).float()
 
 

@@ -12,9 +12,8 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 Pair = tuple[str, str]
-LEAST_SHARED = (
-    1e-5  # of the smaller one's volume: less is touching, as enclosing shapes are larger by rounding
-)
+# Of the smaller one's volume: less is touching, as enclosing shapes are larger by rounding.
+LEAST_SHARED = 1e-5
 
 
 def overlaps(solids: Mapping[str, Manifold]) -> dict[Pair, float]:
