@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from partwright.fields.columns import ROTATION, TRANSLATION, Column
+from partwright.fields.kernel import Rows
 
 Floats = NDArray[np.float64]
-Rows = NDArray[np.float32]
 
 _ALONG = np.linspace(0, 1, 13)  # of an edge of the profile
 _ACROSS = np.array([0.0, 0.35, 0.7, 0.95])  # of a face at either end, from its rim to its middle

@@ -289,7 +289,7 @@ def _cell(points: NDArray[np.floating]) -> NDArray[np.int64]:
 
 def _probes(grid: DistanceGrid) -> NDArray[np.float32]:
     """Lattice points (n, 3), each moved within its cell, that may lie well outside the shape."""
-    corner = np.stack(np.meshgrid(*[np.arange(_PROBES)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    corner = grid_indices((_PROBES,) * 3)
     within = np.random.default_rng(0).uniform(0.1, 0.9, corner.shape)
     points = (_CELL * (corner + within) - _HALF_SIDE).astype(np.float32)
     voxel = _voxel_of(grid, points)
