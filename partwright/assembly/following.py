@@ -1,5 +1,5 @@
-"""What depends on the faces of a part, and goes with them when they move: parts that stand on them, cuts that
-go through them, cuts that begin at one of them."""
+"""What depends on the faces of a part, and goes with them when they move: parts that stand on them or reach
+out of them, cuts that go through them, cuts that begin at one of them."""
 
 from __future__ import annotations
 
@@ -91,13 +91,19 @@ class _Following:
             ]
             return dataclasses.replace(node, children=tuple(children))
         first = node.parts[0]
-        shift = sum((self._shift(first, move, own_cut) * move.axis for move in self.moves), np.zeros(3))
+        shift = sum((self._whole_shift(first, move, own_cut) * move.axis for move in self.moves), np.zeros(3))
         if not shift.any():
             return node
         self.told.append(
             f"{first.name} and what is cut from it moved with {self.part.name}, on whose face it stands"
         )
         return node.translated(shift.tolist())
+
+    def _whole_shift(self, first: Part, move: _Move, own_cut: bool) -> float:
+        """How far a part and what is cut from it move with a face."""
+        shift = self._shift(first, move, own_cut)
+        rooted = self._rooted(first, move) if not shift and not own_cut else None
+        return shift if rooted is None else move.after[rooted[0]] - move.before[rooted[0]]
 
     def _shift(self, other: Part, move: _Move, own_cut: bool) -> float:
         """How far a part that stands on a face moves with it: on the floor of a pocket where that is cut."""
@@ -131,7 +137,41 @@ class _Following:
                 face = f"the face of {self.part.name} that it stands on"
                 self.told.append(f"{other.name} moved by {shift:.6g} with {face}")
                 other = other.translated((shift * move.axis).tolist())
+            elif not own_cut:
+                other = self._rooted_moved(other, move)
         return other
+
+    def _rooted_moved(self, other: Part, move: _Move) -> Part:
+        """A part that is rooted in the part itself: it stands out as far as before, and ends where the part
+        does if it did so, or else would come out of the other face."""
+        rooted = self._rooted(other, move)
+        if rooted is None:
+            return other
+        face, root = rooted
+        shift = move.after[face] - move.before[face]
+        is_whole = abs(root - move.before[1 - face]) <= self.near
+        ends_at = move.after[1 - face] if is_whole else float(np.clip(root + shift, *move.after))
+        more = (root + shift - ends_at) * (1 if face else -1)
+        longer = _stretched(other, move.axis, more) if more else None
+        if longer is not None:
+            other, shift = longer, (shift + ends_at - root) / 2
+        self.told.append(f"{other.name} stands out of {self.part.name} as far as before")
+        return other.translated((shift * move.axis).tolist())
+
+    def _rooted(self, other: Part, move: _Move) -> tuple[int, float] | None:
+        """Out of which face another part reaches with all its copies, and how high its other end lies, within
+        the part or at its other face; None of what does not."""
+        low, high = _extent(other, move.axis)
+        begin, end = move.before
+        up = high > end + self.near and begin - self.near <= low < end - self.near
+        down = low < begin - self.near and begin + self.near < high <= end + self.near
+        if not move.flat or not (up or down) or not np.isfinite([low, high]).all():
+            return None
+        for copy in other.copies:
+            same = np.abs(np.subtract(_extent(copy, move.axis), (low, high))).max() <= self.near
+            if not same or not self._beside(copy, move, within=True):
+                return None
+        return (1, low) if up else (0, high)
 
     def _cut_moved(self, other: Part, move: _Move) -> Part:
         """A cut of the part: it still goes through, or has its depth as before."""

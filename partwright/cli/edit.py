@@ -13,9 +13,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = commands.add_parser(
         "edit",
         help="set numbers of an assembly's parts by name",
-        description="Sets numbers of parts by name. What stood on a face that moves goes with it, cuts that "
-        "went through still do, cuts of one face keep their depth, and copies of a part, or of its group, "
-        "change with it; each such change is said. `partwright describe` shows names and numbers.",
+        description="Sets numbers of parts by name. What stood on a face that moves, or reached out of it, "
+        "goes with it, cuts that went through still do, cuts of one face keep their depth, and copies of a "
+        "part, or of its group, change with it; each such change is said. `partwright describe` shows names "
+        "and numbers.",
     )
     option = command.add_argument
     add_assembly(command)

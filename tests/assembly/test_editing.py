@@ -17,6 +17,8 @@ from partwright.errors import ParameterError
 from partwright.fields import Box, Cylinder
 from partwright.meshing import mesh_assembly
 
+SHIFT = Similarity(translation=(40, 0, 0))
+
 
 def bracket() -> Assembly:
     """A plate 5 thick from z = 0, two holes through it, a pocket 2 deep in its top, a foot under it, and a
@@ -87,6 +89,33 @@ def test_what_is_on_the_floor_of_a_pocket_goes_down_with_it() -> None:
     assert [after[name].translation[2] for name in ("hole", "stud", "shelf", "plate")] == [4, 6.5, 7, 5]
     assert len(edited.followed) == 2
     assert mesh_assembly(after).body_count == mesh_assembly(before).body_count
+
+
+def test_what_is_rooted_in_a_plate_stands_out_of_it_as_far_as_before() -> None:
+    """Fits let what is added reach into what it stands on: down to its other face, or a little way."""
+    plate = Part(Box((60, 40, 6)), (0, 0, 3), name="plate")
+    boss = Part(Cylinder(4, 15), (-20, 0, 7.5), instances=(SHIFT,), name="boss")  # from 0 to 15
+    fin = Part(Box((2, 30, 20)), (0, 0, 15), name="fin")  # from 5 to 25
+    post = Part(Cylinder(3, 10), (10, 0, -1), name="post")  # from -6 to 4, with a hole
+    hole = Part(Cylinder(1, 12), (10, 0, -4), name="hole")
+    shaft = Part(Cylinder(1, 30), (0, 15, 0), name="shaft")  # through both faces
+    wall = Part(Box((4, 40, 30)), (29, 2, 15), name="wall")  # not over the plate alone
+    before = Assembly((plate, boss, fin, Assembly((post, hole), "difference"), shaft, wall))
+    edited = with_numbers(before, {"plate.size.z": 10.0})  # from -2 to 8
+    after = edited.assembly
+    ends = {part.name: part.bounds()[:, 2].tolist() for part in after.parts}
+    assert ends == {
+        "plate": [-2, 8],
+        "boss": [-2, 17],
+        "fin": [7, 27],
+        "post": [-8, 2],
+        "hole": [-12, 0],
+        "shaft": [-15, 15],
+        "wall": [0, 30],
+    }
+    assert [line.split()[0] for line in edited.followed] == ["boss", "fin", "post"]
+    thin = with_numbers(before, {"plate.size.z": 0.5}).assembly  # from 2.75 to 3.25
+    assert thin["fin"].bounds()[:, 2].tolist() == [2.75, 22.25]  # and not out of its other face
 
 
 @pytest.mark.parametrize(
