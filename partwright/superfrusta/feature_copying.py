@@ -40,6 +40,8 @@ _BY_CHANCE = 1.0  # roots of the number of samples, by which a copy may have few
 _LEAST_COPY = 0.3
 _POINTS = 200
 _DIGITS = 9  # of shifts that are told apart
+_APART = 8e-3  # unit lengths: shifts that differ by less lead to the same place
+_SHARED = 0.5  # of the samples in a mirror image, that its part or another copy may hold already
 _CHORD = 1e-3  # unit lengths: how far chords of a cut with moved sides may be off
 
 
@@ -76,6 +78,12 @@ def with_copies(
         covered, reached, within, left = more, better, within | mask, left & ~hit
         return True
 
+    def is_image(whole: Part) -> bool:
+        """Whether a mirror image with its copies joined, which most of it may not have been before."""
+        mask = covers(whole, search.points)
+        is_new = (mask & within).sum() < _SHARED * mask.sum()
+        return bool(is_new) and joined(whole, covers(whole, few), len(whole.copies))
+
     part, image = chosen.part, None
     if not chosen.cuts:  # of which there is but one
         inner, _ = chosen.bodies
@@ -89,13 +97,30 @@ def with_copies(
         found = ((move, part.transformed(move)) for move in moves)
         near = ((move, copy) for move, copy in found if within_box(few, *copy.bounds()).sum() > hits)
         may_pay = {move: (copy, hit) for move, copy in near if (hit := covers(copy, few)).sum() > hits}
-        kept = tuple(move for move in _nearest_first(search, part, list(may_pay)) if joined(*may_pay[move]))
-        part = replace(part, instances=kept)
+        kept = [move for move in _nearest_first(search, part, list(may_pay)) if joined(*may_pay[move])]
+        rest = few[left]
+        ways = _lattice(part, kept) if len(rest) > hits else ()
+        corners = ((move, part.transformed(move)) for move in ways)
+        near = ((move, copy) for move, copy in corners if within_box(rest, *copy.bounds()).sum() > hits)
+        kept += [move for move, copy in near if joined(copy, covers(copy, few))]
+        part = replace(part, instances=tuple(kept))
         flipped = image_of(part, Similarity()) if kept else flipped
         images = ((plane, flipped.transformed(plane)) for plane in planes)
-        image = next((p for p, one in images if joined(one, covers(one, few), len(part.copies))), None)
+        image = next((plane for plane, one in images if is_image(one)), None)
     objective = reached - tree.price - search.price(chosen.sides)
     return Step(chosen, added, part, covered, within, reached, objective, image)
+
+
+def _lattice(part: Part, moves: Sequence[Similarity]) -> list[Similarity]:
+    """Shifts by the sum or difference of two of the ways that a part's middle is moved, where they lead to
+    another place: of four holes that one piece holds, two along the edges are seen, and none across."""
+    middle = np.array(part.translation)
+    known = np.array([np.zeros(3), *(move(middle) - middle for move in moves)])
+    first, second = (known[k] for k in np.triu_indices(len(known), 1))
+    sums = np.concatenate([first + second, first - second, second - first])
+    far = np.linalg.norm(sums[:, None] - known, axis=-1).min(axis=1) > _APART
+    ways = np.unique(np.round(sums[far], _DIGITS) + 0.0, axis=0)
+    return [Similarity(translation=(x, y, z)) for x, y, z in ways.tolist()]
 
 
 def _shifts(part: Part, turns: Sequence[Similarity], mirrors: Sequence[Similarity]) -> list[Similarity]:

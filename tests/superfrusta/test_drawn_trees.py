@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 
 import partwright as pw
+from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Field, Profile, Revolution, Tube
 from partwright.fields.profile import circle
 from partwright.meshing import mesh_assembly
-from partwright.meshing.csg import mesh_csg
+from partwright.meshing.csg import mesh_csg, solid_of
 from partwright.superfrusta import feature_search
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
 from partwright.superfrusta.feature_copying import with_copies
 from partwright.superfrusta.feature_linings import lines_a_hole
 from partwright.superfrusta.feature_search import FeatureSearch
-from partwright.superfrusta.feature_steps import Feature, FeatureTree
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
 from partwright.superfrusta.feature_teeth import with_teeth_apart
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.solids import Settings
@@ -333,3 +336,26 @@ def test_an_engraved_scale_is_a_disc_with_slots() -> None:
         assert (whole.added, whole.part.field.kind) == (True, "tube")
         assert whole.part.field.height * 18 / 0.9 == pytest.approx(8, abs=1e-3)
         assert (slot.added, len(slot.part.copies), slot.sides) == (False, 24, 4)
+
+
+def test_four_holes_that_are_seen_by_twos_are_one_grid() -> None:
+    """A mirror plane shows one of the others, a candidate that is like it the second: the third is where both
+    lead to, and no mirror image of three of them, which would have two of them twice."""
+    holes = at(Cylinder(3, 12), *((x, y, 0.0) for x in (0.0, 40.0) for y in (-15.0, 15.0)))
+    drawn = Assembly((Part(Box((120, 60, 10))), holes), "difference")
+    shape, settings = pw.load_shape(mesh_assembly(drawn), unit="mm"), Settings.for_quality("draft")
+    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+    plate, hole = in_unit_frame(shape, drawn).parts
+    covered = covers(plate, search.points)
+    tree = FeatureTree(covered=covered, score=search.score_of(covered))
+    (first, _, along, _) = (
+        Candidate(copy, partial(_body, copy), 2, float(_body(copy).volume())) for copy in hole.copies
+    )
+    step = with_copies(search, tree, first, False, (), (along,))
+    assert step.image is None
+    assert len(step.part.copies) == 4
+    assert step.score > 0.999
+
+
+def _body(part: Part, further: float = 0.0) -> Manifold:
+    return solid_of(part, 1e-3)
