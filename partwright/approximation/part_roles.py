@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from partwright.approximation.tooth_roles import GAP, tooth_role
+from partwright.approximation.tooth_roles import GAP, is_fin, tooth_role
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.group_copies import in_runs, numbered_names
 from partwright.assembly.names import unique_names
@@ -89,7 +89,7 @@ def _name(node: Node, cut_from: Node | None, roles: dict[str, str], beside: Sequ
     if isinstance(node, Part):
         if _is_solid(node):
             roles[node.name] = tooth_role(node, cut_from, beside) or (
-                _cut(node, cut_from) if cut_from else _added(node.field)
+                _cut(node, cut_from) if cut_from else "fin" if is_fin(node) else _added(node.field)
             )
         return
     first, *others = node.children

@@ -1,4 +1,5 @@
-"""Names of what stands around an axis again and again: teeth, blades, and the gaps between teeth."""
+"""Names of what stands around an axis again and again, teeth, blades, and the gaps between teeth, or in a
+row: fins."""
 
 from __future__ import annotations
 
@@ -18,6 +19,8 @@ GAP = "tooth_gap"
 _FEWEST, _FEW = 5, 8  # of a fan's blades, and of a wheel's teeth
 _SAME = 1e-3  # of the part's size: how far copies may be off a turn
 _STEPS = 200
+_THIN = 0.3  # of a fin's next longer side, that it is thick at most
+_ROW = 3  # others beside one that is a fin, at least
 _LONG = 3.0  # a blade's length over its width, at least
 
 
@@ -43,6 +46,21 @@ def tooth_role(part: Part, cut_from: Node | None, beside: Sequence[Node] = ()) -
     sideways = _ends(part, middle, np.cross(direction, outward))
     length, width = (float(np.linalg.norm(one - other)) for one, other in (ends, sideways))
     return "blade" if length > _LONG * width else None if few else "tooth"
+
+
+def is_fin(part: Part) -> bool:
+    """Whether a part is thin, and there again and again beside its broad sides."""
+    low, high = part.field.bounds()
+    sides = np.asarray(high - low)
+    if not np.isfinite(sides).all():
+        return False
+    thin = int(sides.argmin())
+    across = rotation_matrix(part.rotation)[:, thin]
+    ways = np.array([move.translation for move in part.instances if move.rotation == (1.0, 0.0, 0.0, 0.0)])
+    if len(ways) < _ROW or sides[thin] > _THIN * np.sort(sides)[1]:
+        return False
+    aside = np.linalg.norm(ways - np.outer(ways @ across, across), axis=1)
+    return int((aside < _SAME * _size(part)).sum()) >= _ROW
 
 
 def _axis(part: Part) -> tuple[Floats, Floats] | None:

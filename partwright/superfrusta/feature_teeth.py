@@ -1,14 +1,15 @@
-"""Outlines of gears in a tree of features as a disc and one tooth, or one gap, with its copies: that is how
-they are drawn, and how they are changed."""
+"""Outlines of gears and racks in a tree of features as a body and one tooth, or one gap, with its copies:
+that is how they are drawn, and how they are changed."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from partwright.approximation.profile_parts import stacked, with_profile
+from partwright.approximation.sketches.racks import Rack, racked
 from partwright.approximation.sketches.rims import SHARP
 from partwright.approximation.sketches.sections import FINE
 from partwright.approximation.sketches.teeth import Teeth, toothed
@@ -24,8 +25,9 @@ _LOSS = 1e-3  # of R: one tooth is not quite the next
 
 
 def with_teeth_apart(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
-    """The tree with every outline as a circle and teeth where these have less than half of its corners and
-    the tree is about as near: that they are two features does not count, as both say more than one did."""
+    """The tree with every outline as a circle and teeth, or with a straight side and a row of fins, where
+    these have less than half of its corners and the tree is about as near: that they are two features does
+    not count, as both say more than one did."""
     least = search.scored(tree).score - _LOSS
     while True:
         others = [search.scored(replace(tree, features=features)) for features in _rewritten(search, tree)]
@@ -49,7 +51,8 @@ def _rewritten(search: FeatureSearch, tree: FeatureTree) -> Iterator[list[Featur
             or field.rims != (SHARP, SHARP)
         ):
             continue
-        for teeth in toothed(field.profile):
+        ways: Iterator[Teeth | Rack] = chain(toothed(field.profile), racked(field.profile))
+        for teeth in ways:
             base, tooth = _steps(search, feature, teeth)
             if 2 * (base.sides + tooth.sides) >= len(field.profile.corners):
                 continue
@@ -75,15 +78,12 @@ def _stacked(search: FeatureSearch, one: Feature, other: Feature) -> Feature | N
     return replace(one, part=part, covers=covers(part, search.points)) if part is not None else None
 
 
-def _steps(search: FeatureSearch, feature: Feature, teeth: Teeth) -> tuple[Feature, Feature]:
+def _steps(search: FeatureSearch, feature: Feature, teeth: Teeth | Rack) -> tuple[Feature, Feature]:
     """The base, and the teeth."""
-    whole, (x, y) = feature.part, teeth.centre
+    whole = feature.part
     pose = whole.pose
-    turns = [
-        pose @ Similarity.turn((0, 0, 1), 2 * math.pi * k / teeth.order, (x, y, 0)) @ pose.inverse()
-        for k in range(1, teeth.order)
-    ]
-    copies = [*turns, *(move @ turn for move in whole.instances for turn in (Similarity(), *turns))]
+    own = [pose @ move @ pose.inverse() for move in teeth.moves]
+    copies = [*own, *(move @ inner for move in whole.instances for inner in (Similarity(), *own))]
 
     def step(profile: Profile, instances: Sequence[Similarity], added: bool) -> Feature:
         part = replace(with_profile(whole, profile), instances=tuple(instances))

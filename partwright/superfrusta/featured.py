@@ -14,6 +14,7 @@ from partwright.methods import Checkpoint, FitRequest, Progress
 from partwright.metrics.deviation import place_in
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
+from partwright.superfrusta.feature_boxes import with_whole_boxes
 from partwright.superfrusta.feature_freeform import with_freeform
 from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_pruning import pruned
@@ -73,7 +74,9 @@ class FeaturedFit:
         if tree is None:
             return None, False
         if settings.min_iou is None:
-            return with_teeth_apart(search, with_pockets(tree, self._samples.points)), False
+            points = self._samples.points
+            toothed = with_teeth_apart(search, with_pockets(tree, points))
+            return with_whole_boxes(toothed, points), False
         for count in range(1, len(tree.features) + 1):
             shorter = tree.first(count)
             if volume_iou(shorter, self._samples) >= settings.min_iou:

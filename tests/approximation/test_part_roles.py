@@ -99,3 +99,13 @@ def test_what_stands_around_an_axis_is_teeth_and_holes_in_it_are_not() -> None:
     assert [part.name for part in after.parts] == ["base_cylinder", "tooth_gap", "hole"]
     fan = Assembly((wheel, ring(blades.copies[0], 5), ring(teeth.copies[0], 5)))
     assert {part.name for part in with_role_names(fan).parts} == {"blade", "block", "base_cylinder"}
+
+
+def test_thin_walls_in_a_row_are_fins() -> None:
+    def row(count: int, *step: float) -> Assembly:
+        moves = (Similarity(translation=tuple(k * s for s in step)) for k in range(1, count))
+        fin = Part(Box((2, 40, 20)), (-20, 0, 12), name="a", instances=tuple(moves))
+        return with_role_names(Assembly((Part(Box((60, 60, 6))), fin)))
+
+    names = [row(count, *step).parts[-1].name for count, *step in ((5, 9, 0, 0), (3, 9, 0, 0), (5, 0, 50, 0))]
+    assert names == ["fin", "plate", "plate"]

@@ -21,6 +21,7 @@ from partwright.meshing import mesh_assembly
 from partwright.meshing.csg import mesh_csg, solid_of
 from partwright.superfrusta import feature_search
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
+from partwright.superfrusta.feature_boxes import with_whole_boxes
 from partwright.superfrusta.feature_copying import with_copies
 from partwright.superfrusta.feature_linings import lines_a_hole
 from partwright.superfrusta.feature_search import FeatureSearch
@@ -359,3 +360,25 @@ def test_four_holes_that_are_seen_by_twos_are_one_grid() -> None:
 
 def _body(part: Part, further: float = 0.0) -> Manifold:
     return solid_of(part, 1e-3)
+
+
+def test_a_heat_sink_is_a_plate_with_a_row_of_fins() -> None:
+    """Whatever it was read as: two combs, and a bar between them. The plate is one box."""
+    comb = [(30.0, 0.0), (30.0, 5.0)]
+    for k in range(9):
+        comb += [(x - 6 * k, y) for x, y in ((25.0, 5.0), (25.0, 25.0), (23.0, 25.0), (23.0, 5.0))]
+    outline = Extrusion(Profile.polygon([*comb, (-30, 5), (-30, 0)]), 24)
+    turn = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
+    combs = Part(outline, (0, 18, 0), turn, instances=(Similarity(translation=(0, -36, 0)),))
+    bored = Profile(Profile.rectangle(60, 12).outline, (circle(2, (-25, 0)), circle(2, (25, 0))))
+    drawn = Assembly((combs, Part(Extrusion(bored, 5), (0, 0, 2.5))))
+    shape, settings = pw.load_shape(mesh_assembly(drawn), unit="mm"), Settings.for_quality("draft")
+    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+    none = np.zeros(0, bool)
+    features = [Feature(True, part, none, 40) for part in in_unit_frame(shape, drawn).parts]
+    tree = with_whole_boxes(with_teeth_apart(search, FeatureTree(features)), search.points)
+    assert kinds(tree) == [(True, "box", 1), (False, "cylinder", 2), (True, "box", 18)]
+    plate, _, fin = (np.array(f.part.field.bounds()[1]) * 60 / 0.9 for f in tree.features)
+    assert sorted(plate) == pytest.approx([5, 60, 60], abs=1e-3)
+    assert sorted(fin) == pytest.approx([2, 21, 24], abs=1e-3)
+    assert search.scored(tree).score > 0.998

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from partwright.approximation.sketches.chains import circle_through
 from partwright.approximation.sketches.outlines import fitted_loop
 from partwright.approximation.sketches.sections import FINE, area_centre
+from partwright.assembly import Similarity
 from partwright.errors import ParameterError
 from partwright.fields.profile import Loop, Profile, circle
 
@@ -46,6 +47,14 @@ class Teeth:
     centre: tuple[float, float]
     order: int
     added: bool
+
+    @property
+    def moves(self) -> list[Similarity]:
+        """To the other teeth, in the plane of the profile."""
+        x, y = self.centre
+        return [
+            Similarity.turn((0, 0, 1), 2 * math.pi * k / self.order, (x, y, 0)) for k in range(1, self.order)
+        ]
 
 
 def toothed(profile: Profile) -> Iterator[Teeth]:
