@@ -16,6 +16,7 @@ from partwright.shapes import Shape
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
 from partwright.superfrusta.feature_boxes import with_whole_boxes
 from partwright.superfrusta.feature_freeform import with_freeform
+from partwright.superfrusta.feature_outlines import with_plain_outlines
 from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_pruning import pruned
 from partwright.superfrusta.feature_search import FeatureSearch
@@ -76,7 +77,7 @@ class FeaturedFit:
         if settings.min_iou is None:
             points = self._samples.points
             toothed = with_teeth_apart(search, with_pockets(tree, points))
-            return with_whole_boxes(toothed, points), False
+            return with_plain_outlines(search, with_whole_boxes(toothed, points)), False
         for count in range(1, len(tree.features) + 1):
             shorter = tree.first(count)
             if volume_iou(shorter, self._samples) >= settings.min_iou:
