@@ -4,18 +4,20 @@ out of them, cuts that go through them, cuts that begin at one of them."""
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
-from partwright.assembly.numbers import numbers_of, with_number
-from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.similarity import Similarity, rotation_matrix
+from partwright.assembly.stretching import stretched
 from partwright.assembly.tree import Assembly, Node, Part
+from partwright.fields import Profile, Revolution
 
 _FLUSH = 2e-3  # of the assembly's longest side: faces that are nearer touch
-_ALONG = 1e-3  # radians: axes that differ by less are parallel
-_STRETCHED = ("cylinder", "tube", "extrusion", "capsule")
+_BEYOND = 20  # times that, by which cuts end beyond a shoulder that they are open at
 _FLAT = ("box", "hollow_box", "extrusion")  # kinds that may have flat faces along all of their axes
 _FLAT_ENDS = (*_FLAT, "cylinder", "tube", "cone", "frustum", "hollow_frustum", "revolution")  # and along z
 
@@ -32,7 +34,8 @@ class _Move:
     """The two faces of a part along one of its axes: where they were, and where they are.
 
     flat: whether they are faces that something can stand on, and not where a round wall happens to end.
-    across: the two other axes, and from where to where the part reached along them.
+    across: the two other axes, and from where to where the part reached along them. shoulder: which of
+    them, if one is, lies between the ends of the part, so that what reaches far beyond it is not of it.
     """
 
     axis: np.ndarray
@@ -40,6 +43,14 @@ class _Move:
     after: tuple[float, float]
     flat: bool
     across: tuple[tuple[np.ndarray, tuple[float, float]], ...]
+    shoulder: int | None = None
+
+    @property
+    def of_shoulder(self) -> _Move:
+        """Of the one face alone."""
+        low, high = self.before
+        after = (low, self.after[1]) if self.shoulder else (self.after[0], high)
+        return dataclasses.replace(self, after=after)
 
 
 def _extent(part: Part, axis: np.ndarray) -> tuple[float, float]:
@@ -51,6 +62,8 @@ def _extent(part: Part, axis: np.ndarray) -> tuple[float, float]:
 
 
 def _moves(before: Part, after: Part) -> Iterator[_Move]:
+    if isinstance(before.field, Revolution) and isinstance(after.field, Revolution):
+        yield from _shoulder_moves(before, after, before.field.profile, after.field.profile)
     axes = list(rotation_matrix(before.rotation).T)
     for k, axis in enumerate(axes):
         old, new = _extent(before, axis), _extent(after, axis)
@@ -58,6 +71,26 @@ def _moves(before: Part, after: Part) -> Iterator[_Move]:
             others = tuple((other, _extent(before, other)) for i, other in enumerate(axes) if i != k)
             flat = before.field.kind in (_FLAT_ENDS if k == 2 else _FLAT)
             yield _Move(axis, old, new, flat, others)
+
+
+def _shoulder_moves(before: Part, after: Part, old: Profile, new: Profile) -> Iterator[_Move]:
+    """Of flat faces between the ends of a part that is turned."""
+    *others, axis = rotation_matrix(before.rotation).T
+    ends, now = _extent(before, axis), _extent(after, axis)
+    across = tuple((other, _extent(before, other)) for other in others)
+    shift = float(np.subtract(after.translation, before.translation) @ axis)
+    at = float(np.array(before.translation) @ axis)
+    low, high = (float(y) for y in (old.corners[:, 1].min(), old.corners[:, 1].max()))
+    if old.corners.shape != new.corners.shape:
+        return
+    for side, other in zip(chain(*old.sides), chain(*new.sides), strict=True):
+        level, moved = at + side.start[1], at + other.start[1] + shift
+        if side.start[1] != side.end[1] or not low < side.start[1] < high:
+            continue
+        up = side.start[0] > side.end[0]  # the solid lies on the left
+        was, is_ = ((ends[0], level), (now[0], moved)) if up else ((level, ends[1]), (moved, now[1]))
+        if was != is_:
+            yield _Move(axis, was, is_, True, across, int(up))
 
 
 @dataclass(frozen=True)
@@ -128,18 +161,33 @@ class _Following:
         return any(all(over(copy, axis, *reach) for axis, reach in move.across) for copy in other.copies)
 
     def _moved(self, other: Part, cut: bool, own_cut: bool) -> Part:
+        return self._cut_moved(other) if cut else self._added_moved(other, own_cut)
+
+    def _added_moved(self, other: Part, own_cut: bool) -> Part:
         for move in self.moves:
-            if cut:
-                other = self._cut_moved(other, move)
-                continue
-            shift = self._shift(other, move, own_cut)
-            if shift:
-                face = f"the face of {self.part.name} that it stands on"
-                self.told.append(f"{other.name} moved by {shift:.6g} with {face}")
-                other = other.translated((shift * move.axis).tolist())
-            elif not own_cut:
+            face = move if move.shoulder is None else move.of_shoulder
+            shifts = [self._shift(copy, face, own_cut) for copy in other.copies]
+            if any(shifts):
+                what = f"the face of {self.part.name} that it stands on"
+                other = self._shifted(other, shifts, move, what)
+            elif not own_cut and move.shoulder is None:
                 other = self._rooted_moved(other, move)
         return other
+
+    def _shifted(self, other: Part, shifts: list[float], move: _Move, face: str) -> Part:
+        """Every copy with its own face where they stand on two that move otherwise, else all alike."""
+        ways = sorted({shift for shift in shifts if shift})
+        if not ways:
+            return other
+        self.told.append(f"{other.name} moved by {' and '.join(f'{way:.6g}' for way in ways)} with {face}")
+        if len(ways) == 1:
+            return other.translated((ways[0] * move.axis).tolist())
+        first, *rest = (_shift_along(shift, move.axis) for shift in shifts)
+        moved = dataclasses.replace(other, instances=()).transformed(first)
+        pairs = zip(rest, other.instances, strict=True)
+        return dataclasses.replace(
+            moved, instances=tuple(own @ instance @ first.inverse() for own, instance in pairs)
+        )
 
     def _rooted_moved(self, other: Part, move: _Move) -> Part:
         """A part that is rooted in the part itself: it stands out as far as before, and ends where the part
@@ -152,7 +200,7 @@ class _Following:
         is_whole = abs(root - move.before[1 - face]) <= self.near
         ends_at = move.after[1 - face] if is_whole else float(np.clip(root + shift, *move.after))
         more = (root + shift - ends_at) * (1 if face else -1)
-        longer = _stretched(other, move.axis, more) if more else None
+        longer = stretched(other, move.axis, more) if more else None
         if longer is not None:
             other, shift = longer, (shift + ends_at - root) / 2
         self.told.append(f"{other.name} stands out of {self.part.name} as far as before")
@@ -173,25 +221,54 @@ class _Following:
                 return None
         return (1, low) if up else (0, high)
 
-    def _cut_moved(self, other: Part, move: _Move) -> Part:
+    def _cut_moved(self, other: Part) -> Part:
+        of_shoulders: list[np.ndarray] = []  # axes along which it belongs to one, and not to the part's ends
+        for move in self.moves:
+            if move.shoulder is None and any((axis == move.axis).all() for axis in of_shoulders):
+                continue
+            moved = self._cut_moved_along(other, move)
+            if moved is not other and move.shoulder is not None:
+                of_shoulders.append(move.axis)
+            other = moved
+        return other
+
+    def _cut_moved_along(self, other: Part, move: _Move) -> Part:
         """A cut of the part: it still goes through, or has its depth as before."""
         low, high = _extent(other, move.axis)
         if not np.isfinite([low, high]).all() or not self._beside(other, move):
             return other
         rise, fall = move.after[1] - move.before[1], move.after[0] - move.before[0]
-        below, above = low <= move.before[0] + self.near, high >= move.before[1] - self.near
+        below, above = self._is_open(low, high, move)
         if below and above:
-            longer = _stretched(other, move.axis, rise - fall)
+            longer = stretched(other, move.axis, rise - fall)
             if longer is None:
                 return other
             self.told.append(f"{other.name} goes through {self.part.name} as before")
             return longer.translated(((rise + fall) / 2 * move.axis).tolist())
-        if (above and low < move.before[1]) or (below and high > move.before[0]):
-            shift = rise if above else fall
-            face = f"the face of {self.part.name}: its depth is kept"
-            self.told.append(f"{other.name} moved by {shift:.6g} with {face}")
-            return other.translated((shift * move.axis).tolist())
-        return other
+        shifts = [self._depth_shift(copy, move) for copy in other.copies]
+        return self._shifted(other, shifts, move, f"the face of {self.part.name}: its depth is kept")
+
+    def _is_open(self, low: float, high: float, move: _Move) -> tuple[bool, bool]:
+        """Whether a cut ends beyond the one face, and beyond the other; of a shoulder not far beyond."""
+        least, most = (_BEYOND * self.near if move.shoulder == k else math.inf for k in (0, 1))
+        begin, end = move.before
+        return begin - least <= low <= begin + self.near, end - self.near <= high <= end + most
+
+    def _depth_shift(self, cut: Part, move: _Move) -> float:
+        """How far the face moves in which a blind cut begins; 0 where it begins in neither."""
+        low, high = _extent(cut, move.axis)
+        below, above = self._is_open(low, high, move)
+        begin, end = move.before
+        if above and begin + self.near < low < end:
+            return move.after[1] - end
+        if below and begin < high < end - self.near:
+            return move.after[0] - begin
+        return 0.0
+
+
+def _shift_along(length: float, axis: np.ndarray) -> Similarity:
+    x, y, z = (length * axis).tolist()
+    return Similarity(translation=(x, y, z))
 
 
 def _is_cut(node: Node, name: str) -> bool:
@@ -202,18 +279,3 @@ def _is_cut(node: Node, name: str) -> bool:
         if any(leaf.name == name for leaf in child.parts):
             return (node.operation == "difference" and i > 0) != _is_cut(child, name)
     return False
-
-
-def _stretched(part: Part, axis: np.ndarray, by: float) -> Part | None:
-    """Longer along the direction; None where no number of it is its length that way."""
-    local = np.abs(axis @ rotation_matrix(part.rotation))
-    k = int(local.argmax())
-    if local[k] < 1 - _ALONG:
-        return None
-    if part.field.kind == "box":
-        number = f"size.{'xyz'[k]}"
-    elif k == 2 and part.field.kind in _STRETCHED:
-        number = "height"
-    else:
-        return None
-    return with_number(part, number, numbers_of(part)[number] + by)

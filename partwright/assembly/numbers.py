@@ -7,6 +7,7 @@ from typing import Any
 
 from partwright.assembly.files import MAX_PARTS
 from partwright.assembly.instance_patterns import Circle, Grid, Line, Ring, pattern, with_pattern
+from partwright.assembly.profile_numbers import PREFIX, profile_numbers, with_profile_number
 from partwright.assembly.tree import Part
 from partwright.errors import ParameterError
 
@@ -14,8 +15,9 @@ _OF_COPIES = ("count", "circle", "start", "counts", "spacing", "step")
 
 
 def numbers_of(part: Part) -> dict[str, float]:
-    """The part's numbers by name: those of its field ("radius", "diameter", "size.x"), of its place ("x") and
-    of the pattern of its copies ("count", "circle", "start"; "counts.x", "spacing.x"; "count", "step.x")."""
+    """The part's numbers by name: those of its field ("radius", "diameter", "size.x"), of its profile
+    (`profile_numbers`), of its place ("x") and of the pattern of its copies ("count", "circle", "start";
+    "counts.x", "spacing.x"; "count", "step.x")."""
     found: dict[str, float] = {}
     for entry in dataclasses.fields(part.field):  # type: ignore[arg-type]
         value = getattr(part.field, entry.name)
@@ -25,6 +27,7 @@ def numbers_of(part: Part) -> dict[str, float]:
                 found[entry.name.replace("radius", "diameter")] = 2 * value
         elif entry.name == "size":
             found |= {f"size.{axis}": v for axis, v in zip("xyz", value, strict=True)}
+    found |= profile_numbers(part.field)
     return found | dict(zip("xyz", part.translation, strict=True)) | _numbers_of_copies(part)
 
 
@@ -54,6 +57,8 @@ def with_number(part: Part, number: str, value: float) -> Part:
         return _with_number_of_copies(part, number, value)
     if "diameter" in number:
         number, value = number.replace("diameter", "radius"), value / 2
+    if number.startswith(PREFIX):
+        return dataclasses.replace(part, field=with_profile_number(part.field, number, value))
     new: dict[str, Any] = {number: value}
     if number.startswith("size."):
         size = list(part.field.size)  # type: ignore[attr-defined]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from partwright.assembly.numbers import numbers_of
 from partwright.assembly.repeated_groups import copies_of, line, ring
 from partwright.cli.main import main
 from partwright.errors import ParameterError
-from partwright.fields import Box, Cylinder
+from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution
 from partwright.meshing import mesh_assembly
 
 SHIFT = Similarity(translation=(40, 0, 0))
@@ -116,6 +117,65 @@ def test_what_is_rooted_in_a_plate_stands_out_of_it_as_far_as_before() -> None:
     assert [line.split()[0] for line in edited.followed] == ["boss", "fin", "post"]
     thin = with_numbers(before, {"plate.size.z": 0.5}).assembly  # from 2.75 to 3.25
     assert thin["fin"].bounds()[:, 2].tolist() == [2.75, 22.25]  # and not out of its other face
+
+
+def test_a_counterbored_hole_goes_through_a_thicker_plate_and_keeps_its_depth() -> None:
+    """It is a profile that is turned: its shoulder goes with the face of its wider end."""
+    plate = Part(Box((60, 40, 10)), (0, 0, 5), name="plate")
+    sunk = Revolution(Profile.polygon([(0, -6), (2, -6), (2, 2), (4, 2), (4, 6), (0, 6)]))
+    over = Part(sunk, (20, 0, 5), (0, 1, 0, 0), name="from_below")
+    before = Assembly((plate, Part(sunk, (0, 0, 5), name="from_above"), over), "difference")
+    after = with_numbers(before, {"plate.size.z": 14.0}).assembly  # from -2 to 12
+    assert (
+        after["from_above"].bounds()[:, 2].tolist() == after["from_below"].bounds()[:, 2].tolist() == [-3, 13]
+    )
+    depth = [[x, 0, z] for x, z in ((3, 9.5), (3, 8.5), (23, 0.5), (23, 1.5))]  # 3 mm deep from either face
+    assert (after.distance(depth) < 0).tolist() == [False, True, False, True]
+    assert mesh_assembly(after).euler_number == mesh_assembly(before).euler_number == -2
+
+
+def test_copies_at_two_faces_go_each_with_its_own() -> None:
+    """Rounded corners at both ends of a bar, and feet under it and on it."""
+    bar = Part(Box((60, 20, 10)), name="bar")
+    both = (Similarity(rotation=(0, 0, 0, 1)),)
+    notch = Part(Box((4, 4, 20)), (30, 10, 0), instances=both, name="notch")
+    foot = Part(Box((2, 2, 6)), (0, 0, -8), instances=(Similarity(rotation=(0, 1, 0, 0)),), name="foot")
+    before = Assembly((Assembly((bar, notch), "difference"), foot))
+    edited = with_numbers(before, {"bar.size.x": 70.0, "bar.size.z": 12.0})
+    assert [copy.translation[:2] for copy in edited.assembly["notch"].copies] == [(35, 10), (-35, -10)]
+    assert [copy.translation[2] for copy in edited.assembly["foot"].copies] == [-9, 9]
+    assert "notch moved by -5 and 5 with the face of bar: its depth is kept" in edited.followed
+
+
+def test_profiles_have_numbers_to_set() -> None:
+    """All corners at one place move: a flange becomes wider, or thicker, and the hole still goes through."""
+    hub = Revolution(Profile.polygon([(5, 0), (30, 0), (30, 8), (9, 8), (9, 20), (5, 20)]))
+    hole = Part(Cylinder(2, 10), (20, 0, 4), name="hole")
+    nut = Part(Cylinder(4, 3), (-20, 0, 9.5), name="nut")
+    before = Assembly((Assembly((Part(hub, name="hub"), hole), "difference"), nut))
+    numbers = numbers_of(before["hub"])
+    wanted = {"diameter.1": 10, "diameter.2": 18, "diameter.3": 60, "y.1": 0, "y.2": 8, "y.3": 20}
+    assert {name: numbers[f"profile.{name}"] for name in wanted} == wanted
+    for number, value, ends, seat in (
+        ("diameter.3", 70.0, [-1, 9], 8),
+        ("y.2", 10.0, [-1, 11], 10),
+        ("y.1", -3.0, [-4, 9], 8),
+        ("y.3", 25.0, [-1, 9], 8),
+    ):
+        after = with_numbers(before, {f"hub.profile.{number}": value}).assembly
+        assert numbers_of(after["hub"])[f"profile.{number}"] == value
+        assert after["hole"].bounds()[:, 2].tolist() == ends
+        assert after["nut"].bounds()[0, 2] == seat
+        assert mesh_assembly(after).euler_number == mesh_assembly(before).euler_number
+    with pytest.raises(ParameterError, match="sides cross"):
+        with_numbers(before, {"hub.profile.diameter.3": 8.0})
+
+
+def test_a_slot_of_an_outline_gets_wider_by_its_sides() -> None:
+    slot = Part(Extrusion(Profile(((-5, -3, 0), (5, -3, 1), (5, 3, 0), (-5, 3, 1))), 4), name="slot")
+    assert [name for name in numbers_of(slot) if "profile" in name] == ["profile.y.1", "profile.y.2"]
+    wider = with_numbers(Assembly((slot,)), {"slot.profile.y.1": -4.0, "slot.profile.y.2": 4.0}).assembly
+    assert wider["slot"].field.profile.area == pytest.approx(80 + 16 * math.pi)
 
 
 @pytest.mark.parametrize(

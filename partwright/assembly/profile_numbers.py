@@ -1,0 +1,76 @@
+"""Numbers of a profile by name: where its corners lie, the same for all that lie at one place."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TypeGuard
+
+import numpy as np
+
+from partwright.fields import Extrusion, Field, Profile, Revolution
+from partwright.fields.profile import Loop
+
+PREFIX = "profile."
+_SAME = 1e-5  # of the profile's size, by which corners at one place may differ
+
+
+def profile_numbers(field: Field) -> dict[str, float]:
+    """Of a revolution the distinct distances of corners from the axis and their heights, from the lowest on
+    ("profile.radius.1", "profile.diameter.1", "profile.y.1"); of an extrusion the places of its sides along x
+    and y ("profile.x.1"). Of other fields none."""
+    if not _has_profile(field):
+        return {}
+    xs, ys = _places(field)
+    found: dict[str, float] = {}
+    if isinstance(field, Revolution):
+        for k, x in enumerate(xs, start=1):
+            found |= {f"{PREFIX}radius.{k}": x, f"{PREFIX}diameter.{k}": 2 * x}
+    else:
+        found |= {f"{PREFIX}x.{k}": x for k, x in enumerate(xs, start=1)}
+    return found | {f"{PREFIX}y.{k}": y for k, y in enumerate(ys, start=1)}
+
+
+def with_profile_number(field: Field, number: str, value: float) -> Field:
+    """The field with one of its numbers: all corners there move.
+
+    Raises:
+        ParameterError: sides then cross, or the profile crosses the axis.
+    """
+    assert _has_profile(field)
+    kind, _, index = number.removeprefix(PREFIX).partition(".")
+    axis = int(kind == "y")
+    place = _places(field)[axis][int(index) - 1]
+    near = _SAME * field.profile.size
+
+    def moved(loop: Loop) -> Loop:
+        corners = np.array(loop)
+        corners[np.abs(corners[:, axis] - place) < near, axis] = value
+        return tuple((float(x), float(y), float(bulge)) for x, y, bulge in corners)
+
+    outline, *holes = (moved(loop) for loop in field.profile.loops)
+    return dataclasses.replace(field, profile=Profile(outline, tuple(holes)))
+
+
+def _has_profile(field: Field) -> TypeGuard[Extrusion | Revolution]:
+    return isinstance(field, Extrusion | Revolution)
+
+
+def _places(field: Extrusion | Revolution) -> tuple[list[float], list[float]]:
+    """Of corners along x and y, ascending: all of a revolution's that are off the axis; of an extrusion's,
+    where a line runs across."""
+    near = _SAME * field.profile.size
+    x, y = ([float(v) for v in column] for column in field.profile.corners[:, :2].T)
+    if isinstance(field, Extrusion):
+        lines = [side for loop in field.profile.sides for side in loop if side.centre is None]
+        x, y = ([s.start[k] for s in lines if abs(s.start[k] - s.end[k]) < near] for k in (0, 1))
+    else:
+        x = [value for value in x if value > near]
+    return _distinct(x, near), _distinct(y, near)
+
+
+def _distinct(values: list[float], near: float) -> list[float]:
+    kept: list[float] = []
+    for value in sorted(values):
+        if not kept or value - kept[-1] >= near:
+            kept.append(value)
+    return kept
