@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from manifold3d import CrossSection, FillRule
+from manifold3d import CrossSection, FillRule, JoinType
 from numpy.typing import NDArray
 
 from partwright.approximation.profile_parts import revolved_part, with_profile
@@ -33,7 +33,8 @@ _COPIES = 8  # of a feature, that are looked at
 _ACROSS, _ALONG = 32, 12  # points each way across what changes in an outline, and along or around it
 _OTHER = 0.01  # of the points that an outline gains or loses, which the tree may
 _CHORD = 1e-4  # unit lengths: how far chords of an outline may be off
-_AREA = 1e-7  # square unit lengths of an outline, that are nothing
+_THIN = 2e-4  # unit lengths: half the width of what an outline may gain or lose anyway
+_FEW = 3  # of the samples near a feature, that may lie in such
 
 
 def with_plain_outlines(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
@@ -62,7 +63,7 @@ def _plainer(search: FeatureSearch, tree: FeatureTree, i: int) -> FeatureTree | 
         own = mask_of(other, near)
         changed = own != masks[i]
         after = _folded(tree, [own if k == i else mask for k, mask in enumerate(masks)])
-        if (after != before).sum() > _OTHER * changed.sum():
+        if (after != before).sum() > _OTHER * changed.sum() + _FEW:
             continue
         plainer = replace(tree, features=[other if k == i else f for k, f in enumerate(tree.features)])
         there = _points_between(feature.part, profile)
@@ -144,14 +145,15 @@ def _points_between(part: Part, other: Profile) -> NDArray[np.float32]:
 
 
 def _between(one: Profile, other: Profile) -> NDArray[np.float64]:
-    """(N, 2) points within one of two profiles but not the other."""
+    """(N, 2) points within one of two profiles but not the other, none where these are as good as one."""
     lines = [[np.asarray(line) for line in profile.polylines(_CHORD)] for profile in (one, other)]
     first, second = (CrossSection(line, FillRule.EvenOdd) for line in lines)
-    changed = (first - second) + (second - first)
-    if changed.area() < _AREA:
+    changed = ((first - second) + (second - first)).offset(-_THIN, JoinType.Miter)
+    if changed.is_empty():
         return np.zeros((0, 2))
     x0, y0, x1, y1 = changed.bounds()
     steps = (np.arange(_ACROSS) + 0.5) / _ACROSS
     x, y = np.meshgrid(x0 + steps * (x1 - x0), y0 + steps * (y1 - y0), indexing="ij")
     grid = np.column_stack([x.ravel(), y.ravel()])
-    return grid[(profile_distance(one, grid) < 0) != (profile_distance(other, grid) < 0)]
+    inside, also = (profile_distance(profile, grid) for profile in (one, other))
+    return grid[((inside < 0) != (also < 0)) & (np.minimum(np.abs(inside), np.abs(also)) > _THIN / 2)]

@@ -66,3 +66,10 @@ def test_what_is_seen_stays() -> None:
     fields, change = plain((True, angle), (False, slot))
     assert [len(field.profile.outline) for field in fields] == [6, 4]
     assert change == 0
+
+
+def test_a_corner_on_a_straight_wall_goes() -> None:
+    """Where two readings of one wall met, a few microns apart."""
+    stepped = Profile.polygon([(5, 0), (20, 0), (20, 5), (9.003, 5), (9, 12), (9, 20), (5, 20)])
+    (field,), _ = plain((True, Part(Revolution(stepped))))
+    assert len(field.profile.outline) == 6
