@@ -34,22 +34,25 @@ _ACROSS, _ALONG = 32, 12  # points each way across what changes in an outline, a
 _OTHER = 0.01  # of the points that an outline gains or loses, which the tree may
 _CHORD = 1e-4  # unit lengths: how far chords of an outline may be off
 _THIN = 2e-4  # unit lengths: half the width of what an outline may gain or lose anyway
+_LOSS = 3e-4  # of R, that plainer outlines may cost, all together
 _FEW = 3  # of the samples near a feature, that may lie in such
 
 
 def with_plain_outlines(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
     """The tree with fewer corners, or a rectangle, for outlines of features where that is the same solid."""
+    tree = search.scored(tree)
+    least = tree.score - _LOSS
     for i in range(len(tree.features)):
         while True:
-            plainer = _plainer(search, tree, i)
+            plainer = _plainer(search, tree, i, least)
             if plainer is None:
                 break
             tree = plainer
     return tree
 
 
-def _plainer(search: FeatureSearch, tree: FeatureTree, i: int) -> FeatureTree | None:
-    """The tree with a plainer outline of one feature, the plainest that is the same solid."""
+def _plainer(search: FeatureSearch, tree: FeatureTree, i: int, least: float) -> FeatureTree | None:
+    """The tree with a plainer outline of one feature, the plainest that is the same solid. least: of R."""
     feature = tree.features[i]
     boxes = [copy.bounds() for part in feature.parts for copy in part.copies]
     near = search.points[np.any([within_box(search.points, *box) for box in boxes], axis=0)]
@@ -65,10 +68,13 @@ def _plainer(search: FeatureSearch, tree: FeatureTree, i: int) -> FeatureTree | 
         after = _folded(tree, [own if k == i else mask for k, mask in enumerate(masks)])
         if (after != before).sum() > _OTHER * changed.sum() + _FEW:
             continue
-        plainer = replace(tree, features=[other if k == i else f for k, f in enumerate(tree.features)])
+        features = [other if k == i else f for k, f in enumerate(tree.features)]
+        plainer = replace(tree, features=features, steps=())
         there = _points_between(feature.part, profile)
         if (tree.at(there) != plainer.at(there)).sum() <= _OTHER * len(there):
-            return plainer
+            plainer = search.scored(plainer)
+            if plainer.score >= least:
+                return plainer
     return None
 
 
