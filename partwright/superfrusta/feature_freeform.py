@@ -96,7 +96,13 @@ def with_freeform(
             given_up.append(places[0])
         else:
             tree = _with_copies(search, shape, start, best, places).tree
-    return replace(tree, off=max((p.off for p in far_places(shape, _solid(made(tree)))), default=0.0))
+    return replace(tree, off=far_off(search, made(tree)))
+
+
+def far_off(search: FeatureSearch, whole: Assembly) -> float:
+    """How far an assembly in the unit frame is off where it is far off, unit lengths; else 0."""
+    places = far_places(Solid(search.body, search.samples.measure), _solid(whole))
+    return max((place.off for place in places), default=0.0)
 
 
 def _solid(whole: Assembly) -> Solid:

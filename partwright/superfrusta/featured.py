@@ -15,7 +15,7 @@ from partwright.metrics.deviation import place_in
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
 from partwright.superfrusta.feature_boxes import with_whole_boxes
-from partwright.superfrusta.feature_freeform import with_freeform
+from partwright.superfrusta.feature_freeform import far_off, with_freeform
 from partwright.superfrusta.feature_outlines import with_plain_outlines
 from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_pruning import pruned
@@ -92,17 +92,21 @@ class FeaturedFit:
         return self._thinned(self._with_freeform(tree))
 
     def mended_assembly(self, whole: Assembly) -> tuple[Assembly, float]:
-        """Solids that were found by the search, with freeform where they are far off; itself where nothing is
-        or nothing helps. And how far it is off even so, unit lengths, 0 where that is not far."""
+        """Solids that were found by the search, with freeform where they are far off, or only made anew of
+        the same parts where these are not: cuts then belong to what they meet, and leave no chip of others.
+        Itself where nothing is off or nothing helps. And how far it is off even so, unit lengths, 0 where
+        that is not far."""
         search = self._search
         if not has_exact_mesh(whole) or search.body.is_empty() or search.volume <= 0:
             return whole, 0.0
         none = np.zeros(0, bool)
-        leaves = flattened(in_unit_frame(self._request.shape, whole))
-        tree = search.scored(FeatureTree([Feature(added, part, none, 0) for part, added in leaves]))
+        own = in_unit_frame(self._request.shape, whole)
+        tree = search.scored(FeatureTree([Feature(added, part, none, 0) for part, added in flattened(own)]))
         better = self._thinned(self._with_freeform(tree))
-        changed = len(better.features) != len(tree.features)
-        return self.assembly(better) if changed else whole, better.off
+        same = [f.part for f in better.features] == [f.part for f in tree.features]
+        if not same or far_off(search, own) > better.off:
+            return self.assembly(better), better.off
+        return whole, better.off
 
     @cached_property
     def _search(self) -> FeatureSearch:

@@ -17,12 +17,14 @@ from partwright.assembly import Assembly, Part
 from partwright.fields import Box, Cylinder, Sphere
 from partwright.meshing import mesh_assembly
 from partwright.meshing.csg import solid_of
+from partwright.methods import FitRequest
 from partwright.superfrusta.far_places import Solid, far_places
 from partwright.superfrusta.feature_assembly import FeatureAssembly
 from partwright.superfrusta.feature_freeform import with_freeform
 from partwright.superfrusta.feature_mending import FAR
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
+from partwright.superfrusta.featured import FeaturedFit
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.solids import Settings
 
@@ -110,6 +112,21 @@ def test_pieces_that_hardly_float_are_joined() -> None:
     tree, _, bodies = mended(Assembly((PLATE,)), *halves)
     assert bodies == 1
     assert len(tree.features) == 3
+
+
+def test_a_chip_that_a_cut_leaves_beside_the_shape_goes() -> None:
+    """It is no part, so none can be dropped: its cut goes on in the open where the tree is made anew."""
+    block = Part(Box((1.0, 0.4, 0.5)), (0.9, 0.0, 0.0))  # to x = 1.4
+    cut = Part(Cylinder(0.4, 0.48), (1.14, 0.0, 0.0), (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0))  # 0.9 to 1.38
+    whole = Assembly((Assembly((PLATE, block)), cut), "difference")
+    drawn = Assembly((PLATE, Part(Box((0.5, 0.4, 0.5)), (0.65, 0.0, 0.0))))
+    shape, settings = pw.load_shape(mesh_assembly(drawn)), Settings.for_quality("draft")
+    fit = FeaturedFit(FitRequest(shape, settings), FitSamples.of(shape, settings), lambda: None)
+    after, off = fit.mended_assembly(whole)
+    assert (off, len(after.parts)) == (0, 3)
+    assert mesh_assembly(whole).body_count == 2
+    assert mesh_assembly(after).body_count == 1
+    assert fit.mended_assembly(drawn) == (drawn, 0.0)
 
 
 def test_a_fit_names_what_is_freeform(tmp_path: Path) -> None:
