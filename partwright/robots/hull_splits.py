@@ -23,63 +23,75 @@ Plane = tuple[np.ndarray, float]
 
 
 def best_sides(
-    own: np.ndarray, whole: Hull, kept_out: Sequence[Hull], enough: float, *, further: bool
+    own: np.ndarray, whole: Hull, kept_out: Manifold, enough: float, *, further: bool
 ) -> list[Hull]:
-    """Hulls of what is on either side of a plane, and together overlap others least; none where there is no
-    plane that splits it.
+    """Hulls of what is on either side of a plane, and together overlap others least; none where no plane
+    leaves less than enough.
 
-    own: (T, 3, 3) triangles; whole: the hull of them, which overlaps all of kept_out. enough: an overlap;
-    where more is left, and only if `further`, what is on each side is split again: the halves of a ring fill
-    its hole as much as the ring does, quarters less.
+    own: (T, 3, 3) triangles; whole: the hull of them, which overlaps kept_out. enough: an overlap; where more
+    is left, and only if `further`, what is on each side is split again: the halves of a ring fill its hole as
+    much as the ring does, quarters less.
     """
-    cuts = _cuts(own, whole, kept_out)
-    sides = _halves(own, *cuts[0][1]) if cuts else []
-    if not further or overlap(sides, kept_out) <= enough:
-        return sides
-    return _quarters(own, kept_out, cuts[0][1]) if cuts else []
+    halves, shared = Halves.of(own), whole.solid ^ kept_out
+    cuts = _cuts(own, halves, shared)
+    sides = _best(halves, cuts, shared, enough)
+    return _quarters(own, cuts[0][1], shared) if cuts and further and not sides else sides
 
 
-def overlap(hulls: Sequence[Hull], kept_out: Sequence[Hull]) -> float:
-    """Volume that hulls share with others, each by itself."""
-    return sum(hull.shares(one) for hull in hulls for one in kept_out)
+def overlap(hulls: Sequence[Hull], kept_out: Manifold) -> float:
+    """Volume that hulls share with a solid, each by itself."""
+    return sum(float((hull.solid ^ kept_out).volume()) for hull in hulls)
 
 
-def _halves(own: np.ndarray, normal: np.ndarray, offset: float) -> list[Hull]:
-    return [Hull(hull_of(points)) for points in Halves.of(own).points(normal, offset)]
-
-
-def _cuts(own: np.ndarray, whole: Hull, kept_out: Sequence[Hull]) -> list[tuple[float, Plane]]:
-    """Planes that may split what a hull contains (T, 3, 3), with about the volume in which the hulls of both
-    sides overlap others: the best first. whole: the hull of it all."""
-    worst = max(kept_out, key=whole.shares)
-    halves, found = Halves.of(own), []
-    for plane in _planes(own, worst, whole.solid ^ worst.solid):
+def _cuts(own: np.ndarray, halves: Halves, shared: Manifold) -> list[tuple[float, Plane]]:
+    """Planes that may split what a hull contains (T, 3, 3), the best first, with a volume: the hulls of both
+    sides overlap others by no less. shared: what the hull of it all does."""
+    found = []
+    for plane in _planes(own, shared):
         sides = [Hull(hull_of(points)) for points in halves.ends(*plane)]
         if sides and all(side.volume > 0 for side in sides):
-            found.append((overlap(sides, kept_out), plane))
+            found.append((overlap(sides, shared), plane))
     return sorted(found, key=lambda entry: entry[0])
 
 
-def _quarters(own: np.ndarray, kept_out: Sequence[Hull], plane: Plane) -> list[Hull]:
+def _best(halves: Halves, cuts: Sequence[tuple[float, Plane]], shared: Manifold, enough: float) -> list[Hull]:
+    """The hulls of both sides of the plane that leaves least, of those that leave less than enough."""
+    found: list[Hull] = []
+    for least, plane in cuts:
+        if least >= enough:
+            break
+        sides, left = [], 0.0
+        for points in sorted(halves.points(*plane), key=len, reverse=True):
+            sides.append(Hull(hull_of(points)))
+            left += overlap(sides[-1:], shared)
+            if left >= enough:
+                break
+        else:
+            enough, found = left, sides
+    return found
+
+
+def _quarters(own: np.ndarray, plane: Plane, shared: Manifold) -> list[Hull]:
     """Hulls of what is on either side of a plane, split once more where that overlaps others."""
     normal, offset = plane
     found = []
     for half in (side_of(own, normal, offset), side_of(own, -normal, -offset)):
         whole = Hull(hull_of(half.reshape(-1, 3)))
-        cuts = _cuts(half, whole, kept_out) if overlap([whole], kept_out) > 0 else []
-        found += _halves(half, *cuts[0][1]) if cuts else [whole]
+        left = overlap([whole], shared)
+        sides = best_sides(half, whole, shared, left, further=False) if left > 0 else []
+        found += sides or [whole]
     return found
 
 
-def _planes(own: np.ndarray, met: Hull, both: Manifold) -> Iterator[tuple[np.ndarray, float]]:
-    """Planes that may split what a hull contains (T, 3, 3) where it meets another one. both: what they share.
-    Those of the other's faces and of the own triangles there, the largest first, and across that place."""
-    box = np.reshape(both.bounding_box(), (2, 3))
-    middle, size = box.mean(axis=0), float(np.ptp(met.box, axis=0).max())
+def _planes(own: np.ndarray, shared: Manifold) -> Iterator[Plane]:
+    """Planes that may split what a hull contains (T, 3, 3), where that shares volume with others: across that
+    place along the axes; those of its faces and of the own triangles there, the largest first."""
+    corners, faces = surface_of(shared)
+    box = np.array([corners.min(axis=0), corners.max(axis=0)])
+    middle, size = box.mean(axis=0), float(np.ptp(box, axis=0).max())
     for axis in range(3):
         yield from ((np.eye(3)[axis], float(place)) for place in (*box[:, axis], middle[axis]))
     here = ((own.min(axis=1) <= box[1]) & (own.max(axis=1) >= box[0])).all(axis=1)
-    corners, faces = surface_of(met.solid)
     for triangles in (corners[faces], own[here]):
         areas = area_vectors(triangles)
         length = np.linalg.norm(areas, axis=1)

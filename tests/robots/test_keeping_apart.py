@@ -14,8 +14,10 @@ from partwright.meshing.manifolds import as_manifold
 from partwright.robots import CollideOptions, collide
 from partwright.robots.containment import outside_of, shape_solid
 from partwright.robots.enclosed_link import EnclosedLink
+from partwright.robots.hull_joins import join_hulls
 from partwright.robots.keeping_apart import keep_apart
 from partwright.robots.model import Shape, frame
+from partwright.robots.overlaps import LEAST_SHARED
 
 FINE = 0.001
 SLABS = [
@@ -117,11 +119,12 @@ def test_the_inside_of_a_link_stays_in_its_hulls() -> None:
     assert (as_manifold(block) - union).volume() < 1e-6
 
 
-@pytest.mark.parametrize(("most", "share"), [(1, 1.0), (4, 0.45), (24, 0.0)])
+@pytest.mark.parametrize(("most", "share"), [(1, 1.0), (3, 0.45), (24, LEAST_SHARED)])
 def test_a_ring_around_a_shaft_is_split_as_far_as_that_takes_it_off_the_shaft(
     most: int, share: float
 ) -> None:
-    """Halves of a ring fill its hole as much as it does; quarters are what helps first."""
+    """Halves of a ring fill its hole as much as it does; quarters are what helps first. Three are two of
+    these and a half."""
     cylinder = trimesh.creation.cylinder
     shaft = cylinder(0.5, 1.2, sections=12)
     ring = trimesh.creation.annulus(0.7, 1, 1, sections=12)
@@ -132,6 +135,21 @@ def test_a_ring_around_a_shaft_is_split_as_far_as_that_takes_it_off_the_shaft(
     assert len(around.hulls) <= most
     assert contained(around, ring)
     assert contained(inside, shaft)
+
+
+def test_of_too_many_hulls_those_are_joined_that_overlap_others_least() -> None:
+    """Four blocks in a row; a thin arm stands in the narrowest gap."""
+    blocks = [box((x, 0, 0), (x + 1, 1, 1)) for x in (0, 1.1, 2.3, 3.6)]
+    own = trimesh.util.concatenate(blocks)
+    shapes = [Shape("", mesh=box(mesh.bounds[0] - 0.001, mesh.bounds[1] + 0.001)) for mesh in blocks]
+    link = EnclosedLink(shapes, own.triangles, as_manifold(own), np.eye(4), FINE)
+    arm = box((1.02, 0, 0), (1.08, 1, 3))
+    other = enclosed(arm, arm)
+    join_hulls(link, other.hulls, 3)
+    assert sorted(hull.box[0, 0] for hull in link.hulls) == pytest.approx([-0.001, 1.099, 3.599])
+    join_hulls(link, other.hulls, 2)
+    assert shared(link, other) == 0
+    assert contained(link, own)
 
 
 def test_few_shapes_are_cut_where_the_next_link_is(tmp_path: Path) -> None:
