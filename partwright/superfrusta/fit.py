@@ -13,6 +13,7 @@ from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outco
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_steps import FeatureTree
 from partwright.superfrusta.featured import SURE, FeaturedFit, freeform_warnings, wants_features
+from partwright.superfrusta.hole_search import HoleSearch
 from partwright.superfrusta.outcome import assembly_of
 from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import FitSamples
@@ -54,9 +55,11 @@ def fit(request: FitRequest[Settings]) -> Fitted:
     assembled = partial(assembly_of, shape, settings=settings, fixed=fixed)
     search = ResidualFit(samples, settings, run.told, len(fixed), assembled, checkpoint, seconds=seconds)
     try:
+        holes = HoleSearch.of(shape, search, rows)
         outcome = search.run(rows) if settings.attempts == 1 else SeveralGrowths(search).run(rows)
         if settings.symmetry and search.best is not None:
             search.find_repeats(shape)
+            holes.cut()
     except CancelledError:
         if search.best is None and search.earlier is None:
             raise

@@ -32,7 +32,7 @@ _REFITS = (((100.0, 6),), ((40.0, 4), (100.0, 8), (200.0, 8)))
 
 
 @dataclass(frozen=True)
-class _Trial:
+class Trial:
     """An assembly as leaves, the `value` that mending serves with a price for each leaf, and the most that a
     part is off, unit lengths."""
 
@@ -57,9 +57,9 @@ def repeat(
     than any was, by over a quarter percent of the longest side; where they do, they are given up one by one.
     An IoU that the settings ask for is kept. The first `locked` rows stay leaves of their own.
     """
-    whole = _measured(samples, _leaves(rows, []), settings)
+    whole = measured(samples, _leaves(rows, []), settings)
 
-    def good(trial: _Trial) -> bool:
+    def good(trial: Trial) -> bool:
         if trial.off > whole.off + _FURTHER or trial.value < whole.value:
             return False
         if settings.min_iou is None:
@@ -73,10 +73,10 @@ def repeat(
     wanted += local_repeats(samples, rows, locked, tolerance, mirrors[:_NEARLY])
     for chosen in _choices(samples, whole, wanted, settings):
         for left in range(_GIVEN_UP, -1, -1):
-            trials = [_measured(samples, _leaves(rows, chosen), settings)]
+            trials = [measured(samples, _leaves(rows, chosen), settings)]
             for stages in _REFITS:
                 leaves = refit(samples, trials[0].leaves, stages, settings, locked)
-                trials.append(_measured(samples, leaves, settings))
+                trials.append(measured(samples, leaves, settings))
                 nearer = trials[-1].off <= whole.off + 2 * _FURTHER
                 if not nearer or trials[-1].value < whole.value - _HOPELESS:
                     break
@@ -102,19 +102,19 @@ def _without_the_worst(
     samples: FitSamples, rows: Rows, chosen: Sequence[Repeat], settings: Settings
 ) -> list[Repeat]:
     rest = [[other for other in chosen if other is not one] for one in chosen]
-    return max(rest, key=lambda some: _measured(samples, _leaves(rows, some), settings).value)
+    return max(rest, key=lambda some: measured(samples, _leaves(rows, some), settings).value)
 
 
-def _measured(samples: FitSamples, leaves: list[RepeatedPart], settings: Settings) -> _Trial:
+def measured(samples: FitSamples, leaves: list[RepeatedPart], settings: Settings) -> Trial:
     """Of copies the one that is furthest off counts."""
     rows = expanded(leaves)
     firsts = np.cumsum([0, *(1 + len(leaf.isometries) for leaf in leaves[:-1])])
     off = np.maximum.reduceat(deviations(samples, rows).by_part, firsts)
     value = score(samples, rows) - _PRICE * settings.alpha * len(leaves) - settings.firmness * norm(off)
-    return _Trial(leaves, value, float(off.max()))
+    return Trial(leaves, value, float(off.max()))
 
 
-def _grid_iou(samples: FitSamples, trial: _Trial) -> float:
+def _grid_iou(samples: FitSamples, trial: Trial) -> float:
     """On the grid: a refit leans towards the samples that it saw."""
     occupied = samples.distance_of(expanded(trial.leaves), samples.grid_points[::_GRID_EVERY]) < 0
     inside = samples.grid.values.ravel()[::_GRID_EVERY] < 0
@@ -123,7 +123,7 @@ def _grid_iou(samples: FitSamples, trial: _Trial) -> float:
 
 
 def _choices(
-    samples: FitSamples, whole: _Trial, wanted: list[Repeat], settings: Settings
+    samples: FitSamples, whole: Trial, wanted: list[Repeat], settings: Settings
 ) -> Iterator[list[Repeat]]:
     """Repeats that get along, in several ways, none twice.
 
@@ -140,7 +140,7 @@ def _choices(
     every = np.flatnonzero(likely).tolist()
     cheap = sorted(every, key=lambda i: float(costs[i] - _PRICE * settings.alpha * saved[i]))
     many = sorted(every, key=lambda i: (-int(saved[i]), float(costs[i])))
-    alone = {i: _measured(samples, _leaves(rows, [wanted[i]]), settings) for i in cheap}
+    alone = {i: measured(samples, _leaves(rows, [wanted[i]]), settings) for i in cheap}
     near = [i for i, trial in alone.items() if trial.off <= whole.off + _UNREFITTED_OFF]
     worthy = sorted(near, key=lambda i: -alone[i].value)
     seen: list[list[int]] = [[]]

@@ -197,7 +197,7 @@ class FitSamples:
     @cached_property
     def voxel(self) -> NDArray[np.int64]:
         """Index into grid.values.ravel() of the voxel that each sample lies in (or is nearest to)."""
-        return _voxel_of(self.grid, self.points)
+        return voxel_of(self.grid, self.points)
 
     @cached_property
     def inside_voxels(self) -> int:
@@ -292,13 +292,13 @@ def _probes(grid: DistanceGrid) -> NDArray[np.float32]:
     corner = grid_indices((_PROBES,) * 3)
     within = np.random.default_rng(0).uniform(0.1, 0.9, corner.shape)
     points = (_CELL * (corner + within) - _HALF_SIDE).astype(np.float32)
-    voxel = _voxel_of(grid, points)
+    voxel = voxel_of(grid, points)
     values, nearest = grid.values.ravel()[voxel], grid.points()[voxel].astype(np.float32)
     points = points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]
     return points[morton_order(points)]
 
 
-def _voxel_of(grid: DistanceGrid, points: NDArray[np.float32]) -> NDArray[np.int64]:
+def voxel_of(grid: DistanceGrid, points: NDArray[np.float32]) -> NDArray[np.int64]:
     """Index (N,) into grid.values.ravel() of the voxel nearest to each point (N, 3)."""
     shape = np.array(grid.values.shape)
     cell = np.rint((points - grid.origin) / grid.spacing).astype(np.int64)

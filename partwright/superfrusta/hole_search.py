@@ -1,0 +1,74 @@
+"""A search beside the patterns of holes of its shape: it sees them filled, where they would hide walls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from partwright.shapes import Shape
+from partwright.superfrusta.filling import filled
+from partwright.superfrusta.hole_cutting import with_holes
+from partwright.superfrusta.hole_patterns import HolePattern, hole_patterns
+from partwright.superfrusta.resfit import ResidualFit
+from partwright.superfrusta.samples import FitSamples, Rows
+from partwright.superfrusta.symmetric_fit import expanded
+
+_MUCH = 0.02  # of the shape's volume: a pattern that holds less hides nothing
+_SMALL = 0.01  # of it: a larger hole pays for a part, so that growth finds it
+_MOST = 0.15  # of it: a pattern that holds more hides walls however large its holes are
+
+
+@dataclass
+class HoleSearch:
+    """patterns: that are to be cut out of what the search finds. samples: of the shape as it is."""
+
+    search: ResidualFit
+    patterns: Sequence[HolePattern]
+    samples: FitSamples
+
+    @classmethod
+    def of(cls, shape: Shape, search: ResidualFit, start: Rows) -> HoleSearch:
+        """Of a search that has not begun. It gets samples of the shape with the holes filled that would
+        hide walls, and a part less for each pattern to spend."""
+        settings, samples = search.settings, search.samples
+        wanted = settings.symmetry and settings.carving and settings.family != "solid" and not len(start)
+        if not wanted or settings.curve or settings.min_iou is not None:
+            return cls(search, (), samples)
+        with search.timed("holes"):
+            patterns = hole_patterns(shape, samples)
+            most = settings.max_parts
+            if most is not None:
+                patterns = patterns[: most // 2]
+                search.settings = replace(settings, max_parts=most - len(patterns))
+            hiding = [one.filling for one in patterns if _hides(one, samples.inside_voxels)]
+            if hiding:
+                search.samples = filled(samples, np.any(hiding, axis=0))
+        return cls(search, patterns, samples)
+
+    def cut(self) -> None:
+        """Out of the leaves that were found."""
+        search = self.search
+        if not self.patterns:
+            return
+        with search.timed("holes"):
+            search.samples = self.unfilled(search.samples)
+            search.leaves = with_holes(
+                search.samples, search.leaves, self.patterns, search.settings, search.locked
+            )
+            rows = expanded(search.leaves)
+        search.report_progress("holes", search.settings.rounds, rows, 1.0, len(search.leaves))
+
+    def unfilled(self, samples: FitSamples) -> FitSamples:
+        """Samples of the shape as it is, at the points of others: where something was astray, they are more
+        than it had."""
+        added = samples.points[len(self.samples.points) :]
+        distance = np.concatenate([self.samples.distance, self.samples.measure(added)])
+        return replace(self.samples, points=samples.points, distance=distance, weight=samples.weight)
+
+
+def _hides(pattern: HolePattern, whole: int) -> bool:
+    """Whether parts are better found as if a pattern's holes were full; whole: voxels of the shape."""
+    one, all_ = np.count_nonzero(pattern.hole) / whole, np.count_nonzero(pattern.filling) / whole
+    return bool(all_ > _MOST or (all_ > _MUCH and one < _SMALL))
