@@ -15,7 +15,8 @@ from partwright.methods import Run
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta.filling import filled
 from partwright.superfrusta.hole_cutting import hole_part
-from partwright.superfrusta.hole_patterns import HolePattern, directions, hole_patterns
+from partwright.superfrusta.hole_patterns import HolePattern, hole_patterns
+from partwright.superfrusta.narrow_holes import directions
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 
