@@ -11,6 +11,7 @@ from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from partwright.fields.columns import Column
+from partwright.superfrusta.families import locked_values, with_locked_values
 from partwright.superfrusta.hole_patterns import HolePattern
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.refining import POLISH, refine
@@ -41,15 +42,15 @@ def with_holes(
     """Leaves with those patterns cut out of them that are worth a part, all refitted; the same leaves where
     none is."""
     cuts = [RepeatedPart(hole_part(samples, one, settings), one.isometries) for one in patterns]
-    best = measured(samples, list(leaves), settings)
+    best = as_found = measured(samples, list(leaves), settings)
     # What is there was fitted to voxels where holes were full, or was set back for what it covered.
     beside = refit(_beside(samples, patterns), leaves, _STAGES, settings, locked)
-    for start in (leaves, beside):
-        trial = measured(samples, list(start), settings)
+    for trial in (as_found, measured(samples, beside, settings)):
+        with_cuts = trial
         for cut in cuts:
-            trial = _better(trial, measured(samples, [*trial.leaves, cut], settings))
-        if len(trial.leaves) > len(leaves):
-            best = _better(best, trial)
+            with_cuts = _better(with_cuts, measured(samples, [*with_cuts.leaves, cut], settings))
+        if with_cuts is not trial:
+            best = _better(best, with_cuts)
     if len(leaves) < len(best.leaves) and len(expanded(best.leaves)) <= _MOST_REFITTED:
         fitted = refit(samples, best.leaves, _STAGES, settings, locked)
         best = _better(best, measured(samples, fitted, settings))
@@ -76,11 +77,10 @@ def hole_part(samples: FitSamples, pattern: HolePattern, settings: Settings) -> 
     room = np.abs(pattern.frame) @ half
     local = body.about(middle - room, middle + room)
     turn = Rotation.from_matrix(pattern.frame).as_quat(scalar_first=True)
-    fitted = []
-    for roundness in _ROUNDNESS:
-        shape = [*2 * half, roundness, 0.0, 1.0, 0.0, 0.0, _BLEND]
-        row = np.array([[*middle, *turn, *shape, 1.0]], np.float32)
-        fitted.append(refine(local, row, POLISH, settings))
+    shapes = [[*2 * half, roundness, 0.0, 1.0, 0.0, 0.0, _BLEND] for roundness in _ROUNDNESS]
+    rows = np.array([[*middle, *turn, *shape, 1.0] for shape in shapes], np.float32)
+    rows = with_locked_values(rows, locked_values(settings.family, settings.smooth))
+    fitted = [refine(local, row[None], POLISH, settings) for row in rows]
     part = max(fitted, key=lambda rows: score(local, rows))[0]
     part[Column.SIGN] = -1
     return part

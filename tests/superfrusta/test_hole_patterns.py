@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -106,6 +107,8 @@ def test_a_cut_is_the_hole_and_goes_on_where_that_is_open(depth: float | None) -
     assert local[2] == pytest.approx((height + 0.06) if depth is None else depth + 0.03, abs=0.02)
     assert part[Column.ROUNDNESS] > 0.95
     assert part[Column.SIGN] < 0
+    cuboid = hole_part(samples, pattern, replace(SETTINGS, family="cuboid"))
+    assert cuboid[Column.ROUNDNESS] == 0.0
 
 
 def test_filled_holes_are_inside_and_have_no_surface() -> None:
