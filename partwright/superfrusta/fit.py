@@ -54,12 +54,11 @@ def fit(request: FitRequest[Settings]) -> Fitted:
             return _of_features(shape, featured.assembly(features), "converged", seconds, [])
     assembled = partial(assembly_of, shape, settings=settings, fixed=fixed)
     search = ResidualFit(samples, settings, run.told, len(fixed), assembled, checkpoint, seconds=seconds)
+    holes = HoleSearch.of(shape, search, rows)
     try:
-        holes = HoleSearch.of(shape, search, rows)
         outcome = search.run(rows) if settings.attempts == 1 else SeveralGrowths(search).run(rows)
         if settings.symmetry and search.best is not None:
             search.find_repeats(shape)
-            holes.cut()
     except CancelledError:
         if search.best is None and search.earlier is None:
             raise
@@ -72,7 +71,9 @@ def fit(request: FitRequest[Settings]) -> Fitted:
             f"{shape.name}: no part could be placed; the shape has no volume that {settings.near} samples "
             f"can see. Check its thickness{advice}"
         )
-    leaves = search.leaves or [RepeatedPart(row) for row in search.best]
+    search.leaves = search.leaves or [RepeatedPart(row) for row in search.best]
+    holes.cut()
+    leaves = search.leaves
     whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
     if features is not None:
         # Of the search none says how it would be drawn: there a part costs more than a feature does.

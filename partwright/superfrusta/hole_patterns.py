@@ -29,6 +29,8 @@ _FEWEST = 4  # holes
 _SAME = 0.5  # of a hole that lies in another: both are one
 _TOLERANCE = 2.5e-3  # unit lengths: by so much more a hole's wall may be off, on average, when it is moved
 _UNTURNED = 1e-3  # unit lengths: by so much more a hole may be off that is moved without being turned
+_IN_VAIN = 12  # holes of another form, after which no more are compared with one
+_FAILURES = 8  # holes that no others are like, after which no pattern is looked for
 _NEIGHBOURS, _STEPS = 4, 8  # of each hole; and between them, in which a pattern is gone on with
 _ONE_PLACE = 0.02  # unit lengths between middles: no step is tried twice
 _WALL_POINTS = 400
@@ -42,8 +44,8 @@ _FLIPS = [np.diag([x, y, x * y]) for x, y in product((1.0, -1.0), repeat=2)]
 class HolePattern:
     """Holes of one form.
 
-    hole: voxels (X * Y * Z,) of one of them. frame: (3, 3), its axes in columns, the last along it.
-    isometries: from it to the others. filling: voxels (X, Y, Z) of all.
+    hole: voxels (X, Y, Z) of one of them. frame: (3, 3), its axes in columns, the last along it.
+    isometries: from it to the others. filling: the voxels of all.
     """
 
     hole: Mask
@@ -63,23 +65,23 @@ def hole_patterns(shape: Shape, samples: FitSamples) -> list[HolePattern]:
 def _patterns(samples: FitSamples, holes: Sequence[Hole]) -> Iterator[HolePattern]:
     """Of holes that are alike in their extents, those that one takes to, as their walls say."""
     left = list(holes)
-    while len(left) >= _FEWEST:
+    failed = 0
+    while len(left) >= _FEWEST and failed < _FAILURES:
         alike = [one for one in left if one.like(left[0], samples.grid.spacing)]
         first = sorted(alike, key=lambda hole: len(hole.voxels))[len(alike) // 2]
         left = [one for one in left if one is not first]
         if len(alike) < _FEWEST:
             continue
         form = _Form(samples, first)
-        ways = form.completed(
-            [way for one in alike if one is not first and (way := form.way(one)) is not None]
-        )
-        if len(ways) + 1 >= _FEWEST:
-            filling = form.filling(ways)
-            shape = samples.grid.values.shape
-            yield HolePattern(first.mask(filling.size), first.frame, tuple(ways), filling.reshape(shape))
-            left = [
-                one for one in left if filling[one.voxels].mean() < _SAME and form.clear(one.middle, ways)
-            ]
+        ways = form.completed(form.ways([one for one in alike if one is not first]))
+        if len(ways) + 1 < _FEWEST:
+            failed += 1
+            continue
+        filling = form.filling(ways)
+        shape = samples.grid.values.shape
+        hole = first.mask(filling.size).reshape(shape)
+        yield HolePattern(hole, first.frame, tuple(ways), filling.reshape(shape))
+        left = [one for one in left if filling[one.voxels].mean() < _SAME and form.clear(one.middle, ways)]
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,17 @@ class _Form:
 
     samples: FitSamples
     hole: Hole
+
+    def ways(self, others: Sequence[Hole]) -> list[Isometry]:
+        """Those to others of this form; none if the first that are tried are all of another."""
+        found: list[Isometry] = []
+        for tried, other in enumerate(others if len(self.wall) else ()):
+            way = self.way(other)
+            if way is not None:
+                found.append(way)
+            elif tried >= _IN_VAIN and not found:
+                break
+        return found
 
     def way(self, other: Hole) -> Isometry | None:
         """The isometry to another hole that brings the wall nearest to the shape's surface; None where none
@@ -113,12 +126,21 @@ class _Form:
     def completed(self, ways: Sequence[Isometry]) -> list[Isometry]:
         """The isometries, and those that go on in their steps for as long as there are such holes: where a
         web is thinner than a voxel, two holes look like one."""
+        if not ways:
+            return []
         known = [_STILL, *ways]
         tried = [self.place(way) for way in known]
         away, near = cKDTree(tried).query(tried, min(_NEIGHBOURS + 1, len(known)))
         pairs = [divmod(i, away.shape[1]) for i in np.argsort(away, axis=None, kind="stable")]
-        closest = [(a, near[a, k]) for a, k in pairs if near[a, k] != a][:_STEPS]
-        steps = [known[b] @ known[a].inverse() for a, b in closest]
+        steps: list[Isometry] = []
+        for a, k in pairs:
+            step = known[near[a, k]] @ known[a].inverse()
+            places = [self.hole.middle, *(self.place(one) for one in steps)]
+            if (
+                len(steps) < _STEPS
+                and np.linalg.norm(np.array(places) - self.place(step), axis=1).min() > _ONE_PLACE
+            ):
+                steps.append(step)
         for way in known:  # grows on the way
             for step in steps:
                 place = self.place(step @ way)

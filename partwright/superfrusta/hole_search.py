@@ -22,38 +22,41 @@ _MOST = 0.15  # of it: a pattern that holds more hides walls however large its h
 
 @dataclass
 class HoleSearch:
-    """patterns: that are to be cut out of what the search finds. samples: of the shape as it is."""
+    """patterns: that are to be cut out of what the search finds. samples: of the shape as it is. max_parts:
+    that the search may have in all."""
 
     search: ResidualFit
     patterns: Sequence[HolePattern]
     samples: FitSamples
+    max_parts: int | None
 
     @classmethod
     def of(cls, shape: Shape, search: ResidualFit, start: Rows) -> HoleSearch:
         """Of a search that has not begun. It gets samples of the shape with the holes filled that would
         hide walls, and a part less for each pattern to spend."""
         settings, samples = search.settings, search.samples
+        most = settings.max_parts
         wanted = settings.symmetry and settings.carving and settings.family != "solid" and not len(start)
         if not wanted or settings.curve or settings.min_iou is not None:
-            return cls(search, (), samples)
+            return cls(search, (), samples, most)
         with search.timed("holes"):
             patterns = hole_patterns(shape, samples)
-            most = settings.max_parts
             if most is not None:
                 patterns = patterns[: most // 2]
                 search.settings = replace(settings, max_parts=most - len(patterns))
-            hiding = [one.filling for one in patterns if _hides(one, samples.inside_voxels)]
+            hiding = [one.filling for one in patterns if hides(one, samples.inside_voxels)]
             if hiding:
                 search.samples = filled(samples, np.any(hiding, axis=0))
-        return cls(search, patterns, samples)
+        return cls(search, patterns, samples, most)
 
     def cut(self) -> None:
-        """Out of the leaves that were found."""
+        """The holes, out of the leaves that the search found, which sees the shape as it is from then on."""
         search = self.search
+        search.settings = replace(search.settings, max_parts=self.max_parts)
         if not self.patterns:
             return
         with search.timed("holes"):
-            search.samples = self.unfilled(search.samples)
+            search.take_samples(self.unfilled(search.samples))
             search.leaves = with_holes(
                 search.samples, search.leaves, self.patterns, search.settings, search.locked
             )
@@ -68,7 +71,7 @@ class HoleSearch:
         return replace(self.samples, points=samples.points, distance=distance, weight=samples.weight)
 
 
-def _hides(pattern: HolePattern, whole: int) -> bool:
+def hides(pattern: HolePattern, whole: int) -> bool:
     """Whether parts are better found as if a pattern's holes were full; whole: voxels of the shape."""
     one, all_ = np.count_nonzero(pattern.hole) / whole, np.count_nonzero(pattern.filling) / whole
     return bool(all_ > _MOST or (all_ > _MUCH and one < _SMALL))

@@ -68,8 +68,11 @@ def narrow_holes(shape: Shape, samples: FitSamples) -> list[Hole]:
     normals = shape.unit_surface(_NORMALS, samples.seed).normals.astype(np.float64)
     found: list[Hole] = []
     for direction in directions(normals):
-        found += [one for one in _across(samples, direction) if not any(one.meets(other) for other in found)]
-        found = found[:_MOST]
+        for one in _across(samples, direction):
+            if len(found) == _MOST:
+                return found
+            if not any(one.meets(other) for other in found):
+                found.append(one)
     return found
 
 

@@ -17,6 +17,7 @@ from partwright.shapes import Shape, load_shape
 from partwright.superfrusta.filling import filled
 from partwright.superfrusta.hole_cutting import hole_part
 from partwright.superfrusta.hole_patterns import HolePattern, hole_patterns
+from partwright.superfrusta.hole_search import hides
 from partwright.superfrusta.narrow_holes import directions
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
@@ -53,7 +54,7 @@ def test_a_perforated_plate_has_one_pattern_however_it_lies(turn: tuple[int, int
     shape, samples, (pattern,) = seen(plate().rotate(turn))
     assert len(pattern.isometries) == len(PLACES) - 1
     scale = shape.frame.scale
-    first = samples.grid.points()[pattern.hole].mean(axis=0)
+    first = samples.grid.points()[pattern.hole.ravel()].mean(axis=0)
     found = np.array([first, *(way(first[None])[0] for way in pattern.isometries)])
     holes = [Manifold.sphere(0.01, 8).translate((x, y, 0.0)).rotate(turn) for x, y in PLACES]
     middles = scale * (np.array([mesh(one).bounds.mean(axis=0) for one in holes]) - shape.frame.centre)
@@ -125,7 +126,46 @@ def test_filled_holes_are_inside_and_have_no_surface() -> None:
 
 
 def test_a_fit_of_a_perforated_plate_is_a_plate_and_a_hole() -> None:
-    found = pw.fit(load_shape(mesh(plate())), quality="draft", threads=1)
+    found = pw.fit(load_shape(mesh(plate())), quality="draft", threads=1, max_parts=2)
     assert len(found.assembly) == 2
     assert sorted(1 + len(part.instances) for part in found.assembly.parts) == [1, len(PLACES)]
     assert found.scores.iou > 0.97
+
+
+def test_alike_holes_of_different_forms_are_no_pattern() -> None:
+    forms = [Manifold.cylinder(1.0, 0.1, 0.1, sides, True) for sides in (3, 4, 5, 6, 24)]
+    holes = [form.translate((0.3 * i - 0.6, 0.1, 0)) for i, form in enumerate(forms)]
+    assert not seen(block(1.8, 1.2, 0.1) - Manifold.compose(holes))[2]
+
+
+def test_two_forms_are_two_patterns_and_share_no_hole() -> None:
+    slot = block(0.12, 0.2, 1)
+    slots = Manifold.compose([slot.translate((0.3 * i - 0.6, -0.45, 0)) for i in range(5)])
+    *_, patterns = seen(plate([(x, y + 0.2) for x, y in PLACES if y > -0.1]) - slots)
+    assert [1 + len(one.isometries) for one in patterns] in ([5, 10], [10, 5])
+    assert not (patterns[0].filling & patterns[1].filling).any()
+
+
+@pytest.mark.parametrize(
+    ("one", "count", "hidden"), [(0.005, 3, False), (0.005, 10, True), (0.03, 4, False), (0.03, 6, True)]
+)
+def test_small_holes_hide_a_wall_and_large_ones_if_they_are_most_of_it(
+    one: float, count: int, hidden: bool
+) -> None:
+    voxels, hole = 10_000, np.zeros((100, 100, 1), bool)
+    filling = hole.copy()
+    hole.ravel()[: round(one * voxels)] = True
+    filling.ravel()[: round(count * one * voxels)] = True
+    assert hides(HolePattern(hole, np.eye(3), (), filling), voxels) is hidden
+
+
+def test_an_interrupted_fit_has_its_holes() -> None:
+    cancel = pw.Cancellation()
+    shape = load_shape(mesh(plate()))
+
+    def stop(step: pw.Progress) -> None:
+        cancel.request()
+
+    found = pw.fit(shape, quality="draft", threads=1, progress=stop, cancel=cancel)
+    assert found.outcome == "interrupted"
+    assert max(len(part.copies) for part in found.assembly.parts) == len(PLACES)
