@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property, partial
 
 import numpy as np
@@ -104,9 +105,8 @@ class FeaturedFit:
         tree = search.scored(FeatureTree([Feature(added, part, none, 0) for part, added in flattened(own)]))
         better = self._thinned(self._with_freeform(tree))
         same = [f.part for f in better.features] == [f.part for f in tree.features]
-        if not same or far_off(search, own) > better.off:
-            return self.assembly(better), better.off
-        return whole, better.off
+        off = far_off(search, own) if same else math.inf
+        return (self.assembly(better), better.off) if off > better.off else (whole, off)
 
     @cached_property
     def _search(self) -> FeatureSearch:

@@ -129,6 +129,18 @@ def test_a_chip_that_a_cut_leaves_beside_the_shape_goes() -> None:
     assert fit.mended_assembly(drawn) == (drawn, 0.0)
 
 
+def test_solids_that_are_right_keep_their_own_deviation() -> None:
+    """The parts made anew are one chain, so that the block's cut goes through the plate as well; there is no
+    room for what would fill it."""
+    block = Part(Box((0.5, 0.5, 0.5)), (0.0, 0.0, 0.3))
+    cut = Part(Box((0.3, 0.3, 1.0)), (0.0, 0.0, 0.3))
+    cuts = [Assembly((part, hole), "difference") for part, hole in ((PLATE, LEFT), (block, cut))]
+    whole = Assembly(tuple(cuts))
+    shape, settings = pw.load_shape(mesh_assembly(whole)), Settings.for_quality("draft", max_parts=4)
+    fit = FeaturedFit(FitRequest(shape, settings), FitSamples.of(shape, settings), lambda: None)
+    assert fit.mended_assembly(whole) == (whole, 0.0)
+
+
 def test_a_fit_names_what_is_freeform(tmp_path: Path) -> None:
     ball = trimesh.creation.icosphere(3, 1.0)
     ball.apply_scale((12.0, 7.0, 9.0))
