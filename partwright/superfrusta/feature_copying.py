@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.open_sides import with_open_sides
@@ -41,6 +42,7 @@ _LEAST_COPY = 0.3
 _POINTS = 200
 _DIGITS = 9  # of shifts that are told apart
 _APART = 8e-3  # unit lengths: shifts that differ by less lead to the same place
+_WAYS = 500  # that a part is tried at beyond where it is seen
 _SHARED = 0.5  # of the samples in a mirror image, that its part or another copy may hold already
 _CHORD = 1e-3  # unit lengths: how far chords of a cut with moved sides may be off
 
@@ -65,12 +67,13 @@ def with_copies(
     few, hits = search.points[wrong & ~within], share * count_of_hits
     left = np.ones(len(few), bool)
 
-    def joined(copy: Part, hit: NDArray[np.bool_], count: int = 1) -> bool:
-        """Whether that many further copies gain enough, which they then do. hit: those of `few` within."""
+    def is_new(hit: NDArray[np.bool_]) -> bool:
+        """Whether no other is there. hit: those of `few` within."""
+        return float((hit & left).sum()) > hits
+
+    def gained(mask: NDArray[np.bool_], hit: NDArray[np.bool_], count: int) -> bool:
+        """Whether that many further copies gain enough, which they then do. mask: samples within."""
         nonlocal covered, reached, within, left
-        if float((hit & left).sum()) <= hits:  # another is there
-            return False
-        mask = covers(copy, search.points)
         more = covered | mask if added else covered & ~mask
         better = search.score_of(more)
         if better - reached < least * count:
@@ -78,11 +81,16 @@ def with_copies(
         covered, reached, within, left = more, better, within | mask, left & ~hit
         return True
 
+    def joined(copy: Part, hit: NDArray[np.bool_]) -> bool:
+        return is_new(hit) and gained(covers(copy, search.points), hit, 1)
+
     def is_image(whole: Part) -> bool:
         """Whether a mirror image with its copies joined, which most of it may not have been before."""
+        hit = covers(whole, few)
+        if not is_new(hit):
+            return False
         mask = covers(whole, search.points)
-        is_new = (mask & within).sum() < _SHARED * mask.sum()
-        return bool(is_new) and joined(whole, covers(whole, few), len(whole.copies))
+        return bool((mask & within).sum() < _SHARED * mask.sum()) and gained(mask, hit, len(whole.copies))
 
     part, image = chosen.part, None
     if not chosen.cuts:  # of which there is but one
@@ -113,13 +121,19 @@ def with_copies(
 
 def _lattice(part: Part, moves: Sequence[Similarity]) -> list[Similarity]:
     """Shifts by the sum or difference of two of the ways that a part's middle is moved, where they lead to
-    another place: of four holes that one piece holds, two along the edges are seen, and none across."""
+    another place: of four holes that one piece holds, two along the edges are seen, and none across. Of very
+    many places those to which most of the sums lead, which lie amid the others."""
     middle = np.array(part.translation)
     known = np.array([np.zeros(3), *(move(middle) - middle for move in moves)])
     first, second = (known[k] for k in np.triu_indices(len(known), 1))
     sums = np.concatenate([first + second, first - second, second - first])
-    far = np.linalg.norm(sums[:, None] - known, axis=-1).min(axis=1) > _APART
-    ways = np.unique(np.round(sums[far], _DIGITS) + 0.0, axis=0)
+    far = cKDTree(known).query(sums)[0] > _APART
+    ways, often = np.unique(np.round(sums[far], _DIGITS) + 0.0, axis=0, return_counts=True)
+    _, first, place = np.unique(
+        np.rint(ways / _APART).astype(int), axis=0, return_index=True, return_inverse=True
+    )
+    count = np.bincount(place.ravel(), often)
+    ways = ways[np.sort(first[np.argsort(-count, kind="stable")[:_WAYS]])]
     return [Similarity(translation=(x, y, z)) for x, y, z in ways.tolist()]
 
 
