@@ -28,8 +28,7 @@ def with_whole_boxes(tree: FeatureTree, points: NDArray[np.float32]) -> FeatureT
     points (N, 3): the middle of a plate that two rows of fins stand beside, and both its ends."""
     covered = tree.at(points)
     while True:
-        others = (other for other in _rewritten(tree))
-        found = next((o for o in others if float((o.at(points) != covered).mean()) < _SAME), None)
+        found = next((o for o in _rewritten(tree) if float((o.at(points) != covered).mean()) < _SAME), None)
         if found is None:
             return tree
         tree = found

@@ -35,7 +35,7 @@ _OTHER = 0.01  # of the points that an outline gains or loses, which the tree ma
 _CHORD = 1e-4  # unit lengths: how far chords of an outline may be off
 _THIN = 2e-4  # unit lengths: half the width of what an outline may gain or lose anyway
 _LOSS = 3e-4  # of R, that plainer outlines may cost, all together
-_FEW = 3  # of the samples near a feature, that may lie in such
+_FEW = 3  # of the samples near a feature, in which the trees may differ besides
 
 
 def with_plain_outlines(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
