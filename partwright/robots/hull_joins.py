@@ -27,10 +27,14 @@ def join_hulls(link: EnclosedLink, others: Sequence[Hull], most: int) -> None:
         if one.fixed or other.fixed:
             return
         number += 1
-        if both is None:  # no more than this is surely added
+        if both is None:  # it costs no less: both have all that the two share with others
             cost = hull_volume(np.concatenate([one.corners, other.corners])) - one.volume - other.volume
         else:
-            shared = sum(both.shares(hull) - one.shares(hull) - other.shares(hull) for hull in others)
+            common = Hull(one.solid ^ other.solid)  # which the two have once
+            shared = sum(
+                both.shares(hull) + common.shares(hull) - one.shares(hull) - other.shares(hull)
+                for hull in others
+            )
             cost = both.volume - one.volume - other.volume + _BESIDE * shared
         heapq.heappush(heap, (cost, number, one, other, both))
 

@@ -152,6 +152,17 @@ def test_of_too_many_hulls_those_are_joined_that_overlap_others_least() -> None:
     assert contained(link, own)
 
 
+def test_two_hulls_that_overlap_in_a_neighbour_are_not_joined_for_that() -> None:
+    """Two of a link lie almost in one place, within the neighbour; two beside it have a narrow gap, where
+    nothing is shared."""
+    blocks = [box((x, y, 0), (x + 1, y + 1, 1)) for x, y in ((0, 0), (0.1, 0.1), (5, 0), (6.05, 0))]
+    own = trimesh.util.concatenate(blocks)
+    link = EnclosedLink([Shape("", mesh=mesh) for mesh in blocks], own.triangles, Manifold(), np.eye(4), FINE)
+    around = box((-1, -1, -1), (2, 2, 2))
+    join_hulls(link, enclosed(around, around).hulls, 3)
+    assert sorted(hull.box[0, 0] for hull in link.hulls) == pytest.approx([0, 0.1, 5], abs=1e-5)
+
+
 def test_few_shapes_are_cut_where_the_next_link_is(tmp_path: Path) -> None:
     """A block with two slots and four shapes: by volume alone the wide slot would have most of the cuts, and
     the hull of what is beside the narrow one would go through the arm that stands in it."""
