@@ -85,6 +85,7 @@ class _Pair:
         self._enough = allowed + LEAST_SHARED * self._smaller
         self._price = np.inf  # volume that each hull more has to take off what both share
         self._shares: dict[tuple[Hull, Hull], float] = {}
+        self._last: tuple[tuple[Hull, ...], float] = (), 0.0  # hulls, and the volume that they share
         self._sides: dict[tuple[Hull, bool], tuple[float, Sequence[Hull]]] = {}
 
     def excess(self) -> float:
@@ -134,7 +135,13 @@ class _Pair:
         return {pair: shared for pair, shared in self._shares.items() if shared > 0}
 
     def _shared(self) -> float:
-        """Volume that the links share."""
+        """Volume that the links share, measured again where their hulls are others."""
+        hulls = *self.a.hulls, *self.b.hulls
+        if self._last[0] != hulls:
+            self._last = hulls, self._measured()
+        return self._last[1]
+
+    def _measured(self) -> float:
         from manifold3d import Manifold, OpType
 
         overlaps = self._overlaps()
