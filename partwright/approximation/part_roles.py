@@ -35,6 +35,9 @@ def with_role_names(assembly: Assembly) -> Assembly:
         base = max(added, key=_bulk)
         noun = "cylinder" if isinstance(base.field, Cylinder) else roles[base.name]
         roles[base.name] = f"base_{noun}"
+        for part in added:
+            if roles[part.name] == "plate" and is_fin(part, [other for other in added if other is not part]):
+                roles[part.name] = "fin"
     parts = ordered.parts
     names = unique_names([roles.get(p.name, p.name) for p in parts], [p.field.stem for p in parts])
     fresh = dict(zip((p.name for p in parts), names, strict=True))
@@ -89,7 +92,7 @@ def _name(node: Node, cut_from: Node | None, roles: dict[str, str], beside: Sequ
     if isinstance(node, Part):
         if _is_solid(node):
             roles[node.name] = tooth_role(node, cut_from, beside) or (
-                _cut(node, cut_from) if cut_from else "fin" if is_fin(node) else _added(node.field)
+                _cut(node, cut_from) if cut_from else _added(node.field)
             )
         return
     first, *others = node.children

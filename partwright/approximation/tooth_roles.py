@@ -19,8 +19,10 @@ GAP = "tooth_gap"
 _FEWEST, _FEW = 5, 8  # of a fan's blades, and of a wheel's teeth
 _SAME = 1e-3  # of the part's size: how far copies may be off a turn
 _STEPS = 200
-_THIN = 0.3  # of a fin's next longer side, that it is thick at most
 _ROW = 3  # others beside one that is a fin, at least
+_EDGE_POINTS = 16  # along an edge of a fin
+_BEYOND = 0.1  # of a fin's thickness: how far in and out of its edge it is looked at what is there
+_HELD = 0.5  # of those points, at least, that are in what it stands on
 _LONG = 3.0  # a blade's length over its width, at least
 
 
@@ -48,8 +50,9 @@ def tooth_role(part: Part, cut_from: Node | None, beside: Sequence[Node] = ()) -
     return "blade" if length > _LONG * width else None if few else "tooth"
 
 
-def is_fin(part: Part) -> bool:
-    """Whether a part is thin, and there again and again beside its broad sides."""
+def is_fin(part: Part, others: Sequence[Node]) -> bool:
+    """Whether a plate is there again and again beside its broad sides, and stands with an edge on or in what
+    else is added, free at the opposite one: boards between two sides are none, nor are slats or washers."""
     low, high = part.field.bounds()
     sides = np.asarray(high - low)
     if not np.isfinite(sides).all():
@@ -57,10 +60,30 @@ def is_fin(part: Part) -> bool:
     thin = int(sides.argmin())
     across = rotation_matrix(part.rotation)[:, thin]
     ways = np.array([move.translation for move in part.instances if move.rotation == (1.0, 0.0, 0.0, 0.0)])
-    if len(ways) < _ROW or sides[thin] > _THIN * np.sort(sides)[1]:
+    if len(ways) < _ROW or not others:
         return False
     aside = np.linalg.norm(ways - np.outer(ways @ across, across), axis=1)
-    return int((aside < _SAME * _size(part)).sum()) >= _ROW
+    if int((aside < _SAME * _size(part)).sum()) < _ROW:
+        return False
+    held = [[_is_held(part, thin, way, end, others) for end in (0, 1)] for way in range(3) if way != thin]
+    return any(map(any, held)) and not any(map(all, held))
+
+
+def _is_held(part: Part, thin: int, way: int, end: int, others: Sequence[Node]) -> bool:
+    """Whether others have the edge of a plate at one end of its box along axis `way`. thin: the axis along
+    which it is so. What is round has hardly an edge there."""
+    bounds = np.array(part.field.bounds())
+    low, high = bounds
+    along = 3 - thin - way
+    local = np.repeat((low + high)[None] / 2, _EDGE_POINTS, axis=0)
+    local[:, along] = low[along] + (np.arange(_EDGE_POINTS) + 0.5) / _EDGE_POINTS * (high - low)[along]
+    step = np.zeros(3)
+    step[way] = (2 * end - 1) * _BEYOND * float((high - low)[thin])
+    local[:, way] = bounds[end, way]
+    within, beyond = part.pose(local - step), part.pose(local + step)
+    there = [other.distance(points) < 0 for other in others for points in (within, beyond)]
+    own = part.copies[0].distance(within) < 0
+    return float((own & np.logical_or.reduce(there)).mean()) >= _HELD
 
 
 def _axis(part: Part) -> tuple[Floats, Floats] | None:

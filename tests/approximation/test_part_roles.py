@@ -109,3 +109,27 @@ def test_thin_walls_in_a_row_are_fins() -> None:
 
     names = [row(count, *step).parts[-1].name for count, *step in ((5, 9, 0, 0), (3, 9, 0, 0), (5, 0, 50, 0))]
     assert names == ["fin", "plate", "plate"]
+
+
+def test_boards_slats_and_washers_in_a_row_are_no_fins() -> None:
+    def row(part: Part, *step: float) -> Part:
+        moves = (Similarity(translation=tuple(k * s for s in step)) for k in range(1, 6))
+        return replace(part, instances=tuple(moves))
+
+    def names(*parts: Part) -> list[str]:
+        return sorted(part.name for part in with_role_names(Assembly(parts)).parts)
+
+    sides = Part(Box((4, 30, 180)), name="a", instances=(Similarity(translation=(84, 0, 0)),))
+    boards = row(Part(Box((80, 30, 2)), (42, 0, -80), name="b"), 0, 0, 30)
+    back = Part(Box((80, 2, 180)), (42, 15, 0), name="c")
+    assert names(sides, boards) == ["base_plate", "plate"]
+    assert names(sides, boards, back) == ["base_plate", "plate", "plate_02"]
+    assert names(boards, back) == ["base_plate", "fin"]  # as of a heat sink that hangs on a wall
+    rail = Part(Box((200, 10, 10)), (90, 0, -5.5), name="d")
+    assert names(rail, row(Part(Box((20, 80, 2)), name="e"), 30, 0, 0)) == ["base_bar", "plate"]
+    ring = Profile([(-8, 0, 1), (8, 0, 1)], [[(-3, 0, 1), (3, 0, 1)]])
+    washers = row(Part(Extrusion(ring, 2), name="f"), 0, 0, 4)
+    assert names(washers, Part(Cylinder(3.01, 60), name="g")) == ["base_cylinder", "plate"]
+    assert names(washers, Part(Box((6, 16, 60)), (10, 0, 0), name="h")) == ["base_bar", "plate"]
+    bulkiest = row(Part(Box((80, 100, 8)), (42, -35, -80), name="b"), 0, 0, 30)
+    assert names(bulkiest, back) == ["base_plate", "plate"]

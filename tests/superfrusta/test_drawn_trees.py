@@ -381,4 +381,9 @@ def test_a_heat_sink_is_a_plate_with_a_row_of_fins() -> None:
     plate, _, fin = (np.array(f.part.field.bounds()[1]) * 60 / 0.9 for f in tree.features)
     assert sorted(plate) == pytest.approx([5, 60, 60], abs=1e-3)
     assert sorted(fin) == pytest.approx([2, 21, 24], abs=1e-3)
+    assert [part.name for part in FeatureAssembly(shape).named(tree).parts] == [
+        "base_plate",
+        "bolt_hole",
+        "fin",
+    ]
     assert search.scored(tree).score > 0.998
