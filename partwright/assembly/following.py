@@ -240,8 +240,12 @@ class _Following:
         rise, fall = move.after[1] - move.before[1], move.after[0] - move.before[0]
         below, above = self._is_open(low, high, move)
         if below and above:
-            longer = stretched(other, move.axis, rise - fall)
+            longer = stretched(other, move.axis, rise - fall) if rise != fall else other
             if longer is None:
+                change = f"{'longer' if rise > fall else 'shorter'} by {abs(rise - fall):.6g}"
+                self.told.append(
+                    f"{other.name} stays as it is: it cannot be made {change} with {self.part.name}"
+                )
                 return other
             self.told.append(f"{other.name} goes through {self.part.name} as before")
             return longer.translated(((rise + fall) / 2 * move.axis).tolist())

@@ -132,6 +132,13 @@ def test_a_counterbored_hole_goes_through_a_thicker_plate_and_keeps_its_depth() 
     depth = [[x, 0, z] for x, z in ((3, 9.5), (3, 8.5), (23, 0.5), (23, 1.5))]  # 3 mm deep from either face
     assert (after.distance(depth) < 0).tolist() == [False, True, False, True]
     assert mesh_assembly(after).euler_number == mesh_assembly(before).euler_number == -2
+    thin = with_numbers(before, {"plate.size.z": 6.0}).assembly  # from 2 to 8
+    assert thin["from_above"].bounds()[:, 2].tolist() == thin["from_below"].bounds()[:, 2].tolist() == [1, 9]
+    depth = [[x, 0, z] for x, z in ((3, 5.5), (3, 4.5), (23, 4.5), (23, 5.5))]
+    assert (thin.distance(depth) < 0).tolist() == [False, True, False, True]
+    sheet = with_numbers(before, {"plate.size.z": 2.0})  # thinner than the counterbore is deep
+    assert sheet.assembly["from_above"] == before["from_above"]
+    assert "from_above stays as it is: it cannot be made shorter by 8 with plate" in sheet.followed
 
 
 def test_copies_at_two_faces_go_each_with_its_own() -> None:
