@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain
+from typing import TypeVar
 
 import numpy as np
 
+from partwright.assembly.profile_numbers import SAME_PLACE
 from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.assembly.stretching import stretched
 from partwright.assembly.tree import Assembly, Node, Part
@@ -20,6 +22,8 @@ _FLUSH = 2e-3  # of the assembly's longest side: faces that are nearer touch
 _BEYOND = 20  # times that, by which cuts end beyond a shoulder that they are open at
 _FLAT = ("box", "hollow_box", "extrusion")  # kinds that may have flat faces along all of their axes
 _FLAT_ENDS = (*_FLAT, "cylinder", "tube", "cone", "frustum", "hollow_frustum", "revolution")  # and along z
+
+AnyNode = TypeVar("AnyNode", Part, Assembly)
 
 
 def followed(assembly: Assembly, before: Part, after: Part, told: list[str]) -> Assembly:
@@ -35,7 +39,8 @@ class _Move:
 
     flat: whether they are faces that something can stand on, and not where a round wall happens to end.
     across: the two other axes, and from where to where the part reached along them. shoulder: which of
-    them, if one is, lies between the ends of the part, so that what reaches far beyond it is not of it.
+    them, if one is, lies between the ends of the part, so that what reaches far beyond it is not of it; the
+    other is an end, which has a move of its own.
     """
 
     axis: np.ndarray
@@ -45,12 +50,10 @@ class _Move:
     across: tuple[tuple[np.ndarray, tuple[float, float]], ...]
     shoulder: int | None = None
 
-    @property
-    def of_shoulder(self) -> _Move:
-        """Of the one face alone."""
-        low, high = self.before
-        after = (low, self.after[1]) if self.shoulder else (self.after[0], high)
-        return dataclasses.replace(self, after=after)
+    def shift(self, face: int) -> float:
+        """How far what depends on one face alone goes with it."""
+        own = self.shoulder is None or face == self.shoulder
+        return self.after[face] - self.before[face] if own else 0.0
 
 
 def _extent(part: Part, axis: np.ndarray) -> tuple[float, float]:
@@ -74,7 +77,7 @@ def _moves(before: Part, after: Part) -> Iterator[_Move]:
 
 
 def _shoulder_moves(before: Part, after: Part, old: Profile, new: Profile) -> Iterator[_Move]:
-    """Of flat faces between the ends of a part that is turned."""
+    """Of flat faces between the ends of a part that is turned, one of those that lie in one plane."""
     *others, axis = rotation_matrix(before.rotation).T
     ends, now = _extent(before, axis), _extent(after, axis)
     across = tuple((other, _extent(before, other)) for other in others)
@@ -83,13 +86,17 @@ def _shoulder_moves(before: Part, after: Part, old: Profile, new: Profile) -> It
     low, high = (float(y) for y in (old.corners[:, 1].min(), old.corners[:, 1].max()))
     if old.corners.shape != new.corners.shape:
         return
+    near = SAME_PLACE * old.size
+    found: set[tuple[bool, tuple[float, float], tuple[float, float]]] = set()
     for side, other in zip(chain(*old.sides), chain(*new.sides), strict=True):
         level, moved = at + side.start[1], at + other.start[1] + shift
-        if side.start[1] != side.end[1] or not low < side.start[1] < high:
+        is_level = side.centre is None and abs(side.start[1] - side.end[1]) < near
+        if not is_level or not low + near < side.start[1] < high - near:
             continue
         up = side.start[0] > side.end[0]  # the solid lies on the left
         was, is_ = ((ends[0], level), (now[0], moved)) if up else ((level, ends[1]), (moved, now[1]))
-        if was != is_:
+        if was != is_ and (up, was, is_) not in found:
+            found.add((up, was, is_))
             yield _Move(axis, was, is_, True, across, int(up))
 
 
@@ -123,20 +130,37 @@ class _Following:
                 for i, child in enumerate(node.children)
             ]
             return dataclasses.replace(node, children=tuple(children))
-        first = node.parts[0]
-        shift = sum((self._whole_shift(first, move, own_cut) * move.axis for move in self.moves), np.zeros(3))
-        if not shift.any():
-            return node
+        return self._with_first(node, lambda whole, move: self._whole_moved(whole, move, own_cut))
+
+    def _with_first(self, node: AnyNode, moved: Callable[[AnyNode, _Move], AnyNode | None]) -> AnyNode:
+        """What becomes of a node: along each axis it depends on one move, the first, shoulders before ends,
+        of which `moved` tells so."""
+        done: list[np.ndarray] = []
+        for move in self.moves:
+            if any((axis == move.axis).all() for axis in done):
+                continue
+            after = moved(node, move)
+            if after is not None:
+                done.append(move.axis)
+                node = after
+        return node
+
+    def _whole_moved(self, whole: Assembly, move: _Move, own_cut: bool) -> Assembly | None:
+        """A part and what is cut from it: each copy with its own face where all of it has the same copies."""
+        first = whole.parts[0]
+        shifts = [self._shift(copy, move, own_cut) for copy in first.copies]
+        if not any(shifts) and not own_cut:
+            rooted = self._rooted(first, move)
+            shifts = [move.shift(rooted[0])] if rooted is not None else []
+        ways = {shift for shift in shifts if shift}
+        if not ways:
+            return None
         self.told.append(
             f"{first.name} and what is cut from it moved with {self.part.name}, on whose face it stands"
         )
-        return node.translated(shift.tolist())
-
-    def _whole_shift(self, first: Part, move: _Move, own_cut: bool) -> float:
-        """How far a part and what is cut from it move with a face."""
-        shift = self._shift(first, move, own_cut)
-        rooted = self._rooted(first, move) if not shift and not own_cut else None
-        return shift if rooted is None else move.after[rooted[0]] - move.before[rooted[0]]
+        if len(ways) > 1 and all(part.instances == first.instances for part in whole.parts):
+            return _each(whole, lambda part: _copies_moved(part, shifts, move.axis))
+        return whole.translated((next(filter(None, shifts)) * move.axis).tolist())
 
     def _shift(self, other: Part, move: _Move, own_cut: bool) -> float:
         """How far a part that stands on a face moves with it: on the floor of a pocket where that is cut."""
@@ -145,7 +169,7 @@ class _Following:
             return 0.0
         for end, face in ((low, 0 if own_cut else 1), (high, 1 if own_cut else 0)):
             if abs(end - move.before[face]) <= self.near:
-                return move.after[face] - move.before[face]
+                return move.shift(face)
         return 0.0
 
     def _beside(self, other: Part, move: _Move, within: bool = False) -> bool:
@@ -161,40 +185,32 @@ class _Following:
         return any(all(over(copy, axis, *reach) for axis, reach in move.across) for copy in other.copies)
 
     def _moved(self, other: Part, cut: bool, own_cut: bool) -> Part:
-        return self._cut_moved(other) if cut else self._added_moved(other, own_cut)
+        if cut:
+            return self._with_first(other, self._cut_moved)
+        return self._with_first(other, lambda part, move: self._added_moved(part, move, own_cut))
 
-    def _added_moved(self, other: Part, own_cut: bool) -> Part:
-        for move in self.moves:
-            face = move if move.shoulder is None else move.of_shoulder
-            shifts = [self._shift(copy, face, own_cut) for copy in other.copies]
-            if any(shifts):
-                what = f"the face of {self.part.name} that it stands on"
-                other = self._shifted(other, shifts, move, what)
-            elif not own_cut and move.shoulder is None:
-                other = self._rooted_moved(other, move)
-        return other
+    def _added_moved(self, other: Part, move: _Move, own_cut: bool) -> Part | None:
+        shifts = [self._shift(copy, move, own_cut) for copy in other.copies]
+        if any(shifts):
+            return self._shifted(other, shifts, move, f"the face of {self.part.name} that it stands on")
+        return None if own_cut or move.shoulder is not None else self._rooted_moved(other, move)
 
-    def _shifted(self, other: Part, shifts: list[float], move: _Move, face: str) -> Part:
+    def _shifted(self, other: Part, shifts: list[float], move: _Move, face: str) -> Part | None:
         """Every copy with its own face where they stand on two that move otherwise, else all alike."""
         ways = sorted({shift for shift in shifts if shift})
         if not ways:
-            return other
+            return None
         self.told.append(f"{other.name} moved by {' and '.join(f'{way:.6g}' for way in ways)} with {face}")
         if len(ways) == 1:
             return other.translated((ways[0] * move.axis).tolist())
-        first, *rest = (_shift_along(shift, move.axis) for shift in shifts)
-        moved = dataclasses.replace(other, instances=()).transformed(first)
-        pairs = zip(rest, other.instances, strict=True)
-        return dataclasses.replace(
-            moved, instances=tuple(own @ instance @ first.inverse() for own, instance in pairs)
-        )
+        return _copies_moved(other, shifts, move.axis)
 
-    def _rooted_moved(self, other: Part, move: _Move) -> Part:
+    def _rooted_moved(self, other: Part, move: _Move) -> Part | None:
         """A part that is rooted in the part itself: it stands out as far as before, and ends where the part
         does if it did so, or else would come out of the other face."""
         rooted = self._rooted(other, move)
         if rooted is None:
-            return other
+            return None
         face, root = rooted
         shift = move.after[face] - move.before[face]
         is_whole = abs(root - move.before[1 - face]) <= self.near
@@ -221,22 +237,11 @@ class _Following:
                 return None
         return (1, low) if up else (0, high)
 
-    def _cut_moved(self, other: Part) -> Part:
-        of_shoulders: list[np.ndarray] = []  # axes along which it belongs to one, and not to the part's ends
-        for move in self.moves:
-            if move.shoulder is None and any((axis == move.axis).all() for axis in of_shoulders):
-                continue
-            moved = self._cut_moved_along(other, move)
-            if moved is not other and move.shoulder is not None:
-                of_shoulders.append(move.axis)
-            other = moved
-        return other
-
-    def _cut_moved_along(self, other: Part, move: _Move) -> Part:
+    def _cut_moved(self, other: Part, move: _Move) -> Part | None:
         """A cut of the part: it still goes through, or has its depth as before."""
         low, high = _extent(other, move.axis)
         if not np.isfinite([low, high]).all() or not self._beside(other, move):
-            return other
+            return None
         rise, fall = move.after[1] - move.before[1], move.after[0] - move.before[0]
         below, above = self._is_open(low, high, move)
         if below and above:
@@ -264,10 +269,28 @@ class _Following:
         below, above = self._is_open(low, high, move)
         begin, end = move.before
         if above and begin + self.near < low < end:
-            return move.after[1] - end
+            return move.shift(1)
         if below and begin < high < end - self.near:
-            return move.after[0] - begin
+            return move.shift(0)
         return 0.0
+
+
+def _copies_moved(part: Part, shifts: list[float], axis: np.ndarray) -> Part:
+    """Each copy moved by a length of its own."""
+    first, *rest = (_shift_along(shift, axis) for shift in shifts)
+    moved = dataclasses.replace(part, instances=()).transformed(first)
+    pairs = zip(rest, part.instances, strict=True)
+    return dataclasses.replace(
+        moved, instances=tuple(own @ instance @ first.inverse() for own, instance in pairs)
+    )
+
+
+def _each(whole: Assembly, change: Callable[[Part], Part]) -> Assembly:
+    """With every leaf changed."""
+    children = tuple(
+        change(child) if isinstance(child, Part) else _each(child, change) for child in whole.children
+    )
+    return dataclasses.replace(whole, children=children)
 
 
 def _shift_along(length: float, axis: np.ndarray) -> Similarity:

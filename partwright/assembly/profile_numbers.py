@@ -11,7 +11,8 @@ from partwright.fields import Extrusion, Field, Profile, Revolution
 from partwright.fields.profile import Loop
 
 PREFIX = "profile."
-_SAME = 1e-5  # of the profile's size, by which corners at one place may differ
+SAME_PLACE = 1e-5
+"""Of the profile's size, by which corners at one place may differ."""
 
 
 def profile_numbers(field: Field) -> dict[str, float]:
@@ -40,7 +41,7 @@ def with_profile_number(field: Field, number: str, value: float) -> Field:
     kind, _, index = number.removeprefix(PREFIX).partition(".")
     axis = int(kind == "y")
     place = _places(field)[axis][int(index) - 1]
-    near = _SAME * field.profile.size
+    near = SAME_PLACE * field.profile.size
 
     def moved(loop: Loop) -> Loop:
         corners = np.array(loop)
@@ -58,7 +59,7 @@ def _has_profile(field: Field) -> TypeGuard[Extrusion | Revolution]:
 def _places(field: Extrusion | Revolution) -> tuple[list[float], list[float]]:
     """Of corners along x and y, ascending: all of a revolution's that are off the axis; of an extrusion's,
     where a line runs across."""
-    near = _SAME * field.profile.size
+    near = SAME_PLACE * field.profile.size
     x, y = ([float(v) for v in column] for column in field.profile.corners[:, :2].T)
     if isinstance(field, Extrusion):
         lines = [side for loop in field.profile.sides for side in loop if side.centre is None]

@@ -178,6 +178,70 @@ def test_profiles_have_numbers_to_set() -> None:
         with_numbers(before, {"hub.profile.diameter.3": 8.0})
 
 
+def hub(*corners: tuple[float, float]) -> Part:
+    """Turned: of 5 to 30, from 0 on, with an end of 9 at 20, and in between as it is given."""
+    return Part(Revolution(Profile.polygon([(5, 0), (30, 0), *corners, (9, 20), (5, 20)])), name="hub")
+
+
+def hole(low: float, high: float, x: float = 25.0) -> Part:
+    return Part(Cylinder(2, high - low), (x, 0, (low + high) / 2), name="hole")
+
+
+def test_what_stands_on_a_turned_part_moves_once_though_its_shoulders_move_too() -> None:
+    """A nut under a flange with the hole in it: the lower face is an end of the hub and of its flange."""
+    nut = Assembly((Part(Cylinder(4, 3), (-20, 0, -1.5), name="nut"), hole(-9, 9, -20)), "difference")
+    edited = with_numbers(Assembly((hub((30, 8), (9, 8)), nut)), {"hub.profile.y.1": -3.0})
+    assert edited.assembly["nut"].bounds()[:, 2].tolist() == [-6, -3]
+    assert edited.assembly["hole"].bounds()[:, 2].tolist() == [-12, 6]
+
+
+@pytest.mark.parametrize(
+    ("ends", "number", "value", "then"),
+    [
+        ((-1, 9), "y.1", -3.0, [-4, 9]),  # through the flange
+        ((-1, 5), "y.1", -3.0, [-4, 2]),  # blind, from below
+        ((3, 9), "y.1", -3.0, [3, 9]),  # blind, from the flange's shoulder
+        ((3, 9), "y.2", 10.0, [5, 11]),
+        ((-1, 5), "y.3", 13.0, [-1, 5]),
+    ],
+)
+def test_a_cut_goes_with_the_shoulder_that_it_is_open_at(
+    ends: tuple[float, float], number: str, value: float, then: list[float]
+) -> None:
+    turned = hub((30, 8), (20, 8), (20, 12), (9, 12))
+    before = Assembly((turned, hole(*ends)), "difference")
+    after = with_numbers(before, {f"hub.profile.{number}": value}).assembly
+    assert after["hole"].bounds()[:, 2].tolist() == then
+
+
+def test_a_shoulder_with_a_groove_moves_what_begins_there_once() -> None:
+    grooved = hub((30, 8), (25, 8), (25, 6), (20, 6), (20, 8), (9, 8))
+    before = Assembly((grooved, hole(5, 9, 15)), "difference")
+    edited = with_numbers(before, {"hub.profile.y.3": 9.0})
+    assert edited.assembly["hole"].bounds()[:, 2].tolist() == [6, 10]
+    assert len(edited.followed) == 1
+
+
+def test_a_shoulder_is_level_within_rounding_and_straight() -> None:
+    nut = Part(Cylinder(4, 3), (-20, 0, 9.5), name="nut")
+    rough = Assembly((hub((30, 8.0001), (9, 8)), nut))
+    seat = with_numbers(rough, {"hub.profile.y.2": 10.0}).assembly["nut"].bounds()[0, 2]
+    assert seat == pytest.approx(10, abs=2e-4)
+    loop = ((5, 0, 0), (30, 0, 0), (30, 8, 0.2), (9, 8, 0), (9, 20, 0), (5, 20, 0))
+    domed = Assembly((Part(Revolution(Profile(loop)), name="hub"), nut))
+    assert with_numbers(domed, {"hub.profile.y.2": 10.0}).assembly["nut"] == nut
+
+
+def test_copies_with_cuts_go_each_with_its_own_face_too() -> None:
+    over = (Similarity(rotation=(0, 1, 0, 0)),)  # from below to above
+    foot = Part(Box((8, 8, 6)), (0, 0, -8), instances=over, name="foot")
+    bore = Part(Cylinder(1, 4), (0, 0, -11), instances=over, name="bore")
+    bar = Part(Box((60, 20, 10)), name="bar")
+    after = with_numbers(Assembly((bar, Assembly((foot, bore), "difference"))), {"bar.size.z": 12.0}).assembly
+    assert [copy.translation[2] for copy in after["foot"].copies] == [-9, 9]
+    assert [copy.translation[2] for copy in after["bore"].copies] == [-12, 12]
+
+
 def test_a_slot_of_an_outline_gets_wider_by_its_sides() -> None:
     slot = Part(Extrusion(Profile(((-5, -3, 0), (5, -3, 1), (5, 3, 0), (-5, 3, 1))), 4), name="slot")
     assert [name for name in numbers_of(slot) if "profile" in name] == ["profile.y.1", "profile.y.2"]
