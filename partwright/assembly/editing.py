@@ -15,7 +15,8 @@ import numpy as np
 
 from partwright.assembly.following import followed as with_followers
 from partwright.assembly.motion import Motion
-from partwright.assembly.numbers import numbers_of, with_number
+from partwright.assembly.numbers import numbers_of, with_values
+from partwright.assembly.profile_numbers import PREFIX
 from partwright.assembly.repeated_groups import alike_leaves
 from partwright.assembly.tree import Assembly, Part
 from partwright.errors import ParameterError
@@ -34,7 +35,8 @@ def with_numbers(assembly: Assembly, values: Mapping[str, float], alone: bool = 
     """The assembly with these numbers.
 
     values: by "part.number", lengths in the assembly's unit and angles in degrees; the part's name may be a
-    pattern ("hole*.diameter"). Copies of a part change with it.
+    pattern ("hole*.diameter"). Copies of a part change with it. They are set in order, but those of a
+    profile that are given for the same parts together, with the first: they are counted before any is set.
     alone: parts in the same place of groups that are copies of one another stay as they are; otherwise they
     change alike, and move alike, but for those that the pattern names, too: each of these has the number.
 
@@ -43,15 +45,14 @@ def with_numbers(assembly: Assembly, values: Mapping[str, float], alone: bool = 
     """
     changed: list[str] = []
     followed: list[str] = []
-    for name, value in values.items():
-        wanted, number = _split(assembly, name)
+    for wanted, numbers in _steps(assembly, values):
         alike = {} if alone else alike_leaves(assembly)
         done = set(wanted)  # what is named has the number itself, wherever its like is
         for part_name in wanted:
             before = assembly[part_name]
-            after = with_number(before, number, value)
-            old = numbers_of(before)[number]
-            changed.append(f"{part_name}.{number}: {old:.6g} to {value:.6g}")
+            old = _known(before, numbers)
+            after = with_values(before, numbers)
+            changed += [f"{part_name}.{k}: {old[k]:.6g} to {value:.6g}" for k, value in numbers.items()]
             copies = [one for one in alike.get(part_name, ()) if one[0] not in done]
             if copies:
                 followed.append(
@@ -59,7 +60,7 @@ def with_numbers(assembly: Assembly, values: Mapping[str, float], alone: bool = 
                 )
             for own_name, move in ((part_name, Motion()), *copies):
                 done.add(own_name)
-                assembly = _changed(assembly, own_name, (before, after), move, number, followed)
+                assembly = _changed(assembly, own_name, (before, after), move, numbers, followed)
     return Edited(assembly, tuple(changed), tuple(followed))
 
 
@@ -68,7 +69,12 @@ def _listed(names: list[str]) -> str:
 
 
 def _changed(
-    assembly: Assembly, name: str, change: tuple[Part, Part], motion: Motion, number: str, told: list[str]
+    assembly: Assembly,
+    name: str,
+    change: tuple[Part, Part],
+    motion: Motion,
+    numbers: Mapping[str, float],
+    told: list[str],
 ) -> Assembly:
     """With a part changed as another one was, before and after, that a motion takes to it."""
     own, (before, after) = assembly[name], (motion.of(part) for part in change)
@@ -80,7 +86,36 @@ def _changed(
     if after.rotation != before.rotation:  # of an image that begins where another ends
         made = dataclasses.replace(made, rotation=after.rotation)
     assembly = assembly.replace_part(name, made)
-    return assembly if number in ("x", "y", "z") else with_followers(assembly, own, made, told)
+    return assembly if numbers.keys() <= {"x", "y", "z"} else with_followers(assembly, own, made, told)
+
+
+def _steps(assembly: Assembly, values: Mapping[str, float]) -> list[tuple[list[str], dict[str, float]]]:
+    """Names of parts, and the numbers that they get at once: one, or all of a profile that are given."""
+    steps: list[tuple[list[str], dict[str, float]]] = []
+    of_profiles: dict[tuple[str, ...], dict[str, float]] = {}
+    for name, value in values.items():
+        wanted, number = _split(assembly, name)
+        if not number.startswith(PREFIX):
+            steps.append((wanted, {number: value}))
+            continue
+        key = tuple(wanted)
+        if key not in of_profiles:
+            of_profiles[key] = {}
+            steps.append((wanted, of_profiles[key]))
+        of_profiles[key][number] = value
+    return steps
+
+
+def _known(part: Part, wanted: Mapping[str, float]) -> dict[str, float]:
+    """The part's numbers, the wanted among them."""
+    known = numbers_of(part)
+    for number in wanted:
+        if number not in known:
+            raise ParameterError(
+                f"{part.name!r} is a {part.field.kind} and has no number {number!r}; "
+                f"it has {', '.join(known)}"
+            )
+    return known
 
 
 def _split(assembly: Assembly, name: str) -> tuple[list[str], str]:
@@ -91,13 +126,6 @@ def _split(assembly: Assembly, name: str) -> tuple[list[str], str]:
             continue
         wanted = [one for one in known if one == name[:i] or fnmatchcase(one, name[:i])]
         if wanted:
-            for one in wanted:
-                numbers = numbers_of(assembly[one])
-                if name[i + 1 :] not in numbers:
-                    raise ParameterError(
-                        f"{one!r} is a {assembly[one].field.kind} and has no number {name[i + 1 :]!r}; "
-                        f"it has {', '.join(numbers)}"
-                    )
             return wanted, name[i + 1 :]
     raise ParameterError(
         f"{name!r}: expected PART.NUMBER, and the parts are {', '.join(known[:20])}"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 from partwright.assembly.files import MAX_PARTS
 from partwright.assembly.instance_patterns import Circle, Grid, Line, Ring, pattern, with_pattern
-from partwright.assembly.profile_numbers import PREFIX, profile_numbers, with_profile_number
+from partwright.assembly.profile_numbers import PREFIX, profile_numbers, with_profile_numbers
 from partwright.assembly.tree import Part
 from partwright.errors import ParameterError
 
@@ -47,6 +48,17 @@ def _numbers_of_copies(part: Part) -> dict[str, float]:
     return {}
 
 
+def with_values(part: Part, values: Mapping[str, float]) -> Part:
+    """The part with some of its `numbers_of`; those of its profile are counted before any is set. Raises
+    ParameterError where its field does not allow them."""
+    of_profile = {number: value for number, value in values.items() if number.startswith(PREFIX)}
+    if of_profile:
+        part = dataclasses.replace(part, field=with_profile_numbers(part.field, of_profile))
+    for number, value in values.items():
+        part = part if number in of_profile else with_number(part, number, value)
+    return part
+
+
 def with_number(part: Part, number: str, value: float) -> Part:
     """The part with one of its `numbers_of`. Raises ParameterError where its field does not allow it."""
     if number in ("x", "y", "z"):
@@ -55,10 +67,10 @@ def with_number(part: Part, number: str, value: float) -> Part:
         return dataclasses.replace(part, translation=(place[0], place[1], place[2]))
     if number.partition(".")[0] in _OF_COPIES:
         return _with_number_of_copies(part, number, value)
+    if number.startswith(PREFIX):
+        return with_values(part, {number: value})
     if "diameter" in number:
         number, value = number.replace("diameter", "radius"), value / 2
-    if number.startswith(PREFIX):
-        return dataclasses.replace(part, field=with_profile_number(part.field, number, value))
     new: dict[str, Any] = {number: value}
     if number.startswith("size."):
         size = list(part.field.size)  # type: ignore[attr-defined]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import TypeGuard
 
 import numpy as np
@@ -31,21 +32,25 @@ def profile_numbers(field: Field) -> dict[str, float]:
     return found | {f"{PREFIX}y.{k}": y for k, y in enumerate(ys, start=1)}
 
 
-def with_profile_number(field: Field, number: str, value: float) -> Field:
-    """The field with one of its numbers: all corners there move.
+def with_profile_numbers(field: Field, values: Mapping[str, float]) -> Field:
+    """The field with some of its numbers, counted as it is given: all corners there move.
 
     Raises:
         ParameterError: sides then cross, or the profile crosses the axis.
     """
     assert _has_profile(field)
-    kind, _, index = number.removeprefix(PREFIX).partition(".")
-    axis = int(kind == "y")
-    place = _places(field)[axis][int(index) - 1]
-    near = SAME_PLACE * field.profile.size
+    places, near = _places(field), SAME_PLACE * field.profile.size
+    moves: list[tuple[int, float, float]] = []  # axis, from where, to where
+    for number, value in values.items():
+        kind, _, index = number.removeprefix(PREFIX).partition(".")
+        axis = int(kind == "y")
+        moves.append((axis, places[axis][int(index) - 1], value / 2 if kind == "diameter" else value))
 
     def moved(loop: Loop) -> Loop:
-        corners = np.array(loop)
-        corners[np.abs(corners[:, axis] - place) < near, axis] = value
+        given = np.array(loop)
+        corners = given.copy()
+        for axis, place, value in moves:
+            corners[np.abs(given[:, axis] - place) < near, axis] = value
         return tuple((float(x), float(y), float(bulge)) for x, y, bulge in corners)
 
     outline, *holes = (moved(loop) for loop in field.profile.loops)

@@ -27,7 +27,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         action="append",
         required=True,
         help="a number and its new value, say hole.diameter=6mm, base_plate.size.z=12 or 'hole*.x=0'; "
-        "lengths without a unit are in the assembly's, angles in degrees; may be given several times",
+        "lengths without a unit are in the assembly's, angles in degrees; may be given several times; "
+        "numbers of a profile are counted before any of them is set",
     )
     option(
         "--alone",

@@ -242,6 +242,19 @@ def test_copies_with_cuts_go_each_with_its_own_face_too() -> None:
     assert [copy.translation[2] for copy in after["bore"].copies] == [-12, 12]
 
 
+def test_numbers_of_one_profile_are_counted_before_any_is_set() -> None:
+    before = Assembly((hub((30, 8), (9, 8)), Part(Cylinder(4, 3), (-20, 0, 9.5), name="nut")))
+    edited = with_numbers(before, {"hub.profile.y.2": 25.0, "nut.radius": 3, "hub.profile.y.3": 30.0})
+    assert edited.changed == (
+        "hub.profile.y.2: 8 to 25",
+        "hub.profile.y.3: 20 to 30",
+        "nut.radius: 4 to 3",
+    )
+    levels = edited.assembly["hub"].field.profile.corners[:, 1].tolist()
+    assert levels == [0, 0, 25, 25, 30, 30]
+    assert edited.assembly["nut"].bounds()[0, 2] == 25
+
+
 def test_a_slot_of_an_outline_gets_wider_by_its_sides() -> None:
     slot = Part(Extrusion(Profile(((-5, -3, 0), (5, -3, 1), (5, 3, 0), (-5, 3, 1))), 4), name="slot")
     assert [name for name in numbers_of(slot) if "profile" in name] == ["profile.y.1", "profile.y.2"]
