@@ -10,8 +10,9 @@ import numpy as np
 
 from partwright.assembly.instance_patterns import Circle, Grid, Line, pattern
 from partwright.assembly.placed import placed_quadric
+from partwright.assembly.profile_numbers import profile_numbers
 from partwright.assembly.repeated_groups import children_once
-from partwright.fields import NormalForm, Profile, normal_form
+from partwright.fields import Field, NormalForm, Profile, normal_form
 from partwright.fields.extrusion import RIMS
 
 if TYPE_CHECKING:
@@ -52,11 +53,22 @@ def _leaf(part: Part, digits: int) -> str:
     else:
         shown = {f.name: getattr(part.field, f.name) for f in dataclasses.fields(part.field) if f.repr}  # type: ignore[arg-type]
         numbers = [f"{k} {_value(value, digits)}" for k, value in shown.items() if value or k not in RIMS]
+        if "profile" in shown:
+            numbers[1:1] = _profile(part.field, digits)
         own = " ".join([part.field.kind, ", ".join(numbers), f"at {_numbers(part.translation, digits)}"])
     copies = f", {_copies(part, digits)}" if part.instances else ""
     blend = f", blend {_number(part.blend, digits)}" if part.blend else ""
     thread = f", thread {part.metadata['thread']}" if "thread" in part.metadata else ""
     return f"{part.name + ': ' if part.name else ''}{own}{thread}{copies}{blend}"
+
+
+def _profile(field: Field, digits: int) -> list[str]:
+    """The numbers of a profile, those that are counted in a row."""
+    rows: dict[str, list[float]] = {}
+    for name, value in profile_numbers(field).items():
+        rows.setdefault(name.rpartition(".")[0], []).append(value)
+    rows.pop("profile.radius", None)  # half the diameters
+    return [f"{name} {_value(tuple(values), digits)}" for name, values in rows.items()]
 
 
 def _copies(part: Part, digits: int) -> str:

@@ -6,7 +6,7 @@ import dataclasses
 
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.instance_patterns import Circle, Grid, with_pattern
-from partwright.fields import Cylinder, Quadric
+from partwright.fields import Cylinder, Profile, Quadric, Revolution
 
 
 def test_the_tree_is_readable() -> None:
@@ -38,3 +38,12 @@ def test_copies_are_described_by_the_numbers_of_their_pattern() -> None:
     post = with_pattern(Part(Cylinder(1, 2), name="post"), Grid((3, 2, 1), (20, 36, 0), (0, 0, 0)))
     assert post.describe().endswith(", 3 x 2 copies, 20 x 36 apart")
     assert dataclasses.replace(post, instances=post.instances[:-1]).describe().endswith(", 5 copies")
+
+
+def test_profiles_are_described_by_the_numbers_that_can_be_set() -> None:
+    outline = [(5, 0), (30, 0), (30, 8), (9, 8), (9, 20), (5, 20)]
+    hub = Part(Revolution(Profile.polygon(outline)), name="hub")
+    assert "lines and 0 arcs, profile.diameter (10, 18, 60), profile.y (0, 8, 20), angle" in hub.describe()
+    comb = [(x, y) for x in range(1, 9) for y in ((0, x), (x, 0))[x % 2]]
+    many = Part(Revolution(Profile.polygon([(0, -1), (9, -1), *comb[::-1], (0, 0)])), name="many")
+    assert "profile.diameter of 9 numbers, " in many.describe()
