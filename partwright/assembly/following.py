@@ -219,6 +219,8 @@ class _Following:
         longer = stretched(other, move.axis, more) if more else None
         if longer is not None:
             other, shift = longer, (shift + ends_at - root) / 2
+        elif not shift:
+            return None
         self.told.append(f"{other.name} stands out of {self.part.name} as far as before")
         return other.translated((shift * move.axis).tolist())
 

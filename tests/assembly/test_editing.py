@@ -193,6 +193,10 @@ def test_what_stands_on_a_turned_part_moves_once_though_its_shoulders_move_too()
     edited = with_numbers(Assembly((hub((30, 8), (9, 8)), nut)), {"hub.profile.y.1": -3.0})
     assert edited.assembly["nut"].bounds()[:, 2].tolist() == [-6, -3]
     assert edited.assembly["hole"].bounds()[:, 2].tolist() == [-12, 6]
+    knob = Part(Cylinder(1, 10), (7, 0, 20), name="knob")  # out of the end that stays
+    edited = with_numbers(Assembly((hub((30, 8), (9, 8)), knob)), {"hub.profile.y.1": -3.0})
+    assert edited.assembly["knob"] == knob
+    assert edited.followed == ()
 
 
 @pytest.mark.parametrize(
