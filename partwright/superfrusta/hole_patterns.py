@@ -65,6 +65,7 @@ def hole_patterns(shape: Shape, samples: FitSamples) -> list[HolePattern]:
 def _patterns(samples: FitSamples, holes: Sequence[Hole]) -> Iterator[HolePattern]:
     """Of holes that are alike in their extents, those that one takes to, as their walls say."""
     left = list(holes)
+    taken: list[Floats] = []  # middles of the holes of earlier patterns
     failed = 0
     while len(left) >= _FEWEST and failed < _FAILURES:
         alike = [one for one in left if one.like(left[0], samples.grid.spacing)]
@@ -73,7 +74,7 @@ def _patterns(samples: FitSamples, holes: Sequence[Hole]) -> Iterator[HolePatter
         if len(alike) < _FEWEST:
             continue
         form = _Form(samples, first)
-        ways = form.completed(form.ways([one for one in alike if one is not first]))
+        ways = form.completed(form.ways([one for one in alike if one is not first]), taken)
         if len(ways) + 1 < _FEWEST:
             failed += 1
             continue
@@ -81,7 +82,8 @@ def _patterns(samples: FitSamples, holes: Sequence[Hole]) -> Iterator[HolePatter
         shape = samples.grid.values.shape
         hole = first.mask(filling.size).reshape(shape)
         yield HolePattern(hole, first.frame, tuple(ways), filling.reshape(shape))
-        left = [one for one in left if filling[one.voxels].mean() < _SAME and form.clear(one.middle, ways)]
+        taken += form.places(ways)
+        left = [one for one in left if filling[one.voxels].mean() < _SAME and form.clear(one.middle, taken)]
 
 
 @dataclass(frozen=True)
@@ -123,9 +125,9 @@ class _Form:
             way = Isometry(np.eye(3), self.place(way) - self.hole.middle)
         return way, image_error(self.samples.grid, way, self.wall)
 
-    def completed(self, ways: Sequence[Isometry]) -> list[Isometry]:
+    def completed(self, ways: Sequence[Isometry], taken: Sequence[Floats]) -> list[Isometry]:
         """The isometries, and those that go on in their steps for as long as there are such holes: where a
-        web is thinner than a voxel, two holes look like one."""
+        web is thinner than a voxel, two holes look like one. What is taken, middles (3,), stays so."""
         if not ways:
             return []
         known = [_STILL, *ways]
@@ -148,14 +150,17 @@ class _Form:
                     continue
                 tried.append(place)
                 found, error = self.laid(step @ way)
-                if error < self.most and self.clear(self.place(found), known):
+                if error < self.most and self.clear(self.place(found), [*self.places(known[1:]), *taken]):
                     known.append(found)
         return known[1:]
 
-    def clear(self, place: Floats, ways: Sequence[Isometry]) -> bool:
-        """Whether a place (3,) is in neither the hole nor its images."""
-        taken = np.array([self.place(way) for way in (_STILL, *ways)])
-        return bool(np.linalg.norm(taken - place, axis=1).min() > APART * self.hole.width)
+    def clear(self, place: Floats, taken: Sequence[Floats]) -> bool:
+        """Whether a hole of this form about a place (3,) is none about those that are taken."""
+        return bool(np.linalg.norm(np.array(taken) - place, axis=1).min() > APART * self.hole.width)
+
+    def places(self, ways: Sequence[Isometry]) -> list[Floats]:
+        """Middles (3,) of the hole and of its images."""
+        return [self.hole.middle, *(self.place(way) for way in ways)]
 
     def place(self, way: Isometry) -> Floats:
         """(3,) where the hole's middle comes to."""

@@ -146,6 +146,16 @@ def test_two_forms_are_two_patterns_and_share_no_hole() -> None:
     assert not (patterns[0].filling & patterns[1].filling).any()
 
 
+def test_holes_of_many_widths_in_one_grid_are_each_in_one_pattern() -> None:
+    widths = np.random.default_rng(0).uniform(0.03, 0.09, 40)
+    rods = [Manifold.cylinder(1, w, w, 24, True) for w in widths]
+    places = [(0.2 * (k % 8) - 0.7, 0.2 * (k // 8) - 0.4, 0) for k in range(40)]
+    holes = Manifold.compose([rod.translate(at) for rod, at in zip(rods, places, strict=True)])
+    *_, patterns = seen(block(1.8, 1.2, 0.1) - holes)
+    assert sum(one.filling.astype(int) for one in patterns).max() == 1
+    assert sum(1 + len(one.isometries) for one in patterns) <= 40
+
+
 @pytest.mark.parametrize(
     ("one", "count", "hidden"), [(0.005, 3, False), (0.005, 10, True), (0.03, 4, False), (0.03, 6, True)]
 )
