@@ -16,20 +16,27 @@ from partwright.superfrusta.samples import FitSamples
 _WORTH = 0.1  # of the shape's volume that its hollows must have
 
 
+def closed_sections(occupied: NDArray[np.bool_], axis: int) -> tuple[NDArray[np.integer], NDArray[np.bool_]]:
+    """Labels (X, Y, Z) of what is empty and connected within a layer across an axis, 0 for the shape itself;
+    and of each label whether the shape goes all around it there."""
+    layer = ndimage.generate_binary_structure(3, 1)
+    layer[(slice(None),) * axis + ([0, 2],)] = False  # neighbours within the layer alone
+    labels, count = ndimage.label(~occupied, layer)
+    closed = np.ones(count + 1, bool)
+    closed[0] = False
+    for other in {0, 1, 2} - {axis}:
+        for side in (0, -1):
+            closed[np.take(labels, side, axis=other)] = False
+    return labels, closed
+
+
 def hollows(occupied: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Empty voxels (X, Y, Z) that the shape goes all around in a layer along one of the axes: closed holes,
     bores, and vessels that stand upright or lie."""
     found = np.zeros_like(occupied)
     for axis in range(3):
-        layer = ndimage.generate_binary_structure(3, 1)
-        layer[(slice(None),) * axis + ([0, 2],)] = False  # neighbours within the layer alone
-        labels, count = ndimage.label(~occupied, layer)
-        open_ = np.zeros(count + 1, bool)
-        for other in {0, 1, 2} - {axis}:
-            for side in (0, -1):
-                open_[np.take(labels, side, axis=other)] = True
-        open_[0] = True  # the shape itself
-        found |= ~open_[labels]
+        labels, closed = closed_sections(occupied, axis)
+        found |= closed[labels]
     return found
 
 

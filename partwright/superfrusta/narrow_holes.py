@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from scipy import ndimage
 
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid, grid_indices
+from partwright.superfrusta.hollows import closed_sections
 from partwright.superfrusta.samples import FitSamples
 
 Floats = NDArray[np.float64]
@@ -102,14 +102,8 @@ def _across(samples: FitSamples, along: Floats) -> Iterator[Hole]:
     counts = np.ceil((seen.max(axis=0) + _ROOM * spacing - low) / spacing).astype(int) + 1
     places = (low + spacing * grid_indices(tuple(counts))) @ axes.T
     occupied = (samples.near_distance(places.astype(np.float32)) < 0).reshape(counts)
-    layer = ndimage.generate_binary_structure(3, 1)
-    layer[:, :, [0, 2]] = False
-    labels, count = ndimage.label(~occupied, layer)
-    section = np.bincount(labels.ravel(), minlength=count + 1) * spacing**2
-    narrow = section < _WIDEST
-    narrow[0] = False  # the shape itself
-    for axis, side in product((0, 1), (0, -1)):
-        narrow[np.take(labels, side, axis=axis)] = False
+    labels, closed = closed_sections(occupied, 2)
+    narrow = closed & (np.bincount(labels.ravel(), minlength=len(closed)) * spacing**2 < _WIDEST)
     pieces, _ = ndimage.label(narrow[labels])
     most = _LARGEST * np.count_nonzero(occupied)
     for number, box in enumerate(ndimage.find_objects(pieces), 1):
