@@ -149,7 +149,7 @@ def revolved_part(profile: Profile, frame: np.ndarray, foot: np.ndarray, angle: 
         turned = frame @ np.diag([1.0, -1.0, -1.0]) if over else frame
         return _placed(field, turned, frame @ (foot[0], foot[1], middle))
     middle = (low + high) / 2
-    moved = Profile(loops[0], tuple(loops[1:])).moved((0.0, -middle))
+    moved = Profile.of_loops(loops).moved((0.0, -middle))
     return _placed(Revolution(moved, angle), frame, frame @ (foot[0], foot[1], middle))
 
 

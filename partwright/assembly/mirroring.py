@@ -95,4 +95,4 @@ def _in_y(field: Field, name: str) -> tuple[Field, Quaternion]:
 
 def _upside_down(profile: Profile) -> Profile:
     loops = [tuple((x, -y, -bulge) for x, y, bulge in loop) for loop in profile.loops]
-    return Profile(loops[0], tuple(loops[1:]))
+    return Profile.of_loops(loops)

@@ -9,7 +9,7 @@ from typing import TypeGuard
 import numpy as np
 
 from partwright.fields import Extrusion, Field, Profile, Revolution
-from partwright.fields.profile import Loop
+from partwright.fields.profile import Loop, loop_of
 
 PREFIX = "profile."
 SAME_PLACE = 1e-5
@@ -51,10 +51,10 @@ def with_profile_numbers(field: Field, values: Mapping[str, float]) -> Field:
         corners = given.copy()
         for axis, place, value in moves:
             corners[np.abs(given[:, axis] - place) < near, axis] = value
-        return tuple((float(x), float(y), float(bulge)) for x, y, bulge in corners)
+        return loop_of(corners)
 
-    outline, *holes = (moved(loop) for loop in field.profile.loops)
-    return dataclasses.replace(field, profile=Profile(outline, tuple(holes)))
+    profile = Profile.of_loops([moved(loop) for loop in field.profile.loops])
+    return dataclasses.replace(field, profile=profile)
 
 
 def _has_profile(field: Field) -> TypeGuard[Extrusion | Revolution]:

@@ -50,6 +50,6 @@ def _longer(field: Revolution, by: float) -> Revolution | None:
         return None
     moved = [tuple((a, b + (by / 2 if b >= edge else -by / 2), c) for a, b, c in loop) for loop in loops]
     try:
-        return dataclasses.replace(field, profile=Profile(moved[0], tuple(moved[1:])))
+        return dataclasses.replace(field, profile=Profile.of_loops(moved))
     except ParameterError:  # arcs cross, though their corners do not
         return None

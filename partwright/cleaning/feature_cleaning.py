@@ -308,7 +308,7 @@ def _with_circles(
             radius = radii.get((index, ("circle", number)), whole[0])
             loop = circle(radius, (x, y)) if np.isfinite([x, y]).all() else loop
         loops.append(loop)
-    return Profile(loops[0], tuple(loops[1:]))
+    return Profile.of_loops(loops)
 
 
 def _tidied(profile: Profile) -> Profile:
@@ -318,7 +318,7 @@ def _tidied(profile: Profile) -> Profile:
         return round(value, max(0, _DIGITS - 1 - int(np.ceil(np.log10(profile.size))))) + 0.0
 
     loops = [tuple((tidy(x), tidy(y), b) for x, y, b in loop) for loop in profile.loops]
-    return Profile(loops[0], tuple(loops[1:]))
+    return Profile.of_loops(loops)
 
 
 def _with_plain_moves(part: Part, tolerance: float, grid: Grid) -> Part:

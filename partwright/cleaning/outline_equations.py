@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.errors import ParameterError
-from partwright.fields.profile import Profile
+from partwright.fields.profile import Profile, loop_of
 
 Floats = NDArray[np.float64]
 
@@ -186,10 +186,9 @@ class Solver:
 def with_corners(profile: Profile, corners: Floats) -> Profile | None:
     """The profile with other corners (V, 3); None where that is none."""
     loops = [
-        tuple((float(x), float(y), float(b)) for x, y, b in corners[start:end])
-        for start, end in zip(profile.starts, profile.starts[1:], strict=False)
+        loop_of(corners[start:end]) for start, end in zip(profile.starts, profile.starts[1:], strict=False)
     ]
     try:
-        return Profile(loops[0], tuple(loops[1:]))
+        return Profile.of_loops(loops)
     except ParameterError:
         return None

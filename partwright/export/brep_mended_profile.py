@@ -48,7 +48,7 @@ def _loops_of(section: CrossSection) -> tuple[Loop, ...]:
 
 def _with_profile(field: Swept, loops: tuple[Loop, ...], off: float) -> Iterator[tuple[Swept, float]]:
     with suppress(ParameterError):
-        yield _of_profile(field, Profile(loops[0], loops[1:])), off
+        yield _of_profile(field, Profile.of_loops(loops)), off
 
 
 def _of_profile(field: Swept, profile: Profile) -> Swept:

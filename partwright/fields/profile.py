@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain, pairwise
 from reprlib import repr as brief
@@ -90,6 +90,11 @@ class Profile:
             raise ParameterError("profile: sides cross near ({:.6g}, {:.6g})".format(*crossing))
         if not nested(lines):
             raise ParameterError("profile: a hole lies outside of the outline, or within another hole")
+
+    @classmethod
+    def of_loops(cls, loops: Sequence[Loop]) -> Profile:
+        """Of the outline, then the holes, as `loops` has them."""
+        return cls(loops[0], tuple(loops[1:]))
 
     @classmethod
     def polygon(cls, points: Sequence[Sequence[float]]) -> Profile:
@@ -188,7 +193,7 @@ class Profile:
 
     def _mapped(self, move: Any) -> Profile:
         loops = [tuple((*move(x, y), b) for x, y, b in loop) for loop in self.loops]
-        return replace(self, outline=loops[0], holes=tuple(loops[1:]))
+        return self.of_loops(loops)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: corners [x, y] or [x, y, bulge]."""
@@ -207,6 +212,11 @@ class Profile:
         arcs = sum(side.centre is not None for side in sides)
         holes = f", {len(self.holes)} hole{'s' if len(self.holes) > 1 else ''}" if self.holes else ""
         return f"of {len(sides) - arcs} lines and {arcs} arcs{holes}"
+
+
+def loop_of(corners: Iterable[Iterable[float]]) -> Loop:
+    """Corners (K, 3), of x, y and bulge, as a loop."""
+    return tuple((float(x), float(y), float(bulge)) for x, y, bulge in corners)
 
 
 def circle(radius: float, centre: Sequence[float] = (0.0, 0.0)) -> Loop:

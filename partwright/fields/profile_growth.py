@@ -35,7 +35,7 @@ def with_moved_sides(profile: Profile, by: Sequence[float], tilted: bool = False
     where their parallels would meet far away."""
     outwards = iter(by)
     loops = [_grown_loop(sides, [-next(outwards) for _ in sides], tilted) for sides in profile.sides]
-    result = Profile(loops[0], tuple(loops[1:]))
+    result = Profile.of_loops(loops)
     if any(loop_area(a) * loop_area(b) <= 0 for a, b in zip(loops, profile.loops, strict=True)):
         raise ParameterError(f"profile: nothing is left of a loop {-min(by):.6g} further inside")
     return result

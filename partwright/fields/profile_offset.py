@@ -55,7 +55,7 @@ def offset(profile: Profile, depth: float, curved: bool = False) -> tuple[Profil
         loops.append(tuple(corners))
         walls.append(grown)
     try:
-        inner = Profile(loops[0], tuple(loops[1:]))
+        inner = Profile.of_loops(loops)
     except ParameterError as error:
         raise _too_deep(depth) from error
     made = [

@@ -46,7 +46,7 @@ class Revolution(Swept):
             )
         if any(0 < abs(x) <= near for loop in self.profile.loops for x, _, _ in loop):
             loops = [_snapped(loop, near) for loop in self.profile.loops]
-            object.__setattr__(self, "profile", Profile(loops[0], tuple(loops[1:])))
+            object.__setattr__(self, "profile", Profile.of_loops(loops))
 
     @cached_property
     def _off_axis(self) -> np.ndarray:

@@ -57,7 +57,7 @@ def shaken(assembly: Assembly, by: float = 0.02) -> Assembly:
             changes: dict[str, float] = {}
             if isinstance(field, Extrusion):
                 changes["height"] = field.height + rng.uniform(-by, by)
-            field = dataclasses.replace(field, profile=Profile(loops[0], tuple(loops[1:])), **changes)  # type: ignore[arg-type]
+            field = dataclasses.replace(field, profile=Profile.of_loops(loops), **changes)  # type: ignore[arg-type]
         elif isinstance(field, Cylinder):
             field = Cylinder(field.radius + rng.uniform(-by, by), field.height + rng.uniform(-by, by))
         place = np.array(part.translation) + rng.uniform(-by, by, 3) / 2

@@ -76,7 +76,7 @@ def test_known_solids_under_another_name() -> None:
 def rebuilt(field: Swept, corners: np.ndarray, numbers: list[float]) -> Swept:
     starts = field.profile.starts
     loops = [corners[a:b].tolist() for a, b in pairwise(starts)]
-    return type(field)(Profile(loops[0], tuple(loops[1:])), *numbers)  # type: ignore[call-arg]
+    return type(field)(Profile.of_loops(loops), *numbers)  # type: ignore[call-arg]
 
 
 def names(field: Swept) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from partwright.approximation.sketches.sections import FINE
 from partwright.assembly import Similarity
 from partwright.errors import ParameterError
-from partwright.fields.profile import Loop, Profile
+from partwright.fields.profile import Loop, Profile, loop_of
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ def racked(profile: Profile) -> Iterator[Rack]:
                     loops = [*profile.loops]
                     try:
                         loops[i] = _straight([*row.ends, *_rest(corners, chain, row)])
-                        base = Profile(loops[0], tuple(loops[1:]))
+                        base = Profile.of_loops(loops)
                         yield Rack(base, Profile(row.tooth), row.step, row.count, row.added)
                     except ParameterError:  # the straight side crosses another
                         continue
@@ -156,7 +156,9 @@ def _closed(fin: Floats, way: Floats, height: float, side: float) -> Loop:
         corners.insert(0, fin[0])
     if not steep[1]:
         corners.append(np.array([*last, 0.0]))
-    return _loop([np.array([*ends[0], fin[0, 2] if steep[0] else 0.0]), *corners, np.array([*ends[1], 0.0])])
+    return loop_of(
+        [np.array([*ends[0], fin[0, 2] if steep[0] else 0.0]), *corners, np.array([*ends[1], 0.0])]
+    )
 
 
 def _rest(corners: Floats, run: _Run, row: _Row) -> list[Floats]:
@@ -175,7 +177,7 @@ def _straight(corners: list[Floats]) -> Loop:
         )
         if before[2] or corner[2] or not _is_between(before[:2], corner[:2], after[:2])
     ]
-    return _loop(kept)
+    return loop_of(kept)
 
 
 def _is_between(before: Floats, corner: Floats, after: Floats) -> bool:
@@ -185,7 +187,3 @@ def _is_between(before: Floats, corner: Floats, after: Floats) -> bool:
         return False
     off = float(_across(way / length, (corner - before)[None])[0])
     return abs(off) < _NEAR and 0 < float((corner - before) @ way) < length**2
-
-
-def _loop(corners: list[Floats]) -> Loop:
-    return tuple((float(x), float(y), float(bulge)) for x, y, bulge in corners)

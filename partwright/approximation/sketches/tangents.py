@@ -27,8 +27,7 @@ def with_tangents(profile: Profile, tolerance: float) -> Profile:
         loops = [_tangent(sides, tolerance) for sides in profile.sides]
         if all(loop is None for loop in loops):
             return profile
-        outline, *holes = (new or old for new, old in zip(loops, profile.loops, strict=True))
-        return Profile(outline, tuple(holes))
+        return Profile.of_loops([new or old for new, old in zip(loops, profile.loops, strict=True)])
     except ParameterError:
         return profile
 

@@ -73,7 +73,7 @@ def toothed(profile: Profile) -> Iterator[Teeth]:
             loops = [*profile.loops]
             loops[i] = circle(radius, (x, y))
             try:
-                base = Profile(loops[0], tuple(loops[1:]))
+                base = Profile.of_loops(loops)
                 yield Teeth(base, Profile(tooth).moved((x, y)), (x, y), order, outward is (i == 0))
             except ParameterError:  # the circle crosses another loop
                 continue

@@ -285,7 +285,7 @@ def _off_axis(profile: Profile) -> Profile:
         )
         for loop in loops
     ]
-    return Profile(loops[0], tuple(loops[1:]))
+    return Profile.of_loops(loops)
 
 
 def _squared(loop: Loop) -> Loop:
