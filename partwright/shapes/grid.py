@@ -29,6 +29,11 @@ class DistanceGrid:
         """All grid points (nx * ny * nz, 3) in the order of values.ravel()."""
         return self.origin + self.spacing * grid_indices(self.values.shape)
 
+    def points_of(self, voxels: NDArray[np.int64]) -> NDArray[np.float64]:
+        """(n, 3) of some of them, by their places in values.ravel()."""
+        index = np.unravel_index(voxels, self.values.shape)
+        return self.origin + self.spacing * np.stack(index, axis=1)
+
 
 def distance_grid(
     source: DistanceSource, lower: NDArray[np.float64], upper: NDArray[np.float64], resolution: int

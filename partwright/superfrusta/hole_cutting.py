@@ -90,7 +90,7 @@ def _body(samples: FitSamples, pattern: HolePattern) -> tuple[FitSamples, Floats
     """No samples yet, of the hole as a body, its middle (3,) and half of its extents (3,) in its frame. Where
     it ends in the open it goes on a little, in the section that it has within the shape."""
     along = pattern.frame[:, 2]
-    at = samples.grid.points()[pattern.hole.ravel()]
+    at = samples.grid.points_of(np.flatnonzero(pattern.hole))
     low, high = (end((at - at.mean(axis=0)) @ pattern.frame, axis=0) for end in (np.min, np.max))
     middle = at.mean(axis=0) + pattern.frame @ ((low + high) / 2)
     half = (high - low) / 2 + samples.grid.spacing / 2

@@ -170,7 +170,7 @@ class _Form:
         """Voxels (X * Y * Z,) of the hole and of its images."""
         grid = self.samples.grid
         hole = self.hole.mask(grid.values.size)
-        points, mask = grid.points()[self.hole.voxels], hole.copy()
+        points, mask = grid.points_of(self.hole.voxels), hole.copy()
 
         def image(way: Isometry) -> Callable[[Floats], Mask]:
             back = way.inverse()
@@ -194,7 +194,7 @@ class _Form:
 def _wall(samples: FitSamples, hole: Hole) -> Floats:
     """Points (N, 3) of the shape's surface around a hole."""
     grid = samples.grid
-    corners = grid.points()[hole.voxels]
+    corners = grid.points_of(hole.voxels)
     low, high = corners.min(axis=0) - 2 * grid.spacing, corners.max(axis=0) + 2 * grid.spacing
     cell = float((high - low).max()) / _FINE
     counts = np.ceil((high - low) / cell).astype(int) + 1

@@ -293,7 +293,7 @@ def _probes(grid: DistanceGrid) -> NDArray[np.float32]:
     within = np.random.default_rng(0).uniform(0.1, 0.9, corner.shape)
     points = (_CELL * (corner + within) - _HALF_SIDE).astype(np.float32)
     voxel = voxel_of(grid, points)
-    values, nearest = grid.values.ravel()[voxel], grid.points()[voxel].astype(np.float32)
+    values, nearest = grid.values.ravel()[voxel], grid.points_of(voxel).astype(np.float32)
     points = points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]
     return points[morton_order(points)]
 

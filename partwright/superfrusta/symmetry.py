@@ -91,7 +91,7 @@ def symmetries(
     """
     grid = shape.unit_grid(settings.resolution)
     points = shape.unit_surface(_SAMPLES, seed).points.astype(np.float64)
-    inside = grid.points()[grid.values.ravel() < 0]
+    inside = grid.points_of(np.flatnonzero(grid.values < 0))
     if not len(inside):
         return ()
     centre = inside.mean(axis=0)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from solids import box, box_distance, inverted, sphere, together
 
 from partwright.errors import NotFiniteError, SettingError
-from partwright.shapes import UnitFrame, load_shape
+from partwright.shapes import DistanceGrid, UnitFrame, load_shape
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.topology import EdgeTable
 from partwright.shapes.winding import closing_fans, winding_grid
@@ -211,3 +211,9 @@ def test_the_closest_point_is_as_far_as_the_distance():
     points = np.random.default_rng(0).uniform(-1, 1, (4000, 3))
     off = np.linalg.norm(surface.closest(points) - points, axis=1)
     np.testing.assert_allclose(off, surface.exact(points), atol=1e-6)
+
+
+def test_points_of_some_voxels_are_those_of_all() -> None:
+    grid = DistanceGrid(np.array([-0.93, 0.1, 0.2]), 0.0195652, np.zeros((5, 7, 6), np.float32))
+    some = np.array([0, 209, 17, 17, 41])
+    np.testing.assert_array_equal(grid.points_of(some), grid.points()[some])

@@ -54,7 +54,7 @@ def test_a_perforated_plate_has_one_pattern_however_it_lies(turn: tuple[int, int
     shape, samples, (pattern,) = seen(plate().rotate(turn))
     assert len(pattern.isometries) == len(PLACES) - 1
     scale = shape.frame.scale
-    first = samples.grid.points()[pattern.hole.ravel()].mean(axis=0)
+    first = samples.grid.points_of(np.flatnonzero(pattern.hole)).mean(axis=0)
     found = np.array([first, *(way(first[None])[0] for way in pattern.isometries)])
     holes = [Manifold.sphere(0.01, 8).translate((x, y, 0.0)).rotate(turn) for x, y in PLACES]
     middles = scale * (np.array([mesh(one).bounds.mean(axis=0) for one in holes]) - shape.frame.centre)
