@@ -1,7 +1,7 @@
 """Shapes made of named parts, as they come: a family of our own, or a folder of yours.
 
-A folder holds one shape an entry: a scene whose nodes are the parts (GLB, glTF, 3MF, OBJ with groups), a
-folder of part meshes with perhaps the whole as `_whole`, or a mesh with `FILE.labels.json` beside it.
+A folder holds one shape an entry: a scene whose nodes are the parts (GLB, glTF, 3MF, STEP, OBJ with groups),
+a folder of part meshes with perhaps the whole as `_whole`, or a mesh with `FILE.labels.json` beside it.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from partwright.shapes import MESH_SUFFIXES
 from partwright.shapes.labels import labels_path, read_labels
 from partwright.shapes.reading import read_source
 from partwright.shapes.source import Piece
+from partwright.shapes.step_process import STEP_SUFFIXES
 
 WHOLE = "_whole"
 
@@ -181,7 +182,7 @@ def _sources(folder: Path) -> Iterator[PartedSource]:
             continue
         if entry.is_dir() and _meshes(entry):
             yield PartFolder(entry)
-        elif entry.suffix.lower() in MESH_SUFFIXES:
+        elif entry.suffix.lower() in (*MESH_SUFFIXES, *STEP_SUFFIXES):
             # A scene that `segment` wrote has labels too, but in another order: its nodes say the same.
             is_labelled = labels_path(entry).exists() and entry.suffix.lower() not in (".glb", ".gltf")
             yield LabelledMesh(entry) if is_labelled else SceneFile(entry)

@@ -162,6 +162,13 @@ def _with_parts(
             kept.append(source)
         except PartwrightError as error:
             refused.append(Refused(source.name, str(error)))
+    if any(len(names) > 1 for names in told.values()):
+        unnamed = [source for source in kept if told[source.name] == (source.name,)]
+        kept = [source for source in kept if source not in unnamed]
+        for source in unnamed:  # readers call a piece without a name after its file: no other shape's part
+            del told[source.name]
+            why = "is one piece without a name; name its nodes, or put FILE.labels.json beside it"
+            refused.append(Refused(source.name, why))
     seen = dict.fromkeys(name for names in told.values() for name in names)
     missing = [part for part in parts if part not in seen]
     if missing:

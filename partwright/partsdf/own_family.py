@@ -16,23 +16,25 @@ from partwright.datasets.preparing import PreparationProgress, prepare
 from partwright.errors import FamilyError, SettingError
 from partwright.partsdf.config import Config, DecoderSettings, LossSettings, TrainingSettings, write_config
 from partwright.partsdf.live import LivePicture
-from partwright.partsdf.training import EpochReport, Trained, train, trainer
+from partwright.partsdf.training import EpochReport, Trained, trainer
 from partwright.render import Camera
 
 FAMILY, CHECK, CONFIG, PICTURE = "family", "check.md", "training.toml", "live.png"
 STEPS = 20_000
 _BATCH, _WARM, _TIMED = 4, 3, 8
+_LEAST = 3  # shapes: one is kept to test with, and two are the least to learn from
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is about to be done. findings: what is odd about the shapes. seconds: that training will take, as
-    its first steps on this machine say."""
+    """What is about to be done. findings: what is odd about the shapes. steps: that are left
+    of `total`; seconds: that they will take, as the first ones on this machine say."""
 
     family: PreparedFamily
     findings: tuple[Finding, ...]
     config: Config
     steps: int
+    total: int
     seconds: float
 
 
@@ -79,12 +81,21 @@ def learn_family(
             f"{source}: every shape is one part, {family.parts[0]!r}; name the nodes of each file after its "
             "parts, or put FILE.labels.json beside it"
         )
+    if len(family) < _LEAST:
+        raise FamilyError(
+            f"{source}: {len(family)} usable shapes, of which one is kept to test with; learning takes "
+            f"{_LEAST} or more, and twenty are a start"
+        )
     findings = check_family(family, made.refused)
     write_check(output / CHECK, family, findings)
     config = settings_for(family, name, steps, seed, threads)
+    each = seconds_a_step(config)
+    # Refuses what was begun with other settings, before these are written.
+    learning = trainer(config, output)
     write_config(output / CONFIG, config)
+    total, left = learning.total, learning.total - learning.state.step
     if planned is not None:
-        planned(Plan(family, tuple(findings), config, steps, steps * seconds_a_step(config)))
+        planned(Plan(family, tuple(findings), config, left, total, each * left))
     picture = LivePicture(output / PICTURE, family, camera)
 
     def told(report: EpochReport) -> None:
@@ -92,7 +103,7 @@ def learn_family(
         if progress is not None:
             progress(report)
 
-    return train(config, output, told)
+    return learning.run(told)
 
 
 def settings_for(family: PreparedFamily, name: str, steps: int, seed: int = 0, threads: int = 0) -> Config:

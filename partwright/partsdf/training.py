@@ -136,23 +136,24 @@ class Trainer:
                 folder / CHECKPOINT, config, samples.names, self.plain, self.optimiser.optimizer
             )
         self.steps = -(-len(samples) // self.settings.batch)  # an epoch
+        self._reporting = 0.0  # seconds that who is told of an epoch took: no part of the training
 
     def run(self, report: Callable[[EpochReport], None] | None) -> Trained:
         log = Log(self.folder, self.epoch) if self.fabric.is_global_zero else None
         validation = Validation(self.config, self.family, self.folder) if log else None
         saved, started = time.monotonic(), time.monotonic() - self.state.seconds
         with _stopping() as stop:
-            while self.state.step < self.settings.epochs * self.steps and not stop():
+            while self.state.step < self.total and not stop():
                 self._set_rates()
                 self.step()
-                self.state.seconds = time.monotonic() - started
+                self.state.seconds = time.monotonic() - started - self._reporting
                 if self.state.step % self.steps == 0:
                     self._end_epoch(log, validation, report)
                 if time.monotonic() - saved > 60 * self.settings.checkpoint:
                     self._save()
                     saved = time.monotonic()
             self._save()
-        done = self.state.step >= self.settings.epochs * self.steps
+        done = self.state.step >= self.total
         path = self.folder / MODEL
         model = self.trained()
         if self.fabric.is_global_zero:
@@ -163,6 +164,11 @@ class Trainer:
     @property
     def epoch(self) -> int:
         return self.state.step // self.steps
+
+    @property
+    def total(self) -> int:
+        """Steps of the whole training."""
+        return self.settings.epochs * self.steps
 
     def step(self) -> None:
         """One step of the optimiser, the one that comes next."""
@@ -187,7 +193,7 @@ class Trainer:
     def _config_now(self) -> Config:
         """With less of L_inter in the last epochs."""
         losses, settings = self.config.losses, self.settings
-        if self.state.step < (1 - settings.ease) * settings.epochs * self.steps:
+        if self.state.step < (1 - settings.ease) * self.total:
             return self.config
         return replace(self.config, losses=replace(losses, inter=_EASED * losses.inter))
 
@@ -199,7 +205,7 @@ class Trainer:
         return shuffled[place * self.settings.batch :][: self.settings.batch].to(self.fabric.device)
 
     def _set_rates(self) -> None:
-        done = self.state.step / (self.settings.epochs * self.steps)
+        done = self.state.step / self.total
         if self.settings.anneal:
             late = max(0.0, done - (1 - self.settings.anneal)) / self.settings.anneal
             factor = 0.5 * (1 + math.cos(math.pi * late))
@@ -228,8 +234,9 @@ class Trainer:
             log.picture(self.epoch, picture)
         log.row(self.epoch, row)
         if report:
-            seconds, epochs = self.state.seconds, self.settings.epochs
+            seconds, epochs, start = self.state.seconds, self.settings.epochs, time.monotonic()
             report(EpochReport(self.epoch, epochs, whole, part, inter, seconds, self.trained))
+            self._reporting += time.monotonic() - start
 
     def _save(self) -> None:
         if self.fabric.is_global_zero:

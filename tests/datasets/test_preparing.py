@@ -11,6 +11,7 @@ import trimesh
 
 from partwright.cli.main import main
 from partwright.datasets import PreparedFamily, prepare
+from partwright.datasets.inputs import find_shapes
 from partwright.datasets.preparing import Preparation, splits
 from partwright.errors import FamilyError, OutputError, SettingError
 from partwright.fields import Box, Sphere
@@ -143,6 +144,23 @@ def test_scenes_and_labelled_meshes_are_read_too(tmp_path: Path) -> None:
     np.testing.assert_allclose(by_label.scale, by_scene.scale, rtol=0.05)
     for shape in (by_label, by_scene):
         assert shape.present.tolist() == [1, 1]
+
+
+def test_one_piece_without_a_name_among_shapes_of_parts_is_left_out(tmp_path: Path) -> None:
+    """A reader names it after its file, which would be a part of its own to the whole family."""
+    source = folders_of_parts(tmp_path / "in", 2)
+    parts_of(1)["foot"].export(source / "forgotten.ply")
+    made = prepare(source, tmp_path / "out", samples=SAMPLES, workers=1)
+    assert [(one.name, one.reason[:30]) for one in made.refused] == [
+        ("forgotten", "is one piece without a name; n")
+    ]
+    assert made.family.parts == ("foot", "head")
+
+
+def test_scenes_of_step_are_among_the_shapes(tmp_path: Path) -> None:
+    for name in ("a.step", "b.STP", "c.glb", "d.txt"):
+        (tmp_path / name).write_bytes(b"")
+    assert [source.name for source in find_shapes(tmp_path)] == ["a", "b", "c"]
 
 
 def test_open_parts_of_a_closed_whole_are_told_apart(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -81,7 +82,35 @@ def test_what_a_stopped_training_has_learned_is_kept_and_gone_on_from(tmp_path: 
     assert (again.outcome, epochs) == ("converged", [1, 2, 3])
     assert again.model.hash != first.hash
     assert plans[0].seconds > 0
+    assert [(plan.steps, plan.total) for plan in plans] == [(3, 3), (1, 3)]
     assert [finding.shape for finding in plans[0].findings] == [""]  # three shapes are few
+
+
+def test_what_was_begun_with_other_settings_is_refused_and_its_settings_stay(tmp_path: Path) -> None:
+    source, output = tmp_path / "things", tmp_path / "out"
+    source.mkdir()
+    for i in range(4):
+        scene(source / f"thing_{i}.glb", 1 + 0.1 * i)
+    learn_family(source, output, steps=2, samples=1000, threads=1, workers=1)
+    written = (output / "training.toml").read_bytes()
+    with pytest.raises(SettingError, match=r"other settings \(training.epochs"):
+        learn_family(source, output, steps=3, samples=1000, threads=1, workers=1)
+    assert (output / "training.toml").read_bytes() == written
+
+
+def test_what_the_picture_takes_is_no_part_of_what_is_left(tmp_path: Path) -> None:
+    source, seconds = tmp_path / "things", []
+    source.mkdir()
+    for i in range(4):
+        scene(source / f"thing_{i}.glb", 1 + 0.1 * i)
+
+    def told(report: EpochReport) -> None:
+        seconds.append(report.seconds)
+        if len(seconds) == 1:
+            time.sleep(5)
+
+    learn_family(source, tmp_path / "out", steps=3, samples=1000, threads=1, workers=1, progress=told)
+    assert seconds[1] - seconds[0] < 4
 
 
 def test_bad_folders_are_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -100,6 +129,9 @@ def test_bad_folders_are_told_in_one_line(tmp_path: Path, capsys: pytest.Capture
 
     pair = ("foot", "head")
     assert "1 usable shape; a family needs at least two" in said({"a": pair})
+    assert "2 usable shapes, of which one is kept to test with; learning takes 3" in said(
+        {"a": pair, "b": pair}
+    )
     assert "no part name is in two shapes: a has a2, a1; b has b2, b1" in said(
         {"a": ("a1", "a2"), "b": ("b1", "b2")}
     )

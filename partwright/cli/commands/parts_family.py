@@ -23,7 +23,8 @@ def run(arguments: argparse.Namespace) -> int:
         more = f", {len(odd) - _TOLD} more in {folder / CHECK}" if len(odd) > _TOLD else ""
         say(f"{counted(len(plan.family), 'shape')} of {', '.join(plan.family.parts)}; "
             f"{counted(len(odd), 'finding') if odd else 'nothing stands out'}{more}")  # fmt: skip
-        say(f"{plan.steps} steps will take about {duration(plan.seconds)}; watch {folder / PICTURE}")
+        steps = f"{plan.steps} steps" if plan.steps == plan.total else f"{plan.steps} of {plan.total} steps"
+        say(f"{steps} will take about {duration(plan.seconds)}; watch {folder / PICTURE}")
 
     with raising():
         try:
