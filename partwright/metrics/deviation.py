@@ -128,14 +128,18 @@ def _furthest_again(distances: np.ndarray, measured: Callable[[np.ndarray], np.n
     return again
 
 
-def buried(distance: Callable[[np.ndarray], np.ndarray], points: np.ndarray) -> np.ndarray:
+def buried(
+    distance: Callable[[np.ndarray], np.ndarray], points: np.ndarray, normals: np.ndarray | None = None
+) -> np.ndarray:
     """Which (N,) of the points (N, 3) of a solid's faces have no open space beside them, unit frame.
 
     They lie inside, as those of shells that overlap, or in a crack narrower than 0.5 % of the longest side.
-    distance: signed, of points (n, 3).
+    distance: signed, of points (n, 3). normals: (N, 3), outwards, where most have open space.
     """
     corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(-1, 3) / 3**0.5
     closed = np.ones(len(points), bool)
+    if normals is not None:
+        closed = np.asarray(distance(points + _BESIDE * normals)) < _NARROW * _BESIDE
     for way in _BESIDE * np.concatenate([np.eye(3), -np.eye(3), corners]):
         left = np.flatnonzero(closed)  # most points have open space in one of the first ways
         if len(left):

@@ -15,6 +15,7 @@ from partwright.errors import EmptyShapeError, FlatShapeError, OpenShellError
 from partwright.shapes.boolean import unite
 from partwright.shapes.cleaning import drop_doubles, merge_vertices, weld_boundary
 from partwright.shapes.distance import MeshDistance
+from partwright.shapes.hidden_faces import close_hidden, drop_sheets
 from partwright.shapes.holes import Openings, fill_holes, with_what_stays_open
 from partwright.shapes.orientation import orient
 from partwright.shapes.sampling import sample_triangles
@@ -53,8 +54,10 @@ class Surface:
         return MeshDistance(self.vertices, self.faces, self.winding_faces, self.closed, embedded=self.simple)
 
 
-def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Surface:
+def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64], up: str | None = None) -> Surface:
     """Surface of the solid that the triangles mean; vertices (V, 3) in the unit frame, faces (F, 3).
+
+    up: the axis, where it is known: what opens onto the ground is closed there.
 
     Raises EmptyShapeError when no triangle has area, FlatShapeError when nothing is enclosed, OpenShellError
     when the openings are so large that inside and outside cannot be told apart.
@@ -67,6 +70,9 @@ def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Surface:
         raise EmptyShapeError("no triangle has any area; export the shape again with its surface")
     vertices, edges = weld_boundary(vertices, EdgeTable(faces), notes)
     edges = orient(vertices, edges, notes)
+    if edges.balance.any():
+        vertices, edges = close_hidden(vertices, edges, up, notes)
+        edges = drop_sheets(vertices, edges, notes)
     if not edges.balance.any():
         return _surface_of_closed(vertices, edges, notes, 1.0)
     confidence = _confidence_of_open(vertices, edges.faces)

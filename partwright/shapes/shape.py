@@ -85,7 +85,7 @@ class Shape:
                 "coordinate; all coordinates must be finite. Export the shape again"
             )
         self.frame = _named(name, lambda: UnitFrame.of(corners))
-        self._surface = _named(name, lambda: repair(self.frame.to_unit(corners), compact))
+        self._surface = _named(name, lambda: repair(self.frame.to_unit(corners), compact, source.up))
         self.vertices = self.frame.from_unit(self._surface.vertices)
         self.faces = self._surface.faces
         self.repairs = source.repairs + self._surface.repairs

@@ -115,29 +115,28 @@ def components(count: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArra
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def boundary_loops(open_half_edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Vertex loops along the open half-edges (B, 2); those that touch themselves or others are left out."""
-    if len(open_half_edges) == 0:
-        return []
-    starts, start_count = np.unique(open_half_edges[:, 0], return_counts=True)
-    ends, end_count = np.unique(open_half_edges[:, 1], return_counts=True)
-    label_of, inverse = np.unique(open_half_edges, return_inverse=True)
-    inverse = inverse.reshape(-1, 2)
-    label = components(len(label_of), inverse[:, 0], inverse[:, 1])
-    simple = np.ones(int(label.max()) + 1, dtype=bool)
-    once = np.intersect1d(starts[start_count == 1], ends[end_count == 1])
-    simple[label[~np.isin(label_of, once)]] = False
-    follow = dict(open_half_edges.tolist())
-    loops, seen = [], set()
-    for vertex, body in zip(label_of.tolist(), label.tolist(), strict=True):
-        if body in seen or not simple[body]:
-            continue
-        seen.add(body)
-        loop = [vertex]
-        while (following := follow[loop[-1]]) != vertex:
-            loop.append(following)
-        loops.append(np.array(loop, dtype=np.int64))
-    return loops
+def boundary_loops(half_edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Vertex loops along half-edges (B, 2), of which as many leave each vertex as come to it.
+
+    Unbalanced ones do. None passes a vertex twice: a rim that touches itself comes as several.
+    """
+    follow: dict[int, list[int]] = {}
+    for start, end in half_edges[np.lexsort(half_edges.T)][::-1].tolist():
+        follow.setdefault(start, []).append(end)
+    loops = []
+    for first in sorted(follow):
+        while follow[first]:
+            walk, place = [first], {first: 0}
+            while (following := follow[walk[-1]].pop()) != first:
+                if following in place:
+                    loops.append(walk[place[following] :])
+                    walk = walk[: place[following] + 1]
+                    place = {vertex: number for number, vertex in enumerate(walk)}
+                else:
+                    place[following] = len(walk)
+                    walk.append(following)
+            loops.append(walk)
+    return [np.array(loop, dtype=np.int64) for loop in loops]
 
 
 def signed_volumes(

@@ -13,6 +13,7 @@ from scipy import ndimage
 from partwright.fields.columns import WIDTH, Column
 from partwright.fields.kernel import Target
 from partwright.methods import Checkpoint, Run
+from partwright.metrics.deviation import buried
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid, grid_indices
 from partwright.shapes.sampling import morton_order
@@ -66,7 +67,7 @@ class FitSamples:
     probes: NDArray[np.float32]
     """(n, 3) points that are no samples yet, where a part that goes astray is looked for."""
     surface: NDArray[np.float32]
-    """(n, 3) points of the shape's surface, as many to each unit of area."""
+    """(n, 3) points of the shape's surface that can be seen, as many to each unit of area."""
     growth: int = 0
     """Which of several growths they serve: each optimises on others of them."""
 
@@ -93,7 +94,7 @@ class FitSamples:
             shape.unit_away,
             settings.uniform / float(np.prod(grid.spacing * np.array(grid.values.shape))),
             _probes(grid),
-            shape.unit_surface(_SURFACE, run.seed).points.astype(np.float32),
+            _seen(shape, run.seed),
         )
 
     def variant(self, growth: int, checkpoint: Checkpoint, threads: int) -> FitSamples:
@@ -263,6 +264,13 @@ class FitSamples:
     def covered_by(self, rows: Rows, points: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Whether each part alone covers each point (M, N)."""
         return self.kernel.covered(rows, points, self.threads)
+
+
+def _seen(shape: Shape, seed: int) -> NDArray[np.float32]:
+    """Points (n, 3) of a shape's surface, but for faces between bodies that meet: what covers both covers
+    those, and is not to blame."""
+    drawn = shape.unit_surface(_SURFACE, seed)
+    return drawn.points[~buried(shape.unit_distance, drawn.points, drawn.normals)]
 
 
 def padding(grid: DistanceGrid, uniform: int, seed: int) -> tuple[NDArray[np.float32], float]:

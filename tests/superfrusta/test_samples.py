@@ -78,3 +78,17 @@ def test_a_chip_that_cuts_leave_beyond_all_probes_becomes_samples(box: FitSample
     volume = more.weight[len(box.points) :].sum() / box.density
     assert volume == pytest.approx(0.3 * 0.1**2, rel=0.2)
     assert more.with_stray_samples(chip) is more
+
+
+def test_faces_between_bodies_that_meet_are_no_surface_to_cover() -> None:
+    """What covers both bodies covers them: as walls of something filled they would hide all that is off."""
+    halves = [trimesh.creation.box((1, 1, 1)), trimesh.creation.box((1, 1, 1))]
+    for half, side in zip(halves, (-1, 1), strict=True):
+        half.apply_translation((0.501 * side, 0, 0))
+    shape = load_shape(trimesh.util.concatenate(halves))
+    drawn = shape.unit_surface(8000, 0).points
+    met = (np.abs(drawn[:, 0]) < 0.01) & (np.abs(drawn[:, 1:]).max(axis=1) < 0.43)
+    assert met.sum() > 1000
+    surface = FitSamples.of(shape, SETTINGS).surface
+    assert len(surface) == pytest.approx(len(drawn) - met.sum(), rel=0.03)
+    assert not ((np.abs(surface[:, 0]) < 0.01) & (np.abs(surface[:, 1:]).max(axis=1) < 0.43)).any()

@@ -1,0 +1,130 @@
+"""Shapes put together of open bodies, as assets for games are: what is closed, left out, and kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from solids import box, together, without
+
+from partwright.errors import FlatShapeError, OpenShellError
+from partwright.shapes import Openings, load_shape
+from partwright.shapes.shape import Shape
+from partwright.shapes.source import Piece, Source
+from partwright.shapes.topology import boundary_loops
+
+
+def open_box(extents, centre, *sides: str) -> trimesh.Trimesh:
+    """A box without some of its sides: "+x", "-z" ..."""
+    mesh = box(extents, centre)
+    axes = {f"{sign}{axis}": (sign == "+", "xyz".index(axis)) for sign in "+-" for axis in "xyz"}
+    dropped = np.zeros(12, bool)
+    for side in sides:
+        positive, axis = axes[side]
+        dropped |= mesh.face_normals[:, axis] > 0.9 if positive else mesh.face_normals[:, axis] < -0.9
+    return without(mesh, dropped)
+
+
+def sheet(width: float, depth: float, at: tuple[float, float, float]) -> trimesh.Trimesh:
+    """Flat, along x and y."""
+    corners = np.array([[0, 0, 0], [width, 0, 0], [width, depth, 0], [0, depth, 0]]) + at
+    return trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
+
+
+HOUSE = (
+    box((2, 2, 0.1), (0, 0, -0.05)),
+    open_box((1, 1, 0.5), (0, 0, 0.25), "+z", "-z"),
+    box((1.2, 1.2, 0.2), (0, 0, 0.6)),
+)
+
+
+def test_walls_between_a_plate_and_a_roof_are_closed_where_those_cover_them() -> None:
+    shape = load_shape(together(*HOUSE))
+    assert shape.volume == pytest.approx(0.4 + 0.5 + 1.44 * 0.2, rel=1e-9)
+    assert shape.confidence == 1.0
+    assert shape.openings == Openings()
+    assert any(note.startswith("closed 2 openings") for note in shape.repairs)
+    assert (shape.signed_distance([[0, 0, 0.05], [0.4, 0.4, 0.45]]) < 0).all()
+    with pytest.raises(OpenShellError):  # alone they may be walls of no thickness
+        load_shape(HOUSE[1])
+
+
+def test_an_opening_within_another_body_is_closed() -> None:
+    mesh = together(box(), open_box((0.2, 0.2, 1), (0, 0, 0.8), "-z"))
+    shape = load_shape(mesh)
+    assert shape.volume == pytest.approx(1 + 0.04 * 0.8, rel=1e-9)
+    assert shape.confidence == 1.0
+
+
+@pytest.mark.parametrize(("gap", "certain"), [(1e-3, True), (0.02, False)])
+def test_a_panel_before_a_body_is_closed_where_it_nearly_lies_on_it(gap: float, certain: bool) -> None:
+    panel = open_box((0.6, 0.6, 0.05), (0, 0, 0.525 + gap), "-z")
+    shape = load_shape(together(box(), panel))
+    assert (shape.openings == Openings()) == certain
+    assert shape.volume == pytest.approx(1 + 0.36 * 0.05, rel=1e-3)
+
+
+def test_decals_and_the_ground_are_left_out() -> None:
+    decals = [sheet(0.2, 0.1, (-0.3 + 0.3 * k, 0.1, 0.51)) for k in range(3)]
+    shape = load_shape(together(box(), *decals, sheet(5, 5, (-2.5, -2.5, -0.6))))
+    assert shape.volume == pytest.approx(1, rel=1e-9)
+    assert shape.confidence == 1.0
+    assert "left out 4 loose flat sheets" in shape.repairs
+
+
+def test_a_sheet_that_is_the_side_of_something_stays() -> None:
+    mesh = together(open_box((1, 1, 1), (0, 0, 0), "+z", "+x"), box((0.1, 0.1, 0.1), (3, 0, 0)))
+    lid = sheet(0.998, 0.998, (-0.499, -0.499, 0.5))
+    shape = load_shape(together(mesh, lid))
+    assert not any("left out" in note for note in shape.repairs)
+    loose = [sheet(1, 1, (0, 0, 0)), sheet(1, 1, (0, 0.5, 0.5))]
+    loose[1].apply_transform(trimesh.transformations.rotation_matrix(1.5, [1, 0, 0]))
+    with pytest.raises((FlatShapeError, OpenShellError)):
+        load_shape(together(*loose))
+
+
+def test_what_opens_onto_the_ground_is_closed_where_up_is_known() -> None:
+    mesh = together(open_box((1, 1, 0.1), (0, 0, 0.05), "-z"), box((0.2, 0.2, 0.5), (2, 0, 0.25)))
+
+    def standing(up: str | None) -> Shape:
+        pieces = (Piece("mesh", np.asarray(mesh.vertices), np.asarray(mesh.faces)),)
+        return Shape(Source("mesh", pieces, None, up))
+
+    assert standing("z").volume == pytest.approx(0.12, rel=1e-9)
+    assert standing("z").openings == Openings()
+    for other in ("-z", "y"):
+        with pytest.raises(OpenShellError):
+            standing(other)
+
+
+def test_a_flat_rim_of_any_outline_is_filled_within_it() -> None:
+    """A fan from the middle of an L would lie outside of it."""
+    outline = np.array([[0, 0], [2, 0], [2, 0.2], [0.2, 0.2], [0.2, 2], [0, 2]])
+    prism = trimesh.creation.extrude_polygon(trimesh.path.polygons.Polygon(outline), 1.0)
+    shape = load_shape(without(prism, prism.face_normals[:, 2] > 0.9))
+    assert shape.volume == pytest.approx(0.76, rel=1e-9)
+    assert shape.openings.share == pytest.approx(0.76 / prism.area, rel=1e-6)
+
+
+def test_a_rim_that_touches_itself_is_filled() -> None:
+    mesh = trimesh.creation.icosphere(subdivisions=4)
+    ring = np.flatnonzero((mesh.faces == 100).any(axis=1))
+    away = mesh.triangles_center[ring] - mesh.vertices[100]
+    first, second = np.linalg.svd(mesh.vertices[100][None])[2][1:]
+    ring = ring[np.argsort(np.arctan2(away @ first, away @ second))]
+    shape = load_shape(without(mesh, np.isin(np.arange(len(mesh.faces)), ring[::2])))
+    assert shape.volume == pytest.approx(mesh.volume, rel=1e-4)
+    assert shape.openings.count == len(ring) // 2
+
+
+@given(seed=st.integers(0, 10_000), faces=st.integers(1, 40))
+@settings(max_examples=60, deadline=None)
+def test_loops_hold_each_half_edge_once_and_no_vertex_twice(seed: int, faces: int) -> None:
+    triangles = np.random.default_rng(seed).permuted(np.tile(np.arange(12), (faces, 1)), axis=1)[:, :3]
+    half_edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    loops = boundary_loops(half_edges)
+    found = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops])
+    assert sorted(found.tolist()) == sorted(half_edges.tolist())
+    assert all(len(set(loop.tolist())) == len(loop) for loop in loops)
