@@ -127,7 +127,7 @@ def outlines(seen: list[Looked | None]) -> tuple[np.ndarray, np.ndarray]:
             surface.vertices, surface.faces, one.silhouette, sight.azimuth, sight.elevation
         )
         ious.append(found.iou)
-        told.append(bool(warnings_of("", sight, found)))
+        told.append(bool(warnings_of("", one, found)))
     return np.array(ious), np.array(told)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly.instance_patterns import Circle, Grid, Line, pattern
+from partwright.assembly.metadata import GUESSED
 from partwright.assembly.placed import placed_quadric
 from partwright.assembly.profile_numbers import profile_numbers
 from partwright.assembly.repeated_groups import children_once
@@ -59,7 +60,8 @@ def _leaf(part: Part, digits: int) -> str:
     copies = f", {_copies(part, digits)}" if part.instances else ""
     blend = f", blend {_number(part.blend, digits)}" if part.blend else ""
     thread = f", thread {part.metadata['thread']}" if "thread" in part.metadata else ""
-    return f"{part.name + ': ' if part.name else ''}{own}{thread}{copies}{blend}"
+    guess = ", a guess" if GUESSED in part.metadata else ""
+    return f"{part.name + ': ' if part.name else ''}{own}{thread}{copies}{blend}{guess}"
 
 
 def _profile(field: Field, digits: int) -> list[str]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.metadata import GUESSED
 from partwright.assembly.similarity import quaternion_product
 from partwright.errors import SettingError
 from partwright.partsdf.field import NeuralField
@@ -24,10 +27,12 @@ def to_assembly(
     up: str | None = None,
     source: str = "",
     turn: Quaternion = UPRIGHT,
+    guessed: Collection[str] = (),
 ) -> Assembly:
     """The parts that are there, as an assembly in the units and place of `frame`.
 
     turn: from how the model's family stands to how the assembly does, a unit quaternion (w, x, y, z).
+    guessed: names of parts of which nothing was seen; their metadata say so, by `GUESSED`.
     """
     poses, model = shape.poses.numpy(), shape.model
     length = 1.0 / frame.scale
@@ -48,7 +53,9 @@ def to_assembly(
             origin.translation,
             origin.rotation,
         )
-        parts.append(Part(field, pose.translation, pose.rotation, name=model.parts[i]))
+        name = model.parts[i]
+        told = {GUESSED: "as is usual in the family"} if name in guessed else {}
+        parts.append(Part(field, pose.translation, pose.rotation, name=name, metadata=told))
     metadata: dict[str, str | float] = {"method": "partsdf", "model": model.name}
     return Assembly(
         tuple(parts), unit=unit, up=up, metadata=metadata | ({"source": source} if source else {})

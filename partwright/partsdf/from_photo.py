@@ -16,7 +16,7 @@ from partwright.errors import ModelError
 from partwright.export import export
 from partwright.export.ply import write_mesh
 from partwright.partsdf.assemblies import to_assembly
-from partwright.partsdf.image_encoder import ImageEncoder, Sight, load_image_encoder
+from partwright.partsdf.image_encoder import ImageEncoder, load_image_encoder
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
@@ -29,9 +29,9 @@ from partwright.render import Camera, render_mesh, sheet, write_png
 if TYPE_CHECKING:
     import trimesh
 
-# IoU of silhouettes at least, certainty of the side at least, oddness of the poses at most. A hint: most
-# pictures of the family keep to them, but so does about half of those of another.
-COVERED, CERTAIN, ODD = 0.5, 0.6, 0.7
+# IoU of silhouettes at least, certainty of the side at least, oddness of the poses at most, IoU with what is
+# seen in the mirror image at least. A hint: most pictures of the family keep to them, so do others.
+COVERED, CERTAIN, ODD, MIRRORED = 0.5, 0.6, 0.7, 0.8
 FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
 _PANEL = 320  # pixels
 _UNSEEN = 0.25  # of its light that is left of what is not the shape, in the preview
@@ -132,17 +132,20 @@ def reconstruct_seen(
         "silhouette_iou": round(standpoint.iou, 4),
         "certainty": round(looked.sight.certainty, 4),
         "oddness": round(looked.sight.oddness, 4),
+        "mirrored_iou": round(looked.mirrored, 4),
         "resolution": meshed.resolution,
         "seconds": {"see": round(seen - start, 3), "mesh": round(time.perf_counter() - seen, 3)},
-        "warnings": warnings_of(model.name, looked.sight, standpoint),
+        "warnings": warnings_of(model.name, looked, standpoint),
     }
     assembly = to_assembly(shape, up=FAMILY_UP, source=name)
     return PhotoParts(shape, assembly, surface, looked, standpoint, report)
 
 
-def warnings_of(name: str, sight: Sight, standpoint: Standpoint) -> list[str]:
+def warnings_of(name: str, looked: Looked, standpoint: Standpoint) -> list[str]:
     """One line where a picture may show no shape of the family that the model `name` knows, else none."""
-    said = []
+    said, sight = [], looked.sight
+    if looked.mirrored < MIRRORED:
+        said.append("something else is seen in its mirror image")
     if standpoint.iou < COVERED:
         said.append(
             f"the outline of what was found covers but {100 * standpoint.iou:.0f} % of the silhouette"

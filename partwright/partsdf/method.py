@@ -93,7 +93,7 @@ class LearnedParts(Method[Settings]):
         unseen = [name for name in found.names() if name not in seen.names()]
         with timed(seconds, "mesh"):
             meshed = mesh_shape(found, settings.resolution)  # with the parts, which files ask for
-        assembly = to_assembly(found, shape.frame, shape.unit, shape.up, turn=turn)
+        assembly = to_assembly(found, shape.frame, shape.unit, shape.up, turn=turn, guessed=unseen)
         remember_meshes(assembly, meshed)
         surface = meshed.whole
         surface.vertices = shape.frame.from_unit(Similarity(1.0, turn)(surface.vertices))

@@ -46,6 +46,9 @@ class Looked:
     closely: np.ndarray
     sight: Sight
     silhouette: np.ndarray
+    mirrored: float
+    """IoU of the silhouette that the encoder sees with the one that it sees in the mirror image: near 1 where
+    there is something to be seen, less where it sees faces in the clouds."""
 
 
 def read_photo(path: str | Path) -> Photo:
@@ -101,7 +104,8 @@ def look_at(encoder: ImageEncoder, photo: Photo) -> Looked:
         seen = _largest(sight.silhouette.numpy() > 0.5)
         if photo.shape is not None:
             given = np.repeat(photo.shape[..., None], 3, axis=2).astype(np.float32)
-            return Looked(closely, sight, _mostly(_halved(_cut_out(given, box, outside=0.0)[..., 0])))
+            covered = _mostly(_halved(_cut_out(given, box, outside=0.0)[..., 0]))
+            return Looked(closely, sight, covered, _mirrored(encoder, closely, sight))
         rows, columns = (np.flatnonzero(seen.any(axis=a)) for a in (1, 0))
         if max(len(rows), len(columns)) < _SMALLEST:
             raise EmptyShapeError("no shape is seen in the picture; cut it out, or make what is around plain")
@@ -109,7 +113,14 @@ def look_at(encoder: ImageEncoder, photo: Photo) -> Looked:
             cell = (box[2] - box[0]) / len(seen)
             corners = np.array([rows[0], columns[0], rows[-1] + 1, columns[-1] + 1]) * cell
             box = _squared(np.tile(box[:2], 2) + corners, _FILLED)
-    return Looked(closely, sight, seen)
+    return Looked(closely, sight, seen, _mirrored(encoder, closely, sight))
+
+
+def _mirrored(encoder: ImageEncoder, closely: np.ndarray, sight: Sight) -> float:
+    """IoU of what is taken for the shape with what is taken for it in the mirror image."""
+    (other,) = encoder.see(_tensor(closely[:, ::-1])[None])
+    here, there = sight.silhouette.numpy() > 0.5, other.silhouette.numpy()[:, ::-1] > 0.5
+    return float((here & there).sum() / max((here | there).sum(), 1))
 
 
 def _eight_bits(picture, path: Path):  # type: ignore[no-untyped-def]  # Pillow is heavy to import

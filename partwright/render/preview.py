@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from partwright.assembly.metadata import GUESSED
 from partwright.assembly.palette import palette
 from partwright.meshing import mesh_assembly
 from partwright.render.camera import Camera
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from partwright.shapes import Shape
 
 CAPTIONS = ("input", "parts", "surface", "error")
+GUESSES = "parts (pale: guessed)"
+_PALE, _OF_COLOUR = 238, 0.3  # what guessed parts are painted with, and what is left of their colour
 _GRAINS, _GRAIN = 10_000, 0.005  # points that are drawn, about, and their half-width in longest sides
 _SIDE, _LEAST_SIDE = 400, 310  # pixels of a panel: as a square, and the least; the legend wants some
 
@@ -43,9 +46,9 @@ def preview(
     """Draw input | parts | surface | error as one picture (H, W, 3) uint8, and write it as PNG to `path`.
 
     The input of a shape that came as points is these points. The parts' panel colours every point by the part
-    whose own surface is there. The error panel colours the input by the assembly's signed distance there: red
-    where the assembly covers the input's surface, blue where it does not reach it, with a legend in the
-    input's unit.
+    whose own surface is there; parts that the input does not show (`GUESSED` in their metadata) are pale. The
+    error panel colours the input by the assembly's signed distance there: red where the assembly covers the
+    input's surface, blue where it does not reach it, with a legend in the input's unit.
 
     surface: the assembly's mesh in the input's units, if it is known already. panel: width and height of each
     of the four in pixels; as the object is long and high if None.
@@ -67,16 +70,28 @@ def preview(
     page = sheet(
         [
             input_view.image(np.array(NEUTRAL)),
-            result_view.image(palette(len(assembly))[result_view.labels]),
+            result_view.image(_colours(assembly)[result_view.labels]),
             result_view.image(np.array(NEUTRAL)),
             add_legend(error, limit, shape.unit, float(np.abs(deviation).max(initial=0.0))),
         ],
-        CAPTIONS,
+        [GUESSES if name == "parts" and _guessed(assembly).any() else name for name in CAPTIONS],
         title=title,
     )
     if path is not None:
         write_png(path, page)
     return page
+
+
+def _guessed(assembly: Assembly) -> np.ndarray:
+    """(N,) of the leaves."""
+    return np.array([GUESSED in part.metadata for part in assembly.parts], dtype=bool)
+
+
+def _colours(assembly: Assembly) -> np.ndarray:
+    """(N, 3) uint8 of the leaves."""
+    colours = palette(len(assembly))
+    pale = np.rint(_OF_COLOUR * colours + (1 - _OF_COLOUR) * _PALE).astype(np.uint8)
+    return np.where(_guessed(assembly)[:, None], pale, colours)
 
 
 def _as_given(shape: Shape) -> tuple[np.ndarray, np.ndarray]:

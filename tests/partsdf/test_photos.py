@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,11 +17,12 @@ from partwright.cli.main import main, parser
 from partwright.errors import ModelError, SettingError, UnreadableFileError
 from partwright.partsdf.companions import load_companion, save_companion
 from partwright.partsdf.encoder import EncoderSettings
+from partwright.partsdf.from_photo import warnings_of
 from partwright.partsdf.generator import GeneratorSettings
 from partwright.partsdf.image_encoder import ImageSettings
 from partwright.partsdf.photos import _cut_out, look_at, read_photo
 from partwright.partsdf.settings import Settings
-from partwright.partsdf.standpoint import _HIGHEST, boxed, find_standpoint, outline
+from partwright.partsdf.standpoint import _HIGHEST, Standpoint, boxed, find_standpoint, outline
 from partwright.partsdf.views import SIDE
 from partwright.render import Camera
 from partwright.render.raycast import Scene
@@ -57,6 +59,27 @@ def test_what_is_looked_at_may_be_outside_the_picture(tmp_path: Path) -> None:
     half = _cut_out(np.ones((40, 40, 3), np.float32), np.array([-20.0, 0, 20, 40]), outside=0.0)
     assert half[: SIDE // 2].max() == 0
     assert half[SIDE // 2 :].min() == 1
+
+
+def test_what_is_not_seen_in_the_mirror_image_is_told(tmp_path: Path) -> None:
+    """An encoder that always sees something on the left sees no thing that is there."""
+
+    class Left(Seeing):
+        def see(self, pictures: torch.Tensor) -> list[Any]:
+            (sight,) = super().see(pictures)
+            sight.silhouette[:, 12:] = 0
+            return [sight]
+
+    Image.new("RGB", (64, 64), (90, 90, 90)).save(tmp_path / "grey.png")
+    photo = read_photo(tmp_path / "grey.png")
+    assert look_at(Seeing(), photo).mirrored == 1  # type: ignore[arg-type]
+    looked = look_at(Left(), photo)  # type: ignore[arg-type]
+    assert looked.mirrored == 0
+    sight = SimpleNamespace(certainty=1.0, oddness=0.0)
+    standing = Standpoint(Camera(0, 0), 1.0)
+    assert warnings_of("chairs", replace(looked, sight=sight, mirrored=1.0), standing) == []  # type: ignore[arg-type]
+    (line,) = warnings_of("chairs", replace(looked, sight=sight), standing)  # type: ignore[arg-type]
+    assert "something else is seen in its mirror image" in line
 
 
 def test_damaged_pictures(tmp_path: Path) -> None:

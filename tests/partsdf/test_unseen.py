@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
+import trimesh
 
 import partwright as pw
+from partwright.assembly.metadata import GUESSED
 from partwright.methods import FitRequest
 from partwright.partsdf import method
 from partwright.partsdf.meshing import mesh_shape
@@ -18,6 +21,7 @@ from partwright.partsdf.starts import Start
 from partwright.partsdf.targets import Target
 from partwright.partsdf.unknowns import Frame
 from partwright.partsdf.unseen import with_unseen
+from partwright.render import Camera, preview
 from partwright.shapes.sampling import sample_triangles
 
 LEGS = ["leg_front_left", "leg_front_right", "leg_back_left", "leg_back_right"]
@@ -102,3 +106,25 @@ def test_they_are_told_of(chairs: Model, monkeypatch: pytest.MonkeyPatch) -> Non
     assert learned["absent"] == ["arm_left", "arm_right"]
     assert [part.name for part in fitted.assembly.parts] == ["seat", "back", *LEGS]
     assert fitted.warnings[-1].endswith("usual in the family: leg_front_left, leg_front_right")
+    assert [part.name for part in fitted.assembly.parts if GUESSED in part.metadata] == FRONT
+    guesses = [line for line in fitted.assembly.describe().splitlines() if line.endswith(", a guess")]
+    assert [line.split(":")[0].split()[-1] for line in guesses] == FRONT
+
+
+def test_the_preview_shows_guesses_pale() -> None:
+    """Two boxes side by side, one of which is a guess: its half of the parts' panel has no strong colour."""
+    field = pw.fields.Box(size=(1, 1, 1))
+    seen = pw.Part(field, translation=(-0.5, 0, 0), name="a")
+    guess = pw.Part(field, translation=(0.5, 0, 0), name="b", metadata={GUESSED: "as is usual"})
+    shape = pw.load_shape(trimesh.creation.box((2, 1, 1)))
+
+    def strongest(assembly: pw.Assembly) -> list[float]:
+        page = preview(shape, assembly, camera=Camera(0, 0, margin=0.1), panel=(200, 200))
+        panel = page[-200:, 200:400].astype(float)
+        strong = panel.max(axis=2) - panel.min(axis=2)
+        return [strong[:, :100].max(), strong[:, 100:].max()]
+
+    plain = strongest(pw.Assembly([seen, dataclasses.replace(guess, metadata={})]))
+    pale = strongest(pw.Assembly([seen, guess]))
+    assert pale[0] == plain[0]
+    assert pale[1] < 0.4 * plain[1]
