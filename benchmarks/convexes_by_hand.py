@@ -110,7 +110,7 @@ def table(searched: dict[str, float], excess: dict[str, float], features: dict[s
         "Union of convexes minus union of convexes, quadrics only, repeats by moves, turns and mirrors once.",
         "",
         f"- Ten parts by hand: {mean(hand.values()):.1f} on average; the search finds "
-        f"{mean(searched[name] for name in hand):.1f} (repeats of one direction once).",
+        f"{mean(searched[name] for name in hand):.1f} (repeats once, likewise).",
         f"- The other {len(others)} with one convex a feature that `--method solids` finds, which is less "
         f"than these need: {mean(least[name] for name in others):.1f}; the search finds "
         f"{mean(searched[name] for name in others):.1f}.",

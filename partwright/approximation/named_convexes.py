@@ -4,14 +4,16 @@ person would have drawn, cleaned, edited and exported as such. What is none of t
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 
 import numpy as np
 
 from partwright.approximation.convex_solids import Convex, candidates
-from partwright.assembly import Assembly, Node, Part
+from partwright.assembly import Assembly, Node, Part, Similarity, mirrored
+from partwright.assembly.motion import Motion
 from partwright.assembly.placed import placed_quadric
+from partwright.assembly.repeated_groups import children_once
 from partwright.errors import NoSurfaceError
 from partwright.fields import Box, Quadric
 from partwright.meshing.csg import solid_of
@@ -37,20 +39,47 @@ def with_named_convexes(assembly: Assembly, stopped: Callable[[], None] = lambda
         if isinstance(node, Part) or _is_convex(node):
             return _named(node, room) or node
         assert isinstance(node, Assembly)
-        if node.operation != "difference":
-            inner = room if node.operation == "union" else None
-            return dataclasses.replace(node, children=tuple(renewed(c, inner) for c in node.children))
-        first, *others = node.children
-        within = _corners(first)
+        if node.operation == "intersection":
+            return dataclasses.replace(node, children=tuple(renewed(c, None) for c in node.children))
+        if node.operation == "union":
+            return dataclasses.replace(node, children=tuple(alike(node, 0, room)))
+        within = _corners(node.children[0])
         within = room if within is None else within
-        children = (renewed(first, room), *(renewed(child, within) for child in others))
-        return dataclasses.replace(node, children=children)
+        first = renewed(node.children[0], room)
+        return dataclasses.replace(node, children=(first, *alike(node, 1, within)))
+
+    def alike(node: Assembly, start: int, room: Room | None) -> Iterator[Node]:
+        """The children from one on; groups that are copies of one another stay that, whatever they become."""
+        for child, motions in children_once(node)[start:]:
+            places = room
+            if motions and room is not None:  # the first has to do for what each copy is taken from
+                places = np.concatenate([room, *(motion.inverse()(room) for motion in motions)])
+            yield from _repeated(renewed(child, places), motions)
 
     result = renewed(assembly, None)
     if isinstance(result, Assembly):
         return result
     unit, up = assembly.unit, assembly.up
     return Assembly((result,), unit=unit, up=up, metadata=assembly.metadata)
+
+
+def _repeated(node: Node, motions: Sequence[Motion]) -> Iterator[Node]:
+    """A node and its copies; of a part, those that a rigid move makes are the part's own."""
+    others: list[Node] = []
+    moves: list[Similarity] = []
+    for motion in motions:
+        if isinstance(node, Assembly):
+            image = mirrored(node, "x", suffix="") if motion.mirror else node
+            others.append(image.transformed(motion.move))
+            continue
+        made = motion.of(node)
+        if made.field == node.field and not node.instances:
+            move = made.pose @ node.pose.inverse()
+            moves.append(Similarity(1.0, move.rotation, move.translation))
+        else:
+            others.append(made)
+    yield dataclasses.replace(node, instances=tuple(moves)) if moves and isinstance(node, Part) else node
+    yield from others
 
 
 def _is_convex(node: Assembly) -> bool:

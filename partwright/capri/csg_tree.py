@@ -8,7 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from partwright.assembly import Assembly, Node, Part
+from partwright.assembly.mirroring import mirrored
+from partwright.assembly.motion import Motion
+from partwright.assembly.similarity import Similarity
 from partwright.capri import quadric_rows as rows
+from partwright.capri.repeated_quadrics import with_repeats
 from partwright.fields import Quadric
 
 _MAX_REACH = 4.0  # unit frame: what reaches further was judged by no sample there
@@ -17,16 +21,27 @@ Layers = tuple[tuple[Convex, ...], ...]
 
 
 @dataclass(frozen=True)
+class Copy:
+    """A convex that is another of its layer, `of` its place there, after a motion."""
+
+    of: int
+    motion: Motion
+
+
+@dataclass(frozen=True)
 class CsgTree:
     """Unions of intersections, added and subtracted in turn: (L0 - L1) + L2 ... (section 3.2; eq. 5 has two).
 
     rows (K, 10) in the unit frame; a convex is the indices of the quadrics that it intersects. complement
     (K,) marks rows that are the outside of a convex quadric: subtracting one in a convex counts as a convex.
+    copies: for each convex, None or what it is a copy of; its rows are those of that, moved. None of them is
+    where it is empty.
     """
 
     rows: NDArray[np.float64]
     complement: NDArray[np.bool_]
     layers: Layers
+    copies: tuple[tuple[Copy | None, ...], ...] = ()
 
     @property
     def primitives(self) -> int:
@@ -66,16 +81,36 @@ class CsgTree:
         whole: Node | None = None
         count = 0
         for k, layer in enumerate(self.layers):
-            nodes = []
-            for convex in layer:
+            nodes: list[Node] = []
+            for i, convex in enumerate(layer):
                 count += 1
-                nodes.append(self._node(convex, f"convex_{count:02d}"))
+                name = f"convex_{count:02d}"
+                copy = self.copies[k][i] if self.copies else None
+                if copy is not None and not self._drilled_alike(convex, copy):
+                    nodes.append(_placed(self._said_once(layer[copy.of], name), copy.motion))
+                elif copy is None and self._has_copies(k, i):
+                    nodes.append(self._said_once(convex, name))
+                else:
+                    nodes.append(self._node(convex, name))
             if not nodes:
                 continue
             union: Node = Assembly(tuple(nodes), name="subtracted" if k % 2 else "added")
             whole = union if whole is None else Assembly((whole, union), "difference" if k % 2 else "union")
         assert isinstance(whole, Assembly)
         return whole
+
+    def _has_copies(self, layer: int, index: int) -> bool:
+        return bool(self.copies) and any(c is not None and c.of == index for c in self.copies[layer])
+
+    def _said_once(self, convex: Convex, name: str) -> Assembly:
+        """A convex with copies: what repeats within it is a leaf with copies before it is copied itself."""
+        return with_repeats(self._node(convex, name)) if len(convex) > 1 else self._node(convex, name)
+
+    def _drilled_alike(self, convex: Convex, copy: Copy) -> bool:
+        """Whether a copy is one quadric of the same direction, which `with_repeats` sees by itself."""
+        return len(convex) == 1 and copy.motion == Motion(
+            Similarity(translation=copy.motion.move.translation)
+        )
 
     def _node(self, convex: Convex, name: str) -> Assembly:
         """One convex; quadrics whose outside it takes are subtracted from the rest."""
@@ -85,6 +120,10 @@ class CsgTree:
             return Assembly(tuple(_leaf(self.rows[k]) for k in convex), "intersection", name)
         core = Assembly(tuple(_leaf(self.rows[k]) for k in held), "intersection", name)
         return Assembly((core, *(_leaf(-self.rows[k]) for k in taken)), "difference", f"{name}_cut")
+
+
+def _placed(node: Assembly, motion: Motion) -> Assembly:
+    return (mirrored(node, "x", suffix="") if motion.mirror else node).transformed(motion.move)
 
 
 def _leaf(row: NDArray[np.float64]) -> Part:

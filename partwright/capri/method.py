@@ -71,7 +71,8 @@ class Found:
     @cached_property
     def tree(self) -> CsgTree:
         """The cheapest search's, in the unit frame."""
-        return self.searches[0].bounded_tree()
+        search = self.searches[0]
+        return search.bounded_tree() if self.interrupted else search.final_tree()
 
     @cached_property
     def assembly(self) -> Assembly:
@@ -96,15 +97,17 @@ class Found:
             "start": ORIGINS[best.origin],
             "costs": {ORIGINS[one.origin]: round(one.cost(), 5) for one in self.searches},
             "candidates": len(best.pool.rows),
-            "primitives": primitives(self.quadrics),
-            "convexes": convexes(self.quadrics),
-            "distinct_primitives": distinct_primitives(self.quadrics),
+            "primitives": primitives(self.quadrics, groups_once=True),
+            "convexes": convexes(self.quadrics, groups_once=True),
+            "distinct_primitives": distinct_primitives(self.quadrics, groups_once=True),
             "solids": sum(part.field.quadric() is None for part in self.assembly.parts),
         }
 
     def fitted(self) -> Fitted:
-        history = self.searches[0].history
-        return Fitted(self.assembly, self.outcome, self.seconds, history, details={"tree": self.details})
+        best = self.searches[0]
+        assembly, spent = self.assembly, best.seconds.get("repeat", 0.0)
+        seconds = self.seconds | ({"repeat": spent} if spent else {})
+        return Fitted(assembly, self.outcome, seconds, best.history, details={"tree": self.details})
 
 
 def found(request: FitRequest[Settings]) -> Found:

@@ -28,16 +28,21 @@ def overlapped(tree: CsgTree, samples: OccupancySamples) -> CsgTree:
         later = [mask for above in covered[at + 1 :] for mask in above]
         free = ~np.any(later, axis=0) if later else np.ones(len(values), dtype=bool)
         harmed = free & (samples.inside != (at % 2 == 0))
+        copies = tree.copies[at] if tree.copies else (None,) * len(layer)
+        origin = [i if copy is None else copy.of for i, copy in enumerate(copies)]
+        internal = [_internal(values[:, convex], harmed) for convex in layer]
         convexes = []
-        for convex in layer:
+        for i, convex in enumerate(layer):
             moved = list(convex)
-            for i in np.flatnonzero(_internal(values[:, convex], harmed)):
-                moved[i] = len(table)
-                table.append(tree.rows[convex[i]] - _OVERLAP_DEPTH * np.eye(10)[rows.CONSTANT])
-                complement.append(tree.complement[convex[i]])
+            # Copies stay copies: better a face that stands out by so little than a crack within the solid.
+            alike = [internal[j] for j in range(len(layer)) if origin[j] == origin[i]]
+            for face in np.flatnonzero(np.any(alike, axis=0)):
+                moved[face] = len(table)
+                table.append(tree.rows[convex[face]] - _OVERLAP_DEPTH * np.eye(10)[rows.CONSTANT])
+                complement.append(tree.complement[convex[face]])
             convexes.append(tuple(moved))
         layers.append(tuple(convexes))
-    return CsgTree(np.stack(table), np.array(complement), tuple(layers))
+    return CsgTree(np.stack(table), np.array(complement), tuple(layers), tree.copies)
 
 
 def _internal(values: NDArray[np.float64], harmed: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -76,7 +76,7 @@ class Settings:
     weights: str | None = None
     """File of a pre-trained network (`python -m partwright.capri`), in place of the one that ships."""
     symmetry: bool = True
-    """Holes of one size and direction become one leaf with copies."""
+    """Holes of one size and direction become one leaf with copies, and convexes alike copies of one."""
     named: bool = True
     """Convexes that are boxes, cylinders, cones, frusta, spheres, prisms or turned profiles become these
     solids, called after what they are for (base_plate, hole, pocket); the others stay intersections of

@@ -22,6 +22,7 @@ from partwright.capri.csg_tree import CsgTree
 from partwright.capri.detection import detect
 from partwright.capri.initialisation import start_surface
 from partwright.capri.overlap import overlapped
+from partwright.capri.repeated_convexes import with_repeated_convexes
 from partwright.capri.samples import OccupancySamples
 from partwright.capri.selection import Problem
 from partwright.capri.settings import Settings
@@ -219,7 +220,26 @@ class TreeSearch:
 
     def bounded_tree(self) -> CsgTree:
         """The tree, which ends within the box of the shape, as it becomes the assembly: the unit frame."""
-        return overlapped(self.tree(), self.samples).closed(*self.box)
+        return overlapped(self.tree().closed(*self.box), self.samples)
+
+    def final_tree(self) -> CsgTree:
+        """The bounded tree with alike convexes as copies of one, where no demand is left unmet for that."""
+        s = self.settings
+        if not s.symmetry or s.schedule != "search":
+            return self.bounded_tree()
+        with self.timed("repeat"):
+            whole = self.tree().closed(*self.box)
+            repeated = with_repeated_convexes(whole, self.samples, s.price, s.convex_price)
+        tree = overlapped(repeated, self.samples)
+        too_many = s.max_parts is not None and tree.primitives > s.max_parts
+        too_far = s.min_iou is not None and self.tree_iou(tree) < s.min_iou
+        return self.bounded_tree() if too_many or too_far else tree
+
+    def tree_iou(self, tree: CsgTree) -> float:
+        """IoU of a tree over the uniform samples."""
+        rest = slice(self.samples.near, self.samples.near + self.samples.uniform)
+        occupied, inside = tree.occupancy(self.samples.points[rest]), self.samples.inside[rest]
+        return float((occupied & inside).sum() / max((occupied | inside).sum(), 1))
 
     def tree(self) -> CsgTree:
         if self.tuned is not None:
