@@ -10,6 +10,7 @@ training shape whose seen parts are most alike: of one another's latents parts t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,7 @@ _BARE = 0.02  # of the seen parts' surface that has no points, where a piece is 
 _PLACES = 4000  # in and around each part's cuboid
 _ON = 0.02  # unit lengths from the surface, that places on it are at most
 _NOISE = 3.0  # mean distances of points from the parts' surface
+_PLANE = 0.95  # of either kind's places on their side of a plane, on average, for the scan to end there
 _COVERED = 2.0  # sides of the square that a point stands for: of random ones 3 in a million are farther apart
 
 
@@ -87,7 +89,8 @@ def _told_by(given: Tensor, wanted: Tensor, seen: Tensor) -> Tensor:
 
 def _beside_points(shape: NeuralShape, seen: Tensor, parts: Tensor, target: Target) -> Tensor | None:
     """(Q,) share of the surface of each of the Q `parts` to which the surface of the `seen` ones is nearest
-    where it has points; None where it has them everywhere."""
+    where it has points, and which is not on the far side of where these end; None where it has them
+    everywhere."""
     points = np.unique(target.points[target.sdf <= 0].numpy(), axis=0)
     names = np.array(shape.model.parts)
     visible = replace(shape, present=seen)
@@ -101,13 +104,31 @@ def _beside_points(shape: NeuralShape, seen: Tensor, parts: Tensor, target: Targ
     covered = cloud.query(places)[0] <= _COVERED * side + _ON + _NOISE * noise
     if covered.mean() > 1 - _BARE:
         return None
-    shares = []
+    shares, on_that_side = [], _side(places, covered)
     for part in parts.nonzero().squeeze(1).tolist():
         alone = replace(shape, present=torch.arange(len(names)) == part)
         own = alone.places(names[part], _PLACES)
         own = own[alone.distances(own) < _ON]
-        shares.append(float(covered[surface.query(own)[1]].mean()) if len(own) else 1.0)
+        scanned = covered[surface.query(own)[1]]
+        shares.append(float((scanned & (on_that_side(own) > 0)).mean()) if len(own) else 1.0)
     return torch.tensor(shares)
+
+
+def _side(places: np.ndarray, covered: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Where a scan ends at a plane: above 0 for places (N, 3) on its side, below 0 beyond; else 1 everywhere.
+
+    The plane is that which tells `places` on the seen parts' surface that are covered (V,) from others, by
+    least squares with as much weight for either kind. A leg that stands out of a scanned seat into
+    what was not scanned is nearest to the seat, and yet no point shows that it is not there.
+    """
+    ones = np.ones((len(places), 1))
+    weight = np.where(covered, 0.5 / max(covered.sum(), 1), 0.5 / max((~covered).sum(), 1))
+    rows, wanted = np.hstack([places, ones]), np.where(covered, 1.0, -1.0)
+    plane = np.linalg.lstsq(rows * np.sqrt(weight)[:, None], wanted * np.sqrt(weight), rcond=None)[0]
+    right = float(weight[(rows @ plane > 0) == covered].sum())
+    if right < _PLANE:
+        return lambda other: np.ones(len(other))
+    return lambda other: np.asarray(other @ plane[:3] + plane[3])
 
 
 def _joined(shape: NeuralShape, other: NeuralShape, parts: Tensor) -> NeuralShape:

@@ -92,6 +92,15 @@ def test_what_half_a_scan_would_show_is_not_there(chairs: Model) -> None:
     assert with_unseen(couch, Target.of_points(cut, 8000)).present.equal(couch.present)
 
 
+def test_all_legs_beyond_where_a_scan_ends_are_put_back(chairs: Model) -> None:
+    """They are nearest to what was scanned of the seat, but no point would be where they are."""
+    chair = the_first(chairs, ["seat", "back", *LEGS, "arm_left", "arm_right"])
+    points = points_of(chair)
+    along = points @ [-0.5, 1.0, 1.0]
+    target = Target.of_points(points[along > np.quantile(along, 0.7)], 8000)
+    assert with_unseen(lacking(chair, LEGS), target).present.equal(chair.present)
+
+
 def test_they_are_told_of(chairs: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     chair = the_first(chairs, ["seat", "back", *LEGS])
     cut = pw.load_shape(front_missing(points_of(chair)))
