@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from partwright.errors import SettingError
+from partwright.shapes.units import axis_vector
 
 # Up axis -> the side that azimuth 0 looks at.
 _FRONTS = {"x": (0.0, -1.0, 0.0), "y": (0.0, 0.0, 1.0), "z": (0.0, -1.0, 0.0)}
@@ -22,8 +23,7 @@ def picture_axes(up: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """
     if up.removeprefix("-") not in _FRONTS:
         raise SettingError(f"The up axis is {up!r}; expected x, y or z, or one of them with a minus.")
-    above = np.zeros(3)
-    above["xyz".index(up[-1])] = -1.0 if up.startswith("-") else 1.0
+    above = axis_vector(up)
     front = np.array(_FRONTS[up[-1]])
     return np.cross(above, front), above, front
 

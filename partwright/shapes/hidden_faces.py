@@ -6,78 +6,108 @@ before a box, and pictures on sheets in front. What another body or the ground c
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from partwright.shapes.cleaning import counted
 from partwright.shapes.distance import MeshDistance
-from partwright.shapes.holes import lid_over
+from partwright.shapes.lids import lids_over, patches, with_lids
 from partwright.shapes.orientation import split_bodies
 from partwright.shapes.sampling import sample_triangles
-from partwright.shapes.topology import EdgeTable, boundary_loops, components
+from partwright.shapes.topology import EdgeTable, compacted, doubled_areas, thickness
 
 _TOUCHING = 2e-3  # unit lengths, 0.1 % of the longest side: what is as near lies on it
 _PROBES = 32  # points of a lid that are looked at
 _COVERED = 0.9  # of them
-_FLAT = 1e-4  # unit lengths: what is thinner is a sheet
+_SHEET = 1e-4  # unit lengths: what is thinner is a sheet
 _SPACING = 0.01  # unit lengths between points of a rim
 _ALONG = 0.02  # unit lengths: a rim that is as near runs along another
 
 
-def close_hidden(
-    vertices: NDArray[np.float64], edges: EdgeTable, up: str | None, notes: list[str]
-) -> tuple[NDArray[np.float64], EdgeTable]:
-    """Close the openings that another body covers, or the ground where the up axis is known.
+@dataclass(frozen=True)
+class Ground:
+    """up: (3,) unit vector; height: along it, unit lengths."""
 
-    vertices: (V, 3), unit frame. up: "x", "y", "-z" ... or None.
+    up: NDArray[np.float64]
+    height: float
+
+
+def close_hidden(
+    vertices: NDArray[np.float64], edges: EdgeTable, ground: Ground | None, notes: list[str]
+) -> tuple[NDArray[np.float64], EdgeTable]:
+    """Close the openings that another body covers, or the ground where it is known.
+
+    vertices: (V, 3), unit frame.
     """
-    faces = edges.faces
-    patch = components(len(faces), *edges.pairs[1].T)
-    sheet = np.array([_is_flat(vertices[faces[one]].reshape(-1, 3)) for one in split_bodies(patch)])
-    lids: list[NDArray[np.int64]] = []
-    owners: list[int] = []
-    corners = vertices
-    for loop, owner in _rims(edges, patch):
-        if sheet[owner]:
-            continue
-        corners, lid = lid_over(corners, loop)
-        lids.append(lid)
-        owners.append(owner)
+    faces, patch = edges.faces, patches(edges)
+    members = split_bodies(patch)
+    if ground is None and len(members) == 1:
+        return vertices, edges
+    sheet = [thickness(vertices[faces[one]].reshape(-1, 3)) < _SHEET for one in members]
+    lids = [lid for lid in lids_over(vertices, edges) if not sheet[lid.patch]]
     if not lids:
         return vertices, edges
-    probes = np.stack([sample_triangles(corners, lid, _PROBES, 0)[0] for lid in lids])
-    hidden = _covered(vertices, faces, patch, probes, np.array(owners)) | _on_ground(vertices, probes, up)
-    closed = np.flatnonzero(hidden.mean(axis=1) >= _COVERED)
-    if len(closed) == 0:
+    probes = np.stack([_points_on(lid.corners(vertices)) for lid in lids])
+    hidden = _covered(vertices, faces, patch, probes, np.array([lid.patch for lid in lids]))
+    if ground is not None:
+        hidden |= probes @ ground.up < ground.height + _TOUCHING
+    closed = [lids[one] for one in np.flatnonzero(hidden.mean(axis=1) >= _COVERED)]
+    if not closed:
         return vertices, edges
     notes.append(f"closed {counted(len(closed), 'opening')} against other bodies or the ground")
-    return corners, EdgeTable(np.concatenate([faces, *(lids[one] for one in closed)]))
+    return with_lids(vertices, edges, closed)
 
 
-def drop_sheets(vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]) -> EdgeTable:
-    """Without flat sheets that stand by themselves: decals, panes, the ground.
+def drop_sheets(
+    vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
+) -> tuple[NDArray[np.float64], EdgeTable]:
+    """Without flat sheets that stand by themselves: decals, panes, the ground; and without their vertices.
 
     A sheet whose rim runs along another's, or along that of an opening, is the side of something.
     """
-    count = 0
-    while loose := _loose_sheets(vertices, edges):  # what lies along such a sheet may be another
-        count += len(loose)
-        edges = EdgeTable(np.delete(edges.faces, np.concatenate(loose), axis=0))
-    if count:
-        notes.append(f"left out {counted(count, 'loose flat sheet')}")
-    return edges
-
-
-def _loose_sheets(vertices: NDArray[np.float64], edges: EdgeTable) -> list[NDArray[np.int64]]:
-    """Face numbers of each, none where there is nothing else."""
     members = split_bodies(edges.bodies)
     open_ = [members[one] for one in np.flatnonzero(edges.open_bodies)]
-    flat = [_is_flat(vertices[edges.faces[one]].reshape(-1, 3)) for one in open_]
-    if not any(flat) or sum(flat) == len(members):
-        return []
-    rims = [_rim_points(vertices, EdgeTable(edges.faces[one])) for one in open_]
-    return [one for k, one in enumerate(open_) if flat[k] and not _beside(rims[k], rims[:k] + rims[k + 1 :])]
+    flat = np.array([thickness(vertices[edges.faces[one]].reshape(-1, 3)) < _SHEET for one in open_], bool)
+    if not flat.any() or np.count_nonzero(flat) == len(members):
+        return vertices, edges
+    loose = [open_[one] for one in np.flatnonzero(_loose(vertices, edges, open_, flat))]
+    if not loose or not _is_beside_the_point(doubled_areas(vertices, edges.faces), loose):
+        return vertices, edges
+    notes.append(f"left out {counted(len(loose), 'loose flat sheet')}")
+    used, faces = compacted(np.delete(edges.faces, np.concatenate(loose), axis=0), len(vertices))
+    return vertices[used], EdgeTable(faces)
+
+
+def _loose(
+    vertices: NDArray[np.float64],
+    edges: EdgeTable,
+    bodies: list[NDArray[np.int64]],
+    flat: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Which of the open bodies are flat and run along no other, those left out that are loose themselves."""
+    rims = [_rim_points(vertices, EdgeTable(edges.faces[one])) for one in bodies]
+    of = np.repeat(np.arange(len(rims)), [len(rim) for rim in rims])
+    pairs = cKDTree(np.concatenate(rims)).query_pairs(_ALONG, output_type="ndarray")
+    pairs = pairs[of[pairs[:, 0]] != of[pairs[:, 1]]]
+    pairs = np.concatenate([pairs, pairs[:, ::-1]])
+    loose = np.zeros(len(rims), bool)
+    while True:
+        met = np.unique(pairs[~loose[of[pairs[:, 1]]], 0])
+        along = np.bincount(of[met], minlength=len(rims)) > 0.5 * np.bincount(of, minlength=len(rims))
+        found = flat & ~along
+        if (found == loose).all():
+            return loose
+        loose = found
+
+
+def _is_beside_the_point(area: NDArray[np.float64], sheets: list[NDArray[np.int64]]) -> bool:
+    """Whether sheets but the largest, which may be the ground, have less area than all else: a shape of
+    nothing but sheets, which no rim joins, is not to be left out for a crumb beside it."""
+    areas = np.array([area[sheet].sum() for sheet in sheets])
+    return bool(areas.sum() - areas.max() < area.sum() - areas.sum())
 
 
 def _rim_points(vertices: NDArray[np.float64], edges: EdgeTable) -> NDArray[np.float64]:
@@ -89,34 +119,10 @@ def _rim_points(vertices: NDArray[np.float64], edges: EdgeTable) -> NDArray[np.f
     return np.asarray(start[of] + part[:, None] * (end - start)[of])
 
 
-def _beside(rim: NDArray[np.float64], others: list[NDArray[np.float64]]) -> bool:
-    """Whether half of a rim (N, 3) runs along others."""
-    if not others:
-        return False
-    away, _ = cKDTree(np.concatenate(others)).query(rim, distance_upper_bound=_ALONG)
-    return bool(np.mean(np.isfinite(away)) > 0.5)
-
-
-def _is_flat(points: NDArray[np.float64]) -> bool:
-    centred = points - points.mean(axis=0)
-    normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
-    return bool(np.ptp(centred @ normal) < _FLAT)
-
-
-def _rims(edges: EdgeTable, patch: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], int]]:
-    """Vertex loops along what is not balanced, and the patch that has most of each."""
-    faces = edges.faces
-    count = int(faces.max()) + 1
-    key = (faces * count + np.roll(faces, -1, axis=1)).ravel()
-    order = np.argsort(key, kind="stable")
-    found = []
-    for loop in boundary_loops(edges.unbalanced_half_edges):
-        wanted = loop * count + np.roll(loop, -1)
-        first = np.searchsorted(key[order], wanted, side="left")
-        last = np.searchsorted(key[order], wanted, side="right")
-        at = np.concatenate([order[a:b] for a, b in zip(first, last, strict=True)])
-        found.append((loop, int(np.bincount(patch[at // 3]).argmax())))
-    return found
+def _points_on(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(P, 3) of triangles (T, 3, 3)."""
+    corners = triangles.reshape(-1, 3)
+    return sample_triangles(corners, np.arange(len(corners)).reshape(-1, 3), _PROBES, 0)[0]
 
 
 def _covered(
@@ -132,20 +138,10 @@ def _covered(
     triangle, distance = whole.nearest(points)
     touching = (distance < _TOUCHING) & (patch[triangle] != np.repeat(owners, probes.shape[1]))
     winding = whole.winding(points).reshape(probes.shape[:2])
+    members = split_bodies(patch)
     for owner in np.unique(owners):
-        own = faces[patch == owner]
+        own = faces[members[owner]]
         mine = owners == owner
         alone = MeshDistance(vertices, own, own, closed=False).winding(probes[mine].reshape(-1, 3))
         winding[mine] -= alone.reshape(-1, probes.shape[1])
     return touching.reshape(probes.shape[:2]) | (winding > 0.5)
-
-
-def _on_ground(
-    vertices: NDArray[np.float64], probes: NDArray[np.float64], up: str | None
-) -> NDArray[np.bool_]:
-    """Which of the probes (L, P, 3) lie as low as anything does."""
-    if up is None:
-        return np.zeros(probes.shape[:2], bool)
-    axis, sign = "xyz".index(up[-1]), -1.0 if up.startswith("-") else 1.0
-    height = sign * probes[..., axis]
-    return np.asarray(height < (sign * vertices[:, axis]).min() + _TOUCHING)

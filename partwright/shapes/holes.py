@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from partwright.shapes.cleaning import counted
 from partwright.shapes.distance import MeshDistance
+from partwright.shapes.lids import lids_over, with_lids
 from partwright.shapes.sampling import uniform_box
-from partwright.shapes.topology import EdgeTable, area_vectors, boundary_loops, components, doubled_areas
+from partwright.shapes.topology import EdgeTable, area_vectors, components, doubled_areas
 
 _HALF = 0.3  # a lid over a true opening sees a winding number within 0.5 +- this on both of its sides
 _STEP = 1e-4
-_FLAT = 1e-6  # unit lengths: a rim that leaves its plane by less is flat
 _PROBES = 4000  # points from which what stays open is looked at
 
 
@@ -40,51 +40,21 @@ def fill_holes(
     0 or 1, not near one half, and the patch stays as it is.
     """
     faces = edges.faces
-    loops = boundary_loops(edges.unbalanced_half_edges)
     # A closed body around an opening, or across it, says nothing about it.
     open_ = faces[edges.open_bodies[edges.bodies]]
     source = MeshDistance(vertices, open_, open_, closed=False)
-    lids: list[NDArray[np.int64]] = []
-    middles: list[NDArray[np.float64]] = []
-    closed = vertices
-    for loop in loops:
-        corners, lid = lid_over(closed, loop)
-        if _is_opening(source, corners[lid]):
-            closed = corners
-            lids.append(lid)
-            middles.append(vertices[loop].mean(axis=0))
+    found = lids_over(vertices, edges)
+    is_opening = _are_openings(source, [lid.corners(vertices) for lid in found])
+    lids = [lid for lid, over in zip(found, is_opening, strict=True) if over]
     if not lids:
         return vertices, edges, Openings()
-    faces = np.concatenate([faces, *lids])
-    area = np.array([_area(closed, one) for one in lids])
-    share = float(area.sum()) / _area(closed, faces)
+    area = np.array([np.linalg.norm(area_vectors(lid.corners(vertices)), axis=1).sum() for lid in lids])
+    largest = vertices[lids[int(area.argmax())].rim].mean(axis=0)
+    vertices, edges = with_lids(vertices, edges, lids)
+    share = float(area.sum() / doubled_areas(vertices, edges.faces).sum())
     notes.append(f"filled {counted(len(lids), 'hole')} ({share:.1%} of the surface)")
-    x, y, z = middles[int(area.argmax())].tolist()
-    return closed, EdgeTable(faces), Openings(len(lids), share, (x, y, z))
-
-
-def lid_over(
-    vertices: NDArray[np.float64], loop: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """All vertices with what a lid adds, and its triangles (T, 3), over the opening whose rim is a loop (K,).
-
-    Half-edges of the surface run along the rim, so the lid's run against it. A flat rim is filled between its
-    own corners; another gets a fan from its middle.
-    """
-    rim = vertices[loop]
-    normal = np.cross(rim - rim[0], np.roll(rim, -1, axis=0) - rim[0]).sum(axis=0)
-    length = float(np.linalg.norm(normal))
-    if length > _STEP**2 and np.ptp(rim @ (normal / length)) < _FLAT:
-        from manifold3d import triangulate
-
-        across = np.linalg.svd(normal[None])[2][1:]
-        across[1] *= np.sign(np.linalg.det(np.stack([*across, normal])))
-        flat = np.asarray(triangulate([rim @ across.T]), dtype=np.int64)
-        if len(flat) == len(loop) - 2:
-            return vertices, loop[flat[:, ::-1]]
-    middle = np.full(len(loop), len(vertices))
-    fan = np.stack([np.roll(loop, -1), loop, middle], axis=1)
-    return np.concatenate([vertices, rim.mean(axis=0)[None]]), fan
+    x, y, z = largest.tolist()
+    return vertices, edges, Openings(len(lids), share, (x, y, z))
 
 
 def with_what_stays_open(filled: Openings, vertices: NDArray[np.float64], edges: EdgeTable) -> Openings:
@@ -108,14 +78,16 @@ def with_what_stays_open(filled: Openings, vertices: NDArray[np.float64], edges:
     return Openings(filled.count + int(label.max()) + 1, min(1.0, filled.share + share), largest)
 
 
-def _is_opening(source: MeshDistance, lid: NDArray[np.float64]) -> bool:
-    """lid: (T, 3, 3)."""
-    normal = area_vectors(lid).sum(axis=0)
-    normal /= max(float(np.linalg.norm(normal)), np.finfo(np.float64).tiny)
-    place = lid.mean(axis=1)
-    winding = source.winding(np.concatenate([place - _STEP * normal, place + _STEP * normal]))
-    return bool(np.median(np.abs(winding - 0.5)) < _HALF)
-
-
-def _area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
-    return float(doubled_areas(vertices, faces).sum() / 2)
+def _are_openings(source: MeshDistance, lids: list[NDArray[np.float64]]) -> list[bool]:
+    """Of lids (T, 3, 3) each, all looked at in one go."""
+    if not lids:
+        return []
+    beside = []
+    for lid in lids:
+        normal = area_vectors(lid).sum(axis=0)
+        normal /= max(float(np.linalg.norm(normal)), np.finfo(np.float64).tiny)
+        place = lid.mean(axis=1)
+        beside.append(np.concatenate([place - _STEP * normal, place + _STEP * normal]))
+    off = np.abs(source.winding(np.concatenate(beside)) - 0.5)
+    ends = np.cumsum([len(points) for points in beside])[:-1]
+    return [bool(np.median(one) < _HALF) for one in np.split(off, ends)]

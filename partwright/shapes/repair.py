@@ -15,13 +15,22 @@ from partwright.errors import EmptyShapeError, FlatShapeError, OpenShellError
 from partwright.shapes.boolean import unite
 from partwright.shapes.cleaning import drop_doubles, merge_vertices, weld_boundary
 from partwright.shapes.distance import MeshDistance
-from partwright.shapes.hidden_faces import close_hidden, drop_sheets
+from partwright.shapes.frame import UnitFrame
+from partwright.shapes.hidden_faces import Ground, close_hidden, drop_sheets
 from partwright.shapes.holes import Openings, fill_holes, with_what_stays_open
 from partwright.shapes.orientation import orient
 from partwright.shapes.sampling import sample_triangles
-from partwright.shapes.topology import EdgeTable, area_vectors, components, doubled_areas, signed_volumes
+from partwright.shapes.topology import (
+    EdgeTable,
+    area_vectors,
+    components,
+    doubled_areas,
+    signed_volumes,
+    thickness,
+)
 from partwright.shapes.winding import winding_grid
 
+_SAME_FRAME = 1e-4  # of the scale, and unit lengths: vertices are welded and middles added within it
 _FLAT = 1e-6  # thickness under which the vertices count as one plane
 _NO_VOLUME = 1e-9
 _LEAST_CONFIDENCE = 0.5
@@ -49,15 +58,30 @@ class Surface:
     confidence: float
     openings: Openings = field(default_factory=Openings)
 
+    def in_frame(self, old: UnitFrame) -> tuple[UnitFrame, Surface]:
+        """The unit frame of the surface alone, where sheets were left out of the shape that had the old one;
+        and the surface in it."""
+        own = old.from_unit(self.vertices)
+        new = UnitFrame.of(own)
+        if np.isclose(new.scale, old.scale, rtol=_SAME_FRAME) and np.allclose(
+            new.to_unit(old.centre), 0, atol=_SAME_FRAME
+        ):
+            return old, self
+        openings = self.openings
+        if openings.largest is not None:
+            x, y, z = new.to_unit(old.from_unit(openings.largest)).tolist()
+            openings = replace(openings, largest=(x, y, z))
+        return new, replace(self, vertices=new.to_unit(own), openings=openings)
+
     def distance(self) -> MeshDistance:
         """The distance source of this surface."""
         return MeshDistance(self.vertices, self.faces, self.winding_faces, self.closed, embedded=self.simple)
 
 
-def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64], up: str | None = None) -> Surface:
+def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64], ground: Ground | None = None) -> Surface:
     """Surface of the solid that the triangles mean; vertices (V, 3) in the unit frame, faces (F, 3).
 
-    up: the axis, where it is known: what opens onto the ground is closed there.
+    ground: where it is known, what opens onto it is closed.
 
     Raises EmptyShapeError when no triangle has area, FlatShapeError when nothing is enclosed, OpenShellError
     when the openings are so large that inside and outside cannot be told apart.
@@ -71,8 +95,8 @@ def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64], up: str | No
     vertices, edges = weld_boundary(vertices, EdgeTable(faces), notes)
     edges = orient(vertices, edges, notes)
     if edges.balance.any():
-        vertices, edges = close_hidden(vertices, edges, up, notes)
-        edges = drop_sheets(vertices, edges, notes)
+        vertices, edges = close_hidden(vertices, edges, ground, notes)
+        vertices, edges = drop_sheets(vertices, edges, notes)
     if not edges.balance.any():
         return _surface_of_closed(vertices, edges, notes, 1.0)
     confidence = _confidence_of_open(vertices, edges.faces)
@@ -102,9 +126,7 @@ def consistent(
 
 def _refuse_plane(vertices: NDArray[np.float64]) -> None:
     """Raise FlatShapeError when all vertices lie in one plane, whichever way it is turned."""
-    centred = vertices - vertices.mean(axis=0)
-    normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
-    if np.ptp(centred @ normal) < _FLAT:
+    if thickness(vertices) < _FLAT:
         raise FlatShapeError(
             "all triangles lie in one plane, so there is no inside to fit; give the sheet a thickness"
         )

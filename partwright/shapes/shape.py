@@ -16,9 +16,10 @@ from partwright.errors import NotFiniteError, PartwrightError, SettingError
 from partwright.shapes.curvature import CurvatureField
 from partwright.shapes.frame import UnitFrame
 from partwright.shapes.grid import DistanceGrid, distance_grid, occupancy_grid
+from partwright.shapes.hidden_faces import Ground
 from partwright.shapes.holes import Openings
 from partwright.shapes.reading import read_source, source_of
-from partwright.shapes.repair import repair
+from partwright.shapes.repair import Surface, repair
 from partwright.shapes.sampling import (
     NEAR_SIGMA,
     Samples,
@@ -31,7 +32,7 @@ from partwright.shapes.sampling import (
 )
 from partwright.shapes.source import Piece, Source
 from partwright.shapes.topology import area_vectors, compacted, signed_volumes
-from partwright.shapes.units import canonical_unit, canonical_up
+from partwright.shapes.units import axis_vector, canonical_unit, canonical_up
 
 if TYPE_CHECKING:
     import trimesh
@@ -84,8 +85,10 @@ class Shape:
                 f"{name}: {np.count_nonzero(~finite)} of {len(used)} vertices have a NaN or infinite "
                 "coordinate; all coordinates must be finite. Export the shape again"
             )
-        self.frame = _named(name, lambda: UnitFrame.of(corners))
-        self._surface = _named(name, lambda: repair(self.frame.to_unit(corners), compact, source.up))
+        self._ground = source.ground
+        if source.up is not None and source.ground is None:
+            self._ground = float((corners @ axis_vector(source.up)).min())
+        self.frame, self._surface = _named(name, lambda: _repaired(corners, compact, source.up, self._ground))
         self.vertices = self.frame.from_unit(self._surface.vertices)
         self.faces = self._surface.faces
         self.repairs = source.repairs + self._surface.repairs
@@ -136,8 +139,9 @@ class Shape:
         failure: PartwrightError | None = None
         for node in self.nodes:
             piece = Piece(node.name, self.input_vertices, self.input_faces[node.start : node.stop])
+            alone = Source(node.name, (piece,), self.unit, self.up, ground=self._ground)
             try:
-                shapes.append(Shape(Source(node.name, (piece,), self.unit, self.up)))
+                shapes.append(Shape(alone))
             except PartwrightError as error:
                 failure = error
                 warnings.warn(f"node left out: {error}", NodeLeftOutWarning, stacklevel=2)
@@ -280,6 +284,7 @@ def load_shape(
 
     Points and grids become a mesh first; `repairs` says so, and `confidence` how well the points bear it out.
     `unit` and `up` state what the file does not say, or overrule it; the geometry is never scaled or turned.
+    Where up is known, so is the ground: openings as low as anything lies are closed.
     Raises UnsupportedFormatError, UnreadableFileError, EmptyShapeError, NeedsSurfaceError, NotFiniteError,
     FlatShapeError, OpenShellError, GridError, or SettingError for an unknown unit or axis.
     """
@@ -293,6 +298,21 @@ def load_shape(
     shape = Shape(replace(read, unit=stated_unit or read.unit, up=stated_up or read.up))
     shape.reading_seconds = time.perf_counter() - started
     return shape
+
+
+def _repaired(
+    corners: NDArray[np.float64], faces: NDArray[np.int64], up: str | None, height: float | None
+) -> tuple[UnitFrame, Surface]:
+    """The surface of corners (V, 3), own units, and faces (F, 3), and the unit frame that it is in.
+
+    height: of the ground along the up axis, own units.
+    """
+    frame = UnitFrame.of(corners)
+    ground = None
+    if up is not None and height is not None:
+        above = axis_vector(up)
+        ground = Ground(above, float(frame.to_unit(height * above) @ above))
+    return repair(frame.to_unit(corners), faces, ground).in_frame(frame)
 
 
 def _checked(points: ArrayLike) -> NDArray[Any]:

@@ -24,7 +24,7 @@ class Source:
 
     `repairs` and `confidence`: how the surface was made where the file holds none, and how sure it is. file:
     the file's name with its suffix, None for what was in memory. points: (N, 3) that the surface was laid
-    through, where it was.
+    through, where it was. ground: its height along the up axis, own units; None: as low as anything lies.
     """
 
     name: str
@@ -35,6 +35,7 @@ class Source:
     confidence: float = 1.0
     file: str | None = None
     points: NDArray[np.float64] | None = None
+    ground: float | None = None
 
 
 def in_utf8(name: str) -> str:

@@ -20,6 +20,13 @@ def doubled_areas(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(np.linalg.norm(area_vectors(vertices[faces]), axis=1))
 
 
+def thickness(points: NDArray[Any]) -> float:
+    """Across the plane that lies best through points (N, 3), in their own units."""
+    centred = points - points.mean(axis=0)
+    normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
+    return float(np.ptp(centred @ normal))
+
+
 @dataclass(frozen=True)
 class EdgeTable:
     """The half-edges of faces (F, 3), grouped by the undirected edge they run along."""
@@ -130,8 +137,9 @@ def boundary_loops(half_edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
             while (following := follow[walk[-1]].pop()) != first:
                 if following in place:
                     loops.append(walk[place[following] :])
-                    walk = walk[: place[following] + 1]
-                    place = {vertex: number for number, vertex in enumerate(walk)}
+                    for vertex in walk[place[following] + 1 :]:
+                        del place[vertex]
+                    del walk[place[following] + 1 :]
                 else:
                     place[following] = len(walk)
                     walk.append(following)

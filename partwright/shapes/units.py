@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from partwright.errors import SettingError
 
 METRES = {
@@ -55,3 +58,14 @@ def canonical_up(up: str) -> str:
     if axis not in UP_AXES:
         raise SettingError(f"unknown up axis {up!r}; expected one of {', '.join(UP_AXES)}")
     return axis
+
+
+def axis_vector(axis: str) -> NDArray[np.float64]:
+    """(3,) unit vector of "x", "-y" ...
+
+    Raises SettingError for anything else.
+    """
+    name = canonical_up(axis)
+    result = np.zeros(3)
+    result["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
+    return result

@@ -13,6 +13,7 @@ from partwright.errors import NoSurfaceError
 from partwright.fields import Box, Sphere
 from partwright.meshing import mesh_assembly
 from partwright.metrics import Scores, evaluate
+from partwright.metrics.deviation import buried
 from partwright.shapes import load_shape
 
 
@@ -82,6 +83,14 @@ def test_buried_faces_and_hairline_cracks_do_not_count() -> None:
         solid = load_shape(trimesh.creation.box((2.0 + gap, 1.0, 1.0)).apply_translation(whole.translation))
         scores = evaluate(halves, solid, emd=False)
         assert (scores.max_deviation > 0.3) == seen
+
+
+def test_buried_points_are_the_same_where_normals_are_known() -> None:
+    cracked = load_shape(trimesh.util.concatenate([_block(0.0), _block(1.004), _block(1.7)]))
+    drawn = cracked.unit_surface(4000, 0)
+    alone = buried(cracked.unit_distance, drawn.points)
+    assert 100 < np.count_nonzero(alone) < 2000
+    np.testing.assert_array_equal(alone, buried(cracked.unit_distance, drawn.points, drawn.normals))
 
 
 def _block(x: float) -> trimesh.Trimesh:

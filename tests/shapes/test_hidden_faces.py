@@ -11,7 +11,7 @@ from solids import box, together, without
 
 from partwright.errors import FlatShapeError, OpenShellError
 from partwright.shapes import Openings, load_shape
-from partwright.shapes.shape import Shape
+from partwright.shapes.shape import NodeLeftOutWarning, Shape
 from partwright.shapes.source import Piece, Source
 from partwright.shapes.topology import boundary_loops
 
@@ -72,6 +72,17 @@ def test_decals_and_the_ground_are_left_out() -> None:
     assert shape.volume == pytest.approx(1, rel=1e-9)
     assert shape.confidence == 1.0
     assert "left out 4 loose flat sheets" in shape.repairs
+    alone = load_shape(box())
+    np.testing.assert_allclose(shape.bounds(), alone.bounds())
+    assert shape.frame.scale == pytest.approx(alone.frame.scale)
+    np.testing.assert_allclose(shape.unit_mesh[0].min(axis=0), [-0.9] * 3)
+
+
+def test_a_crumb_beside_loose_sheets_is_not_all_that_is_kept() -> None:
+    sides = [sheet(1, 1, (0, 0, 0)), sheet(0.9, 0.9, (0.05, 0.05, 1)), sheet(0.9, 0.9, (0.05, 0.05, 2))]
+    mesh = together(*sides, box((0.05, 0.05, 0.05), (3, 0, 0)))
+    with pytest.raises(OpenShellError):
+        load_shape(mesh)
 
 
 def test_a_sheet_that_is_the_side_of_something_stays() -> None:
@@ -97,6 +108,34 @@ def test_what_opens_onto_the_ground_is_closed_where_up_is_known() -> None:
     for other in ("-z", "y"):
         with pytest.raises(OpenShellError):
             standing(other)
+
+
+def test_a_node_that_hangs_has_no_ground() -> None:
+    hanging = open_box((1, 1, 0.2), (0, 0, 2), "-z")
+    standing = open_box((1, 1, 0.2), (3, 0, 0.1), "-z")
+    pieces = [Piece(name, m.vertices, m.faces) for name, m in (("lamp", hanging), ("step", standing))]
+    source = Source("room", (*pieces, Piece("post", *solid((0.1, 0.1, 3), (1, 0, 1.5)))), None, "z")
+    with pytest.warns(NodeLeftOutWarning, match="lamp"):
+        nodes = Shape(source).split_nodes()
+    assert [node.name for node in nodes] == ["step", "post"]
+    assert nodes[0].volume == pytest.approx(0.2, rel=1e-9)
+
+
+def solid(extents, centre) -> tuple[np.ndarray, np.ndarray]:
+    mesh = box(extents, centre)
+    return mesh.vertices, mesh.faces
+
+
+def test_an_opening_with_an_island_is_closed_as_a_ring() -> None:
+    """Discs over both of its rims would cancel for the winding number, and lie across the hole as surface."""
+    tube = trimesh.creation.annulus(0.3, 0.5, 1.0)
+    open_ = without(tube, tube.face_normals[:, 2] > 0.9)
+    shape = load_shape(together(open_, box((2, 2, 0.1), (0, 0, 0.55))))
+    assert shape.volume == pytest.approx(tube.volume + 0.4, rel=1e-9)
+    assert shape.signed_distance([[0, 0, 0.4]])[0] == pytest.approx(0.1, abs=1e-6)
+    filled = load_shape(open_)
+    assert filled.area == pytest.approx(tube.area, rel=1e-9)
+    assert filled.openings.count == 1
 
 
 def test_a_flat_rim_of_any_outline_is_filled_within_it() -> None:

@@ -90,5 +90,6 @@ def test_faces_between_bodies_that_meet_are_no_surface_to_cover() -> None:
     met = (np.abs(drawn[:, 0]) < 0.01) & (np.abs(drawn[:, 1:]).max(axis=1) < 0.43)
     assert met.sum() > 1000
     surface = FitSamples.of(shape, SETTINGS).surface
+    assert surface.dtype == np.float32
     assert len(surface) == pytest.approx(len(drawn) - met.sum(), rel=0.03)
     assert not ((np.abs(surface[:, 0]) < 0.01) & (np.abs(surface[:, 1:]).max(axis=1) < 0.43)).any()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from partwright.errors import SettingError
+from partwright.shapes.units import axis_vector
 
 
 def axis(text: str, default: str, what: str) -> np.ndarray:
@@ -16,6 +17,4 @@ def axis(text: str, default: str, what: str) -> np.ndarray:
     name = (text or default).lower().removeprefix("+")
     if name.removeprefix("-") not in ("x", "y", "z"):
         raise SettingError(f"{what}: expected an axis (x, y, z, -x, -y or -z), got {text!r:.40}")
-    result = np.zeros(3)
-    result["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
-    return result
+    return axis_vector(name)
