@@ -10,7 +10,7 @@ from contextlib import suppress
 import numpy as np
 
 from partwright.approximation.convex_solids import Convex, candidates
-from partwright.assembly import Assembly, Node, Part, Similarity, mirrored
+from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.motion import Motion
 from partwright.assembly.placed import placed_quadric
 from partwright.assembly.repeated_groups import children_once
@@ -69,8 +69,7 @@ def _repeated(node: Node, motions: Sequence[Motion]) -> Iterator[Node]:
     moves: list[Similarity] = []
     for motion in motions:
         if isinstance(node, Assembly):
-            image = mirrored(node, "x", suffix="") if motion.mirror else node
-            others.append(image.transformed(motion.move))
+            others.append(motion.of(node))
             continue
         made = motion.of(node)
         if made.field == node.field and not node.instances:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from itertools import permutations, product
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from partwright.assembly.mirroring import mirrored
 from partwright.assembly.similarity import Similarity, rotation_matrix
 
 if TYPE_CHECKING:
-    from partwright.assembly.tree import Part
+    from partwright.assembly.tree import Assembly, Part
+
+Placed = TypeVar("Placed", "Part", "Assembly")
 
 
 @dataclass(frozen=True)
@@ -41,17 +44,28 @@ class Motion:
         back = self.move.inverse()
         return Motion(_seen_in_the_mirror(back) if self.mirror else back, self.mirror)
 
-    def of(self, part: Part) -> Part:
-        """The part there, with all its copies.
+    def of(self, node: Placed) -> Placed:
+        """The part there, with all its copies, or the group; names stay.
 
         Raises:
-            ParameterError: it is a learned part, which cannot be mirrored.
+            ParameterError: a learned part is among it, which cannot be mirrored.
         """
         from partwright.assembly.tree import Assembly
 
         if self.mirror:
-            part = replace(mirrored(Assembly((part,)), "x", suffix="").parts[0], name=part.name)
-        return part.transformed(self.move)
+            (image,) = mirrored(Assembly((node,)), "x", suffix="").children
+            node = cast(Placed, image)
+        return node.transformed(self.move)
+
+
+def signed_permutations() -> tuple[np.ndarray, ...]:
+    """The 48 (3, 3) that map axes onto axes, either way along them: turns, and mirrors (determinant -1)."""
+    made = []
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        matrix = np.zeros((3, 3))
+        matrix[range(3), order] = signs
+        made.append(matrix)
+    return tuple(made)
 
 
 def _seen_in_the_mirror(move: Similarity) -> Similarity:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from partwright.assembly import Assembly, Node, Part
-from partwright.assembly.mirroring import mirrored
 from partwright.assembly.motion import Motion
-from partwright.assembly.similarity import Similarity
 from partwright.capri import quadric_rows as rows
-from partwright.capri.repeated_quadrics import with_repeats
+from partwright.capri.motions import moved
+from partwright.capri.repeated_quadrics import are_repeats, with_repeats
 from partwright.fields import Quadric
 
 _MAX_REACH = 4.0  # unit frame: what reaches further was judged by no sample there
@@ -63,18 +63,31 @@ class CsgTree:
         return result
 
     def closed(self, lower: ArrayLike, upper: ArrayLike) -> CsgTree:
-        """Added convexes that do not end, or far off, are cut off at the box (3,), (3,) around the shape."""
+        """Added convexes that do not end, or far off, are cut off at the box (3,), (3,) around the shape.
+
+        Copies are cut where the first of them is, after their motions.
+        """
         sides = [rows.plane(-e, float(-c)) for e, c in zip(np.eye(3), np.asarray(lower), strict=True)]
         sides += [rows.plane(e, float(c)) for e, c in zip(np.eye(3), np.asarray(upper), strict=True)]
-        table = np.concatenate([self.rows, sides])
-        complement = np.r_[self.complement, np.zeros(6, dtype=bool)]
+        table = [*self.rows, *sides]
 
-        def ended(convex: Convex) -> Convex:
-            open_ = np.flatnonzero(~(np.abs(self._node(convex, "").bounds()) < _MAX_REACH))
-            return (*convex, *(int(i) + len(self.rows) for i in open_))
+        def ended(layer: tuple[Convex, ...], copies: Sequence[Copy | None]) -> Iterator[Convex]:
+            reach = {i: self._node(layer[i], "").bounds() for i, copy in enumerate(copies) if copy is None}
+            for i, (convex, copy) in enumerate(zip(layer, copies, strict=True)):
+                open_ = np.flatnonzero(~(np.abs(reach[i if copy is None else copy.of]) < _MAX_REACH))
+                if copy is None or not len(open_):
+                    ends = [len(self.rows) + int(side) for side in open_]
+                else:
+                    ends = list(range(len(table), len(table) + len(open_)))
+                    table.extend(moved(copy.motion, np.stack([sides[side] for side in open_])))
+                yield (*convex, *ends)
 
-        layers = tuple(c if k % 2 else tuple(map(ended, c)) for k, c in enumerate(self.layers))
-        return CsgTree(table, complement, layers)
+        layers = tuple(
+            layer if k % 2 else tuple(ended(layer, self.copies[k] if self.copies else (None,) * len(layer)))
+            for k, layer in enumerate(self.layers)
+        )
+        complement = np.r_[self.complement, np.zeros(len(table) - len(self.rows), dtype=bool)]
+        return CsgTree(np.stack(table), complement, layers, self.copies)
 
     def assembly(self) -> Assembly:
         """Difference of two unions of intersections (eq. 5), leaves are quadrics; in the unit frame."""
@@ -86,8 +99,8 @@ class CsgTree:
                 count += 1
                 name = f"convex_{count:02d}"
                 copy = self.copies[k][i] if self.copies else None
-                if copy is not None and not self._drilled_alike(convex, copy):
-                    nodes.append(_placed(self._said_once(layer[copy.of], name), copy.motion))
+                if copy is not None and not self._drilled_alike(layer[copy.of], convex):
+                    nodes.append(copy.motion.of(self._said_once(layer[copy.of], name)))
                 elif copy is None and self._has_copies(k, i):
                     nodes.append(self._said_once(convex, name))
                 else:
@@ -106,11 +119,9 @@ class CsgTree:
         """A convex with copies: what repeats within it is a leaf with copies before it is copied itself."""
         return with_repeats(self._node(convex, name)) if len(convex) > 1 else self._node(convex, name)
 
-    def _drilled_alike(self, convex: Convex, copy: Copy) -> bool:
-        """Whether a copy is one quadric of the same direction, which `with_repeats` sees by itself."""
-        return len(convex) == 1 and copy.motion == Motion(
-            Similarity(translation=copy.motion.move.translation)
-        )
+    def _drilled_alike(self, convex: Convex, copy: Convex) -> bool:
+        """Whether both are one quadric of one direction, which `with_repeats` joins with all alike."""
+        return len(convex) == 1 and are_repeats(self._node(convex, ""), self._node(copy, ""))
 
     def _node(self, convex: Convex, name: str) -> Assembly:
         """One convex; quadrics whose outside it takes are subtracted from the rest."""
@@ -120,10 +131,6 @@ class CsgTree:
             return Assembly(tuple(_leaf(self.rows[k]) for k in convex), "intersection", name)
         core = Assembly(tuple(_leaf(self.rows[k]) for k in held), "intersection", name)
         return Assembly((core, *(_leaf(-self.rows[k]) for k in taken)), "difference", f"{name}_cut")
-
-
-def _placed(node: Assembly, motion: Motion) -> Assembly:
-    return (mirrored(node, "x", suffix="") if motion.mirror else node).transformed(motion.move)
 
 
 def _leaf(row: NDArray[np.float64]) -> Part:

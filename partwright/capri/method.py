@@ -65,14 +65,10 @@ class Found:
     shape: Shape
     settings: Settings
     searches: Sequence[TreeSearch]
+    tree: CsgTree
+    """The cheapest search's, in the unit frame."""
     seconds: dict[str, float]
     interrupted: bool
-
-    @cached_property
-    def tree(self) -> CsgTree:
-        """The cheapest search's, in the unit frame."""
-        search = self.searches[0]
-        return search.bounded_tree() if self.interrupted else search.final_tree()
 
     @cached_property
     def assembly(self) -> Assembly:
@@ -105,9 +101,7 @@ class Found:
 
     def fitted(self) -> Fitted:
         best = self.searches[0]
-        assembly, spent = self.assembly, best.seconds.get("repeat", 0.0)
-        seconds = self.seconds | ({"repeat": spent} if spent else {})
-        return Fitted(assembly, self.outcome, seconds, best.history, details={"tree": self.details})
+        return Fitted(self.assembly, self.outcome, self.seconds, best.history, details={"tree": self.details})
 
 
 def found(request: FitRequest[Settings]) -> Found:
@@ -128,16 +122,19 @@ def found(request: FitRequest[Settings]) -> Found:
         )
         for i, origin in enumerate(origins)
     ]
-    interrupted = False
+    interrupted, tree = False, None
+    done: list[TreeSearch] = []
     try:
         for search in searches:
             search.prepare(shape, request.start)
             search.make(shape)
+        done = _cheapest_first(searches)
+        tree = done[0].final_tree() if done else None
     except CancelledError:
         interrupted = True
-        if not any(search.placed for search in searches):
+        done = done or _cheapest_first(searches)
+        if not done:
             raise
-    done = sorted((search for search in searches if search.placed), key=TreeSearch.cost)
     if not done and settings.schedule == "paper":
         raise EmptyShapeError(
             f"{shape.name}: after 3 x {settings.iterations} iterations no convex holds anything; give more "
@@ -151,7 +148,12 @@ def found(request: FitRequest[Settings]) -> Found:
     seconds: dict[str, float] = {}
     for one in searches:
         seconds |= {stage: seconds.get(stage, 0.0) + spent for stage, spent in one.seconds.items()}
-    return Found(shape, settings, done, seconds, interrupted)
+    return Found(shape, settings, done, tree or done[0].bounded_tree(), seconds, interrupted)
+
+
+def _cheapest_first(searches: Sequence[TreeSearch]) -> list[TreeSearch]:
+    """Those that came to a tree."""
+    return sorted((search for search in searches if search.placed), key=TreeSearch.cost)
 
 
 def assembly_of(shape: Shape, settings: Settings, tree: CsgTree) -> Assembly:

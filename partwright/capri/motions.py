@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.assembly.motion import Motion
+from partwright.assembly.motion import Motion, signed_permutations
 from partwright.assembly.similarity import Similarity
 from partwright.capri import quadric_rows as rows
 from partwright.capri.quadric_rows import Row
+from partwright.fields import Quadric
 
 Array = NDArray[np.float64]
 
@@ -24,6 +25,7 @@ _UNDETERMINED = 1e-3  # of the largest singular value: faces leave the place alo
 _SAME_AXIS = 0.02  # unit lengths, and sine of the angle
 _MAX_AXES = 4
 _SAME_TURN = 0.005  # radians
+_SIGNED_PERMUTATIONS = signed_permutations()
 _SAME_RADIUS = 0.08  # unit lengths: of the middles of two convexes from an axis, and between them along it
 
 
@@ -73,13 +75,8 @@ class Face:
 def moved(motion: Motion, table: Array) -> Array:
     """Quadrics (K, 10) as they are after a motion."""
     turn, offset = motion.linear, np.asarray(motion.move.translation)
-    result = []
-    for row in table:
-        form, slope, constant = rows.split(row)
-        form, slope = turn @ form @ turn.T, turn @ slope
-        back = form @ offset
-        result.append(rows.joined(form, slope - 2 * back, float(offset @ back - slope @ offset) + constant))
-    return np.stack(result)
+    made = [Quadric(tuple(row.tolist())).moved(turn, offset).coefficients for row in table]
+    return np.array(made, dtype=np.float64).reshape(-1, 10)
 
 
 def motion_of(linear: Array, offset: Array) -> Motion:
@@ -161,7 +158,7 @@ def _turns(one: Sequence[Face], other: Sequence[Face], axes: Sequence[Line]) -> 
     """The 48 that map coordinate axes to one another, and those about the part's axes that take a plane of
     one to a plane of the other, with and without a mirror."""
     yield from _SIGNED_PERMUTATIONS
-    known: list[Array] = []
+    known = np.stack(_SIGNED_PERMUTATIONS)
     for axis in {tuple(line.direction.round(6)): line.direction for line in axes}.values():
         first, second = (
             [f.across[:, 0] for f in faces if not f.curvatures.any() and abs(f.across[:, 0] @ axis) < 0.02]
@@ -175,20 +172,6 @@ def _turns(one: Sequence[Face], other: Sequence[Face], axes: Sequence[Line]) -> 
                 from_ = flip @ a
                 angle = float(np.arctan2(np.cross(from_, b) @ axis, from_ @ b))
                 turn = Motion(Similarity.turn(axis.tolist(), angle)).linear @ flip
-                if all(np.abs(turn - k).max() > _SAME_TURN for k in (*_SIGNED_PERMUTATIONS, *known)):
-                    known.append(turn)
+                if np.abs(known - turn).max(axis=(1, 2)).min() > _SAME_TURN:
+                    known = np.concatenate([known, turn[None]])
                     yield turn
-
-
-def _signed_permutations() -> tuple[Array, ...]:
-    made = []
-    for order, signs in itertools.product(
-        itertools.permutations(range(3)), itertools.product((1, -1), repeat=3)
-    ):
-        matrix = np.zeros((3, 3))
-        matrix[range(3), order] = signs
-        made.append(matrix)
-    return tuple(made)
-
-
-_SIGNED_PERMUTATIONS = _signed_permutations()

@@ -2,7 +2,8 @@
 
 The search finds each tooth of a gear by itself, a little different from the others. Here a convex takes the
 place of others by a motion, is put where the motions between its copies lead on, and is fitted to what all of
-them have to cover, for the price of one: all where the objective falls, in which a copy costs as a primitive.
+them have to cover, for the price of one. In the objective a copy costs as a primitive, and of what all else
+costs two fifths count: by so much, less a whole primitive for each copy, the error may rise.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from numpy.typing import NDArray
 
 from partwright.assembly.motion import Motion
 from partwright.capri import quadric_rows as rows
-from partwright.capri import selection
 from partwright.capri.csg_tree import Convex, Copy, CsgTree
+from partwright.capri.fitted_copies import FittedCopies, error_reduction
 from partwright.capri.motions import Face, axes_of, by_faces, by_middles, moved
 from partwright.capri.samples import OccupancySamples
 
-_CAUTION = 0.4  # of what a convex costs: by how much more error a copy may take its place
+_CAUTION = 0.4  # of the prices that count: a copy in the place of a convex is surely seen, if not alike
 _COARSE = 6  # one sample of so many tells first which motion is best
 _BY_FACES = 12  # motions between two convexes that are tried, those with most faces in common first
 _SLACK = np.radians(np.linspace(-2.0, 2.0, 9))  # turns about an axis that are tried beside the middles' angle
@@ -30,28 +31,18 @@ _MAX_POWERS = 40  # times that a step is taken
 _MAX_CHAINS = 80  # rows of steps that are tried
 _FURTHEST = 0.95  # unit lengths: the middle of a convex is no further out than that
 _SAME_PLACE = 0.01  # unit lengths
-_FORGIVEN = (
-    0.6  # of what a convex costs: by how much the error may rise before all copies are fitted together
-)
-_REACH = (
-    1.4  # of the distance of the furthest sample of a convex from its middle: samples that it is fitted to
-)
+_FORGIVEN = 0.6  # of what a convex costs: so much more error is allowed until all copies are fitted
 
 Mask = NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Group:
     """A convex by its rows of the table, the motions of its copies, and what it and each of them cover."""
 
     convex: Convex
     motions: tuple[Motion, ...] = ()
     masks: tuple[Mask, ...] = ()
-
-    def __eq__(self, other: object) -> bool:
-        return self is other
-
-    __hash__ = object.__hash__
 
 
 _Layers = list[list[_Group]]
@@ -63,12 +54,14 @@ def with_repeated_convexes(
     price: float,
     convex_price: float,
     pause: Callable[[], None] = lambda: None,
+    further: bool = True,
 ) -> CsgTree:
     """The tree with alike convexes as copies of one, and `copies` that say so.
 
-    price, convex_price: as in the settings. pause: called now and then, and may raise.
+    price, convex_price: as in the settings. pause: called now and then, and may raise. further: copies also
+    where the motions between others lead on, as where a tooth was missed.
     """
-    search = _Search(tree, samples, price, convex_price, pause)
+    search = _Search(tree, samples, price, convex_price, pause, further)
     for at in range(len(tree.layers)):
         search.gather(at)
     search.extend()
@@ -83,9 +76,11 @@ class _Search:
         price: float,
         convex_price: float,
         pause: Callable[[], None],
+        further: bool,
     ) -> None:
-        self.given, self.samples, self.pause = tree, samples, pause
+        self.given, self.samples, self.pause, self.further = tree, samples, pause, further
         self.price, self.convex_price = (_CAUTION * p * samples.volume for p in (price, convex_price))
+        self.fitting = FittedCopies(tree, samples, self.price, self.convex_price, pause)
         self.monomials = rows.monomials(samples.points)
         self.weight = samples.weight.astype(np.float64)
         self.layers: _Layers = [
@@ -95,17 +90,24 @@ class _Search:
         used = sorted({k for layer in tree.layers for convex in layer for k in convex})
         self.axes = axes_of(tree.rows[used])
 
-    def covered(self, table: NDArray[np.float64]) -> Mask:
-        return np.asarray((self.monomials @ table.T <= 0).all(axis=1))
+    def covered(self, table: NDArray[np.float64], step: int = 1) -> Mask:
+        """What quadrics (K, 10) cover together, of one in `step` samples."""
+        return np.asarray((self.monomials[::step] @ table.T <= 0).all(axis=1))
 
-    def error(self, layers: _Layers, step: int = 1) -> float:
-        """Weight on the wrong side, of one in `step` samples."""
-        occupied = np.zeros(len(self.weight[::step]), dtype=bool)
+    def error(self, layers: _Layers) -> float:
+        """Weight on the wrong side."""
+        occupied = np.zeros(len(self.weight), dtype=bool)
         for k, layer in enumerate(layers):
             for group in layer:
                 for mask in group.masks:
-                    occupied[mask[::step]] = k % 2 == 0
-        return step * float(self.weight[::step][occupied != self.samples.inside[::step]].sum())
+                    occupied[mask] = k % 2 == 0
+        return float(self.weight[occupied != self.samples.inside].sum())
+
+    def error_reduction(self, layers: _Layers, at: int) -> NDArray[np.float32]:
+        """(N,) by how much the error falls where one more convex in layer `at` covers a sample."""
+        return error_reduction(
+            self.samples, [[m for group in layer for m in group.masks] for layer in layers], at
+        )
 
     def length(self, group: _Group) -> float:
         """What a group costs."""
@@ -150,8 +152,9 @@ class _Search:
         """Others of the layer replaced by copies of the group, where the error rises by less than they
         cost."""
         faces = self.faces(group)
+        root = group
         for other in layers[at]:
-            if other is group or other.motions or not self.may_replace(group, other):
+            if other is root or other.motions or not self.may_replace(group, other):
                 continue
             best = self.best_motion(layers, at, group, other, faces)
             if best is None:
@@ -171,17 +174,19 @@ class _Search:
         self, layers: _Layers, at: int, group: _Group, other: _Group, faces: list[Face]
     ) -> _Group | None:
         """The group with the copy that does best in the place of the other."""
+        self.pause()
         candidates = by_faces(faces, self.faces(other), self.axes, _BY_FACES)
         middles = self.middle(group.masks[0]), self.middle(other.masks[0])
         candidates += by_middles(*middles, self.axes, _SLACK)
-        rest = _replaced(layers, at, {group, other})
-        best: tuple[float, _Group] | None = None
-        for motion in candidates:
-            made = self.with_copy(group, motion)
-            error = self.error(_replaced(rest, at, set(), made), _COARSE)
-            if best is None or error < best[0]:
-                best = error, made
-        return best[1] if best else None
+        if not candidates:
+            return None
+        reduction = self.error_reduction(_replaced(layers, at, {group, other}), at)[::_COARSE].astype(
+            np.float64
+        )
+        reduction[np.any([mask[::_COARSE] for mask in group.masks], axis=0)] = 0.0
+        table = self.given.rows[list(group.convex)]
+        falls = [reduction[self.covered(moved(motion, table), _COARSE)].sum() for motion in candidates]
+        return self.with_copy(group, candidates[int(np.argmax(falls))])
 
     def with_copy(self, group: _Group, motion: Motion) -> _Group:
         mask = self.covered(moved(motion, self.given.rows[list(group.convex)]))
@@ -189,9 +194,12 @@ class _Search:
 
     def extended(self, layers: _Layers, at: int, group: _Group) -> tuple[_Layers, _Group]:
         """Copies also where the motions lead on from a copy, in place of what they cover, while that pays."""
+        if not self.further:
+            return layers, group
         seen = [Motion(), *group.motions]
         middle = self.middle(group.masks[0])
         for motion in _led_on_to(seen, middle):
+            self.pause()
             made = self.with_copy(group, motion)
             changed = _replaced(layers, at, {group, *self.covered_by(made, layers[at])}, made)
             if self.cost(changed) < self.cost(layers):
@@ -223,19 +231,13 @@ class _Search:
     def fitted(self, layers: _Layers, at: int, group: _Group) -> tuple[_Layers, _Group]:
         """The convex improved for all places of the group at once; as it was where that is no cheaper."""
         rest = _replaced(layers, at, {group})
-        reduction = self.error_reduction(rest, at)
-        outside, value = self.pulled_back(group, reduction)
-        complement = self.given.complement
-        problem = selection.Problem(
-            outside,
-            value > 0,
-            np.abs(value),
-            np.where(complement, self.price + self.convex_price, self.price),
-            self.convex_price,
-            np.random.default_rng(0),
-            self.pause,
+        convex = self.fitting.improved(
+            group.convex,
+            [Motion(), *group.motions],
+            group.masks[0],
+            self.middle(group.masks[0]),
+            self.error_reduction(rest, at),
         )
-        convex, _ = selection.improve(problem, outside, value, group.convex)
         if not convex or set(convex) == set(group.convex):
             return layers, group
         made = _Group(convex, masks=(self.covered(self.given.rows[list(convex)]),))
@@ -243,43 +245,6 @@ class _Search:
             made = self.with_copy(made, motion)
         changed = _replaced(rest, at, set(), made)
         return (changed, made) if self.cost(changed) < self.cost(layers) else (layers, group)
-
-    def pulled_back(
-        self, group: _Group, reduction: NDArray[np.float32]
-    ) -> tuple[selection.Matrix, NDArray[np.float32]]:
-        """Samples around each place as the convex sees them: outside (N, K), and what covering them is worth.
-
-        What is to be covered counts at the nearest place only; what is not to be counts at each.
-        """
-        middle = self.middle(group.masks[0])
-        points = self.samples.points
-        reach = _REACH * float(np.linalg.norm(points[group.masks[0]] - middle, axis=1).max(initial=0.0))
-        places = [Motion(), *group.motions]
-        away = np.stack([np.linalg.norm(points - motion(middle), axis=1) for motion in places])
-        nearest = away.argmin(axis=0)
-        outside, value = [], []
-        for i, motion in enumerate(places):
-            near = np.flatnonzero((reduction != 0) & (away[i] < reach) & ((reduction < 0) | (nearest == i)))
-            local = motion.inverse()(points[near])
-            outside.append((rows.values(self.given.rows, local) > 0).astype(np.float32))
-            value.append(reduction[near])
-        return np.concatenate(outside), np.concatenate(value)
-
-    def error_reduction(self, layers: _Layers, at: int) -> NDArray[np.float32]:
-        """(N,) by how much the error falls where one more convex in layer `at` covers a sample."""
-        before = np.zeros(len(self.weight), dtype=bool)
-        free = ~before
-        for k, layer in enumerate(layers):
-            for group in layer:
-                for mask in group.masks:
-                    if k <= at:
-                        before[mask] = k % 2 == 0
-                    else:
-                        free &= ~mask
-        painted = at % 2 == 0
-        right = self.samples.inside == painted
-        worth = np.where(right, self.samples.weight, -self.samples.weight)
-        return np.where(free & (before != painted), worth, 0).astype(np.float32)
 
     def without_idle(self, layers: _Layers) -> _Layers:
         """Without convexes that no longer pay: copies have come over what they covered."""

@@ -86,6 +86,16 @@ def _merged(children: Sequence[Node]) -> tuple[Node, ...]:
     return tuple(result)
 
 
+def are_repeats(one: Node, other: Node) -> bool:
+    """Whether two nodes, added or subtracted side by side, become one leaf."""
+    form, form_of_other = _form(one), _form(other)
+    if form is None or form_of_other is None:
+        return False
+    group = _Group(0, form.name, form.axes[:, 2])
+    group.add(form)
+    return group.takes(form_of_other)
+
+
 def _only(node: Node) -> Part:
     """The leaf that a node is, alone in its convex or not."""
     while isinstance(node, Assembly):

@@ -33,13 +33,15 @@ from partwright.shapes import Shape
 _MAX_CONVEXES = 64  # convexes: the paper's c (section 4.1)
 _PRICE_FACTOR = 1.5  # factor between the prices that are tried for a budget or a target
 _PRICE_STEPS = 16  # prices that are tried at most
+_SEARCHED = 0.9  # of the expected work, where copies are sought after the search
 
 
 @dataclass
 class TreeSearch:
     """State of one search from one origin: the samples, the pool, and the cheapest layers so far.
 
-    turn: which of how many searches this is. tuned: what the paper's schedule made.
+    turn: which of how many searches this is. tuned: what the paper's schedule made. dearer: times the
+    settings' prices, at which the demands were met.
     """
 
     settings: Settings
@@ -51,6 +53,7 @@ class TreeSearch:
     best: selection.Layers | None = None
     tuned: CsgTree | None = None
     outcome: Outcome = "converged"
+    dearer: float = 1.0
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
     pool: CandidatePool = field(init=False)
@@ -122,8 +125,13 @@ class TreeSearch:
             self.checkpoint()
 
     def fraction(self, done: float) -> float:
-        """Of all runs, where this one has done so much."""
-        return (self.turn[0] + done) / self.turn[1]
+        """Of all runs, where this one has done so much of its search."""
+        return (_SEARCHED if self.repeats else 1.0) * (self.turn[0] + done) / self.turn[1]
+
+    @property
+    def repeats(self) -> bool:
+        """Whether copies are sought among the convexes."""
+        return self.settings.symmetry and self.settings.schedule == "search"
 
     def cost(self) -> float:
         """Of the tree: weight on the wrong side as a share of the shape's, and the description length."""
@@ -176,7 +184,8 @@ class TreeSearch:
                 return "converged"
             for i in range(1, _PRICE_STEPS):
                 fewest = self.bounded_tree().primitives
-                self.best = selection.polish(self.problem(_PRICE_FACTOR**i), self.best, _MAX_CONVEXES)
+                self.dearer = _PRICE_FACTOR**i
+                self.best = selection.polish(self.problem(self.dearer), self.best, _MAX_CONVEXES)
                 if not any(self.best):
                     break
                 if self.bounded_tree().primitives <= s.max_parts:
@@ -192,8 +201,8 @@ class TreeSearch:
         for i in range(_PRICE_STEPS // 2, -_PRICE_STEPS // 2, -1):
             problem = self.problem(_PRICE_FACTOR**i)
             layers = selection.polish(problem, best or [], _MAX_CONVEXES)
-            if self.iou(layers) >= target:
-                self.best = layers
+            if self.iou(problem.occupancy(layers)) >= target:
+                self.best, self.dearer = layers, _PRICE_FACTOR**i
                 return "target_reached"
         return "converged"
 
@@ -204,7 +213,9 @@ class TreeSearch:
         if any(layers) and (self.best is None or problem.cost(layers) < problem.cost(self.best)):
             self.best = layers
         tree = self.tree() if self.best else None
-        parts, iou = (tree.primitives, self.iou(self.best)) if tree and self.best else (0, 0.0)
+        parts, iou = 0, 0.0
+        if tree and self.best:
+            parts, iou = tree.primitives, self.iou(problem.occupancy(self.best))
         self.history.append({"stage": stage, "round": round_, "parts": parts, "iou": iou})
         done = 0.1 + 0.3 * round_ / rounds if stage == "select" else 0.4 + 0.6 * round_ / rounds
         done *= 0.3 if self.settings.schedule == "paper" else 1.0
@@ -212,10 +223,10 @@ class TreeSearch:
         self.run.told(Progress(stage, round_, rounds, parts, iou, self.fraction(done), best))
         self.pause()
 
-    def iou(self, layers: selection.Layers) -> float:
-        """IoU over the uniform samples."""
+    def iou(self, occupied: NDArray[np.bool_]) -> float:
+        """Of a side for each sample (N,): IoU over the uniform ones."""
         rest = slice(self.samples.near, self.samples.near + self.samples.uniform)
-        occupied, inside = self.problem().occupancy(layers)[rest], self.samples.inside[rest]
+        occupied, inside = occupied[rest], self.samples.inside[rest]
         return float((occupied & inside).sum() / max((occupied | inside).sum(), 1))
 
     def bounded_tree(self) -> CsgTree:
@@ -223,23 +234,43 @@ class TreeSearch:
         return overlapped(self.tree().closed(*self.box), self.samples)
 
     def final_tree(self) -> CsgTree:
-        """The bounded tree with alike convexes as copies of one, where no demand is left unmet for that."""
-        s = self.settings
-        if not s.symmetry or s.schedule != "search":
+        """The bounded tree with alike convexes as copies of one, where no demand is left unmet for that.
+
+        Raises:
+            CancelledError: cancelled while copies were sought.
+        """
+        if not self.repeats:
             return self.bounded_tree()
         with self.timed("repeat"):
-            whole = self.tree().closed(*self.box)
-            repeated = with_repeated_convexes(whole, self.samples, s.price, s.convex_price)
-        tree = overlapped(repeated, self.samples)
-        too_many = s.max_parts is not None and tree.primitives > s.max_parts
-        too_far = s.min_iou is not None and self.tree_iou(tree) < s.min_iou
-        return self.bounded_tree() if too_many or too_far else tree
+            found = self.tree().closed(*self.box)
+            self.report_repeats(found, 1)
+            copied = self.with_copies(found)
+            self.report_repeats(copied or found, 2)
+        return overlapped(copied, self.samples) if copied else self.bounded_tree()
 
-    def tree_iou(self, tree: CsgTree) -> float:
-        """IoU of a tree over the uniform samples."""
-        rest = slice(self.samples.near, self.samples.near + self.samples.uniform)
-        occupied, inside = tree.occupancy(self.samples.points[rest]), self.samples.inside[rest]
-        return float((occupied & inside).sum() / max((occupied | inside).sum(), 1))
+    def with_copies(self, tree: CsgTree) -> CsgTree | None:
+        """The tree with copies; without further ones where these go beyond a demand, None where all do."""
+        s, factor = self.settings, self.dearer
+        least = 0.0 if s.min_iou is None else min(s.min_iou, self.iou(tree.occupancy(self.samples.points)))
+        for further in (True, False):
+            copied = with_repeated_convexes(
+                tree, self.samples, factor * s.price, factor * s.convex_price, self.pause, further
+            )
+            # Fitting to all places may drop what ended a convex where no sample is.
+            copied = copied.closed(*self.box)
+            if s.max_parts is not None and copied.primitives > s.max_parts:
+                continue
+            if self.iou(copied.occupancy(self.samples.points)) >= least:
+                return copied
+        return None
+
+    def report_repeats(self, tree: CsgTree, round_: int) -> None:
+        """Progress of the search for copies; a tree before it, and after."""
+        iou = self.iou(tree.occupancy(self.samples.points))
+        best = partial(self.assembled, tree) if self.assembled else None
+        done = _SEARCHED if round_ == 1 else 1.0
+        self.run.told(Progress("repeat", round_, 2, tree.primitives, iou, done, best))
+        self.pause()
 
     def tree(self) -> CsgTree:
         if self.tuned is not None:

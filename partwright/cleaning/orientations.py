@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Part
+from partwright.assembly.motion import signed_permutations
 from partwright.assembly.similarity import rotation_matrix
 from partwright.cleaning.acceptance import AcceptanceTest
 from partwright.cleaning.deviation_samples import State
@@ -30,19 +30,8 @@ _ORDERS = range(2, 13)
 _MIRROR = np.diag([1.0, -1.0, 1.0])  # every SuperFrustum is its own mirror image in y
 
 
-def _cube() -> list[Floats]:
-    """The 24 turns of a cube."""
-    turns = []
-    for order in permutations(range(3)):
-        for signs in product((1.0, -1.0), repeat=3):
-            turn = np.zeros((3, 3))
-            turn[order, range(3)] = signs
-            if np.linalg.det(turn) > 0:
-                turns.append(turn)
-    return turns
-
-
-CUBE = _cube()
+CUBE = [matrix.T for matrix in signed_permutations() if np.linalg.det(matrix) > 0]
+"""The 24 turns of a cube."""
 _HALF_TURNS = {
     "box": [np.diag(s) for s in ([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0])],
     "half": [np.diag(s) for s in ([1, 1, 1], [-1, -1, 1.0])],

@@ -9,10 +9,11 @@ import pytest
 import trimesh
 
 from partwright.assembly import Assembly, Part
-from partwright.capri import Settings
+from partwright.capri import Settings, tree_search
 from partwright.capri import quadric_rows as rows
 from partwright.capri.csg_tree import CsgTree
 from partwright.capri.method import Found, found
+from partwright.capri.repeated_convexes import with_repeated_convexes
 from partwright.capri.tree_search import TreeSearch
 from partwright.errors import (
     GridError,
@@ -150,6 +151,107 @@ def test_progress_and_interruption(plate: Shape) -> None:
     fitted = quick(plate, Run(progress=lambda _: cancel.request(), cancel=cancel))
     assert fitted.outcome == "interrupted"
     assert solid(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.1)
+
+
+def test_an_interruption_is_heard_while_copies_are_sought(plate: Shape, monkeypatch) -> None:
+    """After the last step of the search, as it is told, and within."""
+    cancel = Cancellation()
+
+    def stop_then(step: Progress) -> None:
+        if step.stage == "repeat":
+            cancel.request()
+
+    told = quick(plate, Run(progress=stop_then, cancel=cancel))
+    cancel = Cancellation()
+
+    def sought(*given):
+        cancel.request()
+        with_repeated_convexes(*given)
+        pytest.fail("it was not heard")
+
+    monkeypatch.setattr(tree_search, "with_repeated_convexes", sought)
+    within = quick(plate, Run(cancel=cancel))
+    for fitted in (told, within):
+        assert fitted.outcome == "interrupted"
+        assert not fitted.tree.copies
+        assert solid(fitted.assembly).volume == pytest.approx(drilled_plate().volume, rel=0.01)
+
+
+def two_steps() -> trimesh.Trimesh:
+    """A plate with a block on either end."""
+    blocks = [trimesh.creation.box(bounds=[(x, -0.3, 0.1), (x + 0.3, 0.3, 0.6)]) for x in (-0.9, 0.6)]
+    plate = trimesh.creation.box(bounds=[(-1, -0.5, -0.2), (1, 0.5, 0.2)])
+    return trimesh.boolean.union([plate, *blocks])
+
+
+def with_a_speck(tree: CsgTree, *_) -> CsgTree:
+    """More primitives: a small box within what is there."""
+    speck = [rows.plane(s * e, 0.01) for s in (1.0, -1.0) for e in np.eye(3)]
+    count = len(tree.rows)
+    layers = ((*tree.layers[0], tuple(range(count, count + 6))), *tree.layers[1:])
+    return CsgTree(np.concatenate([tree.rows, speck]), np.r_[tree.complement, np.zeros(6, bool)], layers)
+
+
+def with_one_alone(tree: CsgTree, *_) -> CsgTree:
+    """Less like the shape: nothing but its first convex."""
+    return CsgTree(tree.rows, tree.complement, (tree.layers[0][:1], *((),) * (len(tree.layers) - 1)))
+
+
+@pytest.mark.parametrize(
+    ("demand", "spoilt"),
+    [({"max_parts": 18}, with_a_speck), ({"min_iou": 0.95}, with_one_alone)],
+    ids=["budget", "target"],
+)
+def test_copies_that_leave_a_demand_unmet_are_not_taken(monkeypatch, demand, spoilt) -> None:
+    shape = load_shape(two_steps())
+    monkeypatch.setattr(tree_search, "with_repeated_convexes", lambda tree, *_: tree)
+    met = quick(shape, **demand)
+    monkeypatch.setattr(tree_search, "with_repeated_convexes", spoilt)
+    fitted = quick(shape, **demand)
+    assert fitted.tree.convexes == met.tree.convexes == 3
+    points = np.random.default_rng(0).uniform(-1, 1, (5000, 3))
+    np.testing.assert_array_equal(fitted.tree.occupancy(points), met.tree.occupancy(points))
+
+
+def test_what_a_fit_to_all_places_leaves_open_is_closed(monkeypatch) -> None:
+    def without_an_end(tree: CsgTree, *_) -> CsgTree:
+        layers = tuple(tuple(convex[:-1] for convex in layer) for layer in tree.layers)
+        return CsgTree(tree.rows, tree.complement, layers)
+
+    monkeypatch.setattr(tree_search, "with_repeated_convexes", without_an_end)
+    assert np.abs(quick(load_shape(two_steps())).tree.assembly().bounds()).max() < 1
+
+
+def test_where_further_copies_break_a_budget_the_others_stay(monkeypatch) -> None:
+    asked = []
+
+    def sought(tree: CsgTree, samples, price, convex_price, pause, further) -> CsgTree:
+        asked.append(further)
+        if further:
+            return with_a_speck(tree)
+        return with_repeated_convexes(tree, samples, price, convex_price, pause, further)
+
+    monkeypatch.setattr(tree_search, "with_repeated_convexes", sought)
+    fitted = quick(load_shape(two_steps()), max_parts=18)
+    assert asked == [True, False]
+    assert [copy is None for copy in fitted.tree.copies[0]].count(False) == 1
+
+
+def test_copies_are_sought_at_the_price_at_which_a_demand_was_met(monkeypatch) -> None:
+    prices = []
+
+    def sought(tree: CsgTree, samples, price, convex_price, *rest) -> CsgTree:
+        prices.append((price, convex_price))
+        return tree
+
+    monkeypatch.setattr(tree_search, "with_repeated_convexes", sought)
+    shape, own = load_shape(two_steps()), Settings(**FAST)
+    quick(shape, max_parts=8)
+    quick(shape)
+    dearer, plain = prices
+    assert plain == (own.price, own.convex_price)
+    assert dearer[0] / plain[0] == pytest.approx(dearer[1] / plain[1])
+    assert dearer[0] > plain[0]
 
 
 @pytest.mark.parametrize("scale", [1e-5, 1e5])

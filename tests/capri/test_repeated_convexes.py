@@ -14,10 +14,11 @@ from partwright.assembly import load_assembly
 from partwright.assembly.motion import Motion
 from partwright.assembly.similarity import Similarity
 from partwright.capri import quadric_rows as rows
-from partwright.capri.csg_tree import CsgTree
+from partwright.capri.csg_tree import Copy, CsgTree
 from partwright.capri.motions import Face, axes_of, by_faces, moved
 from partwright.capri.overlap import overlapped
-from partwright.capri.repeated_convexes import with_repeated_convexes
+from partwright.capri.repeated_convexes import _Search, with_repeated_convexes
+from partwright.capri.repeated_quadrics import with_repeats
 from partwright.capri.samples import OccupancySamples, draw_samples
 from partwright.meshing import mesh_csg
 from partwright.metrics.complexity import convexes, primitives
@@ -79,6 +80,58 @@ def test_teeth_are_one_convex_and_the_missing_one_is_put_in(gear: tuple[CsgTree,
     wrong = samples.weight[found.occupancy(samples.points) != samples.inside].sum() / samples.volume
     before = samples.weight[tree.occupancy(samples.points) != samples.inside].sum() / samples.volume
     assert wrong < 0.2 * before
+
+
+def test_nothing_is_a_copy_of_itself(gear: tuple[CsgTree, OccupancySamples]) -> None:
+    tree, samples = gear
+    search = _Search(tree, samples, *PRICES, lambda: None, further=True)
+    search.gather(0)
+    motions = [motion for group in search.layers[0] for motion in group.motions]
+    assert len(motions) == TEETH - 1
+    corners = np.eye(3)
+    assert min(np.abs(motion(corners) - corners).max() for motion in motions) > 0.1
+
+
+def test_without_further_ones_copies_are_where_convexes_were(
+    gear: tuple[CsgTree, OccupancySamples],
+) -> None:
+    tree, samples = gear
+    found = with_repeated_convexes(tree, samples, *PRICES, further=False)
+    assert found.convexes == tree.convexes == TEETH
+    assert sum(copy is None for copy in found.copies[0]) == 2
+
+
+def test_copies_end_where_what_they_are_copies_of_ends() -> None:
+    """A wedge that is open upwards and outwards, and its mirror image."""
+    wedge = slab((0.3, -0.3, -0.1), (0.8, 0.4, 0.5))[[1, 3, 4, 5]]
+    image = Motion(mirror=True)
+    open_ = tree_of(wedge, moved(image, wedge))
+    open_ = CsgTree(open_.rows, open_.complement, open_.layers, ((None, Copy(0, image)),))
+    assert not np.isfinite(open_.assembly().bounds()).all()
+    closed = open_.closed((-0.9, -0.4, -0.3), (0.9, 0.4, 0.5))
+    assert closed.copies == open_.copies
+    np.testing.assert_allclose(closed.assembly().bounds(), [(-0.9, -0.3, -0.1), (0.9, 0.4, 0.5)], atol=1e-9)
+    first, copy = (closed.rows[list(convex)] for convex in closed.layers[0])
+    np.testing.assert_allclose(copy, moved(image, first), atol=1e-12)
+    assert len(closed.complement) == len(closed.rows)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_holes_that_are_copies_join_all_that_are_alike(angle: float) -> None:
+    """Turned about an axis of their own direction they are one leaf with a hole that is no copy."""
+    hole = rows.cylinder((0.5, 0.1, 0), (0, 0, 1), 0.1)[None]
+    motion = (
+        Motion(Similarity.turn((0, 0, 1), angle)) if angle else Motion(Similarity(translation=(0, 0.2, 0)))
+    )
+    another = rows.cylinder((-0.5, 0.1, 0), (0, 0, 1), 0.1)[None]
+    block = slab((-0.9, -0.9, -0.3), (0.9, 0.9, 0.3))
+    table = np.concatenate([block, hole, moved(motion, hole), another])
+    layers = (tuple(range(6)),), ((6,), (7,), (8,))
+    copies = (None,), (None, Copy(0, motion), None)
+    tree = CsgTree(table, np.zeros(len(table), dtype=bool), layers, copies)
+    whole = with_repeats(tree.assembly())
+    assert primitives(whole) == 6 + 1
+    assert [len(part.copies) for part in whole.parts][-1] == 3
 
 
 def test_the_assembly_says_them_once_and_is_the_tree(gear: tuple[CsgTree, OccupancySamples]) -> None:
