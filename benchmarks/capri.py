@@ -42,8 +42,7 @@ POINTS = 8192  # section 4.3
 
 NOTES = (  # what the present table is made of; to be taken out when all of its rows are run anew
     "Row mesh: run after convexes alike became copies of one; beside ablations, run before, the defaults",
-    "have copies that those lack. Its search, and what follows that, were run and timed apart, and beside",
-    "other work, so that its seconds are too high.",
+    "have copies that those lack, and its seconds are not to be compared with theirs.",
 )
 
 

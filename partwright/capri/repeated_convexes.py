@@ -21,7 +21,7 @@ from partwright.capri.fitted_copies import FittedCopies, error_reduction
 from partwright.capri.motions import Face, axes_of, by_faces, by_middles, moved
 from partwright.capri.samples import OccupancySamples
 
-_CAUTION = 0.4  # of the prices that count: a copy in the place of a convex is surely seen, if not alike
+_CAUTION = 0.4  # share of the prices that counts: at all of them what differs would become copies
 _COARSE = 6  # one sample of so many tells first which motion is best
 _BY_FACES = 12  # motions between two convexes that are tried, those with most faces in common first
 _SLACK = np.radians(np.linspace(-2.0, 2.0, 9))  # turns about an axis that are tried beside the middles' angle
