@@ -4,7 +4,9 @@
     python benchmarks/partsdf.py reconstruct --family FOLDER --model MODEL [--config CONFIG] [--shapes N]
     python benchmarks/partsdf.py encode --family FOLDER --model MODEL [--shapes N]
     python benchmarks/partsdf.py images --family FOLDER --model MODEL [--shapes N] [--views N]
+    python benchmarks/partsdf.py nothing [--model MODEL]
     python benchmarks/partsdf.py scans --family FOLDER --model MODEL [--shapes N] [--surface]
+    python benchmarks/partsdf.py unseen [--models A:N,B:N]
     python benchmarks/partsdf.py familiarity --shapes-from FOLDER [--names A,B] [--shapes N] [--others N]
     python benchmarks/partsdf.py shortlist --families FOLDER [--names A,B] [--shapes N]
     python benchmarks/partsdf.py real --shapes-from FOLDER
@@ -18,6 +20,8 @@
 `reconstruct` with CONFIG also trains the same on all parts as one ("1P"), in --work, for a row of its own.
 `encode` has held-out shapes from points by the model's encoder, `images` from one render each by its image
 encoder, `scans` from few points, noise and missing halves, `generate` new ones against held-out ones.
+`nothing` says who is told that a picture shows no shape, `unseen` which parts come back that half a scan does
+not show; both take minutes, and need but the models that ship.
 `soundness` says how many of these come apart, and what it costs to make them anew.
 `real` finds real chairs and vehicles by models of made ones. `familiarity` shows every model that ships
 new shapes of its own family and of the others, and real ones: who is warned of. `shortlist` says
@@ -43,10 +47,10 @@ from partsdf_decoders import decoders
 from partsdf_encoder import encoding
 from partsdf_familiarity import strangers
 from partsdf_generation import generation
-from partsdf_images import imaging
+from partsdf_images import imaging, pictures_of_nothing
 from partsdf_real import reality
 from partsdf_reconstruct import reconstruction, robots
-from partsdf_scans import scanning
+from partsdf_scans import halving, scanning
 from partsdf_shortlist import shortlisting
 from partsdf_soundness import sounding
 from partsdf_speed import speed
@@ -100,6 +104,9 @@ def main() -> None:
     one.add_argument("--family", required=True, help="beside those whose pictures are of something else")
     one.add_argument("--model", required=True)
     one.add_argument("--views", type=int, default=3, help="pictures of each shape")
+    command("nothing", pictures_of_nothing).add_argument("--model", default="chairs")
+    one = command("unseen", halving)
+    one.add_argument("--models", default="chairs:40,vehicles:12", help="and how many shapes of each")
     one = measuring("scans", scanning)
     one.add_argument("--family", required=True)
     one.add_argument("--model", required=True)

@@ -1,16 +1,19 @@
-"""Held-out shapes from one picture each: what the image encoder sees, beside what needs no picture at all."""
+"""Held-out shapes from one picture each: what the image encoder sees, beside what needs no picture at all;
+and who is told that a picture shows nothing of the family."""
 
 from __future__ import annotations
 
 import argparse
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import torch
 import trimesh
 from partsdf_scores import command_line, scale_of, score, write
 
+from partwright.datasets import family as made_family
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import EmptyShapeError
 from partwright.metrics.reconstruction import ReconstructionScores, mean_scores, reconstruction_scores
@@ -20,7 +23,7 @@ from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.photos import Looked, Photo, look_at
-from partwright.partsdf.standpoint import find_standpoint
+from partwright.partsdf.standpoint import Standpoint, find_standpoint
 from partwright.partsdf.starts import nearest_trained
 from partwright.partsdf.targets import Target
 from partwright.render import Camera, render_mesh
@@ -122,13 +125,16 @@ def outlines(seen: list[Looked | None]) -> tuple[np.ndarray, np.ndarray]:
             ious.append(0.0)
             told.append(True)
             continue
-        sight, surface = one.sight, mesh_shape(one.sight.shape, OUTLINED, parts=False).whole
-        found = find_standpoint(
-            surface.vertices, surface.faces, one.silhouette, sight.azimuth, sight.elevation
-        )
+        found = standpoint_of(one)
         ious.append(found.iou)
         told.append(bool(warnings_of("", one, found)))
     return np.array(ious), np.array(told)
+
+
+def standpoint_of(one: Looked) -> Standpoint:
+    """Where what was seen is seen from, by a coarse mesh of it."""
+    sight, surface = one.sight, mesh_shape(one.sight.shape, OUTLINED, parts=False).whole
+    return find_standpoint(surface.vertices, surface.faces, one.silhouette, sight.azimuth, sight.elevation)
 
 
 def nearest(model: Model, shape: PreparedShape) -> NeuralShape:
@@ -165,3 +171,62 @@ def _before(image: np.ndarray, mesh: trimesh.Trimesh, camera: Camera, seed: int)
             where = abs((x - centre[0]) * way[0] + (y - centre[1]) * way[1]) < 0.08
         behind[where] = rng.random(3)
     return np.where(there, image, 0.4 * behind + 0.3).astype(np.float32)
+
+
+SIZES, SEEDS = (32, 64, 96, 128, 200), range(6)  # of pictures of nothing
+NEW = 99  # seed of shapes that no model was trained on
+VIEWS = 3
+
+
+def pictures_of_nothing(arguments: argparse.Namespace) -> None:
+    """How many pictures of noise are refused and warned of, and how many of what is there."""
+    model = load_model(arguments.model)
+    encoder = needed_encoder(model)
+    lines = [
+        f"# PartSDF: pictures in which there is nothing for {model.name}", "",
+        f"Noise: each pixel of its own, of {', '.join(map(str, SIZES))} pixels a side, {len(SEEDS)} seeds; "
+        f"squares: of 8 x 8 pixels. Shapes: made with seed {NEW}, {VIEWS} renders each from random sides, "
+        "two with shadows. Refused: no shape is seen. Warned of: one line that this may be no picture of the "
+        "family; without the mirror: by the other signs alone.", "",
+        command_line(), "",
+        "| | pictures | refused | warned of | without the mirror |", "|---|---|---|---|---|",
+    ]  # fmt: skip
+    kinds = {
+        "noise, coloured": [noise(seed, n, 1, 3) for n in SIZES for seed in SEEDS],
+        "noise, grey": [noise(seed, n, 1, 1) for n in SIZES for seed in SEEDS],
+        "squares, coloured": [noise(seed, n, 8, 3) for n in SIZES for seed in SEEDS],
+        "one grey": [noise(seed, n, n, 1) for n in SIZES for seed in SEEDS],
+        **{name: list(new_pictures(name, count)) for name, count in (("chairs", 16), ("vehicles", 6))},
+    }
+    for label, photos in kinds.items():
+        refused = told = plainly = 0
+        for photo in photos:
+            one = seen_in(encoder, photo)
+            if one is None:
+                refused += 1
+                continue
+            found = standpoint_of(one)
+            told += bool(warnings_of("", one, found))
+            plainly += bool(warnings_of("", replace(one, mirrored=1.0), found))
+        lines.append(f"| {label} | {len(photos)} | {refused} | {told} | {plainly} |")
+        print(lines[-1], flush=True)
+    write(f"images-of-nothing-{model.name}", lines)
+
+
+def noise(seed: int, side: int, square: int, channels: int) -> Photo:
+    """Squares of random colours, or greys, side by side."""
+    levels = np.random.default_rng(seed).random((side // square, side // square, channels))
+    pixels = np.kron(np.repeat(levels, 3 // channels, axis=2), np.ones((square, square, 1)))
+    return Photo(pixels.astype(np.float32), None)
+
+
+def new_pictures(name: str, count: int) -> Iterator[Photo]:
+    rng = np.random.default_rng(0)
+    for shape in made_family(name, count, seed=NEW):
+        mesh = shape.whole.copy()
+        mesh.apply_translation(-mesh.bounds.mean(axis=0))
+        mesh.apply_scale(1.8 / mesh.extents.max())
+        for view in range(VIEWS):
+            camera = Camera(rng.uniform(0, 360), rng.uniform(5, 40))
+            image = render_mesh(mesh, camera, (PIXELS, PIXELS), ground=view % 2 == 0)
+            yield Photo(image.astype(np.float32) / 255, None)

@@ -1,20 +1,25 @@
-"""Held-out shapes from points as scanners give them: few and many, with noise, with a side missing."""
+"""Held-out shapes from points as scanners give them: few and many, with noise, with a side missing; and what
+comes back of parts that half a scan does not show."""
 
 from __future__ import annotations
 
 import argparse
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from unittest.mock import patch
 
 import numpy as np
+import torch
 from partsdf_encoder import NEAR
 from partsdf_scores import command_line, scale_of, write
 
 import partwright as pw
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import PartwrightError
+from partwright.partsdf import unseen
 from partwright.partsdf.encoder import load_encoder
-from partwright.partsdf.model import load_model
+from partwright.partsdf.meshing import mesh_shape
+from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct_unknown
 from partwright.partsdf.targets import Target
@@ -107,3 +112,64 @@ def scores(found: NeuralShape, seen: Shape, shape: PreparedShape) -> tuple[float
         parts = [occupancy_iou(owner[rows] == p, label[rows] == p) for p in np.flatnonzero(shape.present)]
         result += [occupancy_iou(inside[rows], true[rows]), float(np.mean(parts))]
     return tuple(result)
+
+
+SCANNED, SAMPLES = 4096, 8000  # points of a whole shape; samples of a target
+SHOWN = 20  # points of a part, at least, with which it counts as seen
+STRIDE = 13  # between the training shapes that are taken
+
+
+def halving(arguments: argparse.Namespace) -> None:
+    """How many parts that half a scan does not show come back, where the rest lies as it should."""
+    lines = [
+        "# PartSDF: parts that half a scan does not show", "",
+        f"Training shapes of the models that ship, every {STRIDE}th; what is not seen is told by the other "
+        f"ones. {SCANNED:,} points of each, the half on one side of a plane of random direction; parts with "
+        f"less than {SHOWN} of these are lost, the others lie as the shape has them. Back: lost ones that "
+        "are added; wrong: added ones that the shape has not. Without a plane: where it is not looked for "
+        "where a scan ends.", "",
+        command_line(), "",
+        "| | shapes | lost | back | wrong | back, without a plane | wrong, without a plane |",
+        "|---|---|---|---|---|---|---|",
+    ]  # fmt: skip
+    for wanted in arguments.models.split(","):
+        name, count = wanted.split(":")
+        model, counts = load_model(name), np.zeros(5, int)
+        for number in range(int(count)):
+            counts += half_found(model, (STRIDE * number + 5) % len(model.shapes), number)
+        lines.append(f"| {name} | {count} | {' | '.join(map(str, counts))} |")
+        print(lines[-1], flush=True)
+    write("unseen", lines)
+
+
+def half_found(model: Model, index: int, seed: int) -> np.ndarray:
+    """Parts lost, back, wrong, and these two without a plane (5,), of a training shape."""
+    whole = NeuralShape.trained(model, str(index))
+    surface = mesh_shape(whole, 64, parts=False).whole
+    points = np.asarray(sample_triangles(surface.vertices, surface.faces, SCANNED, 0)[0])
+    along = points @ np.random.default_rng(seed).standard_normal(3)
+    kept = points[along > np.median(along)]
+    nearest = np.abs(whole.part_distances(kept.astype(np.float32))).argmin(axis=0)
+    shown = np.bincount(nearest, minlength=int(whole.present.sum())) >= SHOWN
+    lost = whole.present.clone()
+    lost[whole.present] = torch.from_numpy(~shown)
+    seen = replace(whole, model=without(model, index), present=whole.present & ~lost)
+    target = Target.of_points(kept, SAMPLES)
+    counts = [int(lost.sum())]
+    for least in (unseen._PLANE, np.inf):  # none tells places apart so well
+        with patch.object(unseen, "_PLANE", least):
+            found = unseen.with_unseen(seen, target).present
+        counts += [int((found & lost).sum()), int((found & ~whole.present).sum())]
+    return np.array(counts)
+
+
+def without(model: Model, index: int) -> Model:
+    """As if it had not been trained on that shape, as far as what it knows of its shapes goes."""
+    others = torch.arange(len(model.shapes)) != index
+    return replace(
+        model,
+        latents=model.latents[others],
+        poses=model.poses.map(lambda t: t[others]),
+        present=model.present[others],
+        shapes=tuple(np.array(model.shapes)[others.numpy()].tolist()),
+    )

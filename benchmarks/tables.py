@@ -75,6 +75,8 @@ TABLES = (
     Table("partsdf-images-chairs.md", "partsdf.py", None, 0,
           "images --family families/chairs --model chairs --shapes 6 --views 2 --resolution 96 "
           "--threads 1", 5, "families/"),
+    Table("partsdf-images-of-nothing-chairs.md", "partsdf.py", None, 0, "nothing --threads 1", 4),
+    Table("partsdf-unseen.md", "partsdf.py", None, 0, "unseen --threads 1", 2),
     Table("partsdf-scans-mixers.md", "partsdf.py", None, 0,
           "scans --family families/mixers --model mixers --shapes 3 --iterations 200 --threads 1", 3,
           "families/"),

@@ -48,7 +48,7 @@ class Looked:
     silhouette: np.ndarray
     mirrored: float
     """IoU of the silhouette that the encoder sees with the one that it sees in the mirror image: near 1 where
-    there is something to be seen, less where it sees faces in the clouds."""
+    the picture shows something, less where it shows nothing, of which the encoder makes a shape anyway."""
 
 
 def read_photo(path: str | Path) -> Photo:

@@ -115,11 +115,12 @@ def _beside_points(shape: NeuralShape, seen: Tensor, parts: Tensor, target: Targ
 
 
 def _side(places: np.ndarray, covered: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Where a scan ends at a plane: above 0 for places (N, 3) on its side, below 0 beyond; else 1 everywhere.
+    """Where a scan ends at a plane: of places (M, 3), above 0 on the scan's side, below 0 beyond (M,); else
+    1 everywhere.
 
-    The plane is that which tells `places` on the seen parts' surface that are covered (V,) from others, by
-    least squares with as much weight for either kind. A leg that stands out of a scanned seat into
-    what was not scanned is nearest to the seat, and yet no point shows that it is not there.
+    The plane is that which best tells which of the `places` (N, 3) on the seen parts' surface are `covered`
+    (N,) by points, by least squares with as much weight for either kind. A leg that stands out of a scanned
+    seat into what was not scanned is nearest to the seat, and yet no point shows that it is not there.
     """
     ones = np.ones((len(places), 1))
     weight = np.where(covered, 0.5 / max(covered.sum(), 1), 0.5 / max((~covered).sum(), 1))
