@@ -6,8 +6,9 @@ A part is compared with the same part of the other shapes, by medians, which a f
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum, auto
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from partwright.atomic_io import write_bytes
 from partwright.datasets.family_names import FEWEST, USUAL, copied_names, missing, rare_parts
-from partwright.datasets.poses import mean_rotation
+from partwright.datasets.poses import Poses, mean_rotation
 from partwright.datasets.prepared import PreparedFamily, PreparedShape, read_about
 from partwright.datasets.preparing import Refused
 from partwright.shapes.topology import components, doubled_areas
@@ -24,14 +25,20 @@ LEFT_OUT, ODD = "left out", "look at it"
 FEW = 20  # shapes: with fewer a model knows these and little else
 _SPREADS = 4.0  # times the usual spread
 _LARGER, _AWAY, _TURNED = 1.6, 0.25, np.radians(50)  # at least: a factor, unit lengths, an angle
-_UNITS = 8.0  # times as small, from which units are suspected: of cm among mm 10, of mm among inches 25
+_UNITS = 6.0  # times as small along all axes: of mm among cm it is 10, less as shapes differ
 _CRUMB = 0.02  # share of a part's area that a piece of it has at least
 
 Array = NDArray[np.float64]
 
 
+class _Kind(Enum):
+    SHRUNK = auto()  # along all axes, as by another length unit
+    ELSEWHERE = auto()  # or turned
+    OTHER = auto()
+
+
 @dataclass(frozen=True)
-class Oddity:
+class _Oddity:
     """Of a part of a shape. text: what is the matter, with {is}, {lies} and {value} to be filled in; where
     it has {parts}, all of the line; value: a number that it is odd by, as it is `written`."""
 
@@ -39,6 +46,7 @@ class Oddity:
     text: str
     value: float = 0.0
     written: str = "{}"
+    kind: _Kind = _Kind.OTHER
 
 
 @dataclass(frozen=True)
@@ -65,40 +73,11 @@ def check_family(family: PreparedFamily, refused: Iterable[Refused] = ()) -> lis
     shapes = [family.load(i) for i in range(len(family))]
     names = [shape.name for shape in shapes]
     present = np.array([shape.present.astype(bool) for shape in shapes])
-    pieces = np.array([_pieces(shape, len(family.parts)) for shape in shapes])
     found += [Finding("", ODD, text) for text in rare_parts(family.parts, names, present)]
-    odd: list[list[Oddity]] = [[] for _ in shapes]
-    notes = [_surface(family, i) for i in range(len(shapes))]
-    away = np.zeros(len(shapes), dtype=int)
-    for p, part in enumerate(family.parts):
-        has = np.flatnonzero(present[:, p]).tolist()
-        for i, text in missing(family.parts, present, p):
-            odd[i].append(Oddity(part, text))
-        if len(has) < FEWEST:
-            continue
-        for i, count, usual in _unusual(pieces[has, p]):
-            word = "pieces" if count != 1 else "piece"
-            odd[has[i]].append(Oddity(part, f"{{is}} in {count} {word}, in most shapes in {usual}"))
-        for i, larger, factor in _sizes(np.stack([shapes[i].scale[p] for i in has]).astype(np.float64)):
-            text = f"{{is}} {{value}} times as {'large' if larger else 'small'} as usual"
-            odd[has[i]].append(Oddity(part, text, factor, "{:.1f}"))
-        placed = _places(np.stack([shapes[i].translation[p] for i in has]).astype(np.float64))
-        for i, far in placed:
-            text = "{lies} {value} of 1.8 from the usual place"
-            odd[has[i]].append(Oddity(part, text, far, "{:.2f}"))
-        turned = _turns(np.stack([shapes[i].rotation[p] for i in has]).astype(np.float64))
-        for i, degrees in turned:
-            text = "{is} turned by {value} degrees against the others"
-            odd[has[i]].append(Oddity(part, text, degrees, "{:.0f}"))
-        away[[has[i] for i in {i for i, _ in placed + turned}]] += 1
-    for i, name in enumerate(names):
-        told = copied_names(family.parts, present, i) + notes[i] + in_lines(odd[i])
-        if shrunk := sum("times as small" in one.text and one.value > _UNITS for one in odd[i]):
-            if shrunk > max(1, present[i].sum() / 2):
-                told.insert(0, "most parts are much too small for it: others may be in another length unit")
-        elif away[i] > max(1, present[i].sum() / 2):
-            told.insert(0, "most parts lie elsewhere: it may stand otherwise than the others")
-        found += [Finding(name, ODD, text) for text in told]
+    for i, odd in enumerate(_oddities(family.parts, shapes, present)):
+        told = _of_most(odd, int(present[i].sum())) + copied_names(family.parts, present, i)
+        told += _surface(family, i) + _in_lines(odd)
+        found += [Finding(names[i], ODD, text) for text in told]
     return found
 
 
@@ -113,9 +92,65 @@ def write_check(path: str | Path, family: PreparedFamily, findings: Sequence[Fin
     write_bytes(path, ("\n".join(lines) + "\n").encode())
 
 
-def in_lines(odd: Sequence[Oddity]) -> list[str]:
+def _oddities(
+    parts: Sequence[str], shapes: Sequence[PreparedShape], present: NDArray[np.bool_]
+) -> list[list[_Oddity]]:
+    """Of each shape, part by part. present (S, P): which parts they have."""
+    odd: list[list[_Oddity]] = [[] for _ in shapes]
+    pieces = np.array([_pieces(shape, len(parts)) for shape in shapes])
+    for p, part in enumerate(parts):
+        for i, text in missing(parts, present, p):
+            odd[i].append(_Oddity(part, text))
+        has = np.flatnonzero(present[:, p]).tolist()
+        if len(has) < FEWEST:
+            continue
+        poses = [shapes[i].poses for i in has]
+        for row, one in [*_in_pieces(part, pieces[has, p]), *_by_pose(part, p, poses)]:
+            odd[has[row]].append(one)
+    return odd
+
+
+def _in_pieces(part: str, counts: NDArray[np.int64]) -> Iterator[tuple[int, _Oddity]]:
+    for row, count, usual in _unusual(counts):
+        word = "pieces" if count != 1 else "piece"
+        yield row, _Oddity(part, f"{{is}} in {count} {word}, in most shapes in {usual}")
+
+
+def _by_pose(part: str, number: int, poses: Sequence[Poses]) -> Iterator[tuple[int, _Oddity]]:
+    """number: of the part; poses: of each shape that has it."""
+
+    def rows(name: str) -> Array:
+        return np.stack([getattr(one, name)[number] for one in poses]).astype(np.float64)
+
+    for row, larger, factor, kind in _sizes(rows("scale")):
+        text = f"{{is}} {{value}} times as {'large' if larger else 'small'} as usual"
+        yield row, _Oddity(part, text, factor, "{:.1f}", kind)
+    for row, far in _places(rows("translation")):
+        text = "{lies} {value} of 1.8 from the usual place"
+        yield row, _Oddity(part, text, far, "{:.2f}", _Kind.ELSEWHERE)
+    for row, degrees in _turns(rows("rotation")):
+        text = "{is} turned by {value} degrees against the others"
+        yield row, _Oddity(part, text, degrees, "{:.0f}", _Kind.ELSEWHERE)
+
+
+def _of_most(odd: Sequence[_Oddity], parts: int) -> list[str]:
+    """A line on what is the matter with more than half of a shape's parts, and so with the shape."""
+    half = max(1, parts / 2)
+
+    def many(kind: _Kind) -> bool:
+        return len({one.part for one in odd if one.kind is kind}) > half
+
+    if many(_Kind.SHRUNK):
+        return ["most of its parts are many times too small against the rest: they may be in another length "
+                "unit"]  # fmt: skip
+    if many(_Kind.ELSEWHERE):
+        return ["most parts lie elsewhere: it may stand otherwise than the others"]
+    return []
+
+
+def _in_lines(odd: Sequence[_Oddity]) -> list[str]:
     """One line for all parts of a shape that the same is the matter with."""
-    alike: dict[str, list[Oddity]] = {}
+    alike: dict[str, list[_Oddity]] = {}
     for one in odd:
         alike.setdefault(one.text, []).append(one)
     lines = []
@@ -168,16 +203,18 @@ def _unusual(counts: NDArray[np.int64]) -> list[tuple[int, int, int]]:
     return [(i, int(n), usual) for i, n in enumerate(counts) if n != usual]
 
 
-def _sizes(scale: Array) -> list[tuple[int, bool, float]]:
-    """Rows of half-lengths (N, 3) that are far from usual along some axis; whether larger, and how many
-    times."""
+def _sizes(scale: Array) -> list[tuple[int, bool, float, _Kind]]:
+    """Rows of half-lengths (N, 3) that are far from usual along some axis; whether larger, how many times,
+    and SHRUNK where it is much smaller along all axes."""
     logs = np.log(scale)
     off = logs - np.median(logs, axis=0)
     beyond = np.abs(off) > np.maximum(np.log(_LARGER), _SPREADS * _spread(np.abs(off)))
+    shrunk = (off < -np.log(_UNITS)).all(axis=1)
     found = []
     for i in np.flatnonzero(beyond.any(axis=1)).tolist():
         axis = np.abs(off[i]).argmax()
-        found.append((i, bool(off[i, axis] > 0), float(np.exp(np.abs(off[i, axis])))))
+        kind = _Kind.SHRUNK if shrunk[i] else _Kind.OTHER
+        found.append((i, bool(off[i, axis] > 0), float(np.exp(np.abs(off[i, axis]))), kind))
     return found
 
 

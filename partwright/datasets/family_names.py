@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 FEWEST = 4  # shapes that tell what is usual
 USUAL = 0.8  # share of shapes that have something, above which one without it is odd
-_SOME = 3  # names that a line names
 _COPY = re.compile(r"(?P<name>.+?)[._ -]?\d+")  # leg.001 of Blender, leg_1 of readers, leg2 of people
 
 Mask = NDArray[np.bool_]

@@ -7,7 +7,7 @@ a folder of part meshes with perhaps the whole as `_whole`, or a mesh with `FILE
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -25,6 +25,12 @@ from partwright.shapes.source import Piece
 from partwright.shapes.step_process import STEP_SUFFIXES
 
 WHOLE = "_whole"
+# Of programs that people model with. What is not listed may be anything: textures, notes.
+_UNREAD = (
+    ".3dm", ".3ds", ".abc", ".blend", ".brep", ".c4d", ".dae", ".f3d", ".fbx", ".fcstd", ".iges", ".igs",
+    ".ipt", ".ma", ".max", ".mb", ".skp", ".sldprt", ".usd", ".usda", ".usdc", ".usdz", ".wrl", ".x3d",
+)  # fmt: skip
+_NAMED = 5  # files, in a line
 
 
 @dataclass(frozen=True)
@@ -166,14 +172,29 @@ def find_shapes(folder: str | Path) -> list[PartedSource]:
         raise FamilyError(f"{folder}: no such folder; give a folder of shapes, or the name of a family")
     found = sorted(_sources(folder), key=lambda source: source.name)
     if not found:
+        others = "; ".join(" ".join(told) for told in unread_files(folder, ()))
         raise FamilyError(
             f"{folder}: holds no shapes; expected scenes with named nodes, a folder of part meshes a shape, "
-            "or meshes with FILE.labels.json"
+            f"or meshes with FILE.labels.json{'; ' if others else ''}{others}"
         )
     for first, second in pairwise(found):
         if first.name == second.name:
             raise FamilyError(f"{folder}: two shapes are called {first.name!r}; rename one of them")
     return found
+
+
+def unread_files(folder: Path, names: Collection[str]) -> list[tuple[str, str]]:
+    """Files of formats that nothing here reads, all in one line: which they are, and what to do; nothing
+    where there are none. names: of shapes that are read; a file called so is where one came from."""
+    unread = sorted(
+        entry.name
+        for entry in folder.iterdir()
+        if entry.suffix.lower() in _UNREAD and entry.stem not in names
+    )
+    if not unread:
+        return []
+    rest = f" and {len(unread) - _NAMED} more" if len(unread) > _NAMED else ""
+    return [(", ".join(unread[:_NAMED]) + rest, "of a format that is not read; export as GLB or STEP")]
 
 
 def _sources(folder: Path) -> Iterator[PartedSource]:

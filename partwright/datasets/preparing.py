@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from partwright.atomic_io import check_folder
 from partwright.datasets.agreement import agreed
 from partwright.datasets.families.recipes import FAMILIES
-from partwright.datasets.inputs import MadeShape, PartedSource, find_shapes
+from partwright.datasets.inputs import MadeShape, PartedSource, find_shapes, unread_files
 from partwright.datasets.labelling import label_surface, sample
 from partwright.datasets.poses import Poses, average_poses
 from partwright.datasets.prepared import (
@@ -47,7 +48,7 @@ _REVISION = 1  # of what a shape's file holds: another number prepares it again
 
 @dataclass(frozen=True)
 class Refused:
-    """A shape that was left out, and why."""
+    """A shape that was left out, and why; or some files, by their names in one line."""
 
     name: str
     reason: str
@@ -106,8 +107,7 @@ def prepare(
     if samples < FEWEST_SAMPLES:
         raise SettingError(f"{samples} samples a shape were asked for; expected {FEWEST_SAMPLES} or more")
     output = Path(output)
-    name, sources = _sources(source, count, seed)
-    refused: list[Refused] = []
+    name, sources, refused = _sources(source, count, seed)
     sources, names = _with_parts(sources, tuple(parts), refused)
     _check_enough(name, sources, refused)
     unknown = sorted(set(held_out) - {s.name for s in sources})
@@ -127,6 +127,11 @@ def prepare(
     return Preparation(family, tuple(sorted(refused, key=lambda r: r.name)))
 
 
+def reasons_of(refused: Sequence[Refused]) -> str:
+    """To end a message with: why each shape was left out, or ""."""
+    return "".join(f"; {shape.name} was refused: {shape.reason}" for shape in refused)
+
+
 def splits(names: Sequence[str], held_out: Sequence[str], seed: int) -> dict[str, str]:
     """The split of each name; without `held_out` by the order of their hashes, however they come."""
     if held_out:
@@ -137,18 +142,20 @@ def splits(names: Sequence[str], held_out: Sequence[str], seed: int) -> dict[str
     return {name: SPLITS[number] for name, number in zip(ranked, numbers, strict=True)}
 
 
-def _sources(source: str | Path, count: int, seed: int) -> tuple[str, list[PartedSource]]:
-    """A family's name and shapes."""
+def _sources(source: str | Path, count: int, seed: int) -> tuple[str, list[PartedSource], list[Refused]]:
+    """A family's name and shapes, and files that are none that is read."""
     if str(source) in FAMILIES:
         if count < 1:
             raise SettingError(f"{count} shapes of {source} were asked for; expected 2 or more")
-        return str(source), [MadeShape(str(source), seed, number) for number in range(count)]
+        return str(source), [MadeShape(str(source), seed, number) for number in range(count)], []
     folder = Path(source)
     if not folder.is_dir():
         raise FamilyError(
             f"{source}: neither a folder nor one of {', '.join(FAMILIES)}; give a folder of shapes, or a name"
         )
-    return folder.absolute().name, find_shapes(folder)
+    found = find_shapes(folder)
+    unread = [Refused(*told) for told in unread_files(folder, {shape.name for shape in found})]
+    return folder.absolute().name, found, unread
 
 
 def _with_parts(
@@ -163,12 +170,11 @@ def _with_parts(
         except PartwrightError as error:
             refused.append(Refused(source.name, str(error)))
     if any(len(names) > 1 for names in told.values()):
-        unnamed = [source for source in kept if told[source.name] == (source.name,)]
-        kept = [source for source in kept if source not in unnamed]
-        for source in unnamed:  # readers call a piece without a name after its file: no other shape's part
-            del told[source.name]
+        for name in _unnamed(told):
+            del told[name]
             why = "is one piece without a name; name its nodes, or put FILE.labels.json beside it"
-            refused.append(Refused(source.name, why))
+            refused.append(Refused(name, why))
+        kept = [source for source in kept if source.name in told]
     seen = dict.fromkeys(name for names in told.values() for name in names)
     missing = [part for part in parts if part not in seen]
     if missing:
@@ -181,6 +187,13 @@ def _with_parts(
     if len(names) > MOST_PARTS:
         raise FamilyError(f"{len(names)} different part names; at most {MOST_PARTS} can be told apart")
     return kept, names
+
+
+def _unnamed(told: Mapping[str, tuple[str, ...]]) -> set[str]:
+    """Shapes of one piece that a reader called after its file, for want of a name: no other shape has such a
+    part. told: the names of each shape's parts."""
+    holders = Counter(name for names in told.values() for name in set(names))
+    return {shape for shape, names in told.items() if names == (shape,) and holders[shape] == 1}
 
 
 def _check_names(told: Mapping[str, tuple[str, ...]], names: tuple[str, ...]) -> None:
@@ -207,9 +220,8 @@ def _check_names(told: Mapping[str, tuple[str, ...]], names: tuple[str, ...]) ->
 
 def _check_enough(name: str, sources: Sequence[PartedSource], refused: Sequence[Refused]) -> None:
     if len(sources) < 2:
-        why = "".join(f"; {shape.name} was refused: {shape.reason}" for shape in refused)
         usable = "1 usable shape" if len(sources) == 1 else f"{len(sources)} usable shapes"
-        raise FamilyError(f"{name}: {usable}; a family needs at least two{why}")
+        raise FamilyError(f"{name}: {usable}; a family needs at least two{reasons_of(refused)}")
 
 
 def _start(output: Path) -> None:

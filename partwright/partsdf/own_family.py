@@ -12,7 +12,7 @@ from pathlib import Path
 from partwright.atomic_io import check_folder
 from partwright.datasets.family_check import Finding, check_family, write_check
 from partwright.datasets.prepared import PreparedFamily
-from partwright.datasets.preparing import PreparationProgress, prepare
+from partwright.datasets.preparing import PreparationProgress, prepare, reasons_of
 from partwright.errors import FamilyError, SettingError
 from partwright.partsdf.config import Config, DecoderSettings, LossSettings, TrainingSettings, write_config
 from partwright.partsdf.live import LivePicture
@@ -81,13 +81,13 @@ def learn_family(
             f"{source}: every shape is one part, {family.parts[0]!r}; name the nodes of each file after its "
             "parts, or put FILE.labels.json beside it"
         )
+    findings = check_family(family, made.refused)
+    write_check(output / CHECK, family, findings)
     if len(family) < _LEAST:
         raise FamilyError(
             f"{source}: {len(family)} usable shapes, of which one is kept to test with; learning takes "
-            f"{_LEAST} or more, and twenty are a start"
+            f"{_LEAST} or more, and twenty are a start{reasons_of(made.refused)}"
         )
-    findings = check_family(family, made.refused)
-    write_check(output / CHECK, family, findings)
     config = settings_for(family, name, steps, seed, threads)
     each = seconds_a_step(config)
     # Refuses what was begun with other settings, before these are written.

@@ -69,7 +69,7 @@ def test_each_odd_shape_is_told_by_part_and_number(plain: list[PreparedShape], t
     ]
     assert any(f.shape == "lamp03" and f.text.startswith("knob lies 0.5") for f in findings)
     told = [f.text for f in findings if f.shape == "lamp06"]
-    assert told[0] == "most parts lie elsewhere: it may stand otherwise than the others"
+    assert told[0] == STANDS
     assert told[1:] == ["plate, ball, knob lie 0.90 to 0.91 of 1.8 from the usual place"]
     assert {f.shape for f in findings} == {"lamp99", *(f"lamp0{i}" for i in range(1, 7))}
     assert [f.severity for f in findings] == [LEFT_OUT] + [ODD] * (len(findings) - 1)
@@ -98,9 +98,40 @@ def test_what_several_parts_have_in_common_is_one_line(plain: list[PreparedShape
     assert [(f.shape, f.text) for f in check_family(family_of(tmp_path, shapes))] == [
         ("lamp01", "no ball, knob, which 19 of 20 shapes have"),
         ("lamp02", "ball, knob are 2.0 to 3.0 times as large as usual"),
-        ("lamp03", "most parts are much too small for it: others may be in another length unit"),
+        (
+            "lamp03",
+            "most of its parts are many times too small against the rest: they may be in another length unit",
+        ),
         ("lamp03", "ball, knob are 99.2 to 100.8 times as small as usual"),
     ]
+
+
+STANDS = "most parts lie elsewhere: it may stand otherwise than the others"
+
+
+def test_a_small_part_does_not_hide_that_the_shape_stands_otherwise(
+    plain: list[PreparedShape], tmp_path: Path
+) -> None:
+    shapes = list(plain)
+    for p in range(3):
+        away = shapes[1].translation[p] + np.array([0, 0, 0.9], np.float32)
+        shapes[1] = with_pose(shapes[1], p, translation=away)
+    shapes[1] = with_pose(shapes[1], 2, scale=0.05 * np.median([s.scale[2] for s in plain], axis=0))
+    told = [f.text for f in check_family(family_of(tmp_path, shapes))]
+    assert told == [
+        STANDS,
+        "plate, ball, knob lie 0.86 to 0.97 of 1.8 from the usual place",
+        "knob is 20.0 times as small as usual",
+    ]
+
+
+def test_thin_parts_are_not_in_another_unit(plain: list[PreparedShape], tmp_path: Path) -> None:
+    shapes = list(plain)
+    for p in (1, 2):
+        usual = np.median([s.scale[p] for s in plain], axis=0)
+        shapes[1] = with_pose(shapes[1], p, scale=usual * [1, 1, 0.05])
+    told = [f.text for f in check_family(family_of(tmp_path, shapes))]
+    assert told == ["ball, knob are 19.6 to 20.0 times as small as usual"]
 
 
 def test_a_part_that_comes_with_others_is_missed_where_those_are() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import partwright as pw
 from partwright.cli.main import main
 from partwright.datasets import PreparedFamily, prepare
 from partwright.datasets.inputs import find_shapes
@@ -17,6 +18,7 @@ from partwright.errors import FamilyError, OutputError, SettingError
 from partwright.fields import Box, Sphere
 
 SAMPLES = 3000
+UNREAD = "of a format that is not read; export as GLB or STEP"
 FOOT, HEAD = (1.0, 0.6, 0.4), 0.5
 
 
@@ -157,7 +159,56 @@ def test_one_piece_without_a_name_among_shapes_of_parts_is_left_out(tmp_path: Pa
     assert made.family.parts == ("foot", "head")
 
 
-def test_scenes_of_step_are_among_the_shapes(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", ["file", "folder"])
+def test_a_shape_of_one_part_may_be_called_after_it(tmp_path: Path, kind: str) -> None:
+    source = folders_of_parts(tmp_path / "in", 2)
+    foot = parts_of(1)["foot"]
+    if kind == "file":
+        scene = trimesh.Scene()
+        scene.add_geometry(foot, node_name="foot", geom_name="foot")
+        scene.export(source / "foot.glb")
+    else:
+        (source / "foot").mkdir()
+        foot.export(source / "foot" / "foot.ply")
+    made = prepare(source, tmp_path / "out", samples=SAMPLES, workers=1)
+    assert made.refused == ()
+    assert [entry.name for entry in made.family.shapes] == ["foot", "thing_0", "thing_1"]
+    assert made.family.load(0).present.tolist() == [1, 0]
+
+
+def test_products_of_a_step_file_are_its_parts(tmp_path: Path) -> None:
+    """Beside the same shape as meshes: their poses agree."""
+    pytest.importorskip("OCP")
+    source = folders_of_parts(tmp_path / "in", 1)
+    foot = pw.Part(Box(size=(2 * FOOT[0], 2 * FOOT[1], 2 * FOOT[2])), name="foot")
+    head = pw.Part(Sphere(radius=HEAD), translation=(0, 0, 1.2), name="head")
+    pw.export(pw.Assembly((head, foot), unit="mm"), source / "exact.STP", separate=True)
+    made = prepare(source, tmp_path / "out", samples=SAMPLES, workers=1)
+    assert made.refused == ()
+    assert [entry.name for entry in made.family.shapes] == ["exact", "thing_0"]
+    assert set(made.family.parts) == {"foot", "head"}
+    exact, meshes = made.family.load(0), made.family.load(1)
+    assert exact.present.tolist() == [1, 1]
+    np.testing.assert_allclose(exact.scale, meshes.scale, rtol=0.05)
+    np.testing.assert_allclose(exact.translation, meshes.translation, atol=0.02)
+
+
+def test_files_that_are_not_read_are_named_in_one_line(tmp_path: Path) -> None:
+    """But for those that a shape has been exported from."""
+    source = folders_of_parts(tmp_path / "in", 2)
+    for name in ("thing_0.blend", "b.blend", "a.FBX", "notes.txt", *(f"c{i}.igs" for i in range(4))):
+        (source / name).write_bytes(b"")
+    made = prepare(source, tmp_path / "out", samples=SAMPLES, workers=1)
+    assert [(one.name, one.reason) for one in made.refused] == [
+        ("a.FBX, b.blend, c0.igs, c1.igs, c2.igs and 1 more", UNREAD)
+    ]
+    (tmp_path / "none").mkdir()
+    (tmp_path / "none" / "chair.blend").write_bytes(b"")
+    with pytest.raises(FamilyError, match=f"holds no shapes; .*; chair.blend {UNREAD}"):
+        prepare(tmp_path / "none", tmp_path / "out")
+
+
+def test_files_are_told_by_their_suffixes(tmp_path: Path) -> None:
     for name in ("a.step", "b.STP", "c.glb", "d.txt"):
         (tmp_path / name).write_bytes(b"")
     assert [source.name for source in find_shapes(tmp_path)] == ["a", "b", "c"]
@@ -285,7 +336,7 @@ def test_the_command_prepares_and_says_what_it_left_out(
     assert main([*arguments, "--workers", "1", "--test", "thing_2"]) == 0
     output = capsys.readouterr()
     assert "2 shapes of 2 parts (1 train, 0 validation, 1 test)" in output.out
-    assert "warning: thing_1 is left out: " in output.err
+    assert "warning: thing_1, left out: " in output.err
     assert main([*arguments, "--parts", "foot,tail"]) == 2
     assert "no shape has tail" in capsys.readouterr().err
 

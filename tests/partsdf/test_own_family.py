@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import signal
-import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -86,6 +86,22 @@ def test_what_a_stopped_training_has_learned_is_kept_and_gone_on_from(tmp_path: 
     assert [finding.shape for finding in plans[0].findings] == [""]  # three shapes are few
 
 
+def test_the_command_tells_what_is_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, output = tmp_path / "things", tmp_path / "out"
+    source.mkdir()
+    for i in range(3):
+        scene(source / f"thing_{i}.glb", 1 + 0.1 * i)
+
+    def stop(report: EpochReport) -> None:
+        if report.epoch == 2:
+            signal.raise_signal(signal.SIGINT)
+
+    learn_family(source, output, steps=3, samples=1000, threads=1, workers=1, progress=stop)
+    command = ["parts", "family", str(source), "-o", str(output), "--steps", "3", "--samples", "1000"]
+    assert main([*command, "--threads", "1", "--workers", "1"]) == 0
+    assert "1 of 3 steps will take about" in capsys.readouterr().out
+
+
 def test_what_was_begun_with_other_settings_is_refused_and_its_settings_stay(tmp_path: Path) -> None:
     source, output = tmp_path / "things", tmp_path / "out"
     source.mkdir()
@@ -98,19 +114,26 @@ def test_what_was_begun_with_other_settings_is_refused_and_its_settings_stay(tmp
     assert (output / "training.toml").read_bytes() == written
 
 
-def test_what_the_picture_takes_is_no_part_of_what_is_left(tmp_path: Path) -> None:
-    source, seconds = tmp_path / "things", []
+def test_what_the_picture_takes_is_no_part_of_what_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, seconds, now = tmp_path / "things", list[float](), [0.0]
     source.mkdir()
     for i in range(4):
         scene(source / f"thing_{i}.glb", 1 + 0.1 * i)
 
+    def later() -> float:
+        now[0] += 0.001
+        return now[0]
+
     def told(report: EpochReport) -> None:
         seconds.append(report.seconds)
-        if len(seconds) == 1:
-            time.sleep(5)
+        now[0] += 1000
 
+    monkeypatch.setattr("partwright.partsdf.training.time", SimpleNamespace(monotonic=later))
     learn_family(source, tmp_path / "out", steps=3, samples=1000, threads=1, workers=1, progress=told)
-    assert seconds[1] - seconds[0] < 4
+    assert seconds == sorted(seconds)
+    assert 0 < seconds[0] < seconds[2] < 1
 
 
 def test_bad_folders_are_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -147,6 +170,17 @@ def test_bad_folders_are_told_in_one_line(tmp_path: Path, capsys: pytest.Capture
     with pytest.raises(SettingError, match="up axis is 'w'"):
         learn_family(tmp_path, tmp_path / "out", up="w")
     assert not (tmp_path / "out").exists()
+
+
+def test_too_few_usable_shapes_are_told_with_why_the_others_were_refused(tmp_path: Path) -> None:
+    source, output = tmp_path / "things", tmp_path / "out"
+    source.mkdir()
+    for i in range(2):
+        scene(source / f"thing_{i}.glb", 1 + 0.1 * i)
+    (source / "thing_2.glb").write_bytes(b"glTF")
+    with pytest.raises(FamilyError, match=r"twenty are a start; thing_2 was refused: .*thing_2\.glb: cannot"):
+        learn_family(source, output, steps=1, samples=1000, threads=1, workers=1)
+    assert "| thing_2 | left out | " in (output / "check.md").read_text()
 
 
 def test_names_that_one_shape_tells_apart_do_not_conflict(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _report(made: Preparation, folder: Path) -> None:
-    warn(f"{shape.name} is left out: {shape.reason}" for shape in made.refused)
+    warn(f"{shape.name}, left out: {shape.reason}" for shape in made.refused)
     family = made.family
     counts = ", ".join(f"{len(family.split(name))} {name}" for name in ("train", "validation", "test"))
     say(f"{len(family)} shapes of {len(family.parts)} parts ({counts}): {folder}")
