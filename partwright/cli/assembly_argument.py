@@ -23,3 +23,9 @@ def assembly_file(text: str) -> Path:
     path = Path(text)
     within = path / FILE
     return within if within.is_file() else path
+
+
+def shape_text(text: str) -> str:
+    """Of a neural shape, which may be no file, as MODEL:NAME: as `assembly_file`, or as it is."""
+    path = assembly_file(text)
+    return text if path == Path(text) else str(path)

@@ -6,12 +6,13 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from partwright.cli.assembly_argument import shape_text
 from partwright.cli.outputs import add_output, given
 
 _EPILOG = """\
-SHAPE is an assembly of neural parts (.json), as `parts reconstruct` writes them, or MODEL:NAME for a shape
-that a model was trained on, by name or number: mixers:3. Lengths are those of the unit frame, whose longest
-side is 1.8. Edits are done in the order in which they are given.
+SHAPE is an assembly of neural parts (.json), the folder that `parts reconstruct` wrote, or MODEL:NAME for a
+shape that a model was trained on, by name or number: mixers:3. Lengths are those of the unit frame, whose
+longest side is 1.8. Edits are done in the order in which they are given.
 """
 
 
@@ -34,7 +35,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    command.add_argument("shape", metavar="SHAPE", help="an assembly (.json) or MODEL:NAME")
+    command.add_argument(
+        "shape",
+        metavar="SHAPE",
+        type=shape_text,
+        help="an assembly (.json), a folder with one, or MODEL:NAME",
+    )
     add_output(command, "FILE", "assembly (.json)", reads=_reads, writes=_writes)
     command.add_argument("--model", metavar="FILE", help="the model of SHAPE, if it does not ship")
 

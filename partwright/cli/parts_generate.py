@@ -5,15 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.assembly_argument import shape_text
 from partwright.cli.outputs import add_output, given
 
 CHANGE = 0.4  # of `--change`, where it is not given
 TRIES = 8  # of `--tries`: with half of the shapes unsound, one of 256 stays so
 
 _EPILOG = """\
-SHAPE is an assembly of neural parts (.json); MODEL:NAME for a shape that the model was trained on, by name
-or number: mixers:3; or a mesh, points or a picture, for what is found in it. The same seed makes the same
-shapes, and fewer of them the first of more.
+SHAPE is an assembly of neural parts (.json), or a folder with one; MODEL:NAME for a shape that the model was
+trained on, by name or number: mixers:3; or a mesh, points or a picture, for what is found in it. The same
+seed makes the same shapes, and fewer of them the first of more.
 """
 
 
@@ -44,11 +45,17 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "(default: %(default)s)",
     )
     option("--keep", metavar="PARTS", help="these parts of --of stay: names, separated by commas")
-    option("--of", metavar="SHAPE", help="the shape whose parts are kept")
-    option("--poses", metavar="SHAPE", help="a shape whose parts' poses are kept, but none of their forms")
+    option("--of", metavar="SHAPE", type=shape_text, help="the shape whose parts are kept")
+    option(
+        "--poses",
+        metavar="SHAPE",
+        type=shape_text,
+        help="a shape whose parts' poses are kept, but none of their forms",
+    )
     option(
         "--like",
         metavar="SHAPE",
+        type=shape_text,
         help="samples near a shape",
     )
     option(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from partwright.cli.assembly_argument import shape_text
 from partwright.cli.outputs import add_output, given
 
 
@@ -15,8 +16,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description="Draws the shapes between two shapes of one model: a GIF, and a contact sheet beside it "
         "(.png). A and B are assemblies of neural parts (.json), or MODEL:NAME as for `parts edit`.",
     )
-    command.add_argument("first", metavar="A", help="an assembly (.json) or MODEL:NAME")
-    command.add_argument("second", metavar="B", help="another of the same model")
+    command.add_argument(
+        "first", metavar="A", type=shape_text, help="an assembly (.json), a folder with one, or MODEL:NAME"
+    )
+    command.add_argument("second", metavar="B", type=shape_text, help="another of the same model")
     add_output(command, "FILE", "film (.gif)", reads=_reads, writes=_writes)
     option = command.add_argument
     option("--model", metavar="FILE", help="the model of A and B, if it does not ship")

@@ -60,10 +60,11 @@ def report(
         "scores": scores.to_dict(),
         "mass_properties": masses(surface, shape, None),
         "warnings": [
+            # What a method says first, as that it knows no such shape: the others advise to try harder.
+            *dict.fromkeys(line for one in fitted for line in one.warnings),
             *(points_warnings(shape, points) if points else warnings(shape, scores, _more(how["settings"]))),
             *structure_warnings(shape, assembly, surface),
             *(bounds_warnings(enforced, shape) if enforced else []),
-            *dict.fromkeys(line for one in fitted for line in one.warnings),
         ],
     }
     for name in dict.fromkeys(name for one in fitted for name in one.details):

@@ -186,7 +186,7 @@ class Generator:
                 )
             return
         if source.model.hash != self.model.hash:
-            raise SettingError(f"{name} cannot keep parts of another model, {source.model.name}")
+            raise SettingError(f"the shape is of another model, {source.model.name}; give one of {name}")
         if keep_layout + bool(kept.any()) + bool(change) > 1:
             raise SettingError("either all poses are kept, or some parts whole, or all is alike; choose one")
         if not kept.any() and not keep_layout and not change:

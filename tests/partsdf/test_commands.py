@@ -18,6 +18,7 @@ from partwright.cli.commands.parts_generate import _kept
 from partwright.cli.main import main, parser
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import SettingError, UnreadableFileError
+from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.config import read_config
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
@@ -69,6 +70,21 @@ def test_what_samples_are_made_after_may_be_a_mesh_or_picture(
         assert said in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["--poses", "--keep plate --of", "--like"])
+def test_the_folder_of_a_reconstruction_stands_for_its_assembly(
+    option: str, file: Path, model: Model, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shape = NeuralShape.trained(model, "lamp1")
+    Path("found").mkdir()
+    to_assembly(shape).save("found/assembly.json")
+    line = ["parts", "generate", "--model", str(file), *option.split(), "found"]
+    kept = _kept(parser().parse_args(line), model)[0]
+    assert kept is not None
+    np.testing.assert_allclose(kept.poses.translation[shape.present], shape.poses.translation[shape.present])
+    assert main(["parts", "edit", "found", "--model", str(file), "-o", "found/assembly.json"]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+
+
 def test_encoder_and_generator(
     file: Path, lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -118,6 +134,16 @@ def test_encoder_and_generator(
     assert "0 samples: expected 1 or more" in said
     assert "tries: expected a whole number of at least 1, got 0" in said
     assert main(["parts", "train-encoder", str(file), str(lamps.folder), "-o", "encoder.bin"]) == 2
+
+
+def test_a_mesh_of_something_else_is_told_first(file: Path) -> None:
+    """Before what is off, and what to try against that."""
+    trimesh.creation.torus(1.0, 0.2).export("ring.ply")
+    quick = ["--quality", "draft", "--iterations", "5", "--resolution", "48", "--as-it-stands"]
+    assert main(["parts", "reconstruct", str(file), "ring.ply", "-o", "out", *quick]) == 0
+    warnings = json.loads(Path("out/report.json").read_text())["warnings"]
+    assert warnings[0].startswith("this may be no shape of the family that lamps knows")
+    assert any("poor in places" in line for line in warnings[1:])
 
 
 def test_points_are_told_of_and_shown_as_points(

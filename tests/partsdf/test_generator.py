@@ -152,7 +152,7 @@ def test_what_cannot_be_kept_is_told(generator: Generator) -> None:
         ({"source": bare, "keep": ["knob"]}, "knob is to be kept, but the shape has none"),
         (
             {"source": replace(source, model=replace(source.model, hash="0" * 64)), "keep": ["plate"]},
-            "parts of another model",
+            "is of another model",
         ),
     ):
         with pytest.raises(SettingError, match=said):
