@@ -246,7 +246,7 @@ class TreeSearch:
             self.report_repeats(found, 1)
             copied = self.with_copies(found)
             self.report_repeats(copied or found, 2)
-        return overlapped(copied, self.samples) if copied else self.bounded_tree()
+        return overlapped(copied or found, self.samples)
 
     def with_copies(self, tree: CsgTree) -> CsgTree | None:
         """The tree with copies; without further ones where these go beyond a demand, None where all do."""

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from partwright.shapes.cleaning import counted
 from partwright.shapes.distance import MeshDistance
-from partwright.shapes.lids import lids_over, patches, with_lids
+from partwright.shapes.lids import lids_over, with_lids
 from partwright.shapes.orientation import split_bodies
 from partwright.shapes.sampling import sample_triangles
 from partwright.shapes.topology import EdgeTable, compacted, doubled_areas, thickness
@@ -42,16 +42,17 @@ def close_hidden(
 
     vertices: (V, 3), unit frame.
     """
-    faces, patch = edges.faces, patches(edges)
-    members = split_bodies(patch)
+    faces = edges.faces
+    members = split_bodies(edges.patches)
     if ground is None and len(members) == 1:
         return vertices, edges
-    sheet = [thickness(vertices[faces[one]].reshape(-1, 3)) < _SHEET for one in members]
-    lids = [lid for lid in lids_over(vertices, edges) if not sheet[lid.patch]]
+    lids = lids_over(vertices, edges)
+    sheets = {one for one in {lid.patch for lid in lids} if _is_sheet(vertices[faces[members[one]]])}
+    lids = [lid for lid in lids if lid.patch not in sheets]
     if not lids:
         return vertices, edges
     probes = np.stack([_points_on(lid.corners(vertices)) for lid in lids])
-    hidden = _covered(vertices, faces, patch, probes, np.array([lid.patch for lid in lids]))
+    hidden = _covered(vertices, edges, members, probes, np.array([lid.patch for lid in lids]))
     if ground is not None:
         hidden |= probes @ ground.up < ground.height + _TOUCHING
     closed = [lids[one] for one in np.flatnonzero(hidden.mean(axis=1) >= _COVERED)]
@@ -70,7 +71,7 @@ def drop_sheets(
     """
     members = split_bodies(edges.bodies)
     open_ = [members[one] for one in np.flatnonzero(edges.open_bodies)]
-    flat = np.array([thickness(vertices[edges.faces[one]].reshape(-1, 3)) < _SHEET for one in open_], bool)
+    flat = np.array([_is_sheet(vertices[edges.faces[one]]) for one in open_], bool)
     if not flat.any() or np.count_nonzero(flat) == len(members):
         return vertices, edges
     loose = [open_[one] for one in np.flatnonzero(_loose(vertices, edges, open_, flat))]
@@ -79,6 +80,11 @@ def drop_sheets(
     notes.append(f"left out {counted(len(loose), 'loose flat sheet')}")
     used, faces = compacted(np.delete(edges.faces, np.concatenate(loose), axis=0), len(vertices))
     return vertices[used], EdgeTable(faces)
+
+
+def _is_sheet(triangles: NDArray[np.float64]) -> bool:
+    """triangles: (T, 3, 3)."""
+    return thickness(triangles.reshape(-1, 3)) < _SHEET
 
 
 def _loose(
@@ -127,18 +133,21 @@ def _points_on(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _covered(
     vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    patch: NDArray[np.int64],
+    edges: EdgeTable,
+    members: list[NDArray[np.int64]],
     probes: NDArray[np.float64],
     owners: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Which of the probes (L, P, 3) of lids lie on or within patches other than their owner (L,)."""
+    """Which of the probes (L, P, 3) of lids lie on or within patches other than their owner (L,).
+
+    members: face numbers of each patch.
+    """
+    faces, patch = edges.faces, edges.patches
     whole = MeshDistance(vertices, faces, faces, closed=False)
     points = probes.reshape(-1, 3)
     triangle, distance = whole.nearest(points)
     touching = (distance < _TOUCHING) & (patch[triangle] != np.repeat(owners, probes.shape[1]))
     winding = whole.winding(points).reshape(probes.shape[:2])
-    members = split_bodies(patch)
     for owner in np.unique(owners):
         own = faces[members[owner]]
         mine = owners == owner

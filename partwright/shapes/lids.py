@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.shapes.orientation import split_bodies
-from partwright.shapes.topology import EdgeTable, boundary_loops, components
+from partwright.shapes.topology import EdgeTable, boundary_loops
 
 _FLAT = 1e-6  # unit lengths: a rim that leaves its plane by less is flat
 _DIGITS = 5  # of a plane's numbers, that rims in one plane share
@@ -18,7 +18,7 @@ _DIGITS = 5  # of a plane's numbers, that rims in one plane share
 @dataclass(frozen=True)
 class Lid:
     """triangles: (T, 3) vertices; -1 stands for the lid's own `middle` (3,), which only a fan has. rim: the
-    vertices (K,) around the opening. patch: number of the surface's piece that is open there."""
+    vertices (K,) around the opening. patch: number of the surface's patch that is open there."""
 
     triangles: NDArray[np.int64]
     rim: NDArray[np.int64]
@@ -31,11 +31,6 @@ class Lid:
         if self.middle is not None:
             places[self.triangles < 0] = self.middle
         return places
-
-
-def patches(edges: EdgeTable) -> NDArray[np.int64]:
-    """Piece (F,) of the surface that each triangle belongs to: where more than two meet, pieces end."""
-    return components(len(edges.faces), *edges.pairs[1].T)
 
 
 def lids_over(vertices: NDArray[np.float64], edges: EdgeTable) -> list[Lid]:
@@ -78,7 +73,7 @@ def with_lids(
 
 def _owners(edges: EdgeTable, loops: Sequence[NDArray[np.int64]]) -> list[int]:
     """The patch that has most of each loop's half-edges."""
-    faces, patch = edges.faces, patches(edges)
+    faces, patch = edges.faces, edges.patches
     count = int(faces.max(initial=0)) + 1
     key = (faces * count + np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(key, kind="stable")

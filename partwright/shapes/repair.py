@@ -23,7 +23,6 @@ from partwright.shapes.sampling import sample_triangles
 from partwright.shapes.topology import (
     EdgeTable,
     area_vectors,
-    components,
     doubled_areas,
     signed_volumes,
     thickness,
@@ -166,7 +165,7 @@ def _drop_shared_walls(
     faces = edges.faces
     if edges.valence.max() == 2:
         return faces
-    patch = components(len(faces), *edges.pairs[1].T)
+    patch = edges.patches
     area = doubled_areas(vertices, faces)
     order = np.lexsort((-area, patch))
     rank = np.arange(len(order)) - np.searchsorted(patch[order], patch[order])

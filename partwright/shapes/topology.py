@@ -98,6 +98,11 @@ class EdgeTable:
         return components(len(self.faces), order[at - 1] // 3, order[at] // 3)
 
     @cached_property
+    def patches(self) -> NDArray[np.int64]:
+        """Patch number (F,) of each triangle: patches end at edges where more than two triangles meet."""
+        return components(len(self.faces), *self.pairs[1].T)
+
+    @cached_property
     def open_bodies(self) -> NDArray[np.bool_]:
         """Whether each body (number of bodies,) has an edge that is not balanced."""
         order, start = self._sorted
