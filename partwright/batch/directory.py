@@ -38,6 +38,7 @@ class Plan:
     """Of `partwright.fit`, as JSON can hold them."""
     unit: str | None = None
     up: str | None = None
+    thickness: str | None = None
 
     def save(self, output: Path) -> None:
         """Into the output folder, which is made; what is there already must be the same batch.
@@ -204,6 +205,7 @@ class _Work:
                     "options": self._options,
                     "unit": self._plan.unit,
                     "up": self._plan.up,
+                    "thickness": self._plan.thickness,
                 },
             )
 

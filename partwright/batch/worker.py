@@ -62,7 +62,7 @@ def _file(job: dict[str, Any]) -> dict[str, Any]:
     from partwright.shapes import load_shape
 
     try:
-        shape = load_shape(job["path"], unit=job["unit"], up=job["up"])
+        shape = load_shape(job["path"], job["unit"], job["up"], job["thickness"])
         result = fit(shape, job["method"], **job["options"])
         result.save(Path(job["folder"]))
     except (PartwrightError, MemoryError) as error:

@@ -8,6 +8,7 @@ from typing import Any
 
 from partwright.cli.fit import add_method
 from partwright.cli.parser import Parser
+from partwright.cli.reading import add_reading
 
 
 def add(commands: argparse._SubParsersAction[Parser]) -> None:
@@ -35,10 +36,7 @@ def _add_run(subcommands: Any) -> None:
     run.add_argument("folder", metavar="FOLDER", type=Path, help="the folder with the shapes")
     run.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="where to write")
     group = run.add_argument_group("input")
-    group.add_argument(
-        "--unit", metavar="U", help="length unit of shapes that have none: um, mm, cm, m, km, in, ft"
-    )
-    group.add_argument("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
+    add_reading(group, "length unit of shapes that have none")
     add_method(run.add_argument_group("method and budget"))
     group = run.add_argument_group("running")
     group.add_argument("--seed", metavar="S", type=int, default=0, help="of every fit (default: %(default)s)")

@@ -8,6 +8,7 @@ from pathlib import Path
 from partwright.atomic_io import report_path
 from partwright.cli.assembly_argument import add_assembly
 from partwright.cli.outputs import add_output, given
+from partwright.cli.reading import add_thickness
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -22,6 +23,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_assembly(command)
     add_output(command, "FILE", "where to write", reads=_reads, writes=_writes)
     option("--shape", metavar="SHAPE", type=Path, help="what it stands for (default: its own surface)")
+    add_thickness(command)
     option(
         "--clean-tolerance",
         metavar="X",

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from partwright.cli.assembly_argument import add_assembly
+from partwright.cli.reading import add_thickness
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -16,6 +17,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     add_assembly(command)
     command.add_argument("shape", metavar="SHAPE", type=Path, help="the mesh or scene it was made from")
+    add_thickness(command)
     command.add_argument("--json", action="store_true", help="print the scores as JSON")
     command.add_argument(
         "--cad",

@@ -8,6 +8,7 @@ from pathlib import Path
 from partwright.cli.assembly_argument import assembly_file
 from partwright.cli.lengths import length
 from partwright.cli.outputs import Group, add_output_folder
+from partwright.cli.reading import add_reading
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -36,8 +37,7 @@ def _add_input(group: Group) -> None:
         type=Path,
         help="mesh, scene, points, grid or STEP file; with --via a picture",
     )
-    group.add_argument("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
-    group.add_argument("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
+    add_reading(group)
     group.add_argument(
         "--via",
         metavar="GENERATOR",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 
 
 def length(text: str) -> str:
@@ -12,9 +11,15 @@ def length(text: str) -> str:
     Raises:
         argparse.ArgumentTypeError: it is none, as when the name of a file stands in its place.
     """
-    found = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*([A-Za-z]*|%)\s*", text)
-    if found is None or not _is_suffix(found[3]):
-        raise argparse.ArgumentTypeError(f"expected a length such as 0.5, 0.5mm or 1%, got {text!r}")
+    from partwright.errors import SettingError
+    from partwright.shapes.lengths import parse_length
+
+    try:
+        parse_length(text)
+    except SettingError:
+        raise argparse.ArgumentTypeError(
+            f"expected a length such as 0.5, 0.5mm or 1%, got {text!r}"
+        ) from None
     return text
 
 
@@ -29,16 +34,3 @@ def share(text: str) -> float:
         return float("" if rest else number) / (100 if percent else 1)
     except ValueError:
         raise argparse.ArgumentTypeError(f"expected a share such as 8% or 0.08, got {text!r}") from None
-
-
-def _is_suffix(text: str) -> bool:
-    from partwright.errors import SettingError
-    from partwright.shapes.units import canonical_unit
-
-    if text in ("", "%"):
-        return True
-    try:
-        canonical_unit(text)
-    except SettingError:
-        return False
-    return True

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from partwright.cli.outputs import add_output_folder
+from partwright.cli.reading import add_reading
 
 
 class _Name(argparse.Action):
@@ -77,7 +78,6 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         type=int,
         help="cells along the unit frame, a multiple of 8 (default: 128, up to 256 for thin walls)",
     )
-    option("--unit", metavar="U", help="length unit of the shape: um, mm, cm, m, km, in, ft")
-    option("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
+    add_reading(command)
     option("--seed", metavar="S", type=int, help="of the samples (default: 0)")
     command.set_defaults(run="parts_reconstruct")

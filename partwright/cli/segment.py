@@ -7,6 +7,7 @@ from pathlib import Path
 
 from partwright.cli.assembly_argument import add_assembly
 from partwright.cli.outputs import add_output, given
+from partwright.cli.reading import add_thickness
 
 NODES, COLOURS, PROPERTY = "nodes", "colours", "face:"
 
@@ -20,6 +21,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     command.add_argument("shape", metavar="SHAPE", type=Path, help="the mesh or scene to label")
     add_assembly(command)
+    add_thickness(command)
     add_output(command, "FILE", "where to write", reads=_reads, writes=_writes)
     command.add_argument(
         "--within",

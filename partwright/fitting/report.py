@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 POOR_IOU = 0.85
 POOR_DEVIATION = 0.03  # of the longest side
 UNSURE = 0.5
-MUCH_MISSING = 0.02  # of the surface
+MUCH_MISSING = 0.02  # of the surface: made up, or left out
 SAME_VOLUME = 0.01  # of the input's triangles and of its inside: then no surface runs through it twice
 
 
@@ -88,6 +88,7 @@ def about_input(shape: Shape) -> dict[str, Any]:
         "triangles": len(shape.input_faces),
         "repairs": list(shape.repairs),
         "openings": asdict(shape.openings),
+        "left_out": shape.left_out,
         "confidence": shape.confidence,
     }
 
@@ -185,6 +186,11 @@ def warnings(shape: Shape, scores: Scores, more: str) -> list[str]:
         )
     if shape.openings.share > MUCH_MISSING:
         result.append(_about_openings(shape))
+    if shape.left_out > MUCH_MISSING:
+        result.append(
+            f"flat sheets with {shape.left_out:.0%} of the surface enclose nothing and were left out; "
+            "--thickness 1% makes walls of them"
+        )
     if shape.confidence < UNSURE:
         repairs = "; ".join(shape.repairs)
         result.append(

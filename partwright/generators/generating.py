@@ -15,7 +15,7 @@ from partwright.generators.glb import check_glb
 from partwright.generators.service import Service, is_address
 from partwright.input_files import check_file
 from partwright.methods import Cancellation, check_number
-from partwright.shapes import Shape, load_shape
+from partwright.shapes import Length, Shape, load_shape
 
 GENERATED = "generated.glb"  # the name under which a fit keeps a generator's mesh
 TIME_LIMIT = 600.0  # seconds: a generator that loads its model first takes minutes
@@ -29,6 +29,7 @@ def shape_from_image(
     keep: str | Path | None = None,
     unit: str | None = None,
     up: str | None = None,
+    thickness: Length | None = None,
     cancel: Cancellation | None = None,
 ) -> Shape:
     """The shape that a generator makes of a picture (SuperFrusta, section 5).
@@ -41,7 +42,7 @@ def shape_from_image(
             `{"image": "<base64>"}` and answers with a GLB.
         time_limit: seconds after which the generator is ended, with all that it has started.
         keep: where its mesh is written (.glb), as soon as it could be read; its folder is made if need be.
-        unit, up: as of `load_shape`; a GLB is in metres with Y up, where nothing else is said.
+        unit, up, thickness: as of `load_shape`; a GLB is in metres with Y up, where nothing else is said.
         cancel: ends the generator, from any thread.
 
     Returns:
@@ -65,7 +66,7 @@ def shape_from_image(
     with TemporaryDirectory() as folder:
         made = Path(folder) / f"{image.stem or 'image'}.glb"
         made.write_bytes(data)
-        shape = load_shape(made, unit=unit, up=up)
+        shape = load_shape(made, unit, up, thickness)
     if keep is not None:
         with replacing_files(Path(keep).parent) as staging:
             (staging / Path(keep).name).write_bytes(data)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -28,6 +27,7 @@ from partwright.robots.shaping import LIGHT, Wishes, numbered, shapes_for
 from partwright.robots.solids import Solids, Target, largest_deviation
 from partwright.robots.spheres import LinkSpheres, as_json, curobo, spheres_for
 from partwright.shapes.cleaning import counted
+from partwright.shapes.lengths import own_length
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -104,17 +104,15 @@ class CollideOptions:
         Raises:
             SettingError: it is none.
         """
-        from partwright.shapes.units import METRES, canonical_unit
-
         if self.tolerance is None:
             return max(_SHARE * size, _LEAST_SHARE * whole)
-        text = str(self.tolerance).strip()
-        found = re.fullmatch(r"(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\s*([A-Za-z]*|%)", text)
-        if found is None or not 0 < float(found[1]) < np.inf:
-            raise SettingError(f"tolerance: expected a length such as 5mm or 2%, got {self.tolerance!r}")
-        value, unit = float(found[1]), found[2]
-        factor = size / 100 if unit == "%" else METRES[canonical_unit(unit)] if unit else 1.0
-        return value * factor
+        try:
+            length = own_length(self.tolerance, "m", size)
+        except SettingError as error:
+            raise SettingError(f"tolerance: {error}") from error
+        if length == 0:
+            raise SettingError(f"tolerance: expected a length above 0, got {self.tolerance!r}")
+        return length
 
 
 @dataclass(frozen=True)

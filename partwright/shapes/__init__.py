@@ -6,6 +6,7 @@ from partwright.shapes.distance import DistanceSource, MeshDistance
 from partwright.shapes.frame import LONGEST_SIDE, UnitFrame
 from partwright.shapes.grid import DistanceGrid
 from partwright.shapes.holes import Openings
+from partwright.shapes.lengths import Length, own_length, parse_length
 from partwright.shapes.reading import MESH_SUFFIXES, PICTURE_SUFFIXES, SUFFIXES
 from partwright.shapes.sampling import Samples, SurfaceSamples
 from partwright.shapes.shape import Node, NodeLeftOutWarning, Shape, load_shape
@@ -20,6 +21,7 @@ __all__ = [
     "UP_AXES",
     "DistanceGrid",
     "DistanceSource",
+    "Length",
     "MeshDistance",
     "Node",
     "NodeLeftOutWarning",
@@ -31,4 +33,6 @@ __all__ = [
     "canonical_unit",
     "canonical_up",
     "load_shape",
+    "own_length",
+    "parse_length",
 ]

@@ -31,12 +31,12 @@ def merge_vertices(
     return vertices[order[moved]], target[faces]
 
 
-def drop_doubles(faces: NDArray[np.int64], notes: list[str]) -> NDArray[np.int64]:
+def drop_doubles(faces: NDArray[np.int64], notes: list[str], keep_sheets: bool = False) -> NDArray[np.int64]:
     """Drop triangles with a repeated corner and triangles that are there more than once.
 
     Of copies that face the same way one stays. Copies that face opposite ways are the two sides of a sheet:
     they enclose nothing and go together, unless nearly the whole mesh is drawn two-sided, when one side
-    stays.
+    stays; with `keep_sheets` one side stays of those, too, that no other triangle touches.
     """
     sound = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     if not sound.all():
@@ -57,7 +57,10 @@ def drop_doubles(faces: NDArray[np.int64], notes: list[str]) -> NDArray[np.int64
     net = np.bincount(group, facing, len(start))
     mixed = np.bincount(group, minlength=len(start)) > np.abs(net)
     two_sided = float(mixed.mean()) > 0.9
-    wanted = np.where(net == 0, 1 if two_sided else 0, np.sign(net))
+    stays = np.full(len(start), two_sided)
+    if keep_sheets:
+        stays |= _apart(corner[order[start]], net == 0)
+    wanted = np.where(net == 0, stays, np.sign(net))
     matches = facing == wanted[group]
     keep = np.full(len(start), -1, dtype=np.int64)
     at = np.flatnonzero(matches)[::-1]
@@ -69,6 +72,16 @@ def drop_doubles(faces: NDArray[np.int64], notes: list[str]) -> NDArray[np.int64
         else f"dropped {counted(len(faces) - len(kept), 'duplicate triangle')}"
     )
     return faces[kept]
+
+
+def _apart(triangles: NDArray[np.int64], chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which (T,) of the chosen triangles (T, 3) hang together by their corners with chosen ones only."""
+    count = int(triangles.max()) + 1
+    own = triangles[chosen]
+    group = components(count, own[:, [0, 1]].ravel(), own[:, [1, 2]].ravel())
+    met = np.zeros(count, dtype=bool)
+    met[group[triangles[~chosen]]] = True
+    return chosen & ~met[group[triangles[:, 0]]]
 
 
 def weld_boundary(

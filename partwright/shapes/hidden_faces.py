@@ -17,12 +17,12 @@ from partwright.shapes.distance import MeshDistance
 from partwright.shapes.lids import lids_over, with_lids
 from partwright.shapes.orientation import split_bodies
 from partwright.shapes.sampling import sample_triangles
-from partwright.shapes.topology import EdgeTable, compacted, doubled_areas, thickness
+from partwright.shapes.topology import EdgeTable, area_vectors, compacted, doubled_areas, is_sheet
 
 _TOUCHING = 2e-3  # unit lengths, 0.1 % of the longest side: what is as near lies on it
 _PROBES = 32  # points of a lid that are looked at
 _COVERED = 0.9  # of them
-_SHEET = 1e-4  # unit lengths: what is thinner is a sheet
+_ON_GROUND = 1e-4  # unit lengths above it
 _SPACING = 0.01  # unit lengths between points of a rim
 _ALONG = 0.02  # unit lengths: a rim that is as near runs along another
 
@@ -33,6 +33,24 @@ class Ground:
 
     up: NDArray[np.float64]
     height: float
+
+
+def lift_from_ground(
+    vertices: NDArray[np.float64], edges: EdgeTable, ground: Ground | None
+) -> tuple[EdgeTable, NDArray[np.int64]]:
+    """Without the triangles (N, 3) of open bodies that lie on the ground and face up, and those: a road
+    between pavements would be closed against the ground to something of no thickness.
+
+    vertices: (V, 3), unit frame.
+    """
+    faces = edges.faces
+    if ground is None:
+        return edges, faces[:0]
+    low = (vertices @ ground.up < ground.height + _ON_GROUND)[faces].all(axis=1)
+    lying = low & edges.open_bodies[edges.bodies] & (area_vectors(vertices[faces]) @ ground.up > 0)
+    if lying.all() or not lying.any():
+        return edges, faces[:0]
+    return EdgeTable(faces[~lying]), faces[lying]
 
 
 def close_hidden(
@@ -47,7 +65,7 @@ def close_hidden(
     if ground is None and len(members) == 1:
         return vertices, edges
     lids = lids_over(vertices, edges)
-    sheets = {one for one in {lid.patch for lid in lids} if _is_sheet(vertices[faces[members[one]]])}
+    sheets = {one for one in {lid.patch for lid in lids} if is_sheet(vertices[faces[members[one]].ravel()])}
     lids = [lid for lid in lids if lid.patch not in sheets]
     if not lids:
         return vertices, edges
@@ -63,28 +81,41 @@ def close_hidden(
 
 
 def drop_sheets(
-    vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
+    vertices: NDArray[np.float64], edges: EdgeTable, lying: int, notes: list[str]
 ) -> tuple[NDArray[np.float64], EdgeTable]:
     """Without flat sheets that stand by themselves: decals, panes, the ground; and without their vertices.
 
-    A sheet whose rim runs along another's, or along that of an opening, is the side of something.
+    A sheet whose rim runs along another's, or along that of an opening, is the side of something. One that is
+    drawn on both sides has no rim. lying: the last so many triangles, which lie on the ground, go as well.
     """
-    members = split_bodies(edges.bodies)
-    open_ = [members[one] for one in np.flatnonzero(edges.open_bodies)]
-    flat = np.array([_is_sheet(vertices[edges.faces[one]]) for one in open_], bool)
-    if not flat.any() or np.count_nonzero(flat) == len(members):
+    faces = edges.faces
+    if lying:
+        notes.append("left out what lies flat on the ground")
+        edges = EdgeTable(faces[:-lying])
+    loose = _loose_sheets(vertices, edges)
+    if loose:
+        notes.append(f"left out {counted(len(loose), 'loose flat sheet')}")
+        edges = EdgeTable(np.delete(edges.faces, np.concatenate(loose), axis=0))
+    if len(edges.faces) == len(faces):
         return vertices, edges
-    loose = [open_[one] for one in np.flatnonzero(_loose(vertices, edges, open_, flat))]
-    if not loose or not _is_beside_the_point(doubled_areas(vertices, edges.faces), loose):
-        return vertices, edges
-    notes.append(f"left out {counted(len(loose), 'loose flat sheet')}")
-    used, faces = compacted(np.delete(edges.faces, np.concatenate(loose), axis=0), len(vertices))
+    used, faces = compacted(edges.faces, len(vertices))
     return vertices[used], EdgeTable(faces)
 
 
-def _is_sheet(triangles: NDArray[np.float64]) -> bool:
-    """triangles: (T, 3, 3)."""
-    return thickness(triangles.reshape(-1, 3)) < _SHEET
+def _loose_sheets(vertices: NDArray[np.float64], edges: EdgeTable) -> list[NDArray[np.int64]]:
+    """The triangles of each sheet that stands by itself, unless the shape has little else."""
+    members = split_bodies(edges.bodies)
+    if len(members) == 1:
+        return []
+    flat = np.array([is_sheet(vertices[edges.faces[one].ravel()]) for one in members], bool)
+    if not flat.any() or flat.all():
+        return []
+    loose = [members[one] for one in np.flatnonzero(flat & ~edges.open_bodies)]
+    open_ = [members[one] for one in np.flatnonzero(edges.open_bodies)]
+    if open_:
+        found = _loose(vertices, edges, open_, flat[edges.open_bodies])
+        loose += [open_[one] for one in np.flatnonzero(found)]
+    return loose if loose and _is_beside_the_point(doubled_areas(vertices, edges.faces), loose) else []
 
 
 def _loose(

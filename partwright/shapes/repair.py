@@ -16,10 +16,11 @@ from partwright.shapes.boolean import unite
 from partwright.shapes.cleaning import drop_doubles, merge_vertices, weld_boundary
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.frame import UnitFrame
-from partwright.shapes.hidden_faces import Ground, close_hidden, drop_sheets
+from partwright.shapes.hidden_faces import Ground, close_hidden, drop_sheets, lift_from_ground
 from partwright.shapes.holes import Openings, fill_holes, with_what_stays_open
 from partwright.shapes.orientation import orient
 from partwright.shapes.sampling import sample_triangles
+from partwright.shapes.thickening import thicken
 from partwright.shapes.topology import (
     EdgeTable,
     area_vectors,
@@ -36,6 +37,7 @@ _LEAST_CONFIDENCE = 0.5
 _SIDE_STEP = 2e-5  # how far off a triangle its two sides are looked at
 _CLEAR = 0.2  # a winding number this near to 0 or 1 is clear
 _CHECK = 64  # cells along a side in the search for overlaps
+_THICKEN = "give its sheets a thickness (--thickness 1%)"
 _PROBES = 8  # triangles of a patch that are looked at to see whether it is a wall
 
 
@@ -45,7 +47,8 @@ class Surface:
 
     `faces` is the outer surface. `winding_faces` decide the inside and may hold sheets within the shape as
     well; with `closed` they have no open edge. `simple`: no point is enclosed twice, so volume is a sum over
-    `faces`. `openings`: what of the surface was missing.
+    `faces`. `openings`: what of the surface was missing. `left_out`: share of the area as read that flat
+    sheets took, which are no part of it.
     """
 
     vertices: NDArray[np.float64]
@@ -56,6 +59,7 @@ class Surface:
     repairs: tuple[str, ...]
     confidence: float
     openings: Openings = field(default_factory=Openings)
+    left_out: float = 0.0
 
     def in_frame(self, old: UnitFrame) -> tuple[UnitFrame, Surface]:
         """The unit frame of the surface alone, where sheets were left out of the shape that had the old one;
@@ -77,25 +81,45 @@ class Surface:
         return MeshDistance(self.vertices, self.faces, self.winding_faces, self.closed, embedded=self.simple)
 
 
-def repair(vertices: NDArray[np.float64], faces: NDArray[np.int64], ground: Ground | None = None) -> Surface:
+def repair(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    ground: Ground | None = None,
+    wall: float | None = None,
+) -> Surface:
     """Surface of the solid that the triangles mean; vertices (V, 3) in the unit frame, faces (F, 3).
 
-    ground: where it is known, what opens onto it is closed.
+    ground: where it is known, what opens onto it is closed. wall: the thickness, unit lengths, of what is
+    still open then and of flat sheets; None: they are closed, or left out.
 
     Raises EmptyShapeError when no triangle has area, FlatShapeError when nothing is enclosed, OpenShellError
     when the openings are so large that inside and outside cannot be told apart.
     """
     notes: list[str] = []
-    _refuse_plane(vertices)
+    if wall is None:
+        _refuse_plane(vertices)
     vertices, faces = merge_vertices(vertices, faces, notes)
-    faces = drop_doubles(faces, notes)
+    faces = drop_doubles(faces, notes, keep_sheets=wall is not None)
     if len(faces) == 0:
         raise EmptyShapeError("no triangle has any area; export the shape again with its surface")
     vertices, edges = weld_boundary(vertices, EdgeTable(faces), notes)
     edges = orient(vertices, edges, notes)
     if edges.balance.any():
+        edges, lying = lift_from_ground(vertices, edges, ground)
         vertices, edges = close_hidden(vertices, edges, ground, notes)
-        vertices, edges = drop_sheets(vertices, edges, notes)
+        edges = EdgeTable(np.concatenate([edges.faces, lying])) if len(lying) else edges
+    else:
+        lying = edges.faces[:0]
+    if wall is not None:
+        return _enclosed(*thicken(vertices, edges, wall, notes), notes)
+    whole = doubled_areas(vertices, edges.faces).sum()
+    vertices, edges = drop_sheets(vertices, edges, len(lying), notes)
+    left_out = 1.0 - float(doubled_areas(vertices, edges.faces).sum() / whole)
+    return replace(_enclosed(vertices, edges, notes), left_out=left_out)
+
+
+def _enclosed(vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]) -> Surface:
+    """What is inside, of triangles that are wound consistently."""
     if not edges.balance.any():
         return _surface_of_closed(vertices, edges, notes, 1.0)
     confidence = _confidence_of_open(vertices, edges.faces)
@@ -126,9 +150,7 @@ def consistent(
 def _refuse_plane(vertices: NDArray[np.float64]) -> None:
     """Raise FlatShapeError when all vertices lie in one plane, whichever way it is turned."""
     if thickness(vertices) < _FLAT:
-        raise FlatShapeError(
-            "all triangles lie in one plane, so there is no inside to fit; give the sheet a thickness"
-        )
+        raise FlatShapeError(f"all triangles lie in one plane, so there is no inside to fit; {_THICKEN}")
 
 
 def _surface_of_closed(
@@ -137,7 +159,7 @@ def _surface_of_closed(
     vertices, edges = unite(vertices, edges, notes)
     faces = edges.faces
     if abs(signed_volumes(vertices, faces, np.zeros(len(faces), np.int64))[0]) < _NO_VOLUME:
-        raise FlatShapeError("the surface is closed but encloses no volume; give the sheet a thickness")
+        raise FlatShapeError(f"the surface is closed but encloses no volume; {_THICKEN}")
     lower, upper = vertices.min(axis=0), vertices.max(axis=0)
     spacing = float((upper - lower).max()) / _CHECK
     shape = tuple(int(n) for n in np.maximum(np.ceil((upper - lower) / spacing), 1))
@@ -190,9 +212,7 @@ def _surface_of_sheets(
     facing = _facing(source, vertices[faces])
     outer = facing != 0
     if not outer.any():
-        raise FlatShapeError(
-            "the surface is open and encloses no volume; close it or give the sheet a thickness"
-        )
+        raise FlatShapeError(f"the surface is open and encloses no volume; close it, or {_THICKEN}")
     if not outer.all():
         notes.append(
             f"{np.count_nonzero(~outer)} triangles lie within the shape and are no part of its surface"
@@ -229,15 +249,13 @@ def _confidence_of_open(vertices: NDArray[np.float64], faces: NDArray[np.int64])
     winding = source.winding(np.concatenate([near, around]))
     inside = winding > 0.5
     if not inside.any():
-        raise FlatShapeError(
-            "the surface is open and encloses no volume; close it or give the sheet a thickness"
-        )
+        raise FlatShapeError(f"the surface is open and encloses no volume; close it, or {_THICKEN}")
     # Only what may be inside is in question: the wide outside must not make an open shell look sure.
     unsure = np.minimum(np.abs(winding), np.abs(winding - 1)) > _CLEAR
     confidence = 1.0 - float(np.count_nonzero(unsure) / np.count_nonzero(inside | unsure))
     if confidence < _LEAST_CONFIDENCE:
         raise OpenShellError(
             f"the surface is an open shell: only {confidence:.0%} of what it could enclose is clearly "
-            "inside. Close its openings, or give the shell a thickness"
+            f"inside. Close its openings, or {_THICKEN}"
         )
     return confidence

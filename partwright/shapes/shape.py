@@ -18,6 +18,7 @@ from partwright.shapes.frame import UnitFrame
 from partwright.shapes.grid import DistanceGrid, distance_grid, occupancy_grid
 from partwright.shapes.hidden_faces import Ground
 from partwright.shapes.holes import Openings
+from partwright.shapes.lengths import Length, own_length
 from partwright.shapes.reading import read_source, source_of
 from partwright.shapes.repair import Surface, repair
 from partwright.shapes.sampling import (
@@ -64,8 +65,9 @@ class Shape:
     frame: to the unit frame and back. unit: "mm", "m" ... or None; up: "x", "y", "z", "-z" ... or None.
     points: (N, 3) as read, own units, where it came as points, else None. repairs: what was done to the
     surface, a sentence each. openings: how much of the surface the input left out, and where the most of
-    it, own units. confidence: 0 to 1, how sure inside and outside are. reading_seconds: that `load_shape`
-    took, 0 for a node. Results are cached by their arguments; returned arrays are read-only.
+    it, own units. left_out: share of the area that flat sheets took, which are no part of it. confidence:
+    0 to 1, how sure inside and outside are. reading_seconds: that `load_shape` took, 0 for a node. Results are cached
+    by their arguments; returned arrays are read-only.
     """
 
     def __init__(self, source: Source) -> None:
@@ -88,12 +90,16 @@ class Shape:
         self._ground = source.ground
         if source.up is not None and source.ground is None:
             self._ground = float((corners @ axis_vector(source.up)).min())
-        self.frame, self._surface = _named(name, lambda: _repaired(corners, compact, source.up, self._ground))
+        self._thickness = source.thickness
+        self.frame, self._surface = _named(
+            name, lambda: _repaired(corners, compact, source.up, self._ground, self._thickness)
+        )
         self.vertices = self.frame.from_unit(self._surface.vertices)
         self.faces = self._surface.faces
         self.repairs = source.repairs + self._surface.repairs
         self.confidence = min(source.confidence, self._surface.confidence)
         self.openings = self._own(self._surface.openings)
+        self.left_out = self._surface.left_out
         self._source = self._surface.distance()
         self.reading_seconds = 0.0
         self._cache: dict[tuple[Any, ...], Any] = {}
@@ -139,7 +145,9 @@ class Shape:
         failure: PartwrightError | None = None
         for node in self.nodes:
             piece = Piece(node.name, self.input_vertices, self.input_faces[node.start : node.stop])
-            alone = Source(node.name, (piece,), self.unit, self.up, ground=self._ground)
+            alone = Source(
+                node.name, (piece,), self.unit, self.up, ground=self._ground, thickness=self._thickness
+            )
             try:
                 shapes.append(Shape(alone))
             except PartwrightError as error:
@@ -279,14 +287,18 @@ def load_shape(
     source: str | Path | trimesh.Trimesh | tuple[ArrayLike, ArrayLike] | NDArray[Any],
     unit: str | None = None,
     up: str | None = None,
+    thickness: Length | None = None,
 ) -> Shape:
     """Shape of a file, a Trimesh, (vertices (V, 3), faces (F, 3)), points (N, 3 or 6) or a grid (nx, ny, nz).
 
     Points and grids become a mesh first; `repairs` says so, and `confidence` how well the points bear it out.
     `unit` and `up` state what the file does not say, or overrule it; the geometry is never scaled or turned.
     Where up is known, so is the ground: openings as low as anything lies are closed.
+    `thickness` makes walls of surfaces that are open or flat, half of it on either side, where they would be
+    filled or left out; in own units, or text as "2mm" or "1%" of the longest side.
     Raises UnsupportedFormatError, UnreadableFileError, EmptyShapeError, NeedsSurfaceError, NotFiniteError,
-    FlatShapeError, OpenShellError, GridError, or SettingError for an unknown unit or axis.
+    FlatShapeError, OpenShellError, GridError, or SettingError for an unknown unit or axis, or a thickness
+    that is no length above 0.
     """
     started = time.perf_counter()
     stated_unit = None if unit is None else canonical_unit(unit)
@@ -295,24 +307,42 @@ def load_shape(
         read = replace(read_source(Path(source)), file=Path(source).name)
     else:
         read = source_of(source)
-    shape = Shape(replace(read, unit=stated_unit or read.unit, up=stated_up or read.up))
+    read = replace(read, unit=stated_unit or read.unit, up=stated_up or read.up)
+    shape = Shape(read if thickness is None else replace(read, thickness=_wall(thickness, read)))
     shape.reading_seconds = time.perf_counter() - started
     return shape
 
 
+def _wall(thickness: Length, source: Source) -> float:
+    """The thickness in the source's own units."""
+    corners = np.concatenate([piece.vertices[piece.faces].reshape(-1, 3) for piece in source.pieces])
+    try:
+        wall = own_length(thickness, source.unit, float(np.ptp(corners, axis=0).max()))
+    except SettingError as error:
+        raise SettingError(f"thickness: {error}") from error
+    if wall == 0:
+        raise SettingError(f"thickness: expected a length above 0, got {thickness!r}")
+    return wall
+
+
 def _repaired(
-    corners: NDArray[np.float64], faces: NDArray[np.int64], up: str | None, height: float | None
+    corners: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    up: str | None,
+    height: float | None,
+    thickness: float | None,
 ) -> tuple[UnitFrame, Surface]:
     """The surface of corners (V, 3), own units, and faces (F, 3), and the unit frame that it is in.
 
-    height: of the ground along the up axis, own units.
+    height: of the ground along the up axis, own units. thickness: of sheets, own units.
     """
     frame = UnitFrame.of(corners)
     ground = None
     if up is not None and height is not None:
         above = axis_vector(up)
         ground = Ground(above, float(frame.to_unit(height * above) @ above))
-    return repair(frame.to_unit(corners), faces, ground).in_frame(frame)
+    wall = None if thickness is None else float(frame.length_to_unit(thickness))
+    return repair(frame.to_unit(corners), faces, ground, wall).in_frame(frame)
 
 
 def _checked(points: ArrayLike) -> NDArray[Any]:

@@ -25,6 +25,7 @@ class Source:
     `repairs` and `confidence`: how the surface was made where the file holds none, and how sure it is. file:
     the file's name with its suffix, None for what was in memory. points: (N, 3) that the surface was laid
     through, where it was. ground: its height along the up axis, own units; None: as low as anything lies.
+    thickness: of its sheets, own units, if they are to have one.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Source:
     file: str | None = None
     points: NDArray[np.float64] | None = None
     ground: float | None = None
+    thickness: float | None = None
 
 
 def in_utf8(name: str) -> str:

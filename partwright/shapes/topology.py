@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+_SHEET = 1e-4  # unit lengths: what is thinner is a sheet
+
 
 def area_vectors(corners: NDArray[Any]) -> NDArray[Any]:
     """Normals (F, 3) of triangles (F, 3, 3), each as long as twice its area."""
@@ -20,11 +22,20 @@ def doubled_areas(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(np.linalg.norm(area_vectors(vertices[faces]), axis=1))
 
 
+def plane_normal(points: NDArray[Any]) -> NDArray[Any]:
+    """(3,) unit normal, either way, of the plane that lies best through points (N, 3)."""
+    centred = points - points.mean(axis=0)
+    return np.asarray(np.linalg.eigh(centred.T @ centred)[1][:, 0])
+
+
 def thickness(points: NDArray[Any]) -> float:
     """Across the plane that lies best through points (N, 3), in their own units."""
-    centred = points - points.mean(axis=0)
-    normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
-    return float(np.ptp(centred @ normal))
+    return float(np.ptp(points @ plane_normal(points)))
+
+
+def is_sheet(points: NDArray[Any]) -> bool:
+    """Whether points (N, 3), unit frame, lie in a plane."""
+    return thickness(points) < _SHEET
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 
 from partwright.errors import BoundsError, SettingError
-from partwright.shapes import LONGEST_SIDE, METRES, Shape, canonical_unit
+from partwright.shapes import LONGEST_SIDE, Length, Shape, own_length
 from partwright.tolerances.noise import roughness
 
 # Of the longest side. Samples 0.7 % apart on each surface tell no finer difference reliably.
 RESOLUTION = 1e-3
 _NOISE = 3.0  # deviations of the noise that a tolerance has to leave room for
-
-Length = float | str
 
 
 @dataclass(frozen=True)
@@ -119,29 +116,8 @@ def _length(name: str, given: Length | None, shape: Shape) -> float | None:
     """A length in the unit frame."""
     if given is None:
         return None
-    text = re.fullmatch(r"\s*([0-9.eE+-]+)\s*([A-Za-z]*|%)\s*", given) if isinstance(given, str) else None
+    longest = float(shape.frame.length_from_unit(LONGEST_SIDE))
     try:
-        number = float(text[1] if text else given)
-    except (TypeError, ValueError):
-        number = math.nan
-    if isinstance(given, bool) or not math.isfinite(number) or number < 0:
-        raise BoundsError(f'{name}: expected a length such as 0.5, "0.5mm" or "1%", got {given!r}')
-    suffix = text[2] if text else ""
-    if suffix == "%":
-        return number / 100 * LONGEST_SIDE
-    factor = _factor(name, suffix, given, shape) if suffix else 1.0
-    return float(shape.frame.length_to_unit(number * factor))
-
-
-def _factor(name: str, suffix: str, given: Length, shape: Shape) -> float:
-    """What one of the suffix's unit is in the shape's."""
-    try:
-        unit = canonical_unit(suffix)
+        return float(shape.frame.length_to_unit(own_length(given, shape.unit, longest)))
     except SettingError as error:
         raise BoundsError(f"{name}: {error}") from error
-    if shape.unit is None:
-        raise BoundsError(
-            f"{name}: {given!r} has a unit but {shape.name} has none; "
-            "state it (--unit), or give a plain number"
-        )
-    return METRES[unit] / METRES[shape.unit]

@@ -167,3 +167,34 @@ def test_loops_hold_each_half_edge_once_and_no_vertex_twice(seed: int, faces: in
     found = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops])
     assert sorted(found.tolist()) == sorted(half_edges.tolist())
     assert all(len(set(loop.tolist())) == len(loop) for loop in loops)
+
+
+def road_between_kerbs(reach: float) -> trimesh.Trimesh:
+    """One open body: along x a kerb, a road on the ground, a kerb, and the road `reach` further."""
+    profile = np.array(
+        [[0, 0], [0, 0.2], [1, 0.2], [1, 0], [3, 0], [3, 0.2], [4, 0.2], [4, 0], [4 + reach, 0]]
+    )
+    n = len(profile)
+    rows = [np.stack([profile[:, 0], np.full(n, y), profile[:, 1]], axis=1) for y in (0.0, 2.0)]
+    low = np.arange(n - 1)
+    sides = [np.stack([low, low + 1, low + 1 + n], axis=1), np.stack([low, low + 1 + n, low + n], axis=1)]
+    ends = [[0, 2, 1], [0, 3, 2], [4, 6, 5], [4, 7, 6]]
+    ends += [[a + n, c + n, b + n] for a, b, c in ends]
+    return trimesh.Trimesh(np.concatenate(rows), np.concatenate([*sides, ends]), process=False)
+
+
+def test_what_lies_flat_on_the_ground_is_no_body() -> None:
+    mesh = road_between_kerbs(5)
+    shape = load_shape(mesh, up="z")
+    assert shape.volume == pytest.approx(2 * 0.4, rel=1e-9)
+    assert shape.bounds()[1, 0] == pytest.approx(4)
+    assert "left out what lies flat on the ground" in shape.repairs
+    assert shape.left_out == pytest.approx(14 / (14 + 2 * 5.2), rel=1e-6)
+    middles = shape.vertices[shape.faces].mean(axis=1)  # no face is left that no part could reach
+    assert not ((middles[:, 0] > 1.01) & (middles[:, 0] < 2.99)).any()
+
+
+def test_what_lies_flat_on_the_ground_may_have_a_thickness() -> None:
+    shape = load_shape(road_between_kerbs(5), up="z", thickness=0.02)
+    assert shape.volume == pytest.approx(2 * 0.4 + 0.02 * 2 * (2 + 5), rel=1e-3)
+    assert shape.bounds()[1, 0] == pytest.approx(9)

@@ -21,7 +21,12 @@ from partwright.methods import Cancellation
 def run(arguments: argparse.Namespace) -> int:
     options = {"quality": arguments.quality, "seed": arguments.seed, "device": arguments.device}
     plan = Plan(
-        arguments.folder, arguments.method, options | given_settings(arguments), arguments.unit, arguments.up
+        arguments.folder,
+        arguments.method,
+        options | given_settings(arguments),
+        arguments.unit,
+        arguments.up,
+        arguments.thickness,
     )
     return go_on(plan, arguments)
 

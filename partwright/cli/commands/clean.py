@@ -17,7 +17,7 @@ def run(arguments: argparse.Namespace) -> int:
     assembly = load_assembly(arguments.assembly)
     shape = None
     if arguments.shape is not None:
-        shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
+        shape = load_shape(arguments.shape, assembly.unit, assembly.up, arguments.thickness)
     with Work("cleaning") as work:
         cleaned = clean(assembly, shape, arguments.clean_tolerance, told=work.stage)
     write_cleaned(cleaned, arguments.output)

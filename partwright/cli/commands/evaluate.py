@@ -16,7 +16,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.cad is not None and not 100 <= arguments.cad <= 1_000_000:
         raise SettingError(f"--cad {arguments.cad}: expected 100 to 1000000 points")
     assembly = load_assembly(arguments.assembly)
-    shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
+    shape = load_shape(arguments.shape, assembly.unit, assembly.up, arguments.thickness)
     scores = evaluate(assembly, shape, cad_points=arguments.cad)
     if arguments.json:
         print(json.dumps(scores.to_dict(), indent=2))

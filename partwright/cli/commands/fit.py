@@ -62,7 +62,7 @@ def _shape(arguments: argparse.Namespace, display: Display, cancel: Cancellation
     if arguments.via is None:
         if arguments.via_timeout is not None:
             raise SettingError("--via-timeout is of a generator: it needs --via")
-        return load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
+        return load_shape(arguments.shape, arguments.unit, arguments.up, arguments.thickness)
     from partwright.generators import GENERATED, TIME_LIMIT, shape_from_image
 
     display.stage("generating", done=0.0)
@@ -74,5 +74,6 @@ def _shape(arguments: argparse.Namespace, display: Display, cancel: Cancellation
             keep=arguments.output / GENERATED,
             unit=arguments.unit,
             up=arguments.up,
+            thickness=arguments.thickness,
             cancel=cancel,
         )

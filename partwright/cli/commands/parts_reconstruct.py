@@ -17,7 +17,7 @@ from partwright.partsdf.model import load_model
 from partwright.shapes import PICTURE_SUFFIXES, load_shape
 
 _SEARCH = ("iterations", "points", "start")
-_OF_SHAPES = ("quality", *_SEARCH, "as_it_stands", "unit", "up", "seed")  # not of pictures
+_OF_SHAPES = ("quality", *_SEARCH, "as_it_stands", "unit", "up", "thickness", "seed")  # not of pictures
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     cancel = Cancellation()
     with Display() as display:
-        shape = load_shape(arguments.shape, unit=arguments.unit, up=arguments.up)
+        shape = load_shape(arguments.shape, arguments.unit, arguments.up, arguments.thickness)
         with stopping(cancel.request):
             result = fit(shape, settings, seed=arguments.seed or 0, progress=display.show, cancel=cancel)
         display.stage("writing")

@@ -20,7 +20,7 @@ from partwright.shapes.labels import read_labels
 def run(arguments: argparse.Namespace) -> int:
     check_suffix(arguments.output)
     assembly = load_assembly(arguments.assembly)
-    shape = load_shape(arguments.shape, unit=assembly.unit, up=assembly.up)
+    shape = load_shape(arguments.shape, assembly.unit, assembly.up, arguments.thickness)
     if arguments.copies:
         assembly = assembly.expanded()
     within = None if arguments.within is None else _coarse(arguments.within, arguments.shape, shape)

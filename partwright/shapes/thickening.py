@@ -1,0 +1,101 @@
+"""Sheets to walls: surfaces that were drawn without a thickness, given one.
+
+Car bodies, cloth and leaves in assets for games enclose nothing; their walls are a rendering's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.shapes.cleaning import counted
+from partwright.shapes.orientation import split_bodies
+from partwright.shapes.topology import EdgeTable, area_vectors, compacted, is_sheet, plane_normal
+
+_LEAST_COSINE = (
+    0.5  # between a corner's faces and their mean: sharper ones are blunted, or they would be spikes
+)
+
+
+def thicken(
+    vertices: NDArray[np.float64], edges: EdgeTable, thickness: float, notes: list[str]
+) -> tuple[NDArray[np.float64], EdgeTable]:
+    """With a wall in the place of each surface that is open, or closed and flat; half of it on either side.
+
+    vertices: (V, 3), and thickness in units of theirs. A surface that meets others along an edge of three
+    triangles or more gets a wall of its own.
+    """
+    faces, sheets = _parted(vertices, edges)
+    count = int(sheets.max(initial=-1)) + 1
+    if count == 0:
+        notes.append("no surface is open or flat, so none was given a thickness")
+        return vertices, edges
+    is_solid = sheets < 0
+    places, rows = np.unique(
+        np.stack([np.repeat(sheets[~is_solid], 3), faces[~is_solid].ravel()], axis=1),
+        axis=0,
+        return_inverse=True,
+    )
+    middle, sheet = vertices[places[:, 1]], rows.reshape(-1, 3)
+    step = thickness / 2 * _outward(middle, sheet)
+    rim = EdgeTable(sheet).unbalanced_half_edges
+    start, end = rim.T
+    far = len(middle)
+    walls = [
+        sheet,
+        sheet[:, ::-1] + far,
+        np.stack([end, start, start + far], axis=1),
+        np.stack([end, start + far, end + far], axis=1),
+    ]
+    notes.append(f"gave {counted(count, 'sheet')} a thickness")
+    vertices = np.concatenate([middle + step, middle - step, vertices])
+    used, faces = compacted(np.concatenate([*walls, faces[is_solid] + 2 * far]), len(vertices))
+    return vertices[used], EdgeTable(faces)
+
+
+def _parted(vertices: NDArray[np.float64], edges: EdgeTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles (F, 3), and the number (F,) of the sheet that each is of, -1 for those of solids. Of a sheet
+    that is drawn on both sides only one side is there."""
+    faces = edges.faces
+    number = np.full(len(faces), -1)
+    kept = np.ones(len(faces), bool)
+    count = 0
+    for body, is_open in zip(split_bodies(edges.bodies), edges.open_bodies, strict=True):
+        if is_open:
+            patches = split_bodies(np.unique(edges.patches[body], return_inverse=True)[1])
+            for patch in (body[one] for one in patches):
+                if EdgeTable(faces[patch]).balance.any():
+                    number[patch] = count
+                    count += 1
+        elif is_sheet(vertices[faces[body].ravel()]):
+            corners = vertices[faces[body]]
+            above = area_vectors(corners) @ plane_normal(corners.reshape(-1, 3)) > 0
+            number[body[above]] = count
+            kept[body[~above]] = False
+            count += 1
+    return faces[kept], number[kept]
+
+
+def _outward(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(V, 3): from each vertex to where the planes of its faces (F, 3) meet after a step of one along their
+    normals; where they are turned far from one another, not as far."""
+    corners = vertices[faces]
+    normal = area_vectors(corners)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    ahead = np.roll(corners, -1, axis=1) - corners
+    behind = np.roll(corners, 1, axis=1) - corners
+    cross = np.linalg.norm(np.cross(ahead, behind), axis=2)
+    angle = np.arctan2(cross, (ahead * behind).sum(axis=2))
+    at = faces.ravel()
+
+    def summed(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.bincount(at, values, len(vertices)).astype(np.float64)
+
+    weight = angle.ravel()
+    each = np.repeat(normal, 3, axis=0)
+    mean = np.stack([summed(weight * each[:, k]) for k in range(3)], axis=1)
+    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    cosine = summed(weight * (each * mean[at]).sum(axis=1)) / np.maximum(
+        summed(weight), np.finfo(np.float64).tiny
+    )
+    return np.asarray(mean / np.maximum(cosine, _LEAST_COSINE)[:, None])
