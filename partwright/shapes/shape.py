@@ -66,8 +66,8 @@ class Shape:
     points: (N, 3) as read, own units, where it came as points, else None. repairs: what was done to the
     surface, a sentence each. openings: how much of the surface the input left out, and where the most of
     it, own units. left_out: share of the area that flat sheets took, which are no part of it. confidence:
-    0 to 1, how sure inside and outside are. reading_seconds: that `load_shape` took, 0 for a node. Results are cached
-    by their arguments; returned arrays are read-only.
+    0 to 1, how sure inside and outside are. reading_seconds: that `load_shape` took, 0 for a node. Results
+    are cached by their arguments; returned arrays are read-only.
     """
 
     def __init__(self, source: Source) -> None:
