@@ -56,8 +56,8 @@ class CollideOptions:
     """How far a shape's surface may lie from the mesh's: metres, "5mm", or a share "2%" of the link's
     longest side. Not given it is 2%, and no less than 0.3 % of the robot's."""
     max_parts: int = 48
-    """Shapes a link at most; without a tolerance those beyond 32 only where each saves 0.2 % of the
-    link's volume."""
+    """Shapes a link at most; without `tolerance` and `extra` those beyond 24 only where each saves 0.16 % of
+    what one hull would add to the link, and the more there are the more."""
     kinds: tuple[str, ...] = ()
     """Native solids that may be used, and "hull" for convex meshes; all that the format has if empty."""
     spheres: int | None = None
@@ -150,7 +150,8 @@ def collide(
     colliding = [link for link in robot.links if link.collisions or link.natives]
     if not (colliding if options.spheres is not None else links):
         meant = "collides" if options.spheres is not None else "has a collision mesh to replace"
-        raise RobotError(f"{robot.path}: none of its {len(robot.links)} links {meant}")
+        native = f"; {len(colliding)} collide by native solids, which stay" if colliding else ""
+        raise RobotError(f"{robot.path}: none of its {len(robot.links)} links {meant}{native}")
     kinds, hulls = kinds_of(robot, options.kinds)
     solids = Solids()
     before = {link.name: solids.target(link, link.collisions) for link in links}

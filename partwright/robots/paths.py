@@ -66,10 +66,10 @@ def _homes(package: str, beside: Path, packages: Sequence[Path]) -> Iterator[Pat
     """Folders that may be the package."""
     for folder in packages:
         yield folder / package
-        if folder.name == package:
+        if package in (folder.name, _declared(folder)):
             yield folder
     for folder in (beside.absolute(), *beside.absolute().parents):
-        if folder.name == package:
+        if package in (folder.name, _declared(folder)):
             yield folder
         yield folder / package
     for variable in _WITH_FOLDERS:
@@ -80,6 +80,15 @@ def _homes(package: str, beside: Path, packages: Sequence[Path]) -> Iterator[Pat
     for variable in _WITH_PREFIXES:
         for word in filter(None, os.environ.get(variable, "").split(os.pathsep)):
             yield Path(word) / "share" / package
+
+
+def _declared(folder: Path) -> str | None:
+    """The name that a package's own file gives it: its folder may have another."""
+    try:
+        found = re.search(rb"<name>\s*([^<]+?)\s*</name>", (folder / "package.xml").read_bytes())
+    except OSError:
+        return None
+    return found[1].decode("utf-8", "replace") if found else None
 
 
 def new_address(name: str, like: Place | None) -> tuple[str, str]:

@@ -137,7 +137,7 @@ def test_native_solids_get_spheres_with_and_without_meshes(tmp_path: Path) -> No
     save(result, tmp_path / "out")
     assert (tmp_path / "out" / "native.urdf").read_text().count("<cylinder") == 1
     assert Image.open(tmp_path / "out" / "native.urdf.png").width == 3 * 560
-    with pytest.raises(RobotError, match="has a collision mesh to replace"):
+    with pytest.raises(RobotError, match="mesh to replace; 2 collide by native solids"):
         collide(path)
 
 

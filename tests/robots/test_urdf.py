@@ -99,6 +99,20 @@ def test_package_paths_are_kept_and_found(tmp_path: Path) -> None:
     assert len(open_robot(moved, [tmp_path / "ws"]).links) == 2
 
 
+def test_a_package_is_found_by_the_name_that_it_gives_itself(tmp_path: Path) -> None:
+    """A download's folder has another name."""
+    folder = tmp_path / "my_robot-main"
+    path = urdf(folder, base="package://my_robot/meshes/ell.stl")
+    with pytest.raises(UnreadableFileError, match="no package my_robot"):
+        open_robot(path)
+    (folder / "package.xml").write_text("<package format='3'>\n  <name> my_robot </name>\n</package>\n")
+    save(collide(path, CollideOptions(kinds=("hull",))), tmp_path / "out")
+    assert list((tmp_path / "out" / "my_robot" / "collision").iterdir())
+    away = tmp_path / "away.urdf"
+    away.write_text(path.read_text().replace('"meshes/', f'"{folder}/meshes/'))
+    assert len(open_robot(away, [folder]).links) == 2
+
+
 def test_the_report_says_how_far_off_and_who_collides(tmp_path: Path) -> None:
     result = collide(urdf(tmp_path / "in"), CollideOptions(kinds=("box",), max_parts=1))
     save(result, tmp_path / "out")
