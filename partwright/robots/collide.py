@@ -179,11 +179,14 @@ def collide(
         for name, target in wanted.items()
     }
     shapes: dict[str, list[Shape]] = {}
+    made: dict[tuple[Target, Wishes], list[Shape]] = {}
     todo = {link.name for link in links}
     for turn in range(1 + _FINER):
         for link in links:
             if link.name in todo:
-                shapes[link.name] = _shaped(link, wanted[link.name], wishes[link.name])
+                key = wanted[link.name], wishes[link.name]  # one target, as of four legs alike: made once
+                made[key] = made.get(key) or _shaped(link, *key)
+                shapes[link.name] = numbered(_stem(link.name), made[key])
                 told(f"{link.name}: {counted(len(shapes[link.name]), 'shape')}")
         if options.enclose:
             apart = _kept_apart(links, shapes, wanted, wishes, pairs_before)

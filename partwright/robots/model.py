@@ -22,11 +22,19 @@ class MeshUse:
     """A mesh file where a link uses it.
 
     matrix: (4, 4) from the file's coordinates to the link's, with the scale, which may mirror. inline: the
-    mesh itself, for formats that hold it."""
+    mesh itself, for formats that hold it. submesh: the name of what of the file is meant, where it is not
+    all; centred: whether the middle of its box is first moved to the origin."""
 
     source: Path
     matrix: np.ndarray
     inline: trimesh.Trimesh | None = None
+    submesh: str | None = None
+    centred: bool = False
+
+    @property
+    def mesh(self) -> tuple[Path, str | None, bool]:
+        """What it is, wherever it is placed: the same mesh for all uses for which this is."""
+        return self.source, self.submesh, self.centred
 
 
 @dataclass(frozen=True, eq=False)

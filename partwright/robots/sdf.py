@@ -100,7 +100,13 @@ class Sdf(RobotFile):
         if address not in self._places:
             self._places[address] = find(address, self.path.parent, self.packages, link)
         scale = three(mesh.findtext("scale", "1 1 1"), self.path, f"link {link!r}: scale")
-        return MeshUse(self._places[address].path, place @ np.diag([*scale, 1.0]))
+        part = mesh.find("submesh")
+        return MeshUse(
+            self._places[address].path,
+            place @ np.diag([*scale, 1.0]),
+            submesh=None if part is None else part.findtext("name", "").strip(),
+            centred=part is not None and part.findtext("center", "false").strip() in ("true", "1"),
+        )
 
     def _replace(self, link: Any, shapes: Sequence[Shape], files: Files) -> None:
         old = [c for c in link.findall("collision") if c.find("geometry/mesh") is not None]

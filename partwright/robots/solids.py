@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -11,25 +12,25 @@ import numpy as np
 
 from partwright.errors import (
     FlatShapeError,
-    MissingDependencyError,
     OpenShellError,
     PartwrightError,
     RobotError,
-    UnreadableFileError,
 )
 from partwright.meshing.manifolds import closed, surface_of
+from partwright.robots.collada import read_collada
 from partwright.robots.model import Link, MeshUse, mirrored
 from partwright.robots.wrapping import wrapped
 from partwright.shapes import Shape as InputShape
 from partwright.shapes.reading import read_source, source_of
 from partwright.shapes.sampling import sample_triangles
+from partwright.shapes.source import Piece, Source
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from manifold3d import Manifold
 
-    from partwright.shapes.source import Source
+    _Key = tuple[Path, str | None, bool]  # of `MeshUse.mesh`
 
 _OPEN = "it does not close; what its surface goes around, or cannot be reached from outside, is its inside"
 
@@ -75,11 +76,12 @@ class _Mesh:
 
 
 class Solids:
-    """Reads each mesh file once."""
+    """Reads each mesh file once; links that have the same meshes in the same places share one target."""
 
     def __init__(self) -> None:
-        self._meshes: dict[tuple[Path, bool], _Mesh] = {}
-        self._wraps: dict[tuple[tuple[Path, bytes], ...], tuple[Manifold, Manifold]] = {}
+        self._meshes: dict[tuple[_Key, bool], _Mesh] = {}
+        self._wraps: dict[tuple[tuple[_Key, bytes], ...], tuple[Manifold, Manifold]] = {}
+        self._targets: dict[tuple[bool, tuple[tuple[_Key, bytes], ...]], Target] = {}
 
     def target(self, link: Link, uses: Sequence[MeshUse], sheets: bool = False) -> Target:
         """All of these meshes as one. Those that do not close are wrapped together: one may close another.
@@ -89,6 +91,13 @@ class Solids:
         Raises:
             PartwrightError: one of them cannot be read, or encloses nothing; the message names the link.
         """
+        # Zeros have no minus then.
+        key = sheets, tuple((use.mesh, (use.matrix + 0.0).tobytes()) for use in uses)
+        if key not in self._targets:
+            self._targets[key] = self._made(link, uses, sheets)
+        return self._targets[key]
+
+    def _made(self, link: Link, uses: Sequence[MeshUse], sheets: bool) -> Target:
         from manifold3d import Manifold, OpType
 
         read = [self._of(link, use, sheets) for use in uses]
@@ -108,7 +117,7 @@ class Solids:
         if not open_:
             solid = Manifold.batch_boolean(solids, OpType.Add)
             return Target(solid, solid, *_together(placed), ())
-        key = tuple((uses[i].source, uses[i].matrix.tobytes()) for i in open_)
+        key = tuple((uses[i].mesh, uses[i].matrix.tobytes()) for i in open_)
         if key not in self._wraps:
             try:
                 self._wraps[key] = wrapped(*_together([placed[i] for i in open_]))
@@ -125,7 +134,7 @@ class Solids:
     def _of(self, link: Link, use: MeshUse, sheets: bool) -> _Mesh:
         if not np.isfinite(use.matrix).all() or abs(np.linalg.det(use.matrix[:3, :3])) < 1e-30:
             raise RobotError(f"link {link.name!r}: the scale of {use.source.name} leaves nothing of it")
-        key = use.source, sheets
+        key = use.mesh, sheets
         if key not in self._meshes:
             try:
                 self._meshes[key] = _read(use, sheets)
@@ -147,7 +156,7 @@ def _read(use: MeshUse, sheets: bool) -> _Mesh:
     Raises:
         FlatShapeError: they bound none, and are no `sheets`.
     """
-    source = source_of(use.inline) if use.inline is not None else _source(use.source)
+    source = _meant(use)
     vertices, faces = _together([(piece.vertices, piece.faces) for piece in source.pieces])
     solid = None
     with suppress(OpenShellError, *((FlatShapeError,) if sheets else ())):
@@ -156,23 +165,26 @@ def _read(use: MeshUse, sheets: bool) -> _Mesh:
     return _Mesh(vertices, faces, solid)
 
 
-def _source(path: Path) -> Source:
-    """What shapes are read from, and COLLADA by trimesh."""
-    if path.suffix.lower() != ".dae":
-        return read_source(path)
-    try:
-        import collada
-    except ImportError as error:
-        raise MissingDependencyError(
-            "COLLADA meshes need pycollada; install it with: pip install 'partwright[robots]'"
-        ) from error
-    import trimesh
+def _meant(use: MeshUse) -> Source:
+    """The file, or what is meant of it, as one piece.
 
-    try:
-        scene = trimesh.load_scene(path)
-    except (collada.common.DaeError, ValueError, KeyError, TypeError, AttributeError, SyntaxError) as error:
-        raise UnreadableFileError(f"{path}: it cannot be read as COLLADA: {error}") from error
-    return source_of(scene.to_mesh())
+    Raises:
+        RobotError: nothing in it has the submesh's name.
+    """
+    if use.inline is not None:
+        return source_of(use.inline)
+    collada = use.source.suffix.lower() == ".dae"
+    source = read_collada(use.source) if collada else read_source(use.source)
+    if use.submesh is None and not collada:
+        return source
+    pieces = [piece for piece in source.pieces if use.submesh in (None, piece.name)]
+    if not pieces:
+        names = ", ".join(dict.fromkeys(piece.name for piece in source.pieces))
+        raise RobotError(f"it has no submesh {use.submesh!r}; it has {names}")
+    vertices, faces = _together([(piece.vertices, piece.faces) for piece in pieces])
+    if use.centred:
+        vertices = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    return dataclasses.replace(source, pieces=(Piece(source.name, vertices, faces),))
 
 
 def _manifold(vertices: np.ndarray, faces: np.ndarray) -> Manifold | None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ import trimesh
 from partwright.errors import SettingError
 from partwright.robots import CollideOptions, collide
 from partwright.robots.containment import outside_of, shape_solid
+from partwright.robots.model import Shape
 from partwright.robots.report import warnings
+from partwright.robots.shaping import shapes_for
 from partwright.robots.solids import Solids
 from tests.robots.robots import mjcf, urdf
 
@@ -47,6 +51,35 @@ def test_shapes_inside_reach_nowhere_beyond_the_mesh(tmp_path: Path, kind: str) 
     report = next(link for link in result.links if link.link == "base")
     assert report.extra < 1e-6
     assert report.missing < (0.01 if kind in ("box", "hull") else 0.6)
+
+
+def test_links_of_the_same_mesh_have_the_same_shapes_which_are_made_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the legs of a walker; not those of the mesh in another place, or mirrored."""
+    made: list[str] = []
+
+    def counted(name: str, *rest: Any) -> list[Shape]:
+        made.append(name)
+        return shapes_for(name, *rest)
+
+    monkeypatch.setattr(sys.modules["partwright.robots.collide"], "shapes_for", counted)
+    path = urdf(tmp_path)
+    legs = "".join(
+        f"""<link name="{name}"><collision><geometry>
+              <mesh filename="meshes/ell.stl" scale="{scale}"/>
+            </geometry></collision></link>
+            <joint name="{name}" type="fixed">
+              <parent link="base"/><child link="{name}"/><origin xyz="{place} 9 0"/>
+            </joint>"""
+        for name, scale, place in (("left", "1 1 1", 0), ("right", "1 -1 1", 9), ("front", "1 1 1", 18))
+    )
+    path.write_text(path.read_text().replace("</robot>", f"{legs}</robot>"))
+    shapes = collide(path, CollideOptions(kinds=("hull",))).shapes
+    assert made == ["base_collision", "arm_collision", "left_collision", "right_collision"]
+    assert [shape.name for shape in shapes["front"]] == ["front_collision_1", "front_collision_2"]
+    for one, other in zip(shapes["left"], shapes["front"], strict=True):
+        assert np.array_equal(one.mesh.vertices, other.mesh.vertices)
 
 
 def test_inside_of_a_box_with_a_dent_that_hardly_counts(tmp_path: Path) -> None:

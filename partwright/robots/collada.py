@@ -1,0 +1,82 @@
+"""COLLADA meshes (`.dae`), as Gazebo and ROS take them: in metres by the unit that the file names, whatever
+it says of its up axis, and by the names of its nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from partwright.errors import EmptyShapeError, MissingDependencyError, UnreadableFileError
+from partwright.shapes.source import Piece, Source
+
+if TYPE_CHECKING:
+    from collada import Collada
+
+
+def read_collada(path: Path) -> Source:
+    """Its triangles in metres: a piece for each set of a node's, by the name of the nearest node that has
+    one, so that several may have the same.
+
+    Raises:
+        MissingDependencyError: pycollada is not installed.
+        UnreadableFileError: it is damaged. EmptyShapeError: it has no triangles.
+    """
+    try:
+        import collada
+    except ImportError as error:
+        raise MissingDependencyError(
+            "COLLADA meshes need pycollada; install it with: pip install 'partwright[robots]'"
+        ) from error
+    try:
+        document = collada.Collada(BytesIO(_without_materials(path)), ignore=[collada.common.DaeError])
+        pieces = tuple(_placed(document))
+    except (collada.common.DaeError, ValueError, KeyError, TypeError, AttributeError, SyntaxError) as error:
+        raise UnreadableFileError(f"{path}: it cannot be read as COLLADA: {error}") from error
+    if not pieces:
+        raise EmptyShapeError(f"{path}: it has no triangles")
+    return Source(path.stem, pieces, unit="m")
+
+
+def _without_materials(path: Path) -> bytes:
+    """The file without what its surfaces look like: where that is wrong, the surfaces would be left out."""
+    from lxml import etree
+
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
+    tree = etree.parse(str(path), parser)
+    for tag in ("bind_material", "library_materials", "library_effects", "library_images"):
+        for element in list(tree.iter(f"{{*}}{tag}")):
+            element.getparent().remove(element)
+    return bytes(etree.tostring(tree))
+
+
+def _placed(document: Collada) -> Iterator[Piece]:
+    metres = float(document.assetInfo.unitmeter or 1.0)
+    for node in document.scene.nodes if document.scene is not None else ():
+        yield from _of(node, np.diag([metres, metres, metres, 1.0]), "")
+
+
+def _of(node: Any, above: np.ndarray, name: str) -> Iterator[Piece]:
+    """What is in a node. above: (4, 4) of what it is in, to metres. name: of the nearest that has one."""
+    from collada.polylist import Polylist
+    from collada.scene import GeometryNode, Node
+    from collada.triangleset import TriangleSet
+
+    if isinstance(node, Node):
+        for child in node.children:
+            yield from _of(child, above @ node.matrix, node.xmlnode.get("name") or name)
+    if not isinstance(node, GeometryNode):
+        return
+    for primitive in node.geometry.primitives:
+        triangles = primitive.triangleset() if isinstance(primitive, Polylist) else primitive
+        if (
+            isinstance(triangles, TriangleSet)
+            and triangles.vertex is not None
+            and len(triangles.vertex_index)
+        ):
+            used, faces = np.unique(triangles.vertex_index, return_inverse=True)  # sets share all corners
+            corners = np.asarray(triangles.vertex, np.float64)[used] @ above[:3, :3].T + above[:3, 3]
+            yield Piece(name, corners, faces.reshape(-1, 3).astype(np.int64))
