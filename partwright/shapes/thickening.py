@@ -9,9 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.shapes.cleaning import counted
+from partwright.shapes.lids import lids_over, with_lids
 from partwright.shapes.orientation import split_bodies
-from partwright.shapes.topology import EdgeTable, area_vectors, compacted, is_sheet, plane_normal
+from partwright.shapes.topology import (
+    EdgeTable,
+    area_vectors,
+    compacted,
+    doubled_areas,
+    is_sheet,
+    plane_normal,
+)
 
+_SMALL = 0.05  # of a body's surface, all its openings together
 _LEAST_COSINE = (
     0.5  # between a corner's faces and their mean: sharper ones are blunted, or they would be spikes
 )
@@ -23,8 +32,9 @@ def thicken(
     """With a wall in the place of each surface that is open, or closed and flat; half of it on either side.
 
     vertices: (V, 3), and thickness in units of theirs. A surface that meets others along an edge of three
-    triangles or more gets a wall of its own.
+    triangles or more gets a wall of its own. Bodies with small holes are closed, and get none.
     """
+    vertices, edges = _with_small_holes_closed(vertices, edges, notes)
     faces, sheets = _parted(vertices, edges)
     count = int(sheets.max(initial=-1)) + 1
     if count == 0:
@@ -51,6 +61,23 @@ def thicken(
     vertices = np.concatenate([middle + step, middle - step, vertices])
     used, faces = compacted(np.concatenate([*walls, faces[is_solid] + 2 * far]), len(vertices))
     return vertices[used], EdgeTable(faces)
+
+
+def _with_small_holes_closed(
+    vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
+) -> tuple[NDArray[np.float64], EdgeTable]:
+    """A body whose openings are a small share of its surface is a solid that lacks a few faces."""
+    lids = lids_over(vertices, edges) if edges.balance.any() else []
+    first = np.unique(edges.patches, return_index=True)[1]
+    body = np.array([edges.bodies[first[lid.patch]] for lid in lids], np.int64)
+    lid_area = [np.linalg.norm(area_vectors(lid.corners(vertices)), axis=1).sum() for lid in lids]
+    area = np.bincount(edges.bodies, doubled_areas(vertices, edges.faces))
+    small = np.bincount(body, lid_area, len(area)) < _SMALL * area
+    chosen = [lid for lid, one in zip(lids, body, strict=True) if small[one]]
+    if not chosen:
+        return vertices, edges
+    notes.append(f"filled {counted(len(chosen), 'small hole')}")
+    return with_lids(vertices, edges, chosen)
 
 
 def _parted(vertices: NDArray[np.float64], edges: EdgeTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -129,3 +129,13 @@ def test_an_open_shell_says_what_may_be_done() -> None:
     with pytest.raises(OpenShellError, match="--thickness"):
         load_shape(tube)
     assert load_shape(tube, thickness=0.1).volume == pytest.approx(1.1**2 - 0.9**2, rel=1e-6)
+
+
+def test_a_body_with_a_small_hole_is_no_shell() -> None:
+    ball = trimesh.creation.icosphere(3)
+    pierced = without(ball, ball.triangles_center[:, 2] > 0.97)
+    sheet = trimesh.Trimesh(SQUARE + 3 * UP, FACES, process=False)
+    shape = load_shape(together(pierced, sheet), thickness=0.02)
+    assert shape.volume == pytest.approx(ball.volume + 0.02, rel=0.01)
+    assert "filled 1 small hole" in shape.repairs
+    assert "gave 1 sheet a thickness" in shape.repairs
