@@ -33,7 +33,7 @@ from partwright.atomic_io import write_bytes
 
 HERE = Path(__file__).parent
 OWN_SHAPES = HERE.parent / "examples" / "shapes"
-MESHES = {".obj", ".ply", ".stl", ".off", ".glb", ".gltf", ".3mf"}
+MESHES = {".obj", ".ply", ".stl", ".off", ".glb", ".gltf", ".3mf", ".step", ".stp"}
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,8 @@ class Entry:
     path: Path
     options: tuple[str, ...] = ()
     """Passed on to partwright fit, for this shape alone."""
+    source: str = ""
+    """Where it was published, where the index says so."""
 
 
 def find_shapes(folder: Path, sets: set[str], names: set[str]) -> list[Entry]:
@@ -56,7 +58,10 @@ def find_shapes(folder: Path, sets: set[str], names: set[str]) -> list[Entry]:
     index = folder / "index.json"
     if index.is_file():
         listed = json.loads(index.read_text(encoding="utf-8"))
-        entries = [Entry(item["set"], item["name"], folder / item["file"]) for item in listed]
+        entries = [
+            Entry(item["set"], item["name"], folder / item["file"], source=item.get("source", ""))
+            for item in listed
+        ]
     else:
         meshes = sorted(p for p in folder.rglob("*") if p.suffix.lower() in MESHES)
         entries = [Entry(p.parent.name, p.stem, p) for p in meshes]

@@ -1,20 +1,22 @@
 """Solids with and without subtraction beside SuperFrusta, on every shape of a set.
 
     python benchmarks/solids.py --shapes FOLDER --sets cad
+    python benchmarks/solids.py --shapes FOLDER --sets voron,prusa --variants solids --tag unseen --untimed
 
 Each fit is a `partwright fit` process of its own, as in benchmarks/fit.py. Every run is appended to
-benchmarks/results/solids.csv as it ends, and those that are there are not made again: an interrupted
-benchmark goes on where it was. Delete the file, or the rows of one variant, to measure anew.
+benchmarks/results/solids.csv (solids-TAG.csv) as it ends, and those that are there are not made again: an
+interrupted benchmark goes on where it was. Delete the file, or the rows of one variant, to measure anew.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import resource
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import mean, median
 
@@ -33,13 +35,15 @@ VARIANTS = {
     "solids, only added": ["--method", "solids", "--no-subtract"],
     "superfrusta": [],
 }
+FAR = 3.0
+"""% of the longest side, by which nothing should be off."""
 REACH = "mean IoU 0.90 or more, 16 parts or fewer on average, median of 15 seconds or less"
 
 
 @dataclass(frozen=True)
 class Row:
     """One fit. deviation: the largest, in % of the longest side. freeform: parts that are no features.
-    Scores are nan where the fit failed."""
+    place: where it is off the most. warnings: what the fit said. Scores are nan where it failed."""
 
     variant: str
     name: str
@@ -50,9 +54,11 @@ class Row:
     instances: float
     overlap: float
     deviation: float
-    seconds: float
+    seconds: float | None
     cpu_seconds: float
     freeform: float = 0.0
+    place: str = ""
+    warnings: str = ""
 
 
 SCORES = ("iou", "bi_surface_iou", "parts", "instances", "overlap", "deviation")
@@ -68,6 +74,8 @@ def run(variant: str, entry: Entry, out: Path) -> Row:
     whole = out / "assembly.json"
     names = [part.name for part in pw.load_assembly(whole).parts] if whole.exists() else []
     freeform = sum(name.startswith(FREEFORM) for name in names)
+    told = out / "report.json"
+    report = json.loads(told.read_text(encoding="utf-8")) if told.exists() else {}
     return Row(
         variant,
         entry.name,
@@ -76,6 +84,8 @@ def run(variant: str, entry: Entry, out: Path) -> Row:
         seconds=made.seconds,
         cpu_seconds=cpu,
         freeform=float(freeform),
+        place=report["scores"]["worst_place"] if report else "",
+        warnings=" / ".join(report.get("warnings", ())),
     )
 
 
@@ -94,31 +104,56 @@ def summary(rows: list[Row]) -> Iterator[str]:
         yield (
             f"| {variant} | {len(good)} | {m['iou']:.3f} | {m['bi_surface_iou']:.3f} | {m['parts']:.1f} "
             f"({m['instances']:.1f}) | {m['freeform']:.1f} | {m['overlap']:.2f} | {m['deviation']:.1f} | "
-            f"{median(row.seconds for row in good):.1f} | {median(row.cpu_seconds for row in good):.1f} |"
+            f"{_seconds(good)} | {median(row.cpu_seconds for row in good):.1f} |"
         )
 
 
+def _seconds(rows: list[Row]) -> str:
+    """The median, where all were timed."""
+    seconds = [row.seconds for row in rows if row.seconds is not None]
+    return f"{median(seconds):.1f}" if len(seconds) == len(rows) else "-"
+
+
 def shape_by_shape(rows: list[Row]) -> Iterator[str]:
-    yield "| shape | " + " | ".join(f"{variant}: IoU | bi | parts | CPU s" for variant in VARIANTS) + " |"
-    yield "|---|" + "---:|" * 4 * len(VARIANTS)
+    variants = [variant for variant in VARIANTS if any(row.variant == variant for row in rows)]
+    header = (f"{variant}: IoU | bi | parts | deviation % | CPU s" for variant in variants)
+    yield f"| shape | {' | '.join(header)} |"
+    yield "|---|" + "---:|" * 5 * len(variants)
     found = {(row.name, row.variant): row for row in rows}
     for name in dict.fromkeys(row.name for row in rows):
         cells = []
-        for variant in VARIANTS:
+        for variant in variants:
             row = found.get((name, variant))
             if row is None:
-                cells += ["", "", "", ""]
+                cells += ["", "", "", "", ""]
             elif row.iou != row.iou:
-                cells += [row.outcome, "", "", f"{row.cpu_seconds:.1f}"]
+                cells += [row.outcome, "", "", "", f"{row.cpu_seconds:.1f}"]
             else:
                 parts = f"{row.parts:g}" + (f" ({row.freeform:g})" if row.freeform else "")
-                cells += [f"{row.iou:.3f}", f"{row.bi_surface_iou:.3f}", parts]
+                cells += [f"{row.iou:.3f}", f"{row.bi_surface_iou:.3f}", parts, f"{row.deviation:.1f}"]
                 cells += [f"{row.cpu_seconds:.1f}"]
         yield f"| {name} | {' | '.join(cells)} |"
 
 
-def document(rows: list[Row], command: str, planned: int) -> str:
+def far_off(rows: list[Row]) -> Iterator[str]:
+    """What is off by more than `FAR`, where it is, and what the fits said."""
+    for row in rows:
+        if row.deviation > FAR:
+            yield f"- {row.name} ({row.variant}): {row.deviation:.1f} % off, {row.place}"
+        if row.warnings:
+            yield f"- {row.name} ({row.variant}) says: {row.warnings}"
+
+
+def sources(entries: list[Entry]) -> Iterator[str]:
+    """Where the shapes were published, where the index says so."""
+    for entry in entries:
+        if entry.source:
+            yield f"- {entry.name}: {entry.source}"
+
+
+def document(rows: list[Row], command: str, planned: int, entries: list[Entry]) -> str:
     missing = planned - len(rows)
+    far, origins = list(far_off(rows)), list(sources(entries))
     lines = [
         "# Solids, with and without subtraction, and SuperFrusta",
         "",
@@ -133,6 +168,8 @@ def document(rows: list[Row], command: str, planned: int) -> str:
         *summary(rows),
         "",
         *shape_by_shape(rows),
+        *(["", f"Off by more than {FAR:g} %, and what the fits said:", "", *far] if far else []),
+        *(["", "Where the shapes are from:", "", *origins] if origins else []),
     ]
     return "\n".join(lines) + "\n"
 
@@ -142,8 +179,10 @@ def main() -> int:
     names, sets = ({*filter(None, text.split(","))} for text in (options.names, options.sets))
     entries = find_shapes(options.shapes, sets, names)
     chosen = [v for v in VARIANTS if v in options.variants] if options.variants else list(VARIANTS)
-    path = options.output.with_suffix(".csv")
-    command = f"python benchmarks/solids.py --shapes {options.shapes.name} --sets {options.sets}"
+    planned = len(entries) * len(chosen if options.tag else VARIANTS)
+    output = RESULTS / (f"solids-{options.tag}.md" if options.tag else "solids.md")
+    path = output.with_suffix(".csv")
+    command = _command(options)
     for variant in chosen:
         for entry in entries:
             rows = recorded.read(path, Row)
@@ -151,18 +190,26 @@ def main() -> int:
                 continue
             with tempfile.TemporaryDirectory() as folder:
                 row = run(variant, entry, (options.fits or Path(folder)) / variant / entry.name)
+            row = replace(row, seconds=None) if options.untimed else row
             recorded.append(path, row)
             print(
-                f"{variant}: {entry.name}: IoU {row.iou:.3f}, {row.parts:g} parts, {row.seconds:.1f} s",
+                f"{variant}: {entry.name}: IoU {row.iou:.3f}, {row.parts:g} parts, "
+                f"{row.cpu_seconds:.1f} CPU s",
                 flush=True,
             )
-            write_bytes(
-                options.output, document([*rows, row], command, len(entries) * len(VARIANTS)).encode()
-            )
+            write_bytes(output, document([*rows, row], command, planned, entries).encode())
     rows = recorded.read(path, Row)
-    write_bytes(options.output, document(rows, command, len(entries) * len(VARIANTS)).encode())
+    write_bytes(output, document(rows, command, planned, entries).encode())
     print("", *summary(rows), sep="\n")
     return int(any(row.iou != row.iou for row in rows))
+
+
+def _command(options: argparse.Namespace) -> str:
+    """What to type to get this table; of the folder of shapes only its name, wherever it lies."""
+    words = ["python benchmarks/solids.py", f"--shapes {options.shapes.name}", f"--sets {options.sets}"]
+    words += [f"--variants {' '.join(options.variants)}"] if options.variants else []
+    words += [f"--tag {options.tag}"] if options.tag else []
+    return " ".join([*words, *(["--untimed"] if options.untimed else [])])
 
 
 def parser() -> argparse.ArgumentParser:
@@ -175,7 +222,10 @@ def parser() -> argparse.ArgumentParser:
     option("--names", default="", metavar="A,B", help="only these shapes")
     option("--variants", nargs="*", choices=tuple(VARIANTS), help="only these")
     option("--fits", type=Path, metavar="FOLDER", help="keep all fits, as FOLDER/VARIANT/NAME")
-    option("-o", "--output", type=Path, default=RESULTS / "solids.md", metavar="FILE")
+    option("--tag", default="", help="writes solids-TAG.md")
+    option(
+        "--untimed", action="store_true", help="leaves out all but CPU seconds: for a machine that is busy"
+    )
     return result
 
 

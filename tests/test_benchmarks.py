@@ -90,3 +90,28 @@ def test_how_far_seeds_are_apart_is_told() -> None:
     few = runs("few", (0.95, 5.0), (0.95, 8.0), (0.96, 6.0))
     *_, row = module.apart([many, few])
     assert row == "| toys | 0.0150 | 0.0200 (many) | 3.0 | 3 (many) | 1 of 2 |"
+
+
+def test_solids_that_are_far_off_are_named_with_their_place() -> None:
+    sys.path.insert(0, str(FOLDER))
+    module, entry = import_module("solids"), import_module("fit").Entry
+    sys.path.remove(str(FOLDER))
+
+    def row(name: str, deviation: float, place: str = "", warnings: str = "") -> object:
+        return module.Row(
+            "solids", name, "converged", 0.9, 0.8, 5, 6, 0.1, deviation, None, 20.0, 1.0, place, warnings
+        )
+
+    entries = [
+        entry("cad", "hinge", Path("hinge.stl"), source="a/b@0123: hinge.stl"),
+        entry("cad", "x", Path("x")),
+    ]
+    text = module.document(
+        [row("hinge", 3.1, "upper left"), row("x", 2.9, "top", "a piece floats")], "made", 2, entries
+    )
+    assert "| hinge | 0.900 | 0.800 | 5 (1) | 3.1 | 20.0 |" in text
+    assert "- hinge (solids): 3.1 % off, upper left" in text
+    assert "x (solids): 2.9" not in text
+    assert "- x (solids) says: a piece floats" in text
+    assert "- hinge: a/b@0123: hinge.stl" in text
+    assert "Unfinished" not in text
