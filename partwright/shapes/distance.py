@@ -77,6 +77,8 @@ class MeshDistance:
     def _scene(self) -> Any:
         import fcpw
 
+        if not len(self._faces):
+            raise ValueError("a surface without triangles is nowhere near: FCPW would end the process")
         scene = fcpw.scene_3D()
         scene.set_object_count(1)
         scene.set_object_vertices(np.asfortranarray(self._vertices, dtype=np.float32), 0)

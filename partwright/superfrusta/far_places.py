@@ -73,6 +73,16 @@ class Solid:
         vertices, faces = surface_of(self.body)
         return MeshDistance(vertices, faces, faces, True)
 
+    def away(self, points: Floats) -> NDArray[np.floating]:
+        """(N,) from its surface, infinite where it has none: all of a body may lie elsewhere."""
+        return np.full(len(points), np.inf) if self.body.is_empty() else self.surface.unsigned(points)
+
+    def feet(self, points: Floats) -> Floats:
+        """(N, 3) on its surface, nearest to points; these themselves where it has none."""
+        if not len(points) or self.body.is_empty():
+            return points
+        return self.surface.closest(points).astype(np.float64)
+
     @cached_property
     def count(self) -> int:
         """Connected bodies, crumbs left out."""
@@ -101,7 +111,8 @@ def far_places(shape: Solid, other: Solid) -> list[Place]:
 
 
 def reach(shape: Solid, other: Solid, box: Floats, least: float = _REGION * FAR) -> float:
-    """How far the surfaces are apart in a box (2, 3), unit lengths; 0 where that is less than `least`."""
+    """How far the surfaces are apart in a box (2, 3), unit lengths; 0 where that is less than `least`, and
+    infinite where only one of both has any."""
     return float(_apart(shape, other, box, least)[2].max(initial=0.0))
 
 
@@ -133,14 +144,13 @@ def _apart(
     lacks: list[NDArray[np.bool_]] = []
     for one, across, here in ((shape, other, True), (other, shape, False)):
         points = one.points(box)
-        off = across.surface.unsigned(points)
+        off = across.away(points)
         far = np.flatnonzero(off > least)
         far = far[~buried(one.sign, points[far])]
         points = points[far]
         outside = across.sign(points) > 0
         # In a slit of the other body, the shape's surface that is nearest may lie on the far side of a wall.
-        feet = points if not len(points) else across.surface.closest(points).astype(np.float64)
-        feet = np.where((outside | here)[:, None], feet, points)
+        feet = np.where((outside | here)[:, None], across.feet(points), points)
         found.append(np.column_stack([points, feet, off[far]]))
         lacks.append(outside == here)
     both = np.concatenate(found)

@@ -217,3 +217,9 @@ def test_points_of_some_voxels_are_those_of_all() -> None:
     grid = DistanceGrid(np.array([-0.93, 0.1, 0.2]), 0.0195652, np.zeros((5, 7, 6), np.float32))
     some = np.array([0, 209, 17, 17, 41])
     np.testing.assert_array_equal(grid.points_of(some), grid.points()[some])
+
+
+def test_a_surface_without_triangles_is_an_error_and_no_crash() -> None:
+    none = MeshDistance(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((0, 3), np.int64), True)
+    with pytest.raises(ValueError, match="without triangles"):
+        none.unsigned(np.zeros((1, 3)))

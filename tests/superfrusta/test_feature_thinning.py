@@ -7,11 +7,14 @@ import math
 
 import numpy as np
 import pytest
+from manifold3d import Manifold
 
 import partwright as pw
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Tube
 from partwright.meshing import mesh_assembly
+from partwright.meshing.csg import solid_of
+from partwright.superfrusta.far_places import Solid, reach
 from partwright.superfrusta.feature_assembly import FeatureAssembly
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
@@ -84,3 +87,13 @@ def test_holes_in_a_round_wall_stay() -> None:
     flat = dataclasses.replace(drilled, field=Cylinder(0.04, 0.056), translation=(0.569, 0.0, 0.4))
     whole = Assembly((wall, drilled), "difference")
     assert left([(wall, True), (flat, False)], whole, 1.5) == [wall, flat]
+
+
+def test_where_one_of_both_has_no_surface_it_is_infinitely_far() -> None:
+    """A feature whose whole neighbourhood goes with it, or a chip where the shape has nothing: asking how far
+    it was ended the process."""
+    post = Solid(solid_of(POST, 1e-3), POST.distance)
+    nothing = Solid(Manifold(), lambda points: np.full(len(points), np.float32(10)))
+    box = np.array([[-1.0, -0.5, -0.5], [0.0, 0.5, 0.5]])
+    assert reach(post, nothing, box) == reach(nothing, post, box) == math.inf
+    assert reach(nothing, nothing, box) == reach(post, post, box) == 0.0
