@@ -13,13 +13,17 @@ RADIUS, PITCH, LENGTH = 0.4, 0.12, 1.2
 INNER = RADIUS - 0.6134 * PITCH
 
 
-def threaded(pitch: float = PITCH, around: int = 60, along: int = 16) -> Manifold:
-    """A rod with the ISO profile: crests an eighth of the pitch wide, roots a quarter."""
+def threaded(pitch: float = PITCH, around: int = 60, along: int = 16, ends: float = 1.0) -> Manifold:
+    """A rod with the ISO profile: crests an eighth of the pitch wide, roots a quarter.
+
+    ends: of the depth, that there is at the ends, where it runs out over two turns.
+    """
     rows = round(LENGTH / abs(pitch) * along)
     turns, heights = np.arange(around) / around, np.linspace(-LENGTH / 2, LENGTH / 2, rows + 1)
     phase = np.mod(heights[:, None] / pitch - turns, 1.0)
     share = np.clip((np.abs(2 * phase - 1) - 1 / 8) / (5 / 8), 0.0, 1.0)
-    radius = RADIUS - share * (RADIUS - INNER)
+    near = np.clip((LENGTH / 2 - np.abs(heights[:, None])) / (2 * abs(pitch)), 0.0, 1.0)
+    radius = RADIUS - share * (ends + (1 - ends) * near) * (RADIUS - INNER)
     ring = 2 * math.pi * np.broadcast_to(turns, radius.shape)
     walls = np.stack([radius * np.cos(ring), radius * np.sin(ring), heights[:, None] + 0 * ring], axis=-1)
     vertices = np.concatenate([walls.reshape(-1, 3), [(0, 0, -LENGTH / 2), (0, 0, LENGTH / 2)]])

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from manifold3d import Manifold
+from manifold3d import CrossSection, Manifold
 
 from partwright.approximation.sketches.threads import without_threads
 from partwright.meshing.manifolds import closed
@@ -36,6 +36,20 @@ def test_a_rod_becomes_the_cylinder_around_it(pitch: float) -> None:
 def test_both_flanks_are_one_thread_in_coarse_chords_too() -> None:
     _, threads = without_threads(threaded(around=24))
     assert [thread.pitch for thread in threads] == [pytest.approx(PITCH, rel=0.01)]
+
+
+def test_a_thread_that_runs_out_is_one_though_it_goes_over_into_the_rod_and_its_head() -> None:
+    """Where it is less deep, flanks lean less: they came as one patch with the crests, and
+    with a neck and a head that these go over into."""
+    arc = math.pi / 2 * np.arange(11) / 10
+    neck = np.column_stack([RADIUS + 0.3 * (1 - np.cos(arc)), 0.2 + 0.3 * np.sin(arc)])
+    profile = [(0, 0), (RADIUS, 0), *neck.tolist(), (0, 0.5)]
+    head = CrossSection([profile]).revolve(60).translate((0, 0, 0.4))
+    plain, (thread,) = without_threads(threaded(along=40, ends=0.3) + head)
+    assert thread.pitch == pytest.approx(PITCH, rel=1e-2)
+    assert (thread.inner, thread.outer) == pytest.approx((INNER, RADIUS), abs=3e-3)
+    whole = math.pi * RADIUS**2 * (0.4 + LENGTH / 2) + head.volume()
+    assert plain.volume() == pytest.approx(whole, rel=5e-3)
 
 
 def test_a_tapped_hole_becomes_as_narrow_as_its_crests() -> None:

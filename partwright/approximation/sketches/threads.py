@@ -22,7 +22,8 @@ from partwright.shapes.topology import components
 if TYPE_CHECKING:
     import trimesh
 
-_SMOOTH = math.radians(25)  # between faces of one patch
+_SMOOTH = math.radians(25), math.radians(10)  # between faces of one patch, what is coarse first: finely
+# meshed flanks go over into the rod at less where a thread runs out
 _LEAST_AREA, _LEAST_FACES = 2e-3, 24  # of the surface, that a patch has
 _TRIMMED, _ROUNDS = 0.85, 3  # of a patch, that is fitted again: chords beside edges lean
 _UPRIGHT = 1e-3  # of the largest: least spread of normals that are those of no cylinder and no plane
@@ -91,8 +92,14 @@ def without_threads(body: Manifold) -> tuple[Manifold, list[Thread]]:
 def _candidates(body: Manifold) -> list[Thread]:
     """Of patches that a screw motion keeps, and no other motion does; internal or not is not known yet."""
     mesh = as_mesh(body)
+    every = (_threads_of(mesh, smooth) for smooth in _SMOOTH)
+    return next((found for found in every if found), [])
+
+
+def _threads_of(mesh: trimesh.Trimesh, smooth: float) -> list[Thread]:
+    """Of patches whose faces turn by less than an angle from one to the next."""
     pairs, angles = mesh.face_adjacency, mesh.face_adjacency_angles
-    patch = components(len(mesh.faces), *pairs[angles < _SMOOTH].T)
+    patch = components(len(mesh.faces), *pairs[angles < smooth].T)
     areas, counts = np.bincount(patch, mesh.area_faces), np.bincount(patch)
     large = np.flatnonzero((areas > _LEAST_AREA * mesh.area) & (counts >= _LEAST_FACES))
     found: list[Thread] = []
