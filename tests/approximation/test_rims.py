@@ -63,3 +63,18 @@ def test_bodies_of_candidates_lie_on_either_side() -> None:
     assert (inner - body).volume() < 1e-3 * body.volume()
     assert (body - outer).volume() < 1e-3 * body.volume()
     assert inner.volume() > 0.98 * body.volume() > 0.96 * outer.volume()
+
+
+def test_a_chamfer_that_is_mitred_where_the_outline_goes_inwards() -> None:
+    """CAD programs let the planes of a chamfer meet there, as those of two plates do. Measured from the
+    nearest place of the outline, which is that corner, they were deeper than they are: no rim was found."""
+    outline = Profile([(0, 0), (1, 0), (1, 0.4), (0.4, 0.4), (0.4, 1), (0, 1)])
+    lying, standing = (
+        named_solid(Extrusion(Profile.rectangle(*size), 0.4, top_chamfer=0.1), 1e-3).translate(
+            (size[0] / 2, size[1] / 2, 0)
+        )
+        for size in ((1.0, 0.4), (0.4, 1.0))
+    )
+    mesh = (lying + standing).to_mesh64()
+    faces = Leaning.of(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
+    assert top_rim(faces, outline, 0.2) == (0, pytest.approx(0.1, rel=1e-3))

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold
 
+from partwright.approximation.sketches.rim_walls import depth_in_own_walls
 from partwright.fields.profile import Profile, Side
 from partwright.fields.profile_distance import profile_distance
 from partwright.fields.rims import Rim
@@ -78,10 +79,15 @@ def _rim(faces: Leaning, near: np.ndarray, end: float, upwards: float, profile: 
     corners, facing = faces.corners[own], upwards * faces.upwards[own]
     off = np.maximum(upwards * (end - corners[..., 2]), 0)
     flat = corners[..., :2].reshape(-1, 2)
-    deep = -profile_distance(profile, flat).reshape(-1, 3)
+    nearest = -profile_distance(profile, flat).reshape(-1, 3)
+    facing_away = area_vectors(corners)[:, :2]
+    facing_away = facing_away / np.maximum(np.linalg.norm(facing_away, axis=1), 1e-300)[:, None]
+    within, deep = nearest.min(axis=1) >= -_OFF, nearest.copy()
+    deep[within] = depth_in_own_walls(profile, flat.reshape(-1, 3, 2)[within], facing_away[within])
+    deep = np.where(np.isnan(deep), nearest, deep)
     # Of a circle that touches both, through a point; of a chamfer's end points it is the chamfer.
     depth = np.maximum(deep, 0) + off + np.sqrt(2 * np.maximum(deep, 0) * off)
-    depth[(deep.min(axis=1) < -_OFF) | (deep.max(axis=1) > _MOST)] = np.inf
+    depth[~within | (deep.min(axis=1) < -_OFF) | (deep.max(axis=1) > _MOST)] = np.inf
     found = _most_common(depth.ravel(), np.repeat(area, 3))
     alike = (np.abs(depth - found) < _ALIKE * found + _OFF / 4).all(axis=1) if np.isfinite(found) else own[:0]
     if not _LEAST <= found < math.inf or not alike.any():
