@@ -386,3 +386,17 @@ def test_what_stands_on_a_flat_end_of_a_turned_body_is_not_parted_from_it() -> N
     low, high = np.reshape(left.bounding_box(), (2, 3))
     assert low[2] == pytest.approx(0.2, abs=1e-5)
     assert high[2] == pytest.approx(0.4, abs=1e-5)
+
+
+def test_letters_in_a_wall_are_no_corners_of_its_outline() -> None:
+    """Each row of them was an outline of its own, extruded through all of it: letters came as stripes."""
+    bar = named_solid(Box((1.6, 0.4, 0.5)), 1e-3)
+    letter = named_solid(Tube(0.06, 0.02, 0.04), 1e-3).rotate((90, 0, 0))
+    for x in np.linspace(-0.6, 0.6, 5).tolist():
+        for z in (-0.2, 0.0, 0.2):
+            bar -= letter.translate((x, -0.2, z))
+    found = candidates(bar, [np.eye(3)], holes=False)
+    assert max(one.sides for one in found) > 40
+    assert any(
+        np.allclose(np.ptp(one.part.bounds(), axis=0), (1.6, 0.4, 0.5)) and one.sides == 4 for one in found
+    )

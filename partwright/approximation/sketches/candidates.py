@@ -37,6 +37,8 @@ _NEAR_AXIS = 4e-3
 _BALANCED = 0.98  # of the largest second moment of a section's area, that the least has
 _MOST_SLABS = 10
 _ALL_RIM = 0.95  # of a slab's height
+_ENGRAVED = 16  # corners of a section, from which on what cut it may not be its own
+_PLAINER = 0.8  # of them, that the slab as it is seen has at most
 
 
 def candidates(body: Manifold, frames: Sequence[np.ndarray], holes: bool) -> list[Candidate]:
@@ -104,14 +106,24 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
 
 def _regions(view: View, low: float, high: float) -> Iterator[Region]:
     """Of a slab: those in its middle, and others elsewhere in it that hold these, where a hole across it has
-    cut the middle."""
+    cut the middle; where letters that are engraved in its walls have, all of it as it is seen."""
     middle = view.regions((low + high) / 2)[:MOST_REGIONS]
-    yield from (region for region in middle if region.area >= _LEAST_SHARE * middle[0].area)
+    found = [region for region in middle if region.area >= _LEAST_SHARE * middle[0].area]
     for share in ELSEWHERE:
         for region in view.regions(low + share * (high - low))[:1]:
             larger = not any(region.area < (1 + SAME_AREA) * other.area for other in middle)
             if larger and all(goes_on(other, [region]) for other in middle):
+                found.append(region)
+    yield from found
+    largest = max(found, key=lambda region: region.area, default=None)
+    if largest is not None and _corners(largest) > _ENGRAVED:
+        for region in view.shadow(low, high)[:1]:
+            if 0 < _corners(region) < _PLAINER * _corners(largest) and goes_on(largest, [region]):
                 yield region
+
+
+def _corners(region: Region) -> int:
+    return len(region.profile.corners) if region.profile is not None else 0
 
 
 def _outlines(region: Region, holes: bool) -> Iterator[tuple[CrossSection, Profile | None]]:

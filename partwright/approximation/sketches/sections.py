@@ -123,6 +123,13 @@ class View:
             self._sections[height] = _regions(self.body.slice(height))
         return self._sections[height]
 
+    def shadow(self, low: float, high: float) -> list[Region]:
+        """Of what lies between two heights, as it is seen: connected pieces, the largest first."""
+        between = self.body.trim_by_plane((0, 0, 1), low + _SAME_LEVEL).trim_by_plane(
+            (0, 0, -1), _SAME_LEVEL - high
+        )
+        return _regions(between.project())
+
     @cached_property
     def silhouette(self) -> list[Region]:
         """Of the whole, as it is seen: connected pieces, the largest first."""
