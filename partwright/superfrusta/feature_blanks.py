@@ -23,6 +23,7 @@ PERFECT = 0.985
 _ENDED = 0.015  # of the objective, that a tree may gain where it is ended
 _FEW, _CHEAP = 1, 2.2  # features, and prices of plain ones, of which none is left to save
 _BLANKS, _PLAIN = 2, 4.0  # and prices of plain ones, with which but one is tried
+_UNDRAWN = 5.0  # prices of plain features, that each further piece of freeform has to save
 _PATIENT = 6  # steps after which a tree may be well behind, and no more than the best has, but for one
 
 
@@ -33,8 +34,8 @@ def cut_from_blanks(
     tried: Collection[tuple[float, ...]],
 ) -> FeatureTree:
     """The best tree, or one that is cut from a silhouette, no further off, and worth more when both are
-    mended, with no more freeform. others: candidates of the whole. tried: keys of those that a tree has begun
-    with."""
+    mended, by more where it has more freeform. others: candidates of the whole. tried: keys of those that a
+    tree has begun with."""
     if len(best.features) <= _FEW or best.price <= _CHEAP * search.alpha:
         return best
     blanks = [blank for blank in silhouettes(search.body, search.frames) if blank.key not in tried]
@@ -57,7 +58,8 @@ def cut_from_blanks(
         if tree.objective > max(_least(search, tree, whole), highest):
             highest = tree.objective
             rival = search.mend(tree)
-            if worth(rival) > _least(search, rival, whole) and _freeform(rival) <= _freeform(whole):
+            more = max(0, _freeform(rival) - _freeform(whole))
+            if worth(rival) > _least(search, rival, whole) + _UNDRAWN * more * search.alpha:
                 found, whole = tree, rival
     return found
 
@@ -85,5 +87,5 @@ def worth(tree: FeatureTree) -> float:
 
 
 def _freeform(tree: FeatureTree) -> int:
-    """Pieces that no feature explains: a blank that leaves more of them is none that was drawn."""
+    """Pieces that no feature explains: a blank that leaves more of them is hardly one that was drawn."""
     return sum(feature.freeform for feature in tree.features)

@@ -78,6 +78,22 @@ def test_no_blank_is_taken_that_leaves_more_freeform() -> None:
     assert worth(replace(asked[0], off=0.3)) == pytest.approx(asked[0].objective - 0.3)
 
 
+def test_a_blank_that_is_worth_much_more_is_taken_with_its_freeform() -> None:
+    """A cube with bevelled edges and letters stayed a turned body with four sides cut off, for its blank had
+    two pieces of freeform."""
+    asked: list[FeatureTree] = []
+
+    def mend(tree: FeatureTree) -> FeatureTree:
+        asked.append(tree)
+        first, *rest = tree.features
+        if len(asked) == 1:
+            return replace(tree, off=0.3)
+        return replace(tree, features=[first, *rest[:-1], replace(rest[-1], freeform=True)])
+
+    drawn = searching(mend=mend).run()
+    assert any(drawn is tree for tree in asked[1:])
+
+
 def test_no_blank_is_taken_that_is_further_off(monkeypatch: pytest.MonkeyPatch) -> None:
     """Paper-thin skins cost next to nothing of R, and reach as far as the blank does."""
     real, ended = FeatureSearch.ended, []
