@@ -37,12 +37,13 @@ _GAP = 0.02  # unit lengths: what is as near to where a piece nearly touches the
 class Place:
     """points: (N, 3) far from the other surface, and where they would lie on it. lacks: whether the body
     lacks something there; else it has too much. off: unit lengths. gap: whether it is one between a piece
-    that floats and the rest."""
+    that floats and the rest. floats: the share of the volume that does."""
 
     points: Floats
     lacks: bool
     off: float
     gap: bool = False
+    floats: float = 0.0
 
     @cached_property
     def box(self) -> Floats:
@@ -124,14 +125,16 @@ def loose_places(shape: Solid, other: Solid) -> list[Place]:
     found = []
     largest = pieces[0][1]
     rest = Solid(largest, other.distance).surface
-    for _, piece in pieces[1:]:
+    volume = sum(one for one, _ in pieces)
+    for own, piece in pieces[1:]:
         points = Solid(piece, other.distance).points()
         gap = rest.unsigned(points)
         near = points[gap < gap.min() + _GAP]
         across = rest.closest(near)
         middle = (near + across) / 2
         if (shape.sign(middle) < 0).mean() > _WITHIN:
-            found.append(Place(np.concatenate([near, across]), True, float(gap.min()), gap=True))
+            off = float(gap.min())
+            found.append(Place(np.concatenate([near, across]), True, off, gap=True, floats=own / volume))
     return found
 
 

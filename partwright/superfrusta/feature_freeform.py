@@ -43,6 +43,7 @@ _BESIDE = 0.07  # the same of a feature that is cut, whose walls are nearer than
 _LOOKED = 0.1  # unit lengths around a place that is looked at again
 _BETTER = 0.9  # of what a place was off, that it may be when mended
 _LOSS = 3e-3  # of R, that mending one place may cost
+_JOINED = 0.1  # of the share of the volume that floats, which joining it may cost of R besides
 _CHORD = 1e-3  # unit lengths
 
 
@@ -153,7 +154,7 @@ def _joined(
     for feature in features:
         covered = covered | feature.covers if place.lacks else covered & ~feature.covers
     score = search.score_of(covered)
-    if score < tree.score - _LOSS:
+    if score < tree.score - _LOSS - _JOINED * place.floats:
         return None
     price = tree.price + (_DEARER if freeform else 1.0) * search.alpha * len(parts)
     tree = replace(tree, features=[*tree.features, *features], covered=covered, score=score, price=price)

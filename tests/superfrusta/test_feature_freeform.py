@@ -18,6 +18,7 @@ from partwright.fields import Box, Cylinder, Sphere
 from partwright.meshing import mesh_assembly
 from partwright.meshing.csg import solid_of
 from partwright.methods import FitRequest
+from partwright.superfrusta import feature_freeform
 from partwright.superfrusta.far_places import Solid, far_places
 from partwright.superfrusta.feature_assembly import FeatureAssembly
 from partwright.superfrusta.feature_freeform import with_freeform
@@ -112,6 +113,16 @@ def test_pieces_that_hardly_float_are_joined() -> None:
     tree, _, bodies = mended(Assembly((PLATE,)), *halves)
     assert bodies == 1
     assert len(tree.features) == 3
+
+
+def test_the_more_of_a_shape_floats_the_more_may_joining_it_cost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The arm of a knob, 9 % of it, floated for good, as what joins it costs more of R than a place may."""
+    monkeypatch.setattr(feature_freeform, "_LOSS", -0.02)  # what joins has to gain as much, and does not
+    for width, joined in ((0.8995, 1), (0.1995, 2)):
+        sides = [(1.799 - width, -0.9 + (1.799 - width) / 2), (width, 0.9 - width / 2)]
+        parts = [Part(Box((size, 1.0, 0.2)), (x, 0.0, 0.0)) for size, x in sides]
+        _, _, bodies = mended(Assembly((PLATE,)), *parts)
+        assert bodies == joined
 
 
 def test_a_chip_that_a_cut_leaves_beside_the_shape_goes() -> None:
