@@ -94,8 +94,10 @@ def test_how_far_seeds_are_apart_is_told() -> None:
 
 def test_solids_that_are_far_off_are_named_with_their_place() -> None:
     sys.path.insert(0, str(FOLDER))
+    sys.modules.pop("solids", None)  # tests have a module of that name, too
     module, entry = import_module("solids"), import_module("fit").Entry
     sys.path.remove(str(FOLDER))
+    del sys.modules["solids"]
 
     def row(name: str, deviation: float, place: str = "", warnings: str = "") -> object:
         return module.Row(
