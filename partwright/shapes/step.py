@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 TOLERANCE = 5e-4  # of the diagonal of the bounding box: how far triangles may lie off the surface
 NO_NAMES = ("", "SOLID", "COMPOUND", "SHELL", "FACE")  # what CAD programs write where there is no name
 ANGLE = 0.3  # radians between neighbouring triangles of a curved face
+_TRIED = (2.0, 0.5, 4.0)  # of the tolerance, where OpenCASCADE leaves out faces, though they are valid
 
 
 def source_of_step(path: Path) -> Source:
@@ -138,7 +139,7 @@ def _free(name: str, taken: set[str]) -> str:
 def _tessellate(solids: list[TopoDS_Shape]) -> None:
     from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.BRepTools import BRepTools
 
     box = Bnd_Box()
     for solid in solids:
@@ -147,7 +148,32 @@ def _tessellate(solids: list[TopoDS_Shape]) -> None:
         return
     deflection = TOLERANCE * float(np.sqrt(box.SquareExtent()))
     for solid in solids:
-        BRepMesh_IncrementalMesh(solid, deflection, False, ANGLE, False)
+        least, best = _left_out(solid, deflection), 1.0
+        for share in _TRIED if least else ():
+            BRepTools.Clean_s(solid)
+            now = _left_out(solid, share * deflection)
+            if now < least:
+                least, best = now, share
+            if not now:
+                break
+        else:
+            if least:
+                BRepTools.Clean_s(solid)
+                _left_out(solid, best * deflection)
+
+
+def _left_out(solid: TopoDS_Shape, deflection: float) -> int:
+    """Tessellates a solid: how many of its faces have no triangles then."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.TopoDS import TopoDS
+
+    BRepMesh_IncrementalMesh(solid, deflection, False, ANGLE, False)
+    faces = parts_of(solid, TopAbs_ShapeEnum.TopAbs_FACE)
+    meshes = (BRep_Tool.Triangulation_s(TopoDS.Face(face), TopLoc_Location()) for face in faces)
+    return sum(mesh is None or not mesh.NbTriangles() for mesh in meshes)
 
 
 def _triangles(shape: TopoDS_Shape) -> tuple[np.ndarray, np.ndarray]:
