@@ -194,7 +194,8 @@ def warnings(shape: Shape, scores: Scores, more: str) -> list[str]:
     if shape.confidence < UNSURE:
         repairs = "; ".join(shape.repairs)
         result.append(
-            f"it is unsure what lies inside this surface (confidence {shape.confidence:.2f}): {repairs}"
+            f"it is unsure what lies inside this surface (confidence {shape.confidence:.2f}): {repairs}. "
+            "Where sheets were meant, --thickness 1% makes walls of them"
         )
     return result
 
