@@ -20,6 +20,7 @@ Floats = NDArray[np.float32]
 _ON = 0.004  # unit lengths: points this near to a surface are on it
 _CLOSE = 0.009  # unit lengths, half a hundredth of the longest side: what is nearer is not off
 _BESIDE = 0.005  # unit lengths from a surface at which a gap is looked for
+_DEEP, _SLIVER = 0.05, 5e-4  # unit lengths: so deep inside, any place is a void whose field is more
 _AROUND = _BESIDE * np.concatenate([np.eye(3), -np.eye(3)])[:, None].astype(np.float32)
 _STEPS, _FLAT = 4, 0.1  # of a walk to the surface; least squared slope that a step is taken by
 _DEEPEST_BLEND = 0.08  # unit lengths: a quarter of the largest blend
@@ -140,16 +141,19 @@ def _of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tup
     """Places inside the shape that no part fills, and outside that one does.
 
     Where blends wall a void no part's surface is near it, and a hole may lie between the points of a face. A
-    sheet passes between voxels: those beside it walk onto it.
+    sheet passes between voxels: those beside it walk onto it. Further out lie chips of what is
+    mostly cut away.
     """
     points, distance = samples.lattice
     field = samples.distance_of(rows, points)
     beside = np.flatnonzero((field > 0) & (field < samples.grid.spacing) & (distance - field > _CLOSE))
     onto, arrived = _arrived(samples, rows, points[beside], field[beside])
-    wrong = np.where(distance < 0, field, -field) > _BESIDE / 2
+    wrong = np.where(distance < 0, field, -field) > np.where(distance < -_DEEP, _SLIVER, _BESIDE / 2)
     onto = onto[arrived]
-    deepest = samples.parts_of(rows[added], points[wrong]).argmin(axis=0)
+    chips, far = samples.chips(rows)
+    wrong_points = np.concatenate([points[wrong], chips])
+    deepest = samples.parts_of(rows[added], wrong_points).argmin(axis=0)
     nearest = np.abs(samples.parts_of(rows[added], onto)).argmin(axis=0)
-    points = np.concatenate([points[wrong], onto])
-    distance = np.concatenate([distance[wrong], np.maximum(samples.near_distance(onto), 0)])
+    points = np.concatenate([wrong_points, onto])
+    distance = np.concatenate([distance[wrong], far, np.maximum(samples.near_distance(onto), 0)])
     return points, distance, np.abs(distance), added[np.concatenate([deepest, nearest])]

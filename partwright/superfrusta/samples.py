@@ -121,6 +121,13 @@ class FitSamples:
             probes=np.delete(self.probes, hit[hit < len(self.probes)], axis=0),
         )
 
+    def chips(self, rows: Rows) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Points (n, 3) of an assembly so far out that no probe or voxel lies there, and the shape's distance
+        (n,)."""
+        probes = self._probes_beyond(rows)
+        points = probes[self.distance_of(rows, probes) < 0] if len(probes) else probes
+        return points, self.measure(points).astype(np.float32)
+
     def _probes_beyond(self, rows: Rows) -> NDArray[np.float32]:
         """Probes (n, 3) as dense as the others, about parts that reach out of the cube that those fill: of a
         body that is mostly cut away a chip may be left there. None that are samples already."""

@@ -86,10 +86,10 @@ def test_an_exact_assembly_is_nowhere_off(samples: FitSamples, exact: np.ndarray
     assert off.norm == 0
 
 
-def test_a_void_that_only_blends_wall_is_off_by_its_depth(samples: FitSamples) -> None:
-    """Blends fill the corners, so that few points of any part's own surface are at its walls."""
+def void_rows(blend: float) -> np.ndarray:
+    """Six slabs about a void in the middle of BODY, and the arm."""
     (width, depth, height), (x, y, z) = BODY
-    hole = 0.04  # half of it, between six slabs
+    hole = 0.04  # half of it, between the slabs
     walls = [box_row(*ARM)]
     for axis, size in ((0, width), (1, depth), (2, height)):
         for side in (-1, 1):
@@ -98,13 +98,42 @@ def test_a_void_that_only_blends_wall_is_off_by_its_depth(samples: FitSamples) -
             centre[axis] += side * (size / 2 + hole) / 2
             walls.append(box_row(tuple(slab), tuple(centre)))
     rows = np.array(walls)
-    rows[1:, Column.BLEND] = 0.05
+    rows[1:, Column.BLEND] = blend
+    return rows
+
+
+def test_a_void_that_only_blends_wall_is_off_by_its_depth(samples: FitSamples) -> None:
+    """Blends fill the corners, so that few points of any part's own surface are at its walls."""
+    rows = void_rows(0.05)
     field = kernel.evaluate(rows, np.array([BODY[1]], np.float32))
-    assert 0 < field[0] < hole
+    assert 0 < field[0] < 0.04
     off = deviations(samples, rows)
-    assert off.norm == pytest.approx(height / 2, abs=0.04)
+    assert off.by_part.max() == pytest.approx(BODY[0][2] / 2, abs=0.04)
     void = off.points[off.distance < -0.1]
     assert (np.abs(void - np.array(BODY[1])).max(axis=1) < 0.05).all()
+
+
+def test_a_void_that_blends_nearly_fill_is_one(samples: FitSamples) -> None:
+    centre = np.array([BODY[1]], np.float32)
+    blends = np.linspace(0.06, 0.07, 21)
+    fields = np.array([kernel.evaluate(void_rows(blend), centre)[0] for blend in blends])
+    rows = void_rows(blends[np.flatnonzero((fields > 1e-3) & (fields < 2e-3))[0]])
+    assert deviations(samples, rows).by_part.max() == pytest.approx(BODY[0][2] / 2, abs=0.04)
+    filled = void_rows(blends[np.flatnonzero(fields < -1e-3)[0]])
+    assert deviations(samples, filled).by_part.max() < 0.1  # blends bulge
+
+
+def test_a_chip_beyond_all_voxels_is_off(samples: FitSamples, exact: np.ndarray) -> None:
+    """A bar that reaches far out, and is cut away but for its end."""
+    bar, cut = box_row((1.0, 0.3, 0.3), (1.3, 0.0, 0.0)), box_row((0.55, 0.5, 0.5), (1.175, 0.0, 0.0))
+    cut[Column.SIGN] = -1
+    rows = np.vstack([exact, bar, cut])
+    points, distance = samples.chips(rows)
+    assert len(points) > 100
+    assert np.abs(points[:, 0] - 1.625).max() < 0.18
+    assert distance == pytest.approx(points[:, 0] - 0.9, abs=0.02)
+    assert deviations(samples, rows).by_part[2] > OUTSIDE * 0.85
+    assert len(samples.chips(exact)[0]) == 0
 
 
 def test_a_thin_tab_is_off_by_its_length(samples: FitSamples, exact: np.ndarray) -> None:
