@@ -23,6 +23,7 @@ _TOUCHING = 2e-3  # unit lengths, 0.1 % of the longest side: what is as near lie
 _PROBES = 32  # points of a lid that are looked at
 _COVERED = 0.9  # of them
 _ON_GROUND = 1e-4  # unit lengths above it
+_WITHIN = 0.6  # winding number from which on a point is clearly inside: behind a sheet alone it is a half
 _SPACING = 0.01  # unit lengths between points of a rim
 _ALONG = 0.02  # unit lengths: a rim that is as near runs along another
 
@@ -85,8 +86,9 @@ def drop_sheets(
 ) -> tuple[NDArray[np.float64], EdgeTable]:
     """Without flat sheets that stand by themselves: decals, panes, the ground; and without their vertices.
 
-    A sheet whose rim runs along another's, or along that of an opening, is the side of something. One that is
-    drawn on both sides has no rim. lying: the last so many triangles, which lie on the ground, go as well.
+    A sheet whose rim runs along another's, or along that of an opening, is the side of something, and so is
+    one with an inside behind it. One that is drawn on both sides has no rim. lying: the last so many
+    triangles, which lie on the ground, go as well.
     """
     faces = edges.faces
     if lying:
@@ -115,7 +117,9 @@ def _loose_sheets(vertices: NDArray[np.float64], edges: EdgeTable) -> list[NDArr
     if open_:
         found = _loose(vertices, edges, open_, flat[edges.open_bodies])
         loose += [open_[one] for one in np.flatnonzero(found)]
-    return loose if loose and _is_beside_the_point(doubled_areas(vertices, edges.faces), loose) else []
+    if not loose or not _is_beside_the_point(doubled_areas(vertices, edges.faces), loose):
+        return []
+    return [sheet for sheet in loose if not _encloses(vertices, edges, sheet)]
 
 
 def _loose(
@@ -138,6 +142,18 @@ def _loose(
         if (found == loose).all():
             return loose
         loose = found
+
+
+def _encloses(vertices: NDArray[np.float64], edges: EdgeTable, sheet: NDArray[np.int64]) -> bool:
+    """Whether there is something behind a sheet and nothing before it: the floor of a crate, whose walls
+    and bottom are another body's."""
+    triangles = vertices[edges.faces[sheet]]
+    across = area_vectors(triangles).sum(axis=0)
+    step = _TOUCHING * across / max(float(np.linalg.norm(across)), np.finfo(np.float64).tiny)
+    probes = _points_on(triangles)
+    whole = MeshDistance(vertices, edges.faces, edges.faces, closed=False)
+    behind, before = whole.winding(probes - step), whole.winding(probes + step)
+    return float(((behind > _WITHIN) & (before < 1 - _WITHIN)).mean()) > 0.5
 
 
 def _is_beside_the_point(area: NDArray[np.float64], sheets: list[NDArray[np.int64]]) -> bool:

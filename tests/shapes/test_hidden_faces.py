@@ -169,6 +169,25 @@ def test_loops_hold_each_half_edge_once_and_no_vertex_twice(seed: int, faces: in
     assert all(len(set(loop.tolist())) == len(loop) for loop in loops)
 
 
+def test_a_floor_between_walls_that_have_a_bottom_stays() -> None:
+    """The walls are a closed ring, the bottom is a sheet beneath it, the floor one within it."""
+    outer, inner = box((2, 2, 1), (0, 0, 0)), box((1.6, 1.6, 1), (0, 0, 0))
+    ring = outer.difference(inner)
+    bottom = sheet(1.6, 1.6, (-0.8, -0.8, -0.5))
+    bottom.invert()
+    floor = sheet(1.6, 1.6, (-0.8, -0.8, -0.4))
+    shape = load_shape(together(ring, bottom, floor))
+    assert not any("loose" in note for note in shape.repairs)
+    inside = shape.signed_distance(
+        [[0, 0, -0.45], [0.5, 0.5, -0.42], [0, 0, -0.35], [0, 0, 0.3], [0, 0, -0.6]]
+    )
+    assert (inside[:2] < 0).all()
+    assert (inside[2:] > 0).all()
+    alone = load_shape(together(ring, floor))  # a pane
+    assert any("loose" in note for note in alone.repairs)
+    assert alone.volume == pytest.approx(ring.volume, rel=1e-6)
+
+
 def road_between_kerbs(reach: float) -> trimesh.Trimesh:
     """One open body: along x a kerb, a road on the ground, a kerb, and the road `reach` further."""
     profile = np.array(
