@@ -79,8 +79,7 @@ def test_no_blank_is_taken_that_leaves_more_freeform() -> None:
 
 
 def test_a_blank_that_is_worth_much_more_is_taken_with_its_freeform() -> None:
-    """A cube with bevelled edges and letters stayed a turned body with four sides cut off, for its blank had
-    two pieces of freeform."""
+    """Two pieces of freeform ruled out a blank that was worth twenty features more."""
     asked: list[FeatureTree] = []
 
     def mend(tree: FeatureTree) -> FeatureTree:
