@@ -216,9 +216,10 @@ def collide(
         )
         for link in links
     ]
-    spheres = []
+    spheres: list[LinkSpheres] = []
+    of_target: dict[Target, LinkSpheres] = {}
     for link in colliding if options.spheres is not None else ():
-        spheres.append(_spheres(link, wanted.get(link.name), solids, options))
+        spheres.append(_spheres(link, wanted.get(link.name), solids, options, of_target))
         told(f"{link.name}: {counted(len(spheres[-1].balls), 'sphere')}")
     return Collided(robot, shapes, reports, pairs_before, pairs_after, spheres)
 
@@ -320,11 +321,22 @@ def _bodies(links: Sequence[Link], solids: Mapping[str, Manifold]) -> dict[str, 
     return found
 
 
-def _spheres(link: Link, target: Target | None, solids: Solids, options: CollideOptions) -> LinkSpheres:
+def _spheres(
+    link: Link,
+    target: Target | None,
+    solids: Solids,
+    options: CollideOptions,
+    made: dict[Target, LinkSpheres],
+) -> LinkSpheres:
+    """made: those of links that are this target alone, which this one becomes as well."""
     if target is None and options.enclose and link.visuals:
         target = solids.target(link, link.visuals, sheets=True)
     assert options.spheres is not None
-    return spheres_for(link, target, options.spheres, options.mode)
+    if target is None or link.natives:
+        return spheres_for(link, target, options.spheres, options.mode)
+    if target not in made:
+        made[target] = spheres_for(link, target, options.spheres, options.mode)
+    return dataclasses.replace(made[target], link=link.name)
 
 
 def _measured(

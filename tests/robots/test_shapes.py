@@ -75,7 +75,9 @@ def test_links_of_the_same_mesh_have_the_same_shapes_which_are_made_once(
         for name, scale, place in (("left", "1 1 1", 0), ("right", "1 -1 1", 9), ("front", "1 1 1", 18))
     )
     path.write_text(path.read_text().replace("</robot>", f"{legs}</robot>"))
-    shapes = collide(path, CollideOptions(kinds=("hull",))).shapes
+    result = collide(path, CollideOptions(kinds=("hull",), spheres=2))
+    shapes, balls = result.shapes, {each.link: each.balls for each in result.spheres}
+    assert balls["front"] is balls["left"] is not balls["right"]
     assert made == ["base_collision", "arm_collision", "left_collision", "right_collision"]
     assert [shape.name for shape in shapes["front"]] == ["front_collision_1", "front_collision_2"]
     for one, other in zip(shapes["left"], shapes["front"], strict=True):
