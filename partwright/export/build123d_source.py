@@ -1,8 +1,9 @@
 """build123d source to go on with by hand: parameters on top, one function a part with a loop over its
 copies, the tree at the end.
 
-Named solids are exact B-reps when the source runs, and SuperFrusta lofts; what `drawn` refuses becomes the
-nearest solid, and blends sharp edges: FILE.report.json lists them.
+Named solids are exact B-reps when the source runs, and SuperFrusta lofts; quadrics without end that are no
+such solid within the assembly are flat facets, what `drawn` refuses becomes the nearest solid, and blends
+sharp edges: FILE.report.json lists them.
 """
 
 from __future__ import annotations
@@ -11,10 +12,14 @@ import builtins
 import dataclasses
 import keyword
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from partwright.approximation.change import Change
+from partwright.approximation.closed_quadrics import Ball
 from partwright.approximation.nearest import Approximation, compared
 from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node, Part
@@ -26,17 +31,23 @@ from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
 from partwright.export.profile_source import BUILD123D, BUILD123D_SOURCE, draws_loops, loops
+from partwright.export.quadric_facets import few_quadric_facets
 from partwright.export.solid_source import (
     SourcePart,
     children_and_poses,
     drawn,
+    literal,
     plain_unions,
     source_parts,
     superfrustum_source,
 )
 from partwright.fields import Extrusion, SuperFrustum, Swept
 from partwright.fields.extrusion import RIMS
+from partwright.meshing.manifolds import surface_of
 from partwright.shapes import canonical_unit
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
 
 _SOLIDS = {
     "box": "bd.Box(*{size})",
@@ -67,7 +78,9 @@ _RESERVED = (
     "superfrustum",
     "loop",
     "grid",
+    "polyhedron",
 )
+_TRIANGLES = 800  # for a quadric, at most: OpenCASCADE takes minutes for thousands of faces
 _TIGHT = 0.99999  # of a rim's depth, where nothing else would be left between rims
 _NEARLY = 0.01  # of a frame's width
 _GRID = """\
@@ -76,6 +89,11 @@ def grid(counts, spacing):
     x, y, z = ([(i - (n - 1) / 2) * step for i in range(n)] for n, step in zip(counts, spacing))
     return [(a, b, c) for a in x for b in y for c in z]
 """
+_POLYHEDRON = '''\
+def polyhedron(points, faces):
+    """A solid of flat faces, each the numbers of its corners."""
+    return bd.Solid(bd.Shell([bd.Face(bd.Wire.make_polygon([points[i] for i in face])) for face in faces]))
+'''
 
 
 def write(assembly: Assembly, path: str | Path) -> None:
@@ -86,7 +104,10 @@ def write(assembly: Assembly, path: str | Path) -> None:
         SettingError: the assembly's unit is unknown.
         OutputError: the file cannot be written.
     """
-    tree, changes = solid_tree(assembly, keep=_lofted, source=True)
+    tree, changes = solid_tree(assembly, keep=_kept, source=True)
+    facets = _facets(tree)
+    for name, (_, off) in facets.items():
+        changes.append(Change((name,), "flat facets", max_deviation=off, note="it is no solid of build123d"))
     changes += _sharpened(tree.parts)
     plain = plain_unions(tree)
     parts = source_parts(parts_once(plain), own_axes_angles, _RESERVED)
@@ -107,7 +128,8 @@ def write(assembly: Assembly, path: str | Path) -> None:
         *([*drawing, "", ""] if drawing else []),
         *([*_GRID.splitlines(), "", ""] if any(isinstance(part.copies, Grid) for part in parts) else []),
         *([*BUILD123D_SOURCE.splitlines(), "", ""] if draws_loops(swept) else []),
-        *(line for part in parts for line in _function(part)),
+        *([*_POLYHEDRON.splitlines(), "", ""] if facets else []),
+        *(line for part in parts for line in _function(part, facets)),
         f"assembly = {_tree(plain, {p.part.name: p.function for p in parts}, '')}",
         "",
         'if __name__ == "__main__":',
@@ -115,6 +137,20 @@ def write(assembly: Assembly, path: str | Path) -> None:
     ]
     write_bytes(path, ("\n".join(lines) + "\n").encode())
     write_report(assembly, path, changes)
+
+
+def _facets(tree: Assembly) -> dict[str, tuple[Manifold, float]]:
+    """The quadrics without end by their names, as solids, and how far these are off."""
+    quadrics = [(part, own) for part in tree.parts if (own := part.field.quadric()) is not None]
+    ball = Ball.around(tree) if quadrics else None
+    return {part.name: few_quadric_facets(own, part, ball, _TRIANGLES) for part, own in quadrics if ball}
+
+
+def _kept(part: Part) -> Approximation | None:
+    """A quadric without end as it is, and what can be lofted."""
+    if part.field.quadric() is not None and not np.isfinite(part.field.bounds()).all():
+        return Approximation(part.field, part, 0.0, 0.0)
+    return _lofted(part)
 
 
 def _lofted(part: Part) -> Approximation | None:
@@ -144,11 +180,16 @@ def _table(part: SourcePart, unit: str | None) -> Iterator[str]:
     yield ""
 
 
-def _function(part: SourcePart) -> Iterator[str]:
+def _function(part: SourcePart, facets: Mapping[str, tuple[Manifold, float]]) -> Iterator[str]:
     names = {name: variable.upper() for name, variable in part.variables().items()}
     yield f"def {part.function}():"
     field = part.part.field
-    solid = _swept(field, names) if isinstance(field, Swept) else _SOLIDS[field.kind].format(**names)
+    if part.part.name in facets:
+        corners, faces = surface_of(facets[part.part.name][0])
+        points = literal(tuple(map(tuple, corners.tolist())), "()")
+        solid = f"polyhedron({points}, {faces.tolist()})"
+    else:
+        solid = _swept(field, names) if isinstance(field, Swept) else _SOLIDS[field.kind].format(**names)
     yield f"    solid = {solid}"
     if isinstance(field, Extrusion) and field.has_rims:
         yield from _rims(field, names)

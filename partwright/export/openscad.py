@@ -14,8 +14,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from partwright.approximation.change import Change
 from partwright.approximation.closed_quadrics import Ball
 from partwright.approximation.nearest import Approximation
@@ -30,6 +28,7 @@ from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
 from partwright.export.profile_source import SCAD, SCAD_RIMS, SCAD_SOURCE, draws_loops, loops
+from partwright.export.quadric_facets import quadric_facets
 from partwright.export.solid_source import (
     SourcePart,
     children_and_poses,
@@ -39,11 +38,10 @@ from partwright.export.solid_source import (
     source_parts,
     superfrustum_source,
 )
-from partwright.fields import Extrusion, Field, Profile, Quadric, Swept
+from partwright.fields import Extrusion, Field, Profile, Swept
 from partwright.fields.profile_offset import turn_between
 from partwright.meshing.manifolds import surface_of
 from partwright.meshing.named_solids import named_solid
-from partwright.meshing.quadric_solids import quadric_solid
 from partwright.shapes import canonical_unit
 
 if TYPE_CHECKING:
@@ -151,7 +149,7 @@ def _module(part: SourcePart, ball: Ball, facets: int) -> Iterator[str]:
     names, field = part.variables(), part.part.field
     quadric = field.quadric()
     if quadric is not None:
-        solid = _polyhedron(quadric, part.part, ball, facets)
+        solid = _faces(quadric_facets(quadric, part.part, ball, facets))
     elif isinstance(field, Swept):
         solid = _swept(field, names, facets)
     else:
@@ -188,14 +186,6 @@ def _loop(part: SourcePart, names: dict[str, str]) -> Iterator[str]:
             turn = f"translate({centre}) {turn} translate(-{centre})" if centre else turn
             yield f"for (i = [0 : {names['count']} - 1]) {turn}"
         yield f"translate({names['place']}){turned}"
-
-
-def _polyhedron(quadric: Quadric, part: Part, ball: Ball, facets: int) -> str:
-    """The quadric of a part in its own frame, closed off outside the ball."""
-    centre = part.pose.inverse()(ball.centre)
-    chord = ball.radius * (1 - math.cos(math.pi / facets))
-    box = centre + ball.radius * np.array([[-1.0], [1.0]])
-    return _faces(quadric_solid(quadric, box, chord))
 
 
 def _leans(field: Field) -> bool:

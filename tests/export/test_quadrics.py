@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import runpy
 import shutil
 import subprocess
 from pathlib import Path
@@ -126,11 +127,26 @@ def test_what_step_cannot_hold_and_what_does_not_end_is_said(tmp_path: Path) -> 
         export(saddle, tmp_path / "a.step")
     with pytest.raises(NoSurfaceError, match="does not end"):
         export(Assembly((Part(Quadric.cylinder(1.0)),)), tmp_path / "a.step")
-    with pytest.raises(ParameterError, match="without end"):
-        export(
-            Assembly((*planes(), Part(CURVED["paraboloid"][0])), "intersection"), tmp_path / "a.build123d.py"
-        )
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "quadric", [CURVED["paraboloid"][0], Quadric((1, -1, 0, 0, 0, 1, 0))], ids=["paraboloid", "saddle"]
+)
+@pytest.mark.parametrize("hole", [False, True])
+def test_build123d_has_flat_facets_of_quadrics_that_no_solid_is_like(
+    tmp_path: Path, quadric: Quadric, hole: bool
+) -> None:
+    own = Part(quadric.complement() if hole else quadric, name="dish")
+    solid = placed(Assembly((*planes(), own), "intersection"))
+    export(solid, tmp_path / "a.build123d.py")
+    (entry,) = json.loads((tmp_path / "a.build123d.py.report.json").read_text())["approximated"]
+    assert (entry["parts"], entry["to"]) == (["dish"], "flat facets")
+    pytest.importorskip("build123d", reason="build123d is missing: pip install build123d")
+    made = runpy.run_path(str(tmp_path / "a.build123d.py"))["assembly"]
+    assert made.is_valid
+    exact = mesh_csg(solid, 2e-4)
+    assert abs(made.volume - exact.volume) <= min(entry["max_deviation"] * exact.area, 0.02 * exact.volume)
 
 
 def test_openscad_has_named_solids_and_polyhedra(tmp_path: Path) -> None:
