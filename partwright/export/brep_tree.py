@@ -20,7 +20,7 @@ from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
 from partwright.export.brep_topology import side_by_side, solids_of
 from partwright.fields import Sphere
-from partwright.meshing import has_exact_mesh, mesh_csg
+from partwright.meshing import has_exact_mesh, mesh_assembly, mesh_csg
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 _OVERLAP = 0.02  # of a union's volume: more of it twice, and facets stand for the union
 _CHORD = 5e-5  # of the longest side: how far an exact mesh may lie from its surface
 _SAME_MESH = 5e-3  # share of the volume by which what stands for an exact mesh may have less
+_CELLS, _SAME_FIELD = 160, 0.015  # along the longest side of a mesh of a field; the same share of such a one
 _SAME_SOLID = 1e-4  # share of volume and area that a solid keeps when its faces become fewer
 
 
@@ -206,15 +207,19 @@ def volume_off(
     """By which share the volume of all is off what it is to be, 0 as far as it may be.
 
     That is the volume of their exact meshes, which facets follow less closely, and a union with solids that
-    stand apart may have more of; of those that have none, or are built as one solid, it is that of the solid
-    as it was made.
+    stand apart may have more of; of those that have none, that of a mesh of their field, which is less close;
+    of those that are built as one solid, that of the solid as it was made.
     """
-    right = 0.0
+    right, near = 0.0, _SAME_MESH
     for node, solid in zip(nodes, solids, strict=True):
-        exact = _exact_volume(node) if isinstance(node, Assembly) and len(node) > 1 else None
-        right += volume_and_area(solid)[0] if exact is None else exact
+        own: float | None = None
+        if isinstance(node, Assembly) and len(node) > 1:
+            own = _exact_volume(node)
+            if own is None and np.isfinite(node.bounds()).all():
+                own, near = float(mesh_assembly(node, _CELLS).volume), _SAME_FIELD
+        right += volume_and_area(solid)[0] if own is None else own
     off = volume / right - 1
-    less, more = (_OVERLAP if rough else _SAME_MESH for rough in (made.faceted, made.faceted or made.apart))
+    less, more = (_OVERLAP if rough else near for rough in (made.faceted, made.faceted or made.apart))
     return 0.0 if -less <= off <= more else off
 
 

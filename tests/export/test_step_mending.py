@@ -16,9 +16,10 @@ from partwright.errors import (
     NoSurfaceError,
 )
 from partwright.export import brep_booleans, brep_tree, export, step
-from partwright.fields import Box, Cylinder, Extrusion, Revolution, Sphere, Tube
+from partwright.export.brep_facets import FacetsWarning
+from partwright.fields import Box, Cylinder, Extrusion, Revolution, Sphere, SuperFrustum, Tube
 from partwright.fields.profile import Profile
-from partwright.meshing import mesh_csg, mesh_part
+from partwright.meshing import has_exact_mesh, mesh_csg, mesh_part
 from tests.export.step_faces import ANALYTIC, read_back
 from tests.export.trees import lone
 
@@ -235,3 +236,17 @@ def test_a_part_too_small_for_opencascade_does_not_end_the_export(tmp_path: Path
     apart = Assembly((Part(Sphere(1e-9)), Part(Box((1e8, 1e8, 1e8)), (1e8, 0, 0))))
     export(apart, tmp_path / "apart.step")
     assert (tmp_path / "apart.step").stat().st_size > 1000
+
+
+def test_a_bent_part_that_a_union_loses_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bent parts have no exact mesh; a mesh of their field tells the volume."""
+    bent = SuperFrustum((0.4, 0.3, 1.0), bulge=0.3)
+    tree = Assembly((Part(bent, name="left"), Part(bent, (1.0, 0.0, 0.0), name="right")), unit="mm")
+    assert not has_exact_mesh(tree)
+    export(tree, tmp_path / "whole.step")
+    assert not (tmp_path / "whole.step.report.json").exists()
+    monkeypatch.setattr(brep_tree, "operated", lambda _, solids, *rest: solids[0])
+    with pytest.warns(FacetsWarning, match=r"off by -(49|50)\.\d %"):
+        export(tree, tmp_path / "half.step")
+    told = json.loads((tmp_path / "half.step.report.json").read_text())["approximated"]
+    assert [change["to"] for change in told] == ["a solid of another volume"]
