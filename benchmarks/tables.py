@@ -46,9 +46,12 @@ TABLES = (
           "--shapes {data} --sets toys,cad --quality draft --tag draft", 8),
     Table("fit-high.md", "fit.py", None, 0,
           "--shapes {data} --sets toys,cad --every 5 --quality normal,high --tag high", 15),
-    Table("fit-assets.md", "fit.py", None, 0, "--shapes kits --sets kenney,common --tag assets --untimed", 12,
-          "kits/kenney/ with the GLBs of KenneyNL's four starter kits, kits/common/ with the OBJs of "
-          "alecjacobson/common-3d-test-models"),
+    Table("fit-assets.md", "fit.py", None, 0,
+          "--shapes kits --sets kenney,kaykit,generated,common --tag assets --untimed", 25,
+          "kits/kenney/ with GLBs of KenneyNL's four starter kits, kits/kaykit/ with glTFs of "
+          "KayKit-Game-Assets' Restaurant Bits, Space Base Bits and Character Pack Adventures, "
+          "kits/generated/ with the meshes of AsimAslah/TripoSR-Image-to-3D and Bingeljell/image-to-3dlab, "
+          "kits/common/ with OBJs of alecjacobson/common-3d-test-models"),
     Table("ablations.md", "ablations.py", "--names mug --rows default,cuboid", 2, "--shapes {data}", 240),
     Table("ablations-carving.md", "ablations.py", "--names mug --rows default,mended --tag carving", 1,
           '--shapes {data} --rows "default,subtracted,mended" --tag carving --jobs 2', 8),
