@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from partwright.errors import EmptyShapeError, MissingDependencyError, UnreadableFileError
+from partwright.robots.model import mirrored
 from partwright.shapes.source import Piece, Source
 
 if TYPE_CHECKING:
@@ -62,12 +63,13 @@ def _placed(document: Collada) -> Iterator[Piece]:
 def _of(node: Any, above: np.ndarray, name: str) -> Iterator[Piece]:
     """What is in a node. above: (4, 4) of what it is in, to metres. name: of the nearest that has one."""
     from collada.polylist import Polylist
-    from collada.scene import GeometryNode, Node
+    from collada.scene import GeometryNode, Node, NodeNode
     from collada.triangleset import TriangleSet
 
     if isinstance(node, Node):
+        named = node.node if isinstance(node, NodeNode) else node  # a reference has the name of what it means
         for child in node.children:
-            yield from _of(child, above @ node.matrix, node.xmlnode.get("name") or name)
+            yield from _of(child, above @ node.matrix, named.xmlnode.get("name") or name)
     if not isinstance(node, GeometryNode):
         return
     for primitive in node.geometry.primitives:
@@ -79,4 +81,5 @@ def _of(node: Any, above: np.ndarray, name: str) -> Iterator[Piece]:
         ):
             used, faces = np.unique(triangles.vertex_index, return_inverse=True)  # sets share all corners
             corners = np.asarray(triangles.vertex, np.float64)[used] @ above[:3, :3].T + above[:3, 3]
-            yield Piece(name, corners, faces.reshape(-1, 3).astype(np.int64))
+            faces = faces.reshape(-1, 3).astype(np.int64)
+            yield Piece(name, corners, faces[:, ::-1] if mirrored(above) else faces)

@@ -23,7 +23,7 @@ DAE = """<?xml version="1.0"?>
     <node id="n1" name="frame"><node>
       <matrix>1 0 0 0 0 1 0 0 0 0 1 500 0 0 0 1</matrix><instance_geometry url="#box"/>
     </node></node>
-    <node id="n2" name="lid"><instance_geometry url="#ball"><bind_material><technique_common>
+    <node id="n2" name="lid">{mirror}<instance_geometry url="#ball"><bind_material><technique_common>
       <instance_material symbol="gone" target="#gone"/>
     </technique_common></bind_material></instance_geometry></node>
   </visual_scene></library_visual_scenes>
@@ -45,7 +45,18 @@ SDF = """<sdf version="1.9"><model name="tin">
 """
 
 
-def tin(folder: Path) -> Path:
+MIRROR = "<matrix>-1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</matrix>"
+TWICE = """<library_nodes>
+    <node id="turned" name="wheel"><matrix>1 0 0 0 0 1 0 0 0 0 -1 0 0 0 0 1</matrix>
+      <instance_geometry url="#ball"/></node>
+  </library_nodes>
+  <library_visual_scenes><visual_scene id="s">
+    <node id="n1" name="rover"><instance_node url="#turned"/></node>
+    <node id="n2"><matrix>-1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</matrix><instance_node url="#turned"/></node>
+  </visual_scene></library_visual_scenes>"""
+
+
+def tin(folder: Path, mirror: str = "") -> Path:
     """A box of 1 x 2 x 3 m, 5 m up, and beside its foot a ball of a fifth of a metre, in centimetres."""
     box = trimesh.creation.box((100, 200, 300))
     ball = trimesh.creation.icosphere(subdivisions=2, radius=20)
@@ -57,7 +68,7 @@ def tin(folder: Path) -> Path:
             name, mesh.vertices.size, places, len(mesh.vertices), len(mesh.faces), corners
         )
     path = folder / "tin.dae"
-    path.write_text(DAE.format(geometries=text))
+    path.write_text(DAE.format(geometries=text, mirror=mirror))
     return path
 
 
@@ -68,6 +79,28 @@ def test_it_is_in_metres_and_has_its_nodes_names(tmp_path: Path) -> None:
     assert np.allclose(np.ptp(frame.vertices, axis=0), (1, 2, 3))
     assert np.allclose(frame.vertices.mean(axis=0), (0, 0, 5))
     assert np.allclose(lid.vertices.mean(axis=0), (10, 0, 0))
+
+
+def volumes(path: Path) -> list[float]:
+    return [trimesh.Trimesh(piece.vertices, piece.faces).volume for piece in read_collada(path).pieces]
+
+
+def test_what_a_node_mirrors_is_solid(tmp_path: Path) -> None:
+    """It came inside out: a cavity, where it lay within another."""
+    plain, mirrored = volumes(tin(tmp_path)), volumes(tin(tmp_path, MIRROR))
+    assert plain[0] == pytest.approx(6)
+    assert mirrored == pytest.approx(plain)
+
+
+def test_a_node_that_is_referred_to_has_its_own_name_and_is_mirrored_as_often_as_it_is(
+    tmp_path: Path,
+) -> None:
+    path = tin(tmp_path)
+    ball = volumes(path)[1]
+    before, _, after = path.read_text().partition("<library_visual_scenes>")
+    path.write_text(before + TWICE + after.partition("</library_visual_scenes>")[2])
+    assert [piece.name for piece in read_collada(path).pieces] == ["wheel", "wheel"]
+    assert volumes(path) == pytest.approx([ball, ball])
 
 
 @pytest.mark.parametrize(
@@ -96,7 +129,7 @@ def test_what_it_lacks_is_told(tmp_path: Path) -> None:
     path.write_text(SDF.format("<submesh><name>handle</name></submesh>"))
     with pytest.raises(RobotError, match=r"'body': tin.dae: .* no submesh 'handle'; it has frame, lid"):
         collide(path)
-    mesh.write_text(DAE.format(geometries=""))
+    mesh.write_text(DAE.format(geometries="", mirror=""))
     with pytest.raises(EmptyShapeError, match="no triangles"):
         read_collada(mesh)
     mesh.write_text("<html>not found</html>")
