@@ -6,10 +6,12 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote
 
 from partwright.errors import UnreadableFileError
+from partwright.robots.xml_files import parsed
 
 _ADDRESS = re.compile(r"(package|model):///?([^/]+)/(.*)", re.DOTALL)  # a slash more is common
 _WITH_FOLDERS = ("ROS_PACKAGE_PATH", "GZ_SIM_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "SDF_PATH")
@@ -84,11 +86,21 @@ def _homes(package: str, beside: Path, packages: Sequence[Path]) -> Iterator[Pat
 
 def _declared(folder: Path) -> str | None:
     """The name that a package's own file gives it: its folder may have another."""
+    file = folder / "package.xml"
     try:
-        found = re.search(rb"<name>\s*([^<]+?)\s*</name>", (folder / "package.xml").read_bytes())
+        changed = file.stat().st_mtime_ns
     except OSError:
         return None
-    return found[1].decode("utf-8", "replace") if found else None
+    return _name_in(file, changed)
+
+
+@lru_cache
+def _name_in(file: Path, changed: int) -> str | None:
+    """changed: when. Each mesh of a robot asks for the files of all folders above it."""
+    try:
+        return (parsed(file, None).getroot().findtext("{*}name") or "").strip() or None
+    except UnreadableFileError:
+        return None
 
 
 def new_address(name: str, like: Place | None) -> tuple[str, str]:

@@ -17,6 +17,19 @@ def turned_askew(body: Manifold) -> Manifold:
     return body.rotate((20, 30, 40)).translate((0.1, -0.2, 0.3))
 
 
+def head() -> Manifold:
+    """That a neck goes over into."""
+    arc = math.pi / 2 * np.arange(11) / 10
+    neck = np.column_stack([RADIUS + 0.3 * (1 - np.cos(arc)), 0.2 + 0.3 * np.sin(arc)])
+    profile = [(0, 0), (RADIUS, 0), *neck.tolist(), (0, 0.5)]
+    return CrossSection([profile]).revolve(60).translate((0, 0, 0.4))
+
+
+def running_out() -> Manifold:
+    """A finely meshed screw, whose thread ends before its head."""
+    return threaded(along=40, ends=0.3) + head()
+
+
 @pytest.mark.parametrize("pitch", [PITCH, -PITCH])
 def test_a_rod_becomes_the_cylinder_around_it(pitch: float) -> None:
     rod = turned_askew(threaded(pitch))
@@ -41,15 +54,22 @@ def test_both_flanks_are_one_thread_in_coarse_chords_too() -> None:
 def test_a_thread_that_runs_out_is_one_though_it_goes_over_into_the_rod_and_its_head() -> None:
     """Where it is less deep, flanks lean less: they came as one patch with the crests, and
     with a neck and a head that these go over into."""
-    arc = math.pi / 2 * np.arange(11) / 10
-    neck = np.column_stack([RADIUS + 0.3 * (1 - np.cos(arc)), 0.2 + 0.3 * np.sin(arc)])
-    profile = [(0, 0), (RADIUS, 0), *neck.tolist(), (0, 0.5)]
-    head = CrossSection([profile]).revolve(60).translate((0, 0, 0.4))
-    plain, (thread,) = without_threads(threaded(along=40, ends=0.3) + head)
+    plain, (thread,) = without_threads(running_out())
     assert thread.pitch == pytest.approx(PITCH, rel=1e-2)
     assert (thread.inner, thread.outer) == pytest.approx((INNER, RADIUS), abs=3e-3)
-    whole = math.pi * RADIUS**2 * (0.4 + LENGTH / 2) + head.volume()
+    whole = math.pi * RADIUS**2 * (0.4 + LENGTH / 2) + head().volume()
     assert plain.volume() == pytest.approx(whole, rel=5e-3)
+
+
+@pytest.mark.parametrize("slotted", [False, True])
+def test_threads_of_coarse_and_of_fine_meshes_are_found_beside_one_another(slotted: bool) -> None:
+    """Only where no patch of coarse faces was a thread, finer ones were looked at: a plain rod hid a screw that
+    runs out, and so did what was no thread after all."""
+    plate = Manifold.cube((3.4, 1.6, 0.2)).translate((-0.7, -0.8, -0.75))
+    slot = Manifold.cube((0.15, 1.0, 2.0), True).translate((2.4, 0, 0)) if slotted else Manifold()
+    screw, rod = running_out(), threaded().translate((2, 0, 0)) - slot
+    _, threads = without_threads(screw + rod + plate)
+    assert sorted(round(thread.axis[0]) for thread in threads) == ([0] if slotted else [0, 2])
 
 
 def test_a_tapped_hole_becomes_as_narrow_as_its_crests() -> None:

@@ -105,7 +105,13 @@ def test_a_package_is_found_by_the_name_that_it_gives_itself(tmp_path: Path) -> 
     path = urdf(folder, base="package://my_robot/meshes/ell.stl")
     with pytest.raises(UnreadableFileError, match="no package my_robot"):
         open_robot(path)
-    (folder / "package.xml").write_text("<package format='3'>\n  <name> my_robot </name>\n</package>\n")
+    (folder / "package.xml").write_text("<package><!-- <name>my_robot</name> --><name>other</name></package>")
+    with pytest.raises(UnreadableFileError, match="no package my_robot"):
+        open_robot(path)
+    (folder / "package.xml").write_text(
+        "<package format='3'>\n  <!-- <name>template</name> -->\n"
+        "  <author><name>me</name></author><name> my_robot </name>\n</package>\n"
+    )
     save(collide(path, CollideOptions(kinds=("hull",))), tmp_path / "out")
     assert list((tmp_path / "out" / "my_robot" / "collision").iterdir())
     away = tmp_path / "away.urdf"

@@ -11,6 +11,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,8 +23,7 @@ from partwright.shapes.topology import components
 if TYPE_CHECKING:
     import trimesh
 
-_SMOOTH = math.radians(25), math.radians(10)  # between faces of one patch, what is coarse first: finely
-# meshed flanks go over into the rod at less where a thread runs out
+_SMOOTH = math.radians(25), math.radians(10)  # between faces of a patch; run-outs turn into rods by less
 _LEAST_AREA, _LEAST_FACES = 2e-3, 24  # of the surface, that a patch has
 _TRIMMED, _ROUNDS = 0.85, 3  # of a patch, that is fitted again: chords beside edges lean
 _UPRIGHT = 1e-3  # of the largest: least spread of normals that are those of no cylinder and no plane
@@ -72,10 +72,13 @@ class Thread:
 
 
 def without_threads(body: Manifold) -> tuple[Manifold, list[Thread]]:
-    """The body with its grooves filled as far as their crests, and the threads, the largest first. One that a
-    slot runs across stays."""
+    """The body with its grooves filled as far as their crests, and the threads: those of coarse meshes first,
+    the larger before the smaller. One that a slot runs across stays."""
+    mesh = as_mesh(body)
     found: list[Thread] = []
-    for thread in _candidates(body):
+    for thread in chain.from_iterable(_candidates(mesh, smooth) for smooth in _SMOOTH):
+        if any(_is_same(thread, other) for other in found):
+            continue
         sections = _sections(body, thread)
         kinds = [kind for kind in (False, True) if _is_behind(sections, thread, kind)]
         if len(kinds) != 1:  # a spring, a worm's free flight
@@ -89,15 +92,9 @@ def without_threads(body: Manifold) -> tuple[Manifold, list[Thread]]:
     return body, found
 
 
-def _candidates(body: Manifold) -> list[Thread]:
-    """Of patches that a screw motion keeps, and no other motion does; internal or not is not known yet."""
-    mesh = as_mesh(body)
-    every = (_threads_of(mesh, smooth) for smooth in _SMOOTH)
-    return next((found for found in every if found), [])
-
-
-def _threads_of(mesh: trimesh.Trimesh, smooth: float) -> list[Thread]:
-    """Of patches whose faces turn by less than an angle from one to the next."""
+def _candidates(mesh: trimesh.Trimesh, smooth: float) -> list[Thread]:
+    """Of patches, whose faces turn by less than an angle from one to the next, that a screw motion keeps, and
+    no other motion does; internal or not is not known yet."""
     pairs, angles = mesh.face_adjacency, mesh.face_adjacency_angles
     patch = components(len(mesh.faces), *pairs[angles < smooth].T)
     areas, counts = np.bincount(patch, mesh.area_faces), np.bincount(patch)
