@@ -88,15 +88,15 @@ def _declared(folder: Path) -> str | None:
     """The name that a package's own file gives it: its folder may have another."""
     file = folder / "package.xml"
     try:
-        changed = file.stat().st_mtime_ns
+        state = file.stat()
     except OSError:
         return None
-    return _name_in(file, changed)
+    return _name_in(file, state.st_mtime_ns, state.st_size)
 
 
 @lru_cache
-def _name_in(file: Path, changed: int) -> str | None:
-    """changed: when. Each mesh of a robot asks for the files of all folders above it."""
+def _name_in(file: Path, changed: int, size: int) -> str | None:
+    """Read once until it has changed: each mesh of a robot asks for the files of all folders above it."""
     try:
         return (parsed(file, None).getroot().findtext("{*}name") or "").strip() or None
     except UnreadableFileError:

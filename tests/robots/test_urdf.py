@@ -11,7 +11,8 @@ import trimesh
 from lxml import etree
 
 from partwright.errors import PartwrightError, RobotError, UnreadableFileError, UnsupportedFormatError
-from partwright.robots import CollideOptions, collide, open_robot, save
+from partwright.robots import CollideOptions, collide, open_robot, paths, save
+from partwright.robots.xml_files import parsed
 from tests.robots.robots import ell, urdf
 
 
@@ -117,6 +118,22 @@ def test_a_package_is_found_by_the_name_that_it_gives_itself(tmp_path: Path) -> 
     away = tmp_path / "away.urdf"
     away.write_text(path.read_text().replace('"meshes/', f'"{folder}/meshes/'))
     assert len(open_robot(away, [folder]).links) == 2
+
+
+def test_the_file_of_a_package_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was read for each mesh, and twice."""
+    folder = tmp_path / "my_robot-main"
+    path = urdf(folder, base="package://my_robot/meshes/ell.stl", arm="package://my_robot/meshes/rod.stl")
+    (folder / "package.xml").write_text("<package><name>my_robot</name></package>")
+    read: list[Path] = []
+
+    def counted(file: Path, tag: str | None) -> object:
+        read.append(file)
+        return parsed(file, tag)
+
+    monkeypatch.setattr(paths, "parsed", counted)
+    assert len(open_robot(path).links) == 2
+    assert read == [folder / "package.xml"]
 
 
 def test_the_report_says_how_far_off_and_who_collides(tmp_path: Path) -> None:
