@@ -1,4 +1,4 @@
-"""Outlines, directions and holes read off closed surfaces."""
+"""Directions and candidates read off closed surfaces."""
 
 from __future__ import annotations
 
@@ -10,104 +10,10 @@ from manifold3d import CrossSection, Manifold
 
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames, long_axis
-from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
-from partwright.approximation.sketches.outlines import fitted_loop
-from partwright.approximation.sketches.sections import profile_of
-from partwright.approximation.sketches.tangents import with_tangents
-from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly import Part
 from partwright.fields import Box, Cylinder, Extrusion, Revolution, Tube
-from partwright.fields.profile import Profile, circle, circle_of
+from partwright.fields.profile import Profile, circle
 from partwright.meshing.named_solids import named_solid
-
-TOLERANCE = 4e-4
-
-
-def chords(profile: Profile, count: int) -> np.ndarray:
-    """Corners (K, 2) of the outline with `count` chords an arc."""
-    found = []
-    for side in profile.sides[0]:
-        if side.centre is None:
-            found.append(side.start)
-            continue
-        x, y = np.subtract(side.start, side.centre)
-        for angle in np.arange(count) * side.sweep / count:
-            c, s = math.cos(angle), math.sin(angle)
-            found.append((side.centre[0] + c * x - s * y, side.centre[1] + s * x + c * y))
-    return np.array(found)
-
-
-@pytest.mark.parametrize("count", [2, 3, 8, 20])
-@pytest.mark.parametrize("shift", [0, 1, 5])
-def test_a_rounded_rectangle_is_four_lines_and_four_arcs(count: int, shift: int) -> None:
-    polygon = np.roll(chords(Profile.rectangle(1.0, 0.6, corner=0.15), count), shift, axis=0)
-    loop = fitted_loop(polygon, TOLERANCE)
-    assert loop is not None
-    sides = Profile(loop).sides[0]
-    assert sorted(side.centre is not None for side in sides) == [False] * 4 + [True] * 4
-    assert [s.radius for s in sides if s.centre is not None] == pytest.approx([0.15] * 4, abs=1e-9)
-
-
-@pytest.mark.parametrize("sides", [3, 4, 6, 8])
-def test_a_regular_polygon_stays_one(sides: int) -> None:
-    loop = fitted_loop(np.array(Profile.regular(sides, 0.5).outline)[:, :2], TOLERANCE)
-    assert loop is not None
-    assert len(loop) == sides
-    assert not any(bulge for _, _, bulge in loop)
-
-
-@pytest.mark.parametrize("count", [9, 12, 64])
-def test_a_circle_is_one(count: int) -> None:
-    loop = fitted_loop(np.array(Profile.regular(count, 0.5).outline)[:, :2] + (0.1, 0.2), TOLERANCE)
-    assert loop is not None
-    found = circle_of(loop)
-    assert found is not None
-    radius, centre = found
-    assert (radius, *centre) == pytest.approx((0.5, 0.1, 0.2), abs=1e-9)
-
-
-def test_corners_within_a_wall_are_no_corners() -> None:
-    square = np.array([(0, 0), (0.3, 1e-6), (1, 0), (1, 0.5), (1, 1), (0, 1)])
-    loop = fitted_loop(square, TOLERANCE)
-    assert loop is not None
-    assert len(loop) == 4
-
-
-def test_walls_of_a_slot_are_lines_though_a_corner_of_the_mesh_lies_within_them() -> None:
-    turns = np.linspace(-0.5, 0.5, 64) * math.pi
-    half = np.column_stack([0.063 + 0.081 * np.cos(turns), 0.081 * np.sin(turns)])
-    middle = np.array([[0.0, 0.081 + 5e-7]])  # as in single precision
-    points = np.concatenate([half, middle, -half, -middle])
-    loop = fitted_loop(points, TOLERANCE)
-    assert loop is not None
-    assert sorted(round(abs(bulge), 3) for _, _, bulge in loop) == [0.0, 0.0, 1.0, 1.0]
-
-
-def test_an_arc_begins_where_the_line_is_tangent_to_it() -> None:
-    """In vents of a lid, one chord of an end counted as part of the wall."""
-    lean = math.radians(3)
-    x, y = 0.02 * math.cos(lean), 0.2 + 0.02 * math.sin(lean)
-    bulge = math.tan((math.pi - lean) / 4)
-    off = Profile([(0.02, -0.2), (x, y, bulge), (-0.02, 0.2), (-0.02, -0.2, 1.0)])
-    exact = with_tangents(off, TOLERANCE)
-    assert exact.corners == pytest.approx(
-        np.array([(0.02, -0.2, 0.0), (0.02, 0.2, 1.0), (-0.02, 0.2, 0.0), (-0.02, -0.2, 1.0)]), abs=1e-4
-    )
-    corner = Profile([(0.02, -0.2), (0.02, 0.2, 0.8), (-0.02, 0.2), (-0.02, -0.2, 1.0)])
-    assert with_tangents(corner, TOLERANCE) is corner
-    drawn = Profile([(0.02, -0.2), (0.02, 0.2, 1.0), (-0.02, 0.2), (-0.02, -0.2, 1.0)])
-    assert with_tangents(drawn, TOLERANCE) is drawn
-
-
-def test_what_is_flat_is_no_outline() -> None:
-    assert fitted_loop(np.array([(0, 0), (1e-6, 0), (0, 1e-6)]), TOLERANCE) is None
-
-
-def test_a_hole_that_touches_the_outline_is_a_hole() -> None:
-    ring = CrossSection([[(0, 0), (1, 0), (1, 1), (0.5, 1), (0.8, 0.5), (0.2, 0.5), (0.5, 1), (0, 1)]])
-    profile = profile_of(ring)
-    assert profile is not None
-    assert [len(loop) for loop in profile.loops] == [5, 3]
-    assert profile.area == pytest.approx(1 - 0.15, abs=2e-3)
 
 
 def test_an_arc_that_nearly_ends_a_sphere_on_the_axis_does() -> None:
@@ -227,49 +133,6 @@ def test_a_long_piece_has_its_own_direction() -> None:
     assert long_axis(np.asarray(cube.vert_properties)[:, :3], np.asarray(cube.tri_verts, np.int64)) is None
 
 
-def test_round_holes_come_apart_by_size() -> None:
-    holes = [
-        circle(0.1, (-0.5, 0)),
-        circle(0.1, (0.5, 0)),
-        circle(0.2),
-        Profile.regular(6, 0.1).moved((0, 0.3)).outline,
-    ]
-    profile = Profile(Profile.rectangle(1.6, 1.0).outline, tuple(holes))
-    turned = Similarity(rotation=(math.cos(0.3), 0.0, math.sin(0.3), 0.0), translation=(0.1, 0.2, 0.3))
-    plate = Part(Extrusion(profile, 0.2), name="plate").transformed(turned)
-    body, cuts = holes_apart(plate)
-    assert isinstance(body.field, Extrusion)
-    assert len(body.field.profile.holes) == 1
-    assert sorted((round(cut.field.radius, 9), len(cut.copies)) for cut in cuts) == [(0.1, 2), (0.2, 1)]
-    points = np.random.default_rng(0).uniform(-1, 1, (4000, 3)).astype(np.float32)
-    inside = body.distance(points) < 0
-    for cut in cuts:
-        inside &= cut.distance(points) > 0
-    assert (inside == (plate.distance(points) < 0)).all()
-
-
-def test_holes_of_one_form_are_drawn_once() -> None:
-    slot = Profile([(-0.2, -0.05, 0), (0.2, -0.05, 1), (0.2, 0.05, 0), (-0.2, 0.05, 1)])
-    odd = Profile([(-0.1, 0.3), (0.1, 0.3), (0, 0.4)])
-    rolled = Profile((*slot.outline[2:], *slot.outline[:2])).moved((0, -0.2))
-    holes = (slot.outline, slot.moved((0.1, 0.15)).outline, rolled.outline, odd.outline)
-    plate = Part(Extrusion(Profile(Profile.rectangle(1.6, 1.0).outline, holes), 0.2), (0.1, 0, 0))
-    body, (cut,) = holes_apart(plate)
-    assert [len(loop) for loop in body.field.profile.loops] == [4, 3]
-    assert len(cut.copies) == 3
-    points = np.random.default_rng(0).uniform(-1, 1, (4000, 3)).astype(np.float32)
-    inside = (body.distance(points) < 0) & (cut.distance(points) > 0)
-    assert (inside == (plate.distance(points) < 0)).all()
-
-
-def test_a_plate_with_one_round_hole_is_a_box() -> None:
-    body, (hole,) = holes_apart(
-        Part(Extrusion(Profile(Profile.rectangle(1.0, 0.6).outline, (circle(0.1),)), 0.2))
-    )
-    assert body.field == Box((1.0, 0.6, 0.2))
-    assert hole.field.radius == pytest.approx(0.1)
-
-
 def test_nothing_has_no_candidates() -> None:
     assert candidates(Manifold(), [np.eye(3)], holes=True) == []
 
@@ -337,41 +200,6 @@ def test_a_rod_ends_where_it_bends_though_faces_of_other_parts_lie_across_it() -
     ]
     ends = [part.bounds()[:, 0].tolist() for part in rods]
     assert any(end == pytest.approx([-0.6, 0.4], abs=0.04) for end in ends)
-
-
-def test_a_bore_through_two_walls_is_one_and_bolt_holes_are_copies() -> None:
-    walls = Part(Box((0.1, 1.0, 1.0)), (-0.4, 0, 0), instances=(Similarity(translation=(0.8, 0, 0)),))
-    across = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
-    bores = [Part(Cylinder(0.2, 0.1), (x, 0, 0), across) for x in (-0.4, 0.4)]
-    bolts = [Part(Cylinder(0.05, 0.1), (-0.4, y, 0.3), across) for y in (-0.3, 0.3)]
-    tree = Assembly((walls, *bores, *bolts), "difference")
-    assert all(is_empty(hole, tree.distance) for hole in (*bores, *bolts))
-    assert not is_empty(bores[0], walls.distance)
-    bore, bolt = merged_holes([*bores, *bolts], tree.distance)
-    assert bore.field.height == pytest.approx(0.9)
-    assert bore.translation == pytest.approx((0, 0, 0))
-    assert len(bolt.copies) == 2
-    assert bolt.field.height == pytest.approx(0.1)
-    blocked = (tree | Part(Box((0.1, 1.0, 1.0)))).distance
-    assert [len(hole.copies) for hole in merged_holes(bores, blocked)] == [2]
-    pairs = [Part(Cylinder(0.05, 0.1), (x, y, 0.3), across) for x in (-0.4, 0.4) for y in (-0.3, 0.3)]
-    bolted = Assembly((walls, *pairs), "difference")
-    in_the_way = bolted | Part(Box((0.1, 0.5, 1.0)), (0, 0.25, 0))  # of one pair
-    assert [len(hole.copies) for hole in merged_holes(pairs, bolted.distance)] == [2]
-    assert [len(hole.copies) for hole in merged_holes(pairs, in_the_way.distance)] == [4]
-
-
-def test_holes_that_were_turned_copies_of_one_are_one() -> None:
-    """Three set screws in a round wall point three ways; four are two bores through it."""
-    wall = Part(Tube(0.6, 0.1, 1.0))
-    across = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
-    for count, bores, height in ((3, 3, 0.2), (4, 2, 1.3)):
-        turns = tuple(Similarity.turn((0, 0, 1), 2 * math.pi * k / count) for k in range(1, count))
-        screw = Part(Cylinder(0.05, 0.2), (0.55, 0.0, 0.1), across, instances=turns)
-        (hole,) = merged_holes([screw], Assembly((wall, screw), "difference").distance)
-        assert len(hole.copies) == bores
-        assert hole.field.height == pytest.approx(height)
-        assert {move.rotation for move in hole.instances} <= {move.rotation for move in turns}
 
 
 def test_what_stands_on_a_flat_end_of_a_turned_body_is_not_parted_from_it() -> None:

@@ -63,8 +63,8 @@ def test_a_thread_that_runs_out_is_one_though_it_goes_over_into_the_rod_and_its_
 
 @pytest.mark.parametrize("slotted", [False, True])
 def test_threads_of_coarse_and_of_fine_meshes_are_found_beside_one_another(slotted: bool) -> None:
-    """Only where no patch of coarse faces was a thread, finer ones were looked at: a plain rod hid a screw that
-    runs out, and so did what was no thread after all."""
+    """Only where no patch of coarse faces was a thread, finer ones were looked at: a plain rod hid a screw
+    that runs out, and so did what was no thread after all."""
     plate = Manifold.cube((3.4, 1.6, 0.2)).translate((-0.7, -0.8, -0.75))
     slot = Manifold.cube((0.15, 1.0, 2.0), True).translate((2.4, 0, 0)) if slotted else Manifold()
     screw, rod = running_out(), threaded().translate((2, 0, 0)) - slot

@@ -64,7 +64,7 @@ def searching(**more: Callable[[FeatureTree], FeatureTree]) -> FeatureSearch:
     return FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha, **more)
 
 
-def test_no_blank_is_taken_that_leaves_more_freeform() -> None:
+def test_no_blank_is_taken_whose_tree_is_freeform_throughout() -> None:
     asked: list[FeatureTree] = []
 
     def mend(tree: FeatureTree) -> FeatureTree:
