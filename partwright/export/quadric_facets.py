@@ -20,8 +20,10 @@ _FINENESS = (48, 36, 24, 18, 12)  # facets of a full circle, of which the first 
 
 
 def few_quadric_facets(quadric: Quadric, part: Part, ball: Ball, most: int) -> tuple[Manifold, float]:
-    """As `quadric_facets`, in the ball's box alone and of at most so many triangles, if 12 facets of a circle
-    are as few; and how far they may lie from the quadric."""
+    """As `quadric_facets`, in the ball's box alone; and how far they may lie from the quadric.
+
+    most: triangles. The coarsest is returned however many it has: of 1,500 quadrics with random coefficients
+    none had more than 434."""
     from manifold3d import Manifold
 
     box = Manifold.cube((2 * ball.radius,) * 3, True)
