@@ -5,6 +5,7 @@ OpenCASCADE follows wrong references into memory that is not its own, so `step_p
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
@@ -25,20 +26,19 @@ if TYPE_CHECKING:
 TOLERANCE = 5e-4  # of the diagonal of the bounding box: how far triangles may lie off the surface
 NO_NAMES = ("", "SOLID", "COMPOUND", "SHELL", "FACE")  # what CAD programs write where there is no name
 ANGLE = 0.3  # radians between neighbouring triangles of a curved face
-_TRIED = (2.0, 0.5, 4.0)  # of the tolerance, where OpenCASCADE leaves out faces, though they are valid
+_TRIED = (1.0, 2.0, 0.5, 4.0)  # of the tolerance: OpenCASCADE leaves out faces though they are valid
 
 
 def source_of_step(path: Path) -> Source:
     """What `read_step` gives, in this process: damaged references may end it."""
     document, unit = _read(path)
     solids = list(_named_solids(document))
-    _tessellate([solid for _, solid in solids])
+    meshes = _meshes([solid for _, solid in solids])  # none, where nothing has a size
     scale = METRES["mm"] / METRES[unit]  # OpenCASCADE converts to millimetres
     taken: set[str] = set()
     pieces = tuple(
         Piece(_free(name, taken), scale * vertices, faces)
-        for name, solid in solids
-        for vertices, faces in [_triangles(solid)]
+        for (name, _), (vertices, faces) in zip(solids, meshes, strict=False)
         if len(faces)
     )
     if not pieces:
@@ -136,10 +136,11 @@ def _free(name: str, taken: set[str]) -> str:
     return free
 
 
-def _tessellate(solids: list[TopoDS_Shape]) -> None:
+def _meshes(solids: list[TopoDS_Shape]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Vertices (V, 3) and faces (F, 3) of each; what is placed several times is tessellated once."""
     from OCP.Bnd import Bnd_Box
     from OCP.BRepBndLib import BRepBndLib
-    from OCP.BRepTools import BRepTools
+    from OCP.TopLoc import TopLoc_Location
 
     box = Bnd_Box()
     for solid in solids:
@@ -147,30 +148,41 @@ def _tessellate(solids: list[TopoDS_Shape]) -> None:
     if box.IsVoid():
         return
     deflection = TOLERANCE * float(np.sqrt(box.SquareExtent()))
+    made: dict[object, tuple[np.ndarray, np.ndarray]] = {}
     for solid in solids:
-        least, best = _left_out(solid, deflection), 1.0
-        for share in _TRIED if least else ():
-            BRepTools.Clean_s(solid)
-            now = _left_out(solid, share * deflection)
-            if now < least:
-                least, best = now, share
-            if not now:
-                break
-        else:
-            if least:
-                BRepTools.Clean_s(solid)
-                _left_out(solid, best * deflection)
+        key = solid.TShape(), solid.Orientation()
+        if key not in made:
+            made[key] = _mesh(solid.Located(TopLoc_Location()), deflection)
+        (vertices, faces), move = made[key], solid.Location().Transformation()
+        matrix = np.array([[move.Value(i, j) for j in range(1, 5)] for i in range(1, 4)])
+        yield vertices @ matrix[:, :3].T + matrix[:, 3], faces
 
 
-def _left_out(solid: TopoDS_Shape, deflection: float) -> int:
-    """Tessellates a solid: how many of its faces have no triangles then."""
-    from OCP.BRep import BRep_Tool
+def _mesh(solid: TopoDS_Shape, deflection: float) -> tuple[np.ndarray, np.ndarray]:
+    """At the first tolerance that leaves no face without triangles, or that leaves the fewest. All faces
+    are made each time: one that another solid has, too, may be there at another tolerance."""
     from OCP.BRepMesh import BRepMesh_IncrementalMesh
+    from OCP.BRepTools import BRepTools
+
+    best, least = (np.zeros((0, 3)), np.zeros((0, 3), np.int64)), math.inf
+    for share in _TRIED:
+        BRepTools.Clean_s(solid)
+        BRepMesh_IncrementalMesh(solid, share * deflection, False, ANGLE, False)
+        left_out = _left_out(solid)
+        if left_out < least:
+            best, least = _triangles(solid), left_out
+        if not left_out:
+            break
+    return best
+
+
+def _left_out(solid: TopoDS_Shape) -> int:
+    """How many of its faces have no triangles."""
+    from OCP.BRep import BRep_Tool
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopLoc import TopLoc_Location
     from OCP.TopoDS import TopoDS
 
-    BRepMesh_IncrementalMesh(solid, deflection, False, ANGLE, False)
     faces = parts_of(solid, TopAbs_ShapeEnum.TopAbs_FACE)
     meshes = (BRep_Tool.Triangulation_s(TopoDS.Face(face), TopLoc_Location()) for face in faces)
     return sum(mesh is None or not mesh.NbTriangles() for mesh in meshes)
