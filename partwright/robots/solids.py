@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
     _Key = tuple[Path, str | None, bool]  # of `MeshUse.mesh`
+    _Placed = tuple[tuple[_Key, bytes], ...]
 
 _OPEN = "it does not close; what its surface goes around, or cannot be reached from outside, is its inside"
 
@@ -80,8 +81,8 @@ class Solids:
 
     def __init__(self) -> None:
         self._meshes: dict[tuple[_Key, bool], _Mesh] = {}
-        self._wraps: dict[tuple[tuple[_Key, bytes], ...], tuple[Manifold, Manifold]] = {}
-        self._targets: dict[tuple[bool, tuple[tuple[_Key, bytes], ...]], Target] = {}
+        self._wraps: dict[_Placed, tuple[Manifold, Manifold]] = {}
+        self._targets: dict[tuple[bool, _Placed], Target] = {}
 
     def target(self, link: Link, uses: Sequence[MeshUse], sheets: bool = False) -> Target:
         """All of these meshes as one. Those that do not close are wrapped together: one may close another.
@@ -91,8 +92,7 @@ class Solids:
         Raises:
             PartwrightError: one of them cannot be read, or encloses nothing; the message names the link.
         """
-        # Zeros have no minus then.
-        key = sheets, tuple((use.mesh, (use.matrix + 0.0).tobytes()) for use in uses)
+        key = sheets, _placed(uses)
         if key not in self._targets:
             self._targets[key] = self._made(link, uses, sheets)
         return self._targets[key]
@@ -117,7 +117,7 @@ class Solids:
         if not open_:
             solid = Manifold.batch_boolean(solids, OpType.Add)
             return Target(solid, solid, *_together(placed), ())
-        key = tuple((uses[i].mesh, uses[i].matrix.tobytes()) for i in open_)
+        key = _placed([uses[i] for i in open_])
         if key not in self._wraps:
             try:
                 self._wraps[key] = wrapped(*_together([placed[i] for i in open_]))
@@ -141,6 +141,11 @@ class Solids:
             except PartwrightError as error:
                 raise type(error)(f"link {link.name!r}: {use.source.name}: {error}") from error
         return self._meshes[key]
+
+
+def _placed(uses: Sequence[MeshUse]) -> _Placed:
+    """The same for the same meshes in the same places, whatever the signs of zeros."""
+    return tuple((use.mesh, (use.matrix + 0.0).tobytes()) for use in uses)
 
 
 def _together(pieces: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 
-from partwright.robots import CollideOptions, collide
+from partwright.robots import CollideOptions, collide, solids
+from partwright.robots.model import Link, MeshUse
 from partwright.robots.wrapping import wrapped
 from tests.robots.robots import urdf
 
@@ -44,6 +46,27 @@ def test_a_sheet_bounds_what_wraps_it() -> None:
     inner, whole = wrapped(sheet.vertices, sheet.faces)
     assert inner is whole
     assert whole.volume() == pytest.approx(2 * 1.2 / 96, rel=0.3)
+
+
+def test_the_same_skin_in_the_same_place_is_wrapped_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Signs of zeros, as turns leave them, made it another."""
+    path = tmp_path / "skin.stl"
+    skin = tube(2)
+    skin.submesh([skin.triangles_center[:, 0] < 0], append=True).export(path)
+    made: list[int] = []
+
+    def counted(vertices: np.ndarray, faces: np.ndarray) -> tuple[Manifold, Manifold]:
+        made.append(len(faces))
+        return wrapped(vertices, faces)
+
+    monkeypatch.setattr(solids, "wrapped", counted)
+    both, link = solids.Solids(), Link("skin", np.eye(4), (), ())
+    for sheets, zero in ((False, 0.0), (True, -0.0)):
+        matrix = np.where(np.eye(4) == 0, zero, np.eye(4))
+        both.target(link, [MeshUse(path, matrix)], sheets)
+    assert len(made) == 1
 
 
 def test_an_open_skin_is_enclosed_by_one_shape_around_it(tmp_path: Path) -> None:
