@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from manifold3d import CrossSection, Manifold
 
+from partwright.approximation.sketches import threads
 from partwright.approximation.sketches.threads import without_threads
 from partwright.meshing.manifolds import closed
 from tests.threaded import INNER, LENGTH, PITCH, RADIUS, threaded
@@ -47,8 +50,8 @@ def test_a_rod_becomes_the_cylinder_around_it(pitch: float) -> None:
 
 
 def test_both_flanks_are_one_thread_in_coarse_chords_too() -> None:
-    _, threads = without_threads(threaded(around=24))
-    assert [thread.pitch for thread in threads] == [pytest.approx(PITCH, rel=0.01)]
+    _, found = without_threads(threaded(around=24))
+    assert [thread.pitch for thread in found] == [pytest.approx(PITCH, rel=0.01)]
 
 
 def test_a_thread_that_runs_out_is_one_though_it_goes_over_into_the_rod_and_its_head() -> None:
@@ -68,8 +71,21 @@ def test_threads_of_coarse_and_of_fine_meshes_are_found_beside_one_another(slott
     plate = Manifold.cube((3.4, 1.6, 0.2)).translate((-0.7, -0.8, -0.75))
     slot = Manifold.cube((0.15, 1.0, 2.0), True).translate((2.4, 0, 0)) if slotted else Manifold()
     screw, rod = running_out(), threaded().translate((2, 0, 0)) - slot
-    _, threads = without_threads(screw + rod + plate)
-    assert sorted(round(thread.axis[0]) for thread in threads) == ([0] if slotted else [0, 2])
+    _, found = without_threads(screw + rod + plate)
+    assert sorted(round(thread.axis[0]) for thread in found) == ([0] if slotted else [0, 2])
+
+
+def test_a_thread_is_one_though_coarse_and_fine_faces_tell_its_pitch_differently(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    real = threads._candidates
+
+    def told(mesh: trimesh.Trimesh, smooth: float) -> list[threads.Thread]:
+        share = 1.0 if smooth > 0.2 else 1.05
+        return [replace(one, pitch=share * one.pitch) for one in real(mesh, smooth)]
+
+    monkeypatch.setattr(threads, "_candidates", told)
+    assert len(without_threads(threaded())[1]) == 1
 
 
 def test_a_tapped_hole_becomes_as_narrow_as_its_crests() -> None:
@@ -86,8 +102,8 @@ def test_a_tapped_hole_becomes_as_narrow_as_its_crests() -> None:
 def test_what_is_beside_a_thread_stays() -> None:
     head = Manifold.cylinder(0.4, 0.7, 0.7, 6).translate((0, 0, 0.5))
     shank = Manifold.cylinder(0.5, RADIUS, RADIUS, 60).translate((0, 0, -1.0))
-    plain, threads = without_threads(threaded() + head + shank)
-    assert len(threads) == 1
+    plain, found = without_threads(threaded() + head + shank)
+    assert len(found) == 1
     whole = Manifold.cylinder(1.5, RADIUS, RADIUS, 96).translate((0, 0, -1.0)) + head
     assert (plain ^ whole).volume() == pytest.approx(whole.volume(), rel=5e-3)
     assert plain.volume() == pytest.approx(whole.volume(), rel=5e-3)
@@ -98,8 +114,8 @@ def test_what_is_no_thread_stays_as_it_is() -> None:
     grooved = sum(ridges[1:], ridges[0])
     slotted = threaded() - Manifold.cube((0.15, 1.0, 2.0), True).translate((0.4, 0, 0))
     for body in (grooved, slotted, Manifold.cylinder(1.0, 0.4, 0.2, 60), Manifold.sphere(0.5, 60)):
-        plain, threads = without_threads(body)
-        assert threads == []
+        plain, found = without_threads(body)
+        assert found == []
         assert plain.volume() == body.volume()
 
 

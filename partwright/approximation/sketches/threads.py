@@ -77,7 +77,7 @@ def without_threads(body: Manifold) -> tuple[Manifold, list[Thread]]:
     mesh = as_mesh(body)
     found: list[Thread] = []
     for thread in chain.from_iterable(_candidates(mesh, smooth) for smooth in _SMOOTH):
-        if any(_is_same(thread, other) for other in found):
+        if any(_overlap(thread, other) for other in found):
             continue
         sections = _sections(body, thread)
         kinds = [kind for kind in (False, True) if _is_behind(sections, thread, kind)]
@@ -203,14 +203,22 @@ def _screw(mesh: trimesh.Trimesh, faces: np.ndarray) -> Screw | None:
 
 def _is_same(one: Thread, other: Thread) -> bool:
     """Whether they are flanks of one thread."""
+    return _is_coaxial(one, other) and abs(one.pitch - other.pitch) < _SAME * abs(other.pitch)
+
+
+def _overlap(one: Thread, other: Thread) -> bool:
+    """Whether they are in one place, whatever their pitches: that of more than one start is told to a few
+    hundredths only."""
+    apart = abs(float((one.axis - other.axis) @ other.direction))
+    beside = max(one.inner, other.inner) < min(one.outer, other.outer)
+    return _is_coaxial(one, other) and beside and apart < (one.length + other.length) / 2
+
+
+def _is_coaxial(one: Thread, other: Thread) -> bool:
     off = one.axis - other.axis
     off = off - (off @ other.direction) * other.direction
     lean = np.linalg.norm(np.cross(one.direction, other.direction))
-    return bool(
-        np.linalg.norm(off) < _SAME * other.outer
-        and lean * one.length < _SAME * other.outer
-        and abs(one.pitch - other.pitch) < _SAME * abs(other.pitch)
-    )
+    return bool(np.linalg.norm(off) < _SAME * other.outer and lean * one.length < _SAME * other.outer)
 
 
 def _strip(thread: Thread, within: float, beyond: float) -> CrossSection:
