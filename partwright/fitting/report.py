@@ -89,6 +89,7 @@ def about_input(shape: Shape) -> dict[str, Any]:
         "repairs": list(shape.repairs),
         "openings": asdict(shape.openings),
         "left_out": shape.left_out,
+        "thickness": shape.thickness,
         "confidence": shape.confidence,
     }
 
@@ -188,14 +189,18 @@ def warnings(shape: Shape, scores: Scores, more: str) -> list[str]:
         result.append(_about_openings(shape))
     if shape.left_out > MUCH_MISSING:
         result.append(
-            f"flat sheets with {shape.left_out:.0%} of the surface enclose nothing and were left out; "
+            f"sheets with {shape.left_out:.0%} of the surface enclose nothing and were left out; "
             "--thickness 1% makes walls of them"
         )
     if shape.confidence < UNSURE:
         repairs = "; ".join(shape.repairs)
         result.append(
-            f"it is unsure what lies inside this surface (confidence {shape.confidence:.2f}): {repairs}. "
-            "Where sheets were meant, --thickness 1% makes walls of them"
+            f"it is unsure what lies inside this surface (confidence {shape.confidence:.2f}): {repairs}"
+            + (
+                ". Where sheets were meant, --thickness 1% makes walls of them"
+                if shape.thickness is None
+                else ""
+            )
         )
     return result
 

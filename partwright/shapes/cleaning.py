@@ -31,24 +31,25 @@ def merge_vertices(
     return vertices[order[moved]], target[faces]
 
 
-def drop_doubles(faces: NDArray[np.int64], notes: list[str], keep_sheets: bool = False) -> NDArray[np.int64]:
-    """Drop triangles with a repeated corner and triangles that are there more than once.
+def drop_doubles(faces: NDArray[np.int64], notes: list[str]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Without triangles with a repeated corner and triangles that are there more than once; and one side of
+    sheets that were dropped.
 
-    Of copies that face the same way one stays. Copies that face opposite ways are the two sides of a sheet:
-    they enclose nothing and go together, unless nearly the whole mesh is drawn two-sided, when one side
-    stays; with `keep_sheets` one side stays of those, too, that no other triangle touches.
+    Of copies that face the same way one stays. Copies that face opposite ways are the two sides of something
+    that encloses nothing, and go together, unless nearly the whole mesh is drawn two-sided, when one side
+    stays: those with a free edge are a sheet, others a wall between bodies.
     """
     sound = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     if not sound.all():
         notes.append(f"dropped {counted(int(np.count_nonzero(~sound)), 'triangle')} without area")
         faces = faces[sound]
     if len(faces) == 0:
-        return faces
+        return faces, faces
     corner = np.sort(faces, axis=1)
     order = np.lexsort(corner.T)
     start = np.flatnonzero(np.r_[True, (np.diff(corner[order], axis=0) != 0).any(axis=1)])
     if len(start) == len(faces):
-        return faces
+        return faces, faces[:0]
     first = np.argmin(faces, axis=1)
     facing = np.where(
         np.take_along_axis(faces, ((first + 1) % 3)[:, None], axis=1)[:, 0] == corner[:, 1], 1, -1
@@ -57,10 +58,7 @@ def drop_doubles(faces: NDArray[np.int64], notes: list[str], keep_sheets: bool =
     net = np.bincount(group, facing, len(start))
     mixed = np.bincount(group, minlength=len(start)) > np.abs(net)
     two_sided = float(mixed.mean()) > 0.9
-    stays = np.full(len(start), two_sided)
-    if keep_sheets:
-        stays |= _apart(corner[order[start]], net == 0)
-    wanted = np.where(net == 0, stays, np.sign(net))
+    wanted = np.where(net == 0, 1 if two_sided else 0, np.sign(net))
     matches = facing == wanted[group]
     keep = np.full(len(start), -1, dtype=np.int64)
     at = np.flatnonzero(matches)[::-1]
@@ -71,17 +69,22 @@ def drop_doubles(faces: NDArray[np.int64], notes: list[str], keep_sheets: bool =
         if two_sided
         else f"dropped {counted(len(faces) - len(kept), 'duplicate triangle')}"
     )
-    return faces[kept]
+    gone = (net == 0) & (not two_sided)
+    return faces[kept], corner[order[start]][_free(corner[order[start]], gone)]
 
 
-def _apart(triangles: NDArray[np.int64], chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which (T,) of the chosen triangles (T, 3) hang together by their corners with chosen ones only."""
-    count = int(triangles.max()) + 1
-    own = triangles[chosen]
-    group = components(count, own[:, [0, 1]].ravel(), own[:, [1, 2]].ravel())
-    met = np.zeros(count, dtype=bool)
-    met[group[triangles[~chosen]]] = True
-    return chosen & ~met[group[triangles[:, 0]]]
+def _free(triangles: NDArray[np.int64], chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which (T,) of the chosen triangles (T, 3) hang together with one that has an edge of its own."""
+    if not chosen.any():
+        return chosen
+    ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, edge, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    edge = edge.reshape(-1, 3)
+    own = edge[chosen]
+    group = components(len(count), own[:, [0, 1]].ravel(), own[:, [1, 2]].ravel())
+    ends_free = np.zeros(len(count), dtype=bool)
+    ends_free[group[own[count[own] == 1]]] = True
+    return chosen & ends_free[group[edge[:, 0]]]
 
 
 def weld_boundary(
@@ -101,5 +104,6 @@ def weld_boundary(
     target = np.arange(len(vertices))
     target[rim] = rim[first[label]]
     notes.append(f"welded {counted(len(rim) - len(first), 'vertex', 'vertices')} along cracks")
-    vertices, faces = merge_vertices(vertices, drop_doubles(target[edges.faces], []), [])
+    faces = np.concatenate(drop_doubles(target[edges.faces], []))
+    vertices, faces = merge_vertices(vertices, faces, [])
     return vertices, EdgeTable(faces)

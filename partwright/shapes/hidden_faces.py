@@ -17,13 +17,13 @@ from partwright.shapes.distance import MeshDistance
 from partwright.shapes.lids import lids_over, with_lids
 from partwright.shapes.orientation import split_bodies
 from partwright.shapes.sampling import sample_triangles
-from partwright.shapes.topology import EdgeTable, area_vectors, compacted, doubled_areas, is_sheet
+from partwright.shapes.topology import EdgeTable, area_vectors, compacted, doubled_areas, is_plane, is_sheet
 
 _TOUCHING = 2e-3  # unit lengths, 0.1 % of the longest side: what is as near lies on it
 _PROBES = 32  # points of a lid that are looked at
 _COVERED = 0.9  # of them
 _ON_GROUND = 1e-4  # unit lengths above it
-_WITHIN = 0.6  # winding number from which on a point is clearly inside: behind a sheet alone it is a half
+_A_HALF = 0.25  # a winding number this near to a half is one
 _SPACING = 0.01  # unit lengths between points of a rim
 _ALONG = 0.02  # unit lengths: a rim that is as near runs along another
 
@@ -109,7 +109,13 @@ def _loose_sheets(vertices: NDArray[np.float64], edges: EdgeTable) -> list[NDArr
     members = split_bodies(edges.bodies)
     if len(members) == 1:
         return []
-    flat = np.array([is_sheet(vertices[edges.faces[one].ravel()]) for one in members], bool)
+    corners = [vertices[edges.faces[one].ravel()] for one in members]
+    flat = np.array(
+        [
+            (is_sheet if is_open else is_plane)(one)
+            for one, is_open in zip(corners, edges.open_bodies, strict=True)
+        ]
+    )
     if not flat.any() or flat.all():
         return []
     loose = [members[one] for one in np.flatnonzero(flat & ~edges.open_bodies)]
@@ -119,7 +125,8 @@ def _loose_sheets(vertices: NDArray[np.float64], edges: EdgeTable) -> list[NDArr
         loose += [open_[one] for one in np.flatnonzero(found)]
     if not loose or not _is_beside_the_point(doubled_areas(vertices, edges.faces), loose):
         return []
-    return [sheet for sheet in loose if not _encloses(vertices, edges, sheet)]
+    within = _with_inside(vertices, edges.faces, loose)
+    return [sheet for sheet, needed in zip(loose, within, strict=True) if not needed]
 
 
 def _loose(
@@ -144,16 +151,23 @@ def _loose(
         loose = found
 
 
-def _encloses(vertices: NDArray[np.float64], edges: EdgeTable, sheet: NDArray[np.int64]) -> bool:
-    """Whether there is something behind a sheet and nothing before it: the floor of a crate, whose walls
-    and bottom are another body's."""
-    triangles = vertices[edges.faces[sheet]]
-    across = area_vectors(triangles).sum(axis=0)
-    step = _TOUCHING * across / max(float(np.linalg.norm(across)), np.finfo(np.float64).tiny)
-    probes = _points_on(triangles)
-    whole = MeshDistance(vertices, edges.faces, edges.faces, closed=False)
-    behind, before = whole.winding(probes - step), whole.winding(probes + step)
-    return float(((behind > _WITHIN) & (before < 1 - _WITHIN)).mean()) > 0.5
+def _with_inside(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], sheets: list[NDArray[np.int64]]
+) -> list[bool]:
+    """Whether each sheet parts inside from outside together with all that is no such sheet: the floor of a
+    crate, whose walls and bottom are another body's. A decal on a wall and a pane do not.
+
+    Where a sheet is the border, the winding number of the rest is a half, and that of both 1 and 0 beside it.
+    On a surface it is a half, too.
+    """
+    rest = np.delete(faces, np.concatenate(sheets), axis=0)
+    source = MeshDistance(vertices, rest, rest, closed=False)
+    within = []
+    for sheet in sheets:
+        probes = _points_on(vertices[faces[sheet]])
+        border = np.abs(source.winding(probes) - 0.5) < _A_HALF
+        within.append(float((border & (source.exact(probes) > _TOUCHING)).mean()) > 0.5)
+    return within
 
 
 def _is_beside_the_point(area: NDArray[np.float64], sheets: list[NDArray[np.int64]]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 import re
 
 from partwright.errors import SettingError
@@ -20,7 +21,7 @@ def parse_length(given: Length) -> tuple[float, str]:
     """
     text = _TEXT.fullmatch(given) if isinstance(given, str) else None
     number = math.nan
-    if text is not None or (isinstance(given, (int, float)) and not isinstance(given, bool)):
+    if text is not None or (isinstance(given, numbers.Real) and not isinstance(given, bool)):
         number = float(text[1] if text else given)
     if not math.isfinite(number) or number < 0:
         raise SettingError(f'expected a length such as 0.5, "0.5mm" or "1%", got {given!r}')

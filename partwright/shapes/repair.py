@@ -25,19 +25,18 @@ from partwright.shapes.topology import (
     EdgeTable,
     area_vectors,
     doubled_areas,
+    is_plane,
     signed_volumes,
-    thickness,
 )
 from partwright.shapes.winding import winding_grid
 
 _SAME_FRAME = 1e-4  # of the scale, and unit lengths: vertices are welded and middles added within it
-_FLAT = 1e-6  # thickness under which the vertices count as one plane
 _NO_VOLUME = 1e-9
 _LEAST_CONFIDENCE = 0.5
 _SIDE_STEP = 2e-5  # how far off a triangle its two sides are looked at
 _CLEAR = 0.2  # a winding number this near to 0 or 1 is clear
 _CHECK = 64  # cells along a side in the search for overlaps
-_THICKEN = "give its sheets a thickness (--thickness 1%)"
+_THICKEN = "give its sheets a thickness (partwright fit --thickness 1%)"
 _PROBES = 8  # triangles of a patch that are looked at to see whether it is a wall
 
 
@@ -47,8 +46,8 @@ class Surface:
 
     `faces` is the outer surface. `winding_faces` decide the inside and may hold sheets within the shape as
     well; with `closed` they have no open edge. `simple`: no point is enclosed twice, so volume is a sum over
-    `faces`. `openings`: what of the surface was missing. `left_out`: share of the area as read that flat
-    sheets took, which are no part of it.
+    `faces`. `openings`: what of the surface was missing. `left_out`: share of the area that sheets took, and
+    that is no part of it.
     """
 
     vertices: NDArray[np.float64]
@@ -99,7 +98,10 @@ def repair(
     if wall is None:
         _refuse_plane(vertices)
     vertices, faces = merge_vertices(vertices, faces, notes)
-    faces = drop_doubles(faces, notes, keep_sheets=wall is not None)
+    faces, two_sided = drop_doubles(faces, notes)
+    whole = float(doubled_areas(vertices, two_sided).sum())
+    if wall is not None:
+        faces = np.concatenate([faces, two_sided])
     if len(faces) == 0:
         raise EmptyShapeError("no triangle has any area; export the shape again with its surface")
     vertices, edges = weld_boundary(vertices, EdgeTable(faces), notes)
@@ -112,10 +114,10 @@ def repair(
         lying = edges.faces[:0]
     if wall is not None:
         return _enclosed(*thicken(vertices, edges, wall, notes), notes)
-    whole = doubled_areas(vertices, edges.faces).sum()
+    whole += float(doubled_areas(vertices, edges.faces).sum())
     vertices, edges = drop_sheets(vertices, edges, len(lying), notes)
-    left_out = 1.0 - float(doubled_areas(vertices, edges.faces).sum() / whole)
-    return replace(_enclosed(vertices, edges, notes), left_out=left_out)
+    kept = float(doubled_areas(vertices, edges.faces).sum())
+    return replace(_enclosed(vertices, edges, notes), left_out=1 - kept / whole)
 
 
 def _enclosed(vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]) -> Surface:
@@ -140,7 +142,7 @@ def consistent(
     """Vertices (V, 3), in the unit frame, and triangles (F, 3): merged, welded and turned the same way."""
     notes: list[str] = []
     vertices, faces = merge_vertices(vertices, faces, notes)
-    faces = drop_doubles(faces, notes)
+    faces, _ = drop_doubles(faces, notes)
     if len(faces) == 0:
         return vertices, faces
     vertices, edges = weld_boundary(vertices, EdgeTable(faces), notes)
@@ -149,7 +151,7 @@ def consistent(
 
 def _refuse_plane(vertices: NDArray[np.float64]) -> None:
     """Raise FlatShapeError when all vertices lie in one plane, whichever way it is turned."""
-    if thickness(vertices) < _FLAT:
+    if is_plane(vertices):
         raise FlatShapeError(f"all triangles lie in one plane, so there is no inside to fit; {_THICKEN}")
 
 

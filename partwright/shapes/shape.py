@@ -18,7 +18,7 @@ from partwright.shapes.frame import UnitFrame
 from partwright.shapes.grid import DistanceGrid, distance_grid, occupancy_grid
 from partwright.shapes.hidden_faces import Ground
 from partwright.shapes.holes import Openings
-from partwright.shapes.lengths import Length, own_length
+from partwright.shapes.lengths import Length, own_length, parse_length
 from partwright.shapes.reading import read_source, source_of
 from partwright.shapes.repair import Surface, repair
 from partwright.shapes.sampling import (
@@ -65,9 +65,10 @@ class Shape:
     frame: to the unit frame and back. unit: "mm", "m" ... or None; up: "x", "y", "z", "-z" ... or None.
     points: (N, 3) as read, own units, where it came as points, else None. repairs: what was done to the
     surface, a sentence each. openings: how much of the surface the input left out, and where the most of
-    it, own units. left_out: share of the area that flat sheets took, which are no part of it. confidence:
-    0 to 1, how sure inside and outside are. reading_seconds: that `load_shape` took, 0 for a node. Results
-    are cached by their arguments; returned arrays are read-only.
+    it, own units. left_out: share of the area that sheets took, and that is no part of it. confidence: 0 to
+    1, how sure inside and outside are. thickness: that its sheets were given, own units, or None.
+    reading_seconds: that `load_shape` took, 0 for a node. Results are cached by their arguments; returned
+    arrays are read-only.
     """
 
     def __init__(self, source: Source) -> None:
@@ -90,9 +91,9 @@ class Shape:
         self._ground = source.ground
         if source.up is not None and source.ground is None:
             self._ground = float((corners @ axis_vector(source.up)).min())
-        self._thickness = source.thickness
+        self.thickness = source.thickness
         self.frame, self._surface = _named(
-            name, lambda: _repaired(corners, compact, source.up, self._ground, self._thickness)
+            name, lambda: _repaired(corners, compact, source.up, self._ground, self.thickness)
         )
         self.vertices = self.frame.from_unit(self._surface.vertices)
         self.faces = self._surface.faces
@@ -146,7 +147,7 @@ class Shape:
         for node in self.nodes:
             piece = Piece(node.name, self.input_vertices, self.input_faces[node.start : node.stop])
             alone = Source(
-                node.name, (piece,), self.unit, self.up, ground=self._ground, thickness=self._thickness
+                node.name, (piece,), self.unit, self.up, ground=self._ground, thickness=self.thickness
             )
             try:
                 shapes.append(Shape(alone))
@@ -316,12 +317,15 @@ def load_shape(
 def _wall(thickness: Length, source: Source) -> float:
     """The thickness in the source's own units."""
     corners = np.concatenate([piece.vertices[piece.faces].reshape(-1, 3) for piece in source.pieces])
+    longest = float(np.ptp(corners, axis=0).max())
     try:
-        wall = own_length(thickness, source.unit, float(np.ptp(corners, axis=0).max()))
+        wall = own_length(thickness, source.unit, longest)
     except SettingError as error:
         raise SettingError(f"thickness: {error}") from error
-    if wall == 0:
-        raise SettingError(f"thickness: expected a length above 0, got {thickness!r}")
+    if parse_length(thickness)[0] == 0 or wall > longest / 2 > 0:
+        raise SettingError(
+            f"thickness: expected a length above 0, and at most half of the longest side, got {thickness!r}"
+        )
     return wall
 
 

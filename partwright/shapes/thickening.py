@@ -16,11 +16,12 @@ from partwright.shapes.topology import (
     area_vectors,
     compacted,
     doubled_areas,
-    is_sheet,
+    is_plane,
     plane_normal,
 )
 
 _SMALL = 0.05  # of a body's surface, all its openings together
+_NARROW = 0.5  # of a body's middle side, any of its openings
 _LEAST_COSINE = (
     0.5  # between a corner's faces and their mean: sharper ones are blunted, or they would be spikes
 )
@@ -66,18 +67,29 @@ def thicken(
 def _with_small_holes_closed(
     vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
 ) -> tuple[NDArray[np.float64], EdgeTable]:
-    """A body whose openings are a small share of its surface is a solid that lacks a few faces."""
+    """A body whose openings are a small share of its surface, and not as wide as it, is a solid that lacks a
+    few faces; a pipe is none."""
     lids = lids_over(vertices, edges) if edges.balance.any() else []
     first = np.unique(edges.patches, return_index=True)[1]
     body = np.array([edges.bodies[first[lid.patch]] for lid in lids], np.int64)
     lid_area = [np.linalg.norm(area_vectors(lid.corners(vertices)), axis=1).sum() for lid in lids]
     area = np.bincount(edges.bodies, doubled_areas(vertices, edges.faces))
     small = np.bincount(body, lid_area, len(area)) < _SMALL * area
+    for lid, one in zip(lids, body, strict=True):
+        if small[one]:
+            wide = _sides(vertices[lid.rim])[2]
+            small[one] = wide < _NARROW * _sides(vertices[edges.faces[edges.bodies == one].ravel()])[1]
     chosen = [lid for lid, one in zip(lids, body, strict=True) if small[one]]
     if not chosen:
         return vertices, edges
     notes.append(f"filled {counted(len(chosen), 'small hole')}")
     return with_lids(vertices, edges, chosen)
+
+
+def _sides(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) ascending, of the box along the principal axes of points (N, 3)."""
+    centred = points - points.mean(axis=0)
+    return np.sort(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0))
 
 
 def _parted(vertices: NDArray[np.float64], edges: EdgeTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -88,19 +100,38 @@ def _parted(vertices: NDArray[np.float64], edges: EdgeTable) -> tuple[NDArray[np
     kept = np.ones(len(faces), bool)
     count = 0
     for body, is_open in zip(split_bodies(edges.bodies), edges.open_bodies, strict=True):
+        corners = vertices[faces[body]]
         if is_open:
-            patches = split_bodies(np.unique(edges.patches[body], return_inverse=True)[1])
-            for patch in (body[one] for one in patches):
-                if EdgeTable(faces[patch]).balance.any():
-                    number[patch] = count
-                    count += 1
-        elif is_sheet(vertices[faces[body].ravel()]):
-            corners = vertices[faces[body]]
+            for sheet in _sheets_of(faces, edges.patches, body):
+                number[sheet] = count
+                count += 1
+        elif is_plane(corners.reshape(-1, 3)):
             above = area_vectors(corners) @ plane_normal(corners.reshape(-1, 3)) > 0
             number[body[above]] = count
             kept[body[~above]] = False
             count += 1
     return faces[kept], number[kept]
+
+
+def _sheets_of(
+    faces: NDArray[np.int64], patch: NDArray[np.int64], body: NDArray[np.int64]
+) -> list[NDArray[np.int64]]:
+    """Of an open body's triangles those of each patch that is open; but where all that do not end free close
+    among themselves, as a ball with a brim does, only those that do."""
+    patches = [body[one] for one in split_bodies(np.unique(patch[body], return_inverse=True)[1])]
+    free = np.sort(EdgeTable(faces[body]).open_half_edges, axis=1)
+    ends = [_has_one_of(faces[one], free) for one in patches]
+    rest = [one for one, ends_free in zip(patches, ends, strict=True) if not ends_free]
+    if rest and not EdgeTable(faces[np.concatenate(rest)]).balance.any():
+        return [one for one, ends_free in zip(patches, ends, strict=True) if ends_free]
+    return [one for one in patches if EdgeTable(faces[one]).balance.any()]
+
+
+def _has_one_of(faces: NDArray[np.int64], edges: NDArray[np.int64]) -> bool:
+    """Whether one of the edges (B, 2), ends ascending, is of triangles (T, 3)."""
+    ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    count = int(max(ends.max(initial=0), edges.max(initial=0))) + 1
+    return bool(np.isin(ends @ (count, 1), edges @ (count, 1)).any())
 
 
 def _outward(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:

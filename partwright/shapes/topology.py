@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_SHEET = 1e-4  # unit lengths: what is thinner is a sheet
+_SHEET = 1e-4  # unit lengths: what is open and thinner is a flat sheet
+_PLANE = 1e-6  # unit lengths: thickness under which points count as one plane
 
 
 def area_vectors(corners: NDArray[Any]) -> NDArray[Any]:
@@ -34,8 +35,13 @@ def thickness(points: NDArray[Any]) -> float:
 
 
 def is_sheet(points: NDArray[Any]) -> bool:
-    """Whether points (N, 3), unit frame, lie in a plane."""
+    """Whether points (N, 3), unit frame, of an open surface lie in a plane as nearly as it matters."""
     return thickness(points) < _SHEET
+
+
+def is_plane(points: NDArray[Any]) -> bool:
+    """Whether points (N, 3), unit frame, lie in one plane: what is closed may be thinner than a sheet."""
+    return thickness(points) < _PLANE
 
 
 @dataclass(frozen=True)

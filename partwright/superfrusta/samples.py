@@ -28,6 +28,7 @@ _HALF_SIDE = 1.2  # unit lengths: half the side of the cube that padding and pro
 _MOST_PADDING_WEIGHT = 3.0  # of one point, where the weight of a sample in the box is 1
 _PROBES = 48  # along a side of that cube
 _CELL = 2 * _HALF_SIDE / _PROBES
+_MOST_BEYOND = 60_000  # probes beyond the cube at most, where chips are looked for again and again
 _FURTHEST = 2.4  # unit lengths from the middle: how far parts are followed
 _SURFACE = 8000  # points of the shape's surface
 _STRAY = 0.05  # unit lengths: what an assembly covers further than this from the shape is astray
@@ -122,26 +123,31 @@ class FitSamples:
         )
 
     def chips(self, rows: Rows) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Points (n, 3) of an assembly so far out that no probe or voxel lies there, and the shape's distance
-        (n,)."""
-        probes = self._probes_beyond(rows)
+        """Points (n, 3) of an assembly so far out that no voxel lies there, samples or not, and the shape's
+        distance (n,)."""
+        probes = self._probes_beyond(rows, with_samples=True)
+        probes = probes[:: 1 + len(probes) // _MOST_BEYOND]
         points = probes[self.distance_of(rows, probes) < 0] if len(probes) else probes
         return points, self.measure(points).astype(np.float32)
 
-    def _probes_beyond(self, rows: Rows) -> NDArray[np.float32]:
+    def _probes_beyond(self, rows: Rows, with_samples: bool = False) -> NDArray[np.float32]:
         """Probes (n, 3) as dense as the others, about parts that reach out of the cube that those fill: of a
-        body that is mostly cut away a chip may be left there. None that are samples already."""
+        body that is mostly cut away a chip may be left there. None that are samples already, or those too."""
         added = surface_points(rows[rows[:, Column.SIGN] > 0]).reshape(-1, 3)
         if len(added) == 0 or np.abs(added).max() <= _HALF_SIDE:
             return NOTHING[:, :3]
         first, last = (_cell(np.clip(end, -_FURTHEST, _FURTHEST)) for end in (added.min(0), added.max(0)))
         counts = last - first + 1
         cells = first + np.asarray(grid_indices(tuple(counts)))
-        known = _cell(self.points[np.abs(self.points).max(axis=1) > _HALF_SIDE]) - first
-        known = known[((known >= 0) & (known < counts)).all(axis=1)]
         wanted = (np.abs(cells + 0.5).max(axis=1) > _PROBES / 2).reshape(counts)
-        wanted[tuple(known.T)] = False
+        if not with_samples:
+            wanted[tuple(self._cells_of_samples(first, counts))] = False
         return (_CELL * (cells[wanted.ravel()] + 0.5)).astype(np.float32)
+
+    def _cells_of_samples(self, first: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(3, n) beyond the cube, counted from the first of so many (3,)."""
+        known = _cell(self.points[np.abs(self.points).max(axis=1) > _HALF_SIDE]) - first
+        return known[((known >= 0) & (known < counts)).all(axis=1)].T
 
     def about(self, low: NDArray[np.floating], high: NDArray[np.floating]) -> FitSamples:
         """These and more, with another grid, a little beyond the box between two corners (3,)."""

@@ -169,23 +169,58 @@ def test_loops_hold_each_half_edge_once_and_no_vertex_twice(seed: int, faces: in
     assert all(len(set(loop.tolist())) == len(loop) for loop in loops)
 
 
+def crate(bottom: bool) -> trimesh.Trimesh:
+    """A closed ring of walls, 2 by 2 and 1 high, and a sheet below what they enclose that hangs on them."""
+    lines = [-1.0, -0.8, 0.8, 1.0]
+    points = np.array([[x, y, z] for z in (-0.5, 0.5) for y in lines for x in lines])
+    quads = [] if not bottom else [[5, 9, 10, 6]]
+    for row in range(3):
+        for column in range(3):
+            a = 4 * row + column
+            if (row, column) != (1, 1):
+                quads += [[a, a + 4, a + 5, a + 1], [a + 16, a + 17, a + 21, a + 20]]
+    around = [0, 1, 2, 3, 7, 11, 15, 14, 13, 12, 8, 4]
+    within = [5, 9, 10, 6]
+    for loop in (around, within):
+        quads += [[a, b, b + 16, a + 16] for a, b in zip(loop, np.roll(loop, -1).tolist(), strict=True)]
+    faces = np.array([[[a, b, c], [a, c, d]] for a, b, c, d in quads]).reshape(-1, 3)
+    return trimesh.Trimesh(points, faces, process=False)
+
+
 def test_a_floor_between_walls_that_have_a_bottom_stays() -> None:
-    """The walls are a closed ring, the bottom is a sheet beneath it, the floor one within it."""
-    outer, inner = box((2, 2, 1), (0, 0, 0)), box((1.6, 1.6, 1), (0, 0, 0))
-    ring = outer.difference(inner)
-    bottom = sheet(1.6, 1.6, (-0.8, -0.8, -0.5))
-    bottom.invert()
     floor = sheet(1.6, 1.6, (-0.8, -0.8, -0.4))
-    shape = load_shape(together(ring, bottom, floor))
+    shape = load_shape(together(crate(bottom=True), floor))
     assert not any("loose" in note for note in shape.repairs)
     inside = shape.signed_distance(
         [[0, 0, -0.45], [0.5, 0.5, -0.42], [0, 0, -0.35], [0, 0, 0.3], [0, 0, -0.6]]
     )
     assert (inside[:2] < 0).all()
     assert (inside[2:] > 0).all()
+    ring = crate(bottom=False)
+    assert ring.volume == pytest.approx(4 - 1.6**2)
     alone = load_shape(together(ring, floor))  # a pane
     assert any("loose" in note for note in alone.repairs)
     assert alone.volume == pytest.approx(ring.volume, rel=1e-6)
+
+
+@pytest.mark.parametrize("above", [0.0, 1e-5, 1e-3, 0.05])
+def test_decals_are_left_out_however_near(above: float) -> None:
+    decal = sheet(0.4, 0.4, (-0.2, -0.2, 0.5 + above))
+    shape = load_shape(together(box(), decal, box((0.2, 0.2, 0.2), (2, 0, 0))))
+    assert shape.volume == pytest.approx(1.008, rel=1e-6)
+    assert shape.left_out == pytest.approx(0.16 / (6 + 0.24 + 0.16), rel=1e-6)
+
+
+def test_two_panes_are_no_body() -> None:
+    front, back = sheet(1, 1, (2, 0, 0.3)), sheet(1, 1, (2, 0, 0))
+    back.invert()
+    assert load_shape(together(box((2, 2, 1)), front, back)).volume == pytest.approx(4.0)
+
+
+def test_a_closed_plate_stays_however_thin() -> None:
+    shape = load_shape(together(box(), box((0.5, 0.5, 5e-5), (0, 0, 2))))
+    assert shape.volume == pytest.approx(1 + 0.25 * 5e-5, abs=1e-7)
+    assert shape.bounds()[1, 2] == pytest.approx(2, abs=1e-3)
 
 
 def road_between_kerbs(reach: float) -> trimesh.Trimesh:

@@ -116,7 +116,13 @@ def test_a_shape_that_has_no_sheets_says_so() -> None:
 
 @pytest.mark.parametrize(
     ("asked", "message"),
-    [(0, "above 0"), (-1, "expected a length"), ("thick", "expected a length"), ("1mm", "--unit")],
+    [
+        (0, "above 0"),
+        ("60%", "at most half"),
+        (-1, "expected a length"),
+        ("thick", "expected a length"),
+        ("1mm", "--unit"),
+    ],
 )
 def test_what_is_no_thickness_is_one_line(asked, message) -> None:
     with pytest.raises(SettingError, match=f"thickness: .*{message}"):
@@ -139,3 +145,62 @@ def test_a_body_with_a_small_hole_is_no_shell() -> None:
     assert shape.volume == pytest.approx(ball.volume + 0.02, rel=0.01)
     assert "filled 1 small hole" in shape.repairs
     assert "gave 1 sheet a thickness" in shape.repairs
+
+
+def test_a_pipe_without_caps_is_a_pipe_however_long() -> None:
+    pipe = trimesh.creation.cylinder(0.05, 20, sections=64)
+    tube = without(pipe, np.abs(pipe.face_normals[:, 2]) > 0.9)
+    assert load_shape(tube, thickness=0.02).volume == pytest.approx(tube.area * 0.02, rel=0.02)
+
+
+def test_a_ball_with_a_brim_stays_solid() -> None:
+    ball = trimesh.creation.icosphere(3)
+    flat = np.flatnonzero(np.abs(ball.vertices[:, 2]) < 1e-9)
+    ring = flat[np.argsort(np.arctan2(*ball.vertices[flat, :2].T))]
+    follow, n = np.roll(np.arange(len(ring)), -1), len(ball.vertices)
+    outer = n + np.arange(len(ring))
+    brim = np.concatenate(
+        [
+            np.stack([ring, outer, ring[follow]], axis=1),
+            np.stack([ring[follow], outer, outer[follow]], axis=1),
+        ]
+    )
+    mesh = (np.concatenate([ball.vertices, 1.5 * ball.vertices[ring]]), np.concatenate([ball.faces, brim]))
+    shape = load_shape(mesh, thickness=0.02)
+    area = np.pi * (1.5**2 - 1)
+    assert shape.volume == pytest.approx(ball.volume + area * 0.02, rel=0.01)
+
+
+def test_both_sides_of_a_sheet_are_one_wherever_it_touches() -> None:
+    """A leaf that shares a corner with a box, and one whose sides are a hair apart."""
+    cube = box((1, 1, 1), (0.5, 0.5, 0.5))
+    leaf = np.array([[1, 1, 1], [2, 1, 1], [2, 2, 1], [1, 2, 1]], float)
+    both = np.concatenate([FACES, FACES[:, ::-1]])
+    at_corner = trimesh.Trimesh(leaf, both, process=False)
+    apart = trimesh.Trimesh(
+        np.concatenate([SQUARE + 3 * UP, SQUARE + (3 + 2e-6) * UP]),
+        np.concatenate([FACES[:, ::-1], FACES + 4]),
+        process=False,
+    )
+    scene = together(cube, at_corner, apart)
+    assert load_shape(scene, thickness=0.01).volume == pytest.approx(1.02, rel=2e-3)
+    plain = load_shape(scene)
+    assert plain.volume == pytest.approx(1.0)
+    assert plain.left_out == pytest.approx(2 / 8, abs=0.02)
+
+
+def test_a_wall_between_two_rooms_is_no_sheet() -> None:
+    one, other = box((1, 1, 1), (0, 0, 0)), box((1, 1, 1), (1, 0, 0))
+    shape = load_shape(together(one, other), thickness=0.1)
+    assert shape.volume == pytest.approx(2.0)
+    assert shape.left_out == 0
+
+
+@pytest.mark.parametrize("number", [np.float32(0.02), np.float64(0.02), 0.02, "0.02", "2%"])
+def test_a_thickness_may_be_any_number(number) -> None:
+    assert load_shape((SQUARE, FACES), thickness=number).volume == pytest.approx(0.02, rel=1e-5)
+
+
+def test_the_error_of_a_mesh_without_area_comes_first() -> None:
+    with pytest.raises(FlatShapeError, match="one point"):
+        load_shape((np.zeros((3, 3)), np.array([[0, 1, 2]])), thickness="1%")

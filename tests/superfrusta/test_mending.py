@@ -132,8 +132,13 @@ def test_a_chip_beyond_all_voxels_is_off(samples: FitSamples, exact: np.ndarray)
     assert len(points) > 100
     assert np.abs(points[:, 0] - 1.625).max() < 0.18
     assert distance == pytest.approx(points[:, 0] - 0.9, abs=0.02)
-    assert deviations(samples, rows).by_part[2] > OUTSIDE * 0.85
     assert len(samples.chips(exact)[0]) == 0
+    # Growth, which comes first, makes samples of such places; they are off all the same.
+    after = samples.with_stray_samples(rows)
+    assert len(after.points) > len(samples.points)
+    assert np.array_equal(after.chips(rows)[0], points)
+    found = deviations(after, rows)
+    assert {tuple(point) for point in points.tolist()} <= {tuple(point) for point in found.points.tolist()}
 
 
 def test_a_thin_tab_is_off_by_its_length(samples: FitSamples, exact: np.ndarray) -> None:
