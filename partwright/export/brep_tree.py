@@ -1,4 +1,5 @@
-"""Trees of B-rep solids: each node's boolean operation, its volume compared with that of the exact mesh."""
+"""Trees of B-rep solids: each node's boolean operation, its volume compared with that of the exact mesh, or
+of the field where there is none."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
 from partwright.export.brep_topology import side_by_side, solids_of
 from partwright.fields import Sphere
-from partwright.meshing import has_exact_mesh, mesh_assembly, mesh_csg
+from partwright.meshing import has_exact_mesh, mesh_csg
+from partwright.meshing.sampled_volume import sampled_volume
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -28,7 +30,6 @@ if TYPE_CHECKING:
 _OVERLAP = 0.02  # of a union's volume: more of it twice, and facets stand for the union
 _CHORD = 5e-5  # of the longest side: how far an exact mesh may lie from its surface
 _SAME_MESH = 5e-3  # share of the volume by which what stands for an exact mesh may have less
-_CELLS, _SAME_FIELD = 160, 0.015  # along the longest side of a mesh of a field; the same share of such a one
 _SAME_SOLID = 1e-4  # share of volume and area that a solid keeps when its faces become fewer
 
 
@@ -82,12 +83,22 @@ def _combined(node: Node, ball: Ball, made: Compromises) -> TopoDS_Shape:
         combined(child, ball, made) if united or isinstance(child, Part) else _combined(child, ball, made)
         for child in node.children
     ]
-    right = _exact_volume(node)
     try:
-        solid = operated(node.operation, solids, right, _label(node), made.repairs, made.rough)
-        return _unified(node, solid)
+        return _unified(node, _operated(node, solids, _volume(node), made))
     except NoSurfaceError:
-        return _unified(node, _stepwise(node, solids, right, made))
+        if has_exact_mesh(node):
+            raise
+    return _unified(node, _operated(node, solids, None, made))  # what the file lacks then is told at the end
+
+
+def _operated(
+    node: Assembly, solids: Sequence[TopoDS_Shape], right: float | None, made: Compromises
+) -> TopoDS_Shape:
+    """All at once, or one after another where that goes wrong. right: the volume, where it is known."""
+    try:
+        return operated(node.operation, solids, right, _label(node), made.repairs, made.rough)
+    except NoSurfaceError:
+        return _stepwise(node, solids, right, made)
 
 
 def _stepwise(
@@ -135,7 +146,7 @@ class _Steps:
         self.operation, self.known, self.made = node.operation, known, made
         self.result, self.joined = solids[0], [node.children[0]]
         self.waiting = list(zip(node.children[1:], solids[1:], strict=True))
-        self._expected = _exact_volume(Assembly((node.children[0],))) if known else None
+        self._expected = _volume(Assembly((node.children[0],))) if known else None
 
     def join(self, way: _Way) -> None:
         """All that can be joined in this way; the others go on waiting."""
@@ -150,7 +161,7 @@ class _Steps:
     def _joined(self, way: _Way, child: Node, solid: TopoDS_Shape) -> None:
         expected = volume = None
         if self._expected is not None:
-            expected = _exact_volume(Assembly((*self.joined, child), self.operation))
+            expected = _volume(Assembly((*self.joined, child), self.operation))
             assert expected is not None
             # By how much this step changes it; what earlier ones are off is not its fault.
             volume = expected + volume_and_area(self.result)[0] - self._expected
@@ -168,7 +179,7 @@ class _Steps:
             return solid
         with suppress(NoSurfaceError):
             pair = (solid, self.result)
-            return operated("difference", pair, _exact_volume(rest), _label(child), self.made.repairs)
+            return operated("difference", pair, _volume(rest), _label(child), self.made.repairs)
         with suppress(NoSurfaceError):
             whole = faceted(rest, fine=True)
             self.made.faceted += [part.name for part in child.parts]
@@ -207,26 +218,24 @@ def volume_off(
     """By which share the volume of all is off what it is to be, 0 as far as it may be.
 
     That is the volume of their exact meshes, which facets follow less closely, and a union with solids that
-    stand apart may have more of; of those that have none, that of a mesh of their field, which is less close;
-    of those that are built as one solid, that of the solid as it was made.
+    stand apart may have more of; of those that have none, what their fields enclose; of those that are built
+    as one solid, that of the solid as it was made.
     """
-    right, near = 0.0, _SAME_MESH
+    right = 0.0
     for node, solid in zip(nodes, solids, strict=True):
-        own: float | None = None
-        if isinstance(node, Assembly) and len(node) > 1:
-            own = _exact_volume(node)
-            if own is None and np.isfinite(node.bounds()).all():
-                own, near = float(mesh_assembly(node, _CELLS).volume), _SAME_FIELD
+        own = _volume(node) if isinstance(node, Assembly) and len(node) > 1 else None
         right += volume_and_area(solid)[0] if own is None else own
     off = volume / right - 1
-    less, more = (_OVERLAP if rough else near for rough in (made.faceted, made.faceted or made.apart))
+    less, more = (_OVERLAP if rough else _SAME_MESH for rough in (made.faceted, made.faceted or made.apart))
     return 0.0 if -less <= off <= more else off
 
 
-def _exact_volume(node: Assembly) -> float | None:
-    """By its exact mesh; None where it has none, or no end."""
-    if not has_exact_mesh(node) or not np.isfinite(node.bounds()).all():
+def _volume(node: Node) -> float | None:
+    """By its exact mesh, or by points where it has none; None where it has no end."""
+    if not np.isfinite(node.bounds()).all():
         return None
+    if not has_exact_mesh(node):
+        return sampled_volume(node)
     try:
         longest = float(np.ptp(np.array(node.bounds()), axis=0).max())
         return float(mesh_csg(node, _CHORD * longest).volume)

@@ -239,7 +239,7 @@ def test_a_part_too_small_for_opencascade_does_not_end_the_export(tmp_path: Path
 
 
 def test_a_bent_part_that_a_union_loses_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bent parts have no exact mesh; a mesh of their field tells the volume."""
+    """Bent parts have no exact mesh; points of their field tell the volume."""
     bent = SuperFrustum((0.4, 0.3, 1.0), bulge=0.3)
     tree = Assembly((Part(bent, name="left"), Part(bent, (1.0, 0.0, 0.0), name="right")), unit="mm")
     assert not has_exact_mesh(tree)
