@@ -77,14 +77,12 @@ def _free(triangles: NDArray[np.int64], chosen: NDArray[np.bool_]) -> NDArray[np
     """Which (T,) of the chosen triangles (T, 3) hang together with one that has an edge of its own."""
     if not chosen.any():
         return chosen
-    ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    _, edge, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
-    edge = edge.reshape(-1, 3)
-    own = edge[chosen]
-    group = components(len(count), own[:, [0, 1]].ravel(), own[:, [1, 2]].ravel())
-    ends_free = np.zeros(len(count), dtype=bool)
-    ends_free[group[own[count[own] == 1]]] = True
-    return chosen & ends_free[group[edge[:, 0]]]
+    found = np.zeros(len(triangles), dtype=bool)
+    found[EdgeTable(triangles).open_faces] = True
+    own = np.flatnonzero(chosen)
+    body = EdgeTable(triangles[own]).bodies
+    found[own] = (np.bincount(body, found[own]) > 0)[body]
+    return chosen & found
 
 
 def weld_boundary(

@@ -119,19 +119,12 @@ def _sheets_of(
     """Of an open body's triangles those of each patch that is open; but where all that do not end free close
     among themselves, as a ball with a brim does, only those that do."""
     patches = [body[one] for one in split_bodies(np.unique(patch[body], return_inverse=True)[1])]
-    free = np.sort(EdgeTable(faces[body]).open_half_edges, axis=1)
-    ends = [_has_one_of(faces[one], free) for one in patches]
-    rest = [one for one, ends_free in zip(patches, ends, strict=True) if not ends_free]
+    free = body[EdgeTable(faces[body]).open_faces]
+    ends_free = [bool(np.isin(free, one).any()) for one in patches]
+    rest = [one for one, is_free in zip(patches, ends_free, strict=True) if not is_free]
     if rest and not EdgeTable(faces[np.concatenate(rest)]).balance.any():
-        return [one for one, ends_free in zip(patches, ends, strict=True) if ends_free]
+        return [one for one, is_free in zip(patches, ends_free, strict=True) if is_free]
     return [one for one in patches if EdgeTable(faces[one]).balance.any()]
-
-
-def _has_one_of(faces: NDArray[np.int64], edges: NDArray[np.int64]) -> bool:
-    """Whether one of the edges (B, 2), ends ascending, is of triangles (T, 3)."""
-    ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    count = int(max(ends.max(initial=0), edges.max(initial=0))) + 1
-    return bool(np.isin(ends @ (count, 1), edges @ (count, 1)).any())
 
 
 def _outward(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -84,6 +84,12 @@ class EdgeTable:
         return self._half_edges[order[start[self.valence == 1]]]
 
     @cached_property
+    def open_faces(self) -> NDArray[np.int64]:
+        """Triangles with an edge that has no partner at all."""
+        order, start = self._sorted
+        return np.unique(order[start[self.valence == 1]] // 3)
+
+    @cached_property
     def unbalanced_half_edges(self) -> NDArray[np.int64]:
         """The half-edges (B, 2) that outnumber those the other way, each as often as it does."""
         order, start = self._sorted
