@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from partwright.cli.lengths import length
+from partwright.cli.outputs import Group
 
 
-def add_reading(group: Any, unit: str = "length unit of the shape") -> None:
+def add_reading(group: Group, unit: str = "length unit of the shape") -> None:
     """--unit, --up and --thickness."""
     group.add_argument("--unit", metavar="U", help=f"{unit}: um, mm, cm, m, km, in, ft")
     group.add_argument("--up", metavar="AXIS", help="axis that points up: x, y, z, -x, -y, -z")
     add_thickness(group)
 
 
-def add_thickness(group: Any) -> None:
+def add_thickness(group: Group) -> None:
     group.add_argument(
         "--thickness",
         metavar="T",

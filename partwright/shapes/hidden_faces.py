@@ -82,26 +82,20 @@ def close_hidden(
 
 
 def drop_sheets(
-    vertices: NDArray[np.float64], edges: EdgeTable, lying: int, notes: list[str]
+    vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
 ) -> tuple[NDArray[np.float64], EdgeTable]:
-    """Without flat sheets that stand by themselves: decals, panes, the ground; and without their vertices.
+    """Without flat sheets that stand by themselves: decals, panes, the ground; and without vertices that no
+    triangle uses.
 
     A sheet whose rim runs along another's, or along that of an opening, is the side of something, and so is
-    one with an inside behind it. One that is drawn on both sides has no rim. lying: the last so many
-    triangles, which lie on the ground, go as well.
+    one with an inside behind it. One that is drawn on both sides has no rim.
     """
-    faces = edges.faces
-    if lying:
-        notes.append("left out what lies flat on the ground")
-        edges = EdgeTable(faces[:-lying])
     loose = _loose_sheets(vertices, edges)
     if loose:
         notes.append(f"left out {counted(len(loose), 'loose flat sheet')}")
         edges = EdgeTable(np.delete(edges.faces, np.concatenate(loose), axis=0))
-    if len(edges.faces) == len(faces):
-        return vertices, edges
     used, faces = compacted(edges.faces, len(vertices))
-    return vertices[used], EdgeTable(faces)
+    return (vertices, edges) if len(used) == len(vertices) else (vertices[used], EdgeTable(faces))
 
 
 def _loose_sheets(vertices: NDArray[np.float64], edges: EdgeTable) -> list[NDArray[np.int64]]:

@@ -99,7 +99,7 @@ def repair(
         _refuse_plane(vertices)
     vertices, faces = merge_vertices(vertices, faces, notes)
     faces, two_sided = drop_doubles(faces, notes)
-    whole = float(doubled_areas(vertices, two_sided).sum())
+    left_out = _area(vertices, two_sided)
     if wall is not None:
         faces = np.concatenate([faces, two_sided])
     if len(faces) == 0:
@@ -109,15 +109,21 @@ def repair(
     if edges.balance.any():
         edges, lying = lift_from_ground(vertices, edges, ground)
         vertices, edges = close_hidden(vertices, edges, ground, notes)
-        edges = EdgeTable(np.concatenate([edges.faces, lying])) if len(lying) else edges
     else:
         lying = edges.faces[:0]
     if wall is not None:
+        edges = EdgeTable(np.concatenate([edges.faces, lying]))
         return _enclosed(*thicken(vertices, edges, wall, notes), notes)
-    whole += float(doubled_areas(vertices, edges.faces).sum())
-    vertices, edges = drop_sheets(vertices, edges, len(lying), notes)
-    kept = float(doubled_areas(vertices, edges.faces).sum())
-    return replace(_enclosed(vertices, edges, notes), left_out=1 - kept / whole)
+    if len(lying):
+        notes.append("left out what lies flat on the ground")
+    whole = left_out + _area(vertices, lying) + _area(vertices, edges.faces)
+    vertices, edges = drop_sheets(vertices, edges, notes)
+    return replace(_enclosed(vertices, edges, notes), left_out=1 - _area(vertices, edges.faces) / whole)
+
+
+def _area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
+    """Twice the area of all triangles."""
+    return float(doubled_areas(vertices, faces).sum())
 
 
 def _enclosed(vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]) -> Surface:

@@ -18,7 +18,7 @@ from partwright.shapes.frame import UnitFrame
 from partwright.shapes.grid import DistanceGrid, distance_grid, occupancy_grid
 from partwright.shapes.hidden_faces import Ground
 from partwright.shapes.holes import Openings
-from partwright.shapes.lengths import Length, own_length, parse_length
+from partwright.shapes.lengths import Length, own_length
 from partwright.shapes.reading import read_source, source_of
 from partwright.shapes.repair import Surface, repair
 from partwright.shapes.sampling import (
@@ -322,7 +322,7 @@ def _wall(thickness: Length, source: Source) -> float:
         wall = own_length(thickness, source.unit, longest)
     except SettingError as error:
         raise SettingError(f"thickness: {error}") from error
-    if parse_length(thickness)[0] == 0 or wall > longest / 2 > 0:
+    if longest > 0 and not 0 < wall <= longest / 2:  # without any length the mesh is what is wrong
         raise SettingError(
             f"thickness: expected a length above 0, and at most half of the longest side, got {thickness!r}"
         )

@@ -18,13 +18,12 @@ from partwright.shapes.topology import (
     doubled_areas,
     is_plane,
     plane_normal,
+    principal_axes,
 )
 
 _SMALL = 0.05  # of a body's surface, all its openings together
 _NARROW = 0.5  # of a body's middle side, any of its openings
-_LEAST_COSINE = (
-    0.5  # between a corner's faces and their mean: sharper ones are blunted, or they would be spikes
-)
+_LEAST_COSINE = 0.5  # between a corner's faces and their mean: sharper ones are blunted, not spikes
 
 
 def thicken(
@@ -88,8 +87,7 @@ def _with_small_holes_closed(
 
 def _sides(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3,) ascending, of the box along the principal axes of points (N, 3)."""
-    centred = points - points.mean(axis=0)
-    return np.sort(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0))
+    return np.sort(np.ptp(points @ principal_axes(points), axis=0))
 
 
 def _parted(vertices: NDArray[np.float64], edges: EdgeTable) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -23,10 +23,15 @@ def doubled_areas(vertices: NDArray[Any], faces: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(np.linalg.norm(area_vectors(vertices[faces]), axis=1))
 
 
+def principal_axes(points: NDArray[Any]) -> NDArray[Any]:
+    """(3, 3) unit vectors in columns, along which points (N, 3) spread least, more, and most."""
+    centred = points - points.mean(axis=0)
+    return np.asarray(np.linalg.eigh(centred.T @ centred)[1])
+
+
 def plane_normal(points: NDArray[Any]) -> NDArray[Any]:
     """(3,) unit normal, either way, of the plane that lies best through points (N, 3)."""
-    centred = points - points.mean(axis=0)
-    return np.asarray(np.linalg.eigh(centred.T @ centred)[1][:, 0])
+    return principal_axes(points)[:, 0]
 
 
 def thickness(points: NDArray[Any]) -> float:
