@@ -17,9 +17,12 @@ from partwright.errors import AssemblyFileError, NewerVersionError, ParameterErr
 from partwright.fields import from_dict
 from partwright.input_files import check_file
 
+SUFFIX = ".json"
 MAX_BYTES = 64 * 1024 * 1024
 MAX_PARTS = 100_000
 
+# Of a file that is called otherwise: a mesh or a picture, most likely.
+_NONE = f"no assembly file ({SUFFIX}), which `partwright fit` makes of a shape; give that"
 _PART_KEYS = {"name", "field", "translation", "rotation", "blend", "metadata", "instances"}
 _INSTANCE_KEYS = {"translation", "rotation"}
 _COPY_KEYS = {*_INSTANCE_KEYS, "mirror", "names"}
@@ -45,8 +48,12 @@ def load_assembly(path: str | Path) -> Assembly:
     try:
         return from_text(data.decode("utf-8"))
     except UnicodeDecodeError as error:
-        raise AssemblyFileError(f"{path}: not UTF-8 text, so not an assembly file") from error
+        if path.suffix.lower() == SUFFIX:
+            raise AssemblyFileError(f"{path}: not UTF-8 text, so not an assembly file") from error
+        raise AssemblyFileError(f"{path}: {_NONE}") from error
     except AssemblyFileError as error:
+        if path.suffix.lower() != SUFFIX and not isinstance(error, NewerVersionError):
+            raise AssemblyFileError(f"{path}: {_NONE}") from error
         raise type(error)(f"{path}: {error}") from error
 
 

@@ -59,7 +59,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def _reads(arguments: argparse.Namespace) -> list[Path]:
-    others = [text.partition("=")[2] for name, text in arguments.edits if name == "swap"]
+    others = [shape_text(text.partition("=")[2]) for name, text in arguments.edits if name == "swap"]
     return given(arguments.shape, arguments.model, *others)
 
 

@@ -184,24 +184,33 @@ def find_shapes(folder: str | Path) -> list[PartedSource]:
 
 
 def unread_files(folder: Path, names: Collection[str]) -> list[tuple[str, str]]:
-    """Files of formats that nothing here reads, all in one line: which they are, and what to do; nothing
-    where there are none. names: of shapes that are read; a file called so is where one came from."""
-    unread = sorted(
-        entry.name
-        for entry in folder.iterdir()
-        if entry.suffix.lower() in _UNREAD and entry.stem not in names
-    )
+    """Files of formats that nothing here reads, also in shapes' own folders, all in one line: which they are,
+    and what to do; nothing where there are none. names: of shapes that are read; a file called so, or as a
+    part beside it, is where that came from."""
+    unread = [entry.name for entry in _unread(folder) if entry.stem not in names]
+    for within in (entry for entry in folder.iterdir() if _is_shapes_folder(entry)):
+        parts = {file.stem for file in _meshes(within)}
+        unread += [f"{within.name}/{entry.name}" for entry in _unread(within) if entry.stem not in parts]
+    unread.sort()
     if not unread:
         return []
     rest = f" and {len(unread) - _NAMED} more" if len(unread) > _NAMED else ""
     return [(", ".join(unread[:_NAMED]) + rest, "of a format that is not read; export as GLB or STEP")]
 
 
+def _unread(folder: Path) -> Iterator[Path]:
+    return (entry for entry in folder.iterdir() if entry.suffix.lower() in _UNREAD and not entry.is_dir())
+
+
+def _is_shapes_folder(entry: Path) -> bool:
+    return entry.is_dir() and not entry.name.startswith(".")
+
+
 def _sources(folder: Path) -> Iterator[PartedSource]:
     for entry in folder.iterdir():
         if entry.name.startswith("."):
             continue
-        if entry.is_dir() and _meshes(entry):
+        if _is_shapes_folder(entry) and _meshes(entry):
             yield PartFolder(entry)
         elif entry.suffix.lower() in (*MESH_SUFFIXES, *STEP_SUFFIXES):
             # A scene that `segment` wrote has labels too, but in another order: its nodes say the same.
@@ -210,8 +219,12 @@ def _sources(folder: Path) -> Iterator[PartedSource]:
 
 
 def _meshes(folder: Path) -> list[Path]:
-    files = [path for path in folder.iterdir() if path.suffix.lower() in MESH_SUFFIXES]
-    return sorted(path for path in files if not path.name.startswith("."))
+    """Files of parts; a STEP file only where no mesh has its name: that would be made of it."""
+    files = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    meshes = [path for path in files if path.suffix.lower() in MESH_SUFFIXES]
+    stems = {path.stem for path in meshes}
+    exact = [path for path in files if path.suffix.lower() in STEP_SUFFIXES and path.stem not in stems]
+    return sorted([*meshes, *exact])
 
 
 def _joined(path: Path) -> Piece:

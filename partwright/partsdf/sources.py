@@ -66,7 +66,9 @@ def open_source(text: str, model: str | None = None) -> Source:
         return Source(shape, frame, assembly.unit, assembly.up, name, turn)
     source, colon, shape_name = text.rpartition(":")
     if not colon:
+        made = "; `parts reconstruct MODEL FILE` makes one of a mesh" if Path(text).is_file() else ""
         raise SettingError(
-            f"{text!r} is no assembly file (.json) and no MODEL:SHAPE, such as mixers:0; give one of these"
+            f"{text!r} is no assembly file (.json), no folder with an assembly.json, and no MODEL:SHAPE, "
+            f"such as mixers:0; give one of these{made}"
         )
     return Source(NeuralShape.trained(load_model(source), shape_name), name=shape_name)

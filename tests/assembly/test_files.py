@@ -166,6 +166,10 @@ def test_files_that_are_no_text(tmp_path: Path) -> None:
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(AssemblyFileError, match="not UTF-8"):
         load_assembly(path)
+    for name, data in (("a.obj", b"v 0 0 0\n"), ("a.ply", b"ply\n\xff\xfe\x00"), ("a.gltf", b"{}")):
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(AssemblyFileError, match="`partwright fit` makes of a shape"):
+            load_assembly(tmp_path / name)
     path.write_bytes(b"")
     with pytest.raises(AssemblyFileError, match=r"a\.json: not complete JSON"):
         load_assembly(path)

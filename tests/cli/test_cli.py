@@ -213,7 +213,11 @@ def test_export(method: BoxMethod, block: Path, tmp_path: Path) -> None:
         (["fit", "{block}", "--max-parts", "0"], "max_parts: expected a number of at least 1, got 0"),
         (["fit", "{block}", "--density", "2700"], "state it by --unit"),
         (["fit", "{block}", "--unit", "mm", "--density", "-1"], "density: expected a positive number"),
-        (["evaluate", "{block}", "{block}"], "not UTF-8"),
+        (["evaluate", "{block}", "{block}"], "no assembly file (.json), which `partwright fit` makes"),
+        (
+            ["optimise", "{block}", "-o", "out", "--objective", "volume"],
+            "no assembly file (.json), which `partwright fit` makes of a shape",
+        ),
         (["export", "missing.json", "-o", "a.glb"], "missing.json"),
         (["export", "{assembly}", "-o", "a.dwg"], "use one of .json, .glb"),
         (["export", "{assembly}", "-o", "{assembly}/a.glb"], "cannot write"),

@@ -193,6 +193,22 @@ def test_products_of_a_step_file_are_its_parts(tmp_path: Path) -> None:
     np.testing.assert_allclose(exact.translation, meshes.translation, atol=0.02)
 
 
+def test_a_part_in_a_shapes_folder_may_be_a_step_file(tmp_path: Path) -> None:
+    """But not the one that the mesh beside it was made of."""
+    pytest.importorskip("OCP")
+    source = folders_of_parts(tmp_path / "in", 2)
+    foot = pw.Part(Box(size=(2 * FOOT[0], 2 * FOOT[1], 2 * FOOT[2])), name="foot")
+    (source / "thing_0" / "foot.ply").unlink()
+    for number in range(2):
+        pw.export(pw.Assembly((foot,), unit="mm"), source / f"thing_{number}" / "foot.step")
+    made = prepare(source, tmp_path / "out", samples=SAMPLES, workers=1)
+    assert made.refused == ()
+    assert made.family.parts == ("foot", "head")
+    exact = made.family.load(0)
+    assert exact.present.tolist() == [1, 1]
+    np.testing.assert_allclose(np.sort(exact.scale[0]) / exact.scale[0].max(), np.sort(FOOT), atol=0.05)
+
+
 def test_files_that_are_not_read_are_named_in_one_line(tmp_path: Path) -> None:
     """But for those that a shape has been exported from."""
     source = folders_of_parts(tmp_path / "in", 2)
@@ -202,6 +218,15 @@ def test_files_that_are_not_read_are_named_in_one_line(tmp_path: Path) -> None:
     assert [(one.name, one.reason) for one in made.refused] == [
         ("a.FBX, b.blend, c0.igs, c1.igs, c2.igs and 1 more", UNREAD)
     ]
+    (source / "thing_0" / "arm.blend").write_bytes(b"")
+    part = next(file.stem for file in (source / "thing_0").glob("*.*") if file.stem not in ("_whole", "arm"))
+    (source / "thing_0" / f"{part}.blend").write_bytes(b"")  # of which the mesh beside it was made
+    (told,) = prepare(source, tmp_path / "again", samples=SAMPLES, workers=1).refused
+    assert told.name == "a.FBX, b.blend, c0.igs, c1.igs, c2.igs and 2 more"
+    for file in [*source.glob("*.FBX"), *source.glob("*.blend"), *source.glob("*.igs")]:
+        file.unlink()
+    (told,) = prepare(source, tmp_path / "third", samples=SAMPLES, workers=1).refused
+    assert (told.name, told.reason) == ("thing_0/arm.blend", UNREAD)
     (tmp_path / "none").mkdir()
     (tmp_path / "none" / "chair.blend").write_bytes(b"")
     with pytest.raises(FamilyError, match=f"holds no shapes; .*; chair.blend {UNREAD}"):

@@ -216,6 +216,26 @@ def test_edit(file: Path, model: Model, capsys: pytest.CaptureFixture[str]) -> N
     assert after == pytest.approx((before[0], before[1], before[2] / 2))
 
 
+def test_a_part_is_swapped_for_that_of_an_assembly_or_of_its_folder(file: Path, model: Model) -> None:
+    other = NeuralShape.trained(model, "lamp3")
+    Path("found").mkdir()
+    to_assembly(other).save("found/assembly.json")
+    want = pytest.approx(other.latents[model.index("plate")].tolist(), abs=1e-6)
+    for source in ("found", "found/assembly.json"):
+        assert main(["parts", "edit", f"{file}:lamp1", "-o", "a.json", "--swap", f"plate={source}"]) == 0
+        assert pw.load_assembly("a.json")["plate"].field.latent == want
+
+
+def test_an_assembly_that_a_part_is_taken_from_is_not_written_over(
+    file: Path, model: Model, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("found").mkdir()
+    to_assembly(NeuralShape.trained(model, "lamp3")).save("found/assembly.json")
+    arguments = ["parts", "edit", f"{file}:lamp1", "--swap", "plate=found", "-o", "found/assembly.json"]
+    assert main(arguments) == 2
+    assert "--overwrite" in capsys.readouterr().err
+
+
 def test_interpolate(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["parts", "interpolate", f"{file}:lamp1", f"{file}:2", "-o", "film.gif"]
     assert main([*arguments, "--steps", "3", "--size", "64", "--resolution", "32"]) == 0
@@ -233,6 +253,8 @@ def test_interpolate(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["edit", "{}:lamp1", "-o", "a.glb"], "written as .json"),
         (["edit", "{}:lamp1", "-o", "a.json", "--move", "ball=1,2"], "3 numbers"),
         (["edit", "{}:lamp1", "-o", "a.json", "--drop", "arm"], "no part 'arm'"),
+        (["edit", "{}:lamp1", "-o", "a.json", "--swap", "plate"], "expected PART=SHAPE"),
+        (["edit", "{}", "-o", "a.json"], "`parts reconstruct MODEL FILE` makes one of a mesh"),
         (["edit", "{}:lamp99", "-o", "a.json"], "was not trained on 'lamp99'"),
         (["edit", "sofas:1", "-o", "a.json"], "no model is named 'sofas'"),
         (["interpolate", "{}:1", "{}:2", "-o", "a.avi"], "written as .gif"),

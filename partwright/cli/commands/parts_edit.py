@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 
+from partwright.cli.assembly_argument import shape_text
 from partwright.cli.progress import Work
 from partwright.cli.terminal import say
 from partwright.errors import SettingError, UnsupportedFormatError
@@ -37,7 +38,9 @@ def _edited(shape: NeuralShape, name: str, text: str) -> NeuralShape:
     if name == "drop":
         return editing.without(shape, text)
     if name == "swap":
-        return editing.swapped(shape, part, open_source(value).shape)
+        if not part or not value:
+            raise SettingError(f"--swap {text}: expected PART=SHAPE, as seat=chairs:3 or seat=other.json")
+        return editing.swapped(shape, part, open_source(shape_text(value)).shape)
     if name == "resample":
         (seed,) = _numbers(name, text, 1)
         return editing.resampled(shape, part, int(seed))
