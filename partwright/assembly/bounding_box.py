@@ -5,6 +5,8 @@ Assemblies of quadrics are bounded by `enclosure`; where they do not end, their 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,43 +19,91 @@ if TYPE_CHECKING:
 
 _AXES = np.vstack([-np.eye(3), np.eye(3)])
 _AT_ONCE = 4096  # copies of a part
+_PAIRS = 128  # members of a union that are looked at in pairs
 
 
 def bounding_box(node: Node, level: float = 0.0) -> np.ndarray:
     """(2, 3) lowest and highest corner of where the node's distance is below `level` (>= 0)."""
     if node.is_part:
-        return _box_of_copies(node, level) if node.instances else _box_of_part(node, level)
+        return _united([node], level) if node.instances else _box_of_part(node, level)
     if any(part.field.quadric() is not None for part in node.parts):
         return enclosing_box(node, level)
+    if node.operation == "union":
+        return _united(node.children, level)
     first, *rest = node.children
     result = bounding_box(first, level)
-    for child in rest:
-        if node.operation == "union":
-            result = _union(result, child, level)
-        elif node.operation == "intersection":
-            box = bounding_box(child, level)
-            result = np.array([np.maximum(result[0], box[0]), np.minimum(result[1], box[1])])
+    if node.operation == "intersection":
+        for child in rest:
+            result = _shared(result, bounding_box(child, level))
     return np.array([np.minimum(result[0], result[1]), result[1]])
 
 
-def _union(box: np.ndarray, child: Node, level: float) -> np.ndarray:
-    """The smooth minimum lies at most a quarter of the blend below either argument: both grow by that."""
-    if child.is_part and child.instances:
-        other = _boxes(child, level + child.blend / 4)
-    else:
-        other = bounding_box(child, level + child.blend / 4)[None]
-    return _folded(box, other, child.blend)
+@dataclass(frozen=True)
+class _Member:
+    """A child of a union, or one of its copies, in the order in which they melt together."""
+
+    node: Node
+    copy: int
+
+    def box(self, level: float) -> np.ndarray:
+        return _boxes_of(self.node, level)[self.copy]
 
 
-def _box_of_copies(part: Part, level: float) -> np.ndarray:
-    return _folded(_box_of_part(part, level), _boxes(part, level + part.blend / 4)[1:], part.blend)
+def _united(children: Sequence[Node], level: float) -> np.ndarray:
+    """Of children that melt into what lies before them, one after the other.
+
+    The smooth minimum of a and b with a blend of k lies below both where these differ by less than k, by at
+    most k/4. So it is below a level L where a or b is, and beyond these only where one is below L + k/4
+    and the other below L + k: within what both boxes share at those levels.
+    """
+    own = [_boxes_of(child, level) for child in children]
+    members = [_Member(child, i) for child, of in zip(children, own, strict=True) for i in range(len(of))]
+    boxes = np.concatenate(own)
+    blends = np.repeat([child.blend for child in children], [len(of) for of in own])
+    blends[0] = 0.0
+    if len(members) > _PAIRS:
+        melted = [_boxes_of(child, level + child.blend) for child in children if child.blend]
+        return _joined(np.concatenate([boxes, *melted]))
+    lowered = np.cumsum(blends) / 4  # by how much the union of all up to each may lie below its members
+    result = boxes[0]
+    for last in range(1, len(members)):
+        result = _joined([result, boxes[last]])
+        if not (blend := float(blends[last])):
+            continue
+        reach = members[last].box(level + blend)
+        if _holds(result, reach):
+            continue
+        near = members[last].box(level + blend / 4)
+        for one in range(last):
+            drop = float(lowered[last - 1] - (lowered[one - 1] if one else 0.0))
+            far = _shared(members[one].box(level + blend + drop), reach)
+            if _is_empty(far) or _holds(result, far):
+                continue
+            close = _shared(members[one].box(level + blend / 4 + drop), reach)
+            shared = [box for box in (close, _shared(far, near)) if not _is_empty(box)]
+            result = _joined([result, *shared])
+    return result
 
 
-def _folded(box: np.ndarray, others: np.ndarray, blend: float) -> np.ndarray:
-    """A box (2, 3) united with others (N, 2, 3) in their order: each blend lets all before it grow."""
-    grows = np.arange(len(others), -1, -1.0)[:, None] * blend / 4
-    boxes = np.concatenate([box[None], others])
-    return np.array([(boxes[:, 0] - grows).min(axis=0), (boxes[:, 1] + grows).max(axis=0)])
+def _boxes_of(node: Node, level: float) -> np.ndarray:
+    """(N, 2, 3) of a group, or of a part and its copies."""
+    return _boxes(node, level) if node.is_part else bounding_box(node, level)[None]
+
+
+def _joined(boxes: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+    return np.array([np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)])
+
+
+def _shared(box: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return np.array([np.maximum(box[0], other[0]), np.minimum(box[1], other[1])])
+
+
+def _holds(box: np.ndarray, other: np.ndarray) -> bool:
+    return bool((other[0] >= box[0]).all() and (other[1] <= box[1]).all())
+
+
+def _is_empty(box: np.ndarray) -> bool:
+    return bool((box[0] > box[1]).any())
 
 
 def _boxes(part: Part, level: float) -> np.ndarray:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 
 from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.bounding_box import bounding_box
 from partwright.fields import Box, Cone, Cylinder, Sphere, SuperFrustum, Torus
 from tests.assembly.strategies import ASSEMBLIES, PARTS, SWEPT
 
@@ -87,3 +88,26 @@ def test_every_side_is_reached(part: Part) -> None:
     slack = 0.1 * (upper - lower).max() + 0.05
     assert (inside.min(axis=0) - lower < slack).all()
     assert (upper - inside.max(axis=0) < slack).all()
+
+
+def test_blends_reach_no_further_than_two_parts_that_meet() -> None:
+    """Twenty balls that melt into a bar in its middle leave its ends where they are."""
+    bar = Part(Box((4, 1, 1)))
+    balls = tuple(Part(Sphere(0.4), (0.1 * i - 1.0, 0, 0), blend=0.5) for i in range(20))
+    moves = tuple(Similarity(translation=(0.1 * i, 0, 0)) for i in range(1, 20))
+    copied = Part(Sphere(0.4), (-1.0, 0, 0), blend=0.5, instances=moves)
+    assert np.allclose(Assembly((bar, copied)).bounds()[:, 0], [-2, 2], atol=1e-9)
+    assert np.allclose(Assembly((bar, *balls)).bounds()[:, 0], [-2, 2], atol=1e-9)
+
+
+@settings(max_examples=40)
+@given(ASSEMBLIES)
+def test_no_wider_than_every_member_by_its_own_blend(node: Assembly) -> None:
+    """What twenty members add up to is no reason for a box that is wider than any pair of them can make."""
+    if node.operation != "union" or not np.isfinite(node.bounds()).all():
+        return
+    most = max(child.blend for child in node.children)
+    boxes = np.array([bounding_box(child, most) for child in node.children])
+    lower, upper = node.bounds()
+    assert (lower >= boxes[:, 0].min(axis=0) - 1e-9).all()
+    assert (upper <= boxes[:, 1].max(axis=0) + 1e-9).all()

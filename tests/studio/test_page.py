@@ -246,6 +246,26 @@ def test_a_hole_is_drilled_and_measured(shared: Callable[..., Page]) -> None:
     assert labels == ["⌀ 34 mm", "34 mm"]
 
 
+def test_the_size_is_that_of_the_surface(shared: Callable[..., Page]) -> None:
+    """Not of what is taken away from it, and not of corners that a turned or a cut part has not."""
+    turned_ball = Part(Sphere(10), (40, 0, 0), (0.8, 0.2, 0.5, -0.3))
+    block = Part(Box((30, 20, 10)))
+    slot = Part(Box((400, 6, 300)))
+    halved = Assembly((Part(Box((40, 40, 16))), Part(Box((100, 100, 100)), (0, 0, 52))), "difference")
+    for parts, operation, size in (
+        ((block, slot), "difference", "30 × 20 × 10 mm"),
+        ((block, turned_ball), "union", "65 × 20 × 20 mm"),
+        ((halved, Part(Sphere(1))), "union", "40 × 40 × 10 mm"),
+    ):
+        page = shared(Assembly(parts, operation, unit="mm"))
+        sides = page.page.locator("dt:text-is('Size') + dd")
+        sides.filter(has_text="mm").wait_for()
+        assert sides.text_content() == size
+    # The frame is that of what is there, so that it fills the picture.
+    page = shared(Assembly((block, slot), "difference", unit="mm"))
+    assert np.isclose(page.ask("() => partwright.store.frame.scale"), 1.8 / 30)
+
+
 def test_what_is_downloaded_is_read_by_the_package(shared: Callable[..., Page], tmp_path: Path) -> None:
     import trimesh
 

@@ -1,6 +1,7 @@
 /** Asks the worker for meshes. */
 
 import { rgb } from "../model/palette";
+import type { Program } from "../model/program";
 import type { Store } from "../model/store";
 import type { Maps } from "../model/maps";
 import type { Looks, Surface } from "./contour";
@@ -17,6 +18,12 @@ export interface Baked {
 }
 
 export function mesh(store: Store, cells: number, baked: Baked): Promise<Surface> {
+  const colours = Uint8Array.from(store.program.parts.flatMap((part) => rgb(store.colourOf(part)).map((v) => Math.round(v * 255))));
+  const layers = baked.layers; // which also begins to load what is not there yet
+  return contoured(store.program, cells, { colours, layers, maps: baked.maps.maps });
+}
+
+export function contoured(program: Program, cells: number, looks: Looks): Promise<Surface> {
   if (!worker) {
     worker = new MeshWorker();
     worker.onmessage = (event: MessageEvent<{ id: number; surface?: Surface; error?: string }>) => {
@@ -33,9 +40,6 @@ export function mesh(store: Store, cells: number, baked: Baked): Promise<Surface
     worker = null;
   };
   const id = ++last;
-  const colours = Uint8Array.from(store.program.parts.flatMap((part) => rgb(store.colourOf(part)).map((v) => Math.round(v * 255))));
-  const layers = baked.layers; // which also begins to load what is not there yet
-  const looks: Looks = { colours, layers, maps: baked.maps.maps };
-  worker.postMessage({ id, program: store.program, cells, looks });
+  worker.postMessage({ id, program, cells, looks });
   return new Promise((resolve, reject) => waiting.set(id, { resolve, reject }));
 }

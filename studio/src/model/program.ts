@@ -9,7 +9,7 @@ import { programDistance } from "./distance";
 import { fieldBox, quadric, superfrustum } from "./fields";
 import { isLearned } from "./learned";
 import { type Swept, swept } from "./profiles";
-import { type Group, type Node, type Part, isGroup, leaves, poses } from "./tree";
+import { type Group, type Node, type Part, bodies, isGroup, leaves, poses } from "./tree";
 import {
   type Box,
   type Vec3,
@@ -109,12 +109,22 @@ export function partBox(part: Part): Box {
     .reduce(joinBoxes, EMPTY);
 }
 
+/** What holds all that is not taken away, in own units; infinite where that is not known. */
+export function solidBox(node: Node): Box {
+  if (!isGroup(node)) return partBox(node);
+  const boxes = (node.operation === "difference" ? node.children.slice(0, 1) : node.children).map(solidBox);
+  if (node.operation !== "intersection") return boxes.reduce(joinBoxes, EMPTY);
+  const ending = boxes.filter(isFinite3);
+  return ending.length ? ending.reduce(sharedBox) : boxes.reduce(joinBoxes, EMPTY);
+}
+
 /** A frame in which all that ends is centred, with a longest side of 1.8; extra: what it holds instead. */
 export function unitFrame(root: Group, extra: Box | null = null): Frame {
-  const boxes = [...leaves(root)].map(partBox).filter(isFinite3);
+  const solid = [...bodies(root)];
+  const boxes = solid.map(partBox).filter(isFinite3);
   let box = boxes.reduce(joinBoxes, EMPTY);
   if (extra) box = extra;
-  else if (boxes.length < [...leaves(root)].length) {
+  else if (boxes.length < solid.length) {
     const rough = roughBox(root);
     if (rough) box = boxes.length ? sharedBoxOr(joinBoxes(box, rough), rough) : rough;
   }

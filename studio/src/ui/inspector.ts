@@ -1,24 +1,30 @@
 /** The numbers of what is selected. */
 
+import { extent } from "../mesh/extent";
 import { asSuperfrustum, KINDS, newField, patterned, patternedAround, roleOf } from "../model/edits";
 import { complaint, type FieldData, type Parameter, PARAMETERS } from "../model/fields";
 import { isLearned } from "../model/learned";
 import { formatLength } from "../model/lengths";
 import { fromUnit, partBox } from "../model/program";
 import type { Store } from "../model/store";
-import { type Node, type Operation, type Part, edited, find, isGroup, leaves } from "../model/tree";
-import { type Vec3, EMPTY, fromEuler, isFinite3, joinBoxes, sub, toEuler } from "../model/vectors";
+import { type Group, type Node, type Operation, type Part, edited, find, isGroup, leaves } from "../model/tree";
+import { type Vec3, fromEuler, isFinite3, sub, toEuler } from "../model/vectors";
 import type { Commands } from "./commands";
 import { button, menu, numberField, type NumberField, slider, toast } from "./controls";
 import { h } from "./dom";
 import { rename } from "./parts";
 
 const AXES = ["X", "Y", "Z"];
+const STILL = 300; // ms without a change, after which the whole is measured
+const ROUGH = 4; // times fewer digits of what is measured
 
 export class Inspector {
   readonly element = h("div", { class: "inspector" });
   private fields: NumberField[] = [];
   private shown = "";
+  private sides = h("dd", {}, "…");
+  private measuring: ReturnType<typeof setTimeout> | undefined;
+  private measured: Group | null = null;
 
   /** What can be done to a learned part, where there is somebody who can decode it. */
   learnedActions: (part: Part) => HTMLElement[] = () => [
@@ -53,16 +59,14 @@ export class Inspector {
       this.element.replaceChildren(...(one ? this.part(one) : selected.length ? this.several(selected) : this.whole()));
     }
     for (const field of this.fields) field.refresh();
+    this.measure();
   }
 
   private whole(): HTMLElement[] {
     const { store } = this;
     if (!store.program.parts.length)
       return [h("h2", {}, store.root.name || "Nothing yet"), h("p", { class: "hint" }, "Fit the shape, or add a part by hand.")];
-    const box = [...leaves(store.root)].map(partBox).filter(isFinite3).reduce(joinBoxes, EMPTY);
-    const all: [Vec3, Vec3] = isFinite3(box) ? box : [fromUnit(store.frame, store.program.box[0]), fromUnit(store.frame, store.program.box[1])];
     const unit = store.root.unit ?? "";
-    const extents = sub(all[1], all[0]).map((v) => formatLength(v, store.size)).join(" × ");
     return [
       h("h2", {}, store.root.name || "Assembly"),
       h(
@@ -71,12 +75,27 @@ export class Inspector {
         h("dt", {}, "Parts"),
         h("dd", {}, String([...leaves(store.root)].length)),
         h("dt", {}, "Size"),
-        h("dd", {}, `${extents} ${unit}`),
+        this.sides,
         h("dt", {}, "Unit"),
         h("dd", {}, unit || "unknown"),
       ),
       h("p", { class: "hint" }, "Click a part to change it; Shift-click for more. Drag to look around, right-drag to move the view, wheel to zoom."),
     ];
+  }
+
+  /** Measured once all is still, as that takes a moment. */
+  private measure(): void {
+    clearTimeout(this.measuring);
+    if (this.store.selected.length || !this.store.program.parts.length || this.measured === this.store.root) return;
+    this.measuring = setTimeout(async () => {
+      const { root } = this.store;
+      const measured = await extent(this.store).catch(() => []);
+      if (root !== this.store.root) return;
+      this.measured = root;
+      const { size } = this.store;
+      const sides = measured.map(({ length, exact }) => formatLength(length, exact ? size : ROUGH * size));
+      this.sides.textContent = sides.length ? `${sides.join(" × ")} ${root.unit ?? ""}` : "?";
+    }, STILL);
   }
 
   private several(nodes: Node[]): HTMLElement[] {
