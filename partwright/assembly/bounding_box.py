@@ -6,7 +6,6 @@ Assemblies of quadrics are bounded by `enclosure`; where they do not end, their 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,13 +18,13 @@ if TYPE_CHECKING:
 
 _AXES = np.vstack([-np.eye(3), np.eye(3)])
 _AT_ONCE = 4096  # copies of a part
-_PAIRS = 128  # members of a union that are looked at in pairs
+_PAIRS = 48  # members of a union that are looked at in pairs; of more, each may reach as far as its own blend
 
 
 def bounding_box(node: Node, level: float = 0.0) -> np.ndarray:
     """(2, 3) lowest and highest corner of where the node's distance is below `level` (>= 0)."""
     if node.is_part:
-        return _united([node], level) if node.instances else _box_of_part(node, level)
+        return _united((node,), level) if node.instances else _box_of_part(node, level)
     if any(part.field.quadric() is not None for part in node.parts):
         return enclosing_box(node, level)
     if node.operation == "union":
@@ -38,17 +37,6 @@ def bounding_box(node: Node, level: float = 0.0) -> np.ndarray:
     return np.array([np.minimum(result[0], result[1]), result[1]])
 
 
-@dataclass(frozen=True)
-class _Member:
-    """A child of a union, or one of its copies, in the order in which they melt together."""
-
-    node: Node
-    copy: int
-
-    def box(self, level: float) -> np.ndarray:
-        return _boxes_of(self.node, level)[self.copy]
-
-
 def _united(children: Sequence[Node], level: float) -> np.ndarray:
     """Of children that melt into what lies before them, one after the other.
 
@@ -57,29 +45,29 @@ def _united(children: Sequence[Node], level: float) -> np.ndarray:
     and the other below L + k: within what both boxes share at those levels.
     """
     own = [_boxes_of(child, level) for child in children]
-    members = [_Member(child, i) for child, of in zip(children, own, strict=True) for i in range(len(of))]
     boxes = np.concatenate(own)
     blends = np.repeat([child.blend for child in children], [len(of) for of in own])
     blends[0] = 0.0
-    if len(members) > _PAIRS:
+    if len(boxes) > _PAIRS:
         melted = [_boxes_of(child, level + child.blend) for child in children if child.blend]
         return _joined(np.concatenate([boxes, *melted]))
+    members = [one for child in children for one in (child.copies if child.is_part else (child,))]
     lowered = np.cumsum(blends) / 4  # by how much the union of all up to each may lie below its members
     result = boxes[0]
     for last in range(1, len(members)):
         result = _joined([result, boxes[last]])
         if not (blend := float(blends[last])):
             continue
-        reach = members[last].box(level + blend)
+        reach = bounding_box(members[last], level + blend)
         if _holds(result, reach):
             continue
-        near = members[last].box(level + blend / 4)
+        near = bounding_box(members[last], level + blend / 4)
         for one in range(last):
             drop = float(lowered[last - 1] - (lowered[one - 1] if one else 0.0))
-            far = _shared(members[one].box(level + blend + drop), reach)
+            far = _shared(bounding_box(members[one], level + blend + drop), reach)
             if _is_empty(far) or _holds(result, far):
                 continue
-            close = _shared(members[one].box(level + blend / 4 + drop), reach)
+            close = _shared(bounding_box(members[one], level + blend / 4 + drop), reach)
             shared = [box for box in (close, _shared(far, near)) if not _is_empty(box)]
             result = _joined([result, *shared])
     return result

@@ -264,6 +264,10 @@ def test_the_size_is_that_of_the_surface(shared: Callable[..., Page]) -> None:
     # The frame is that of what is there, so that it fills the picture.
     page = shared(Assembly((block, slot), "difference", unit="mm"))
     assert np.isclose(page.ask("() => partwright.store.frame.scale"), 1.8 / 30)
+    view = page.ask("() => partwright.viewport.view")
+    corners = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * [1.8, 1.2, 0.6] - view["eye"]
+    across = (corners @ np.transpose([view["right"], view["up"]])) / (corners @ view["back"])[:, None]
+    assert np.isclose(np.abs(across / view["half"]).max(), 0.92, atol=1e-3)
 
 
 def test_what_is_downloaded_is_read_by_the_package(shared: Callable[..., Page], tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import { combined, isLearned, type Meshes, rayHit, smoothNormals, type Triangles
 import { roundDown } from "../model/lengths";
 import { type Maps, PartMaps } from "../model/maps";
 import { rgb } from "../model/palette";
-import { fromUnit, partBox, toUnit } from "../model/program";
+import { fromUnit, partBox, tightBox, toUnit } from "../model/program";
 import type { Store } from "../model/store";
 import { type Box, type Vec3, add, dot, EMPTY, isFinite3, joinBoxes, mul } from "../model/vectors";
 import { Camera, rayThrough, type View } from "../view/camera";
@@ -164,14 +164,14 @@ export class Scene {
 
   private ground(): void {
     const { above } = this.camera;
-    const { box } = this.store.program;
+    const box = tightBox(this.store.program);
     const low = Math.min(...[box[0], box[1]].map((corner) => dot(corner, above)));
     this.renderer?.setLook({ ground: [...above, low - 0.002], grid: roundDown(this.store.size / 8) * this.store.frame.scale });
   }
 
   frameAll(): void {
     const chosen = this.store.selectedParts.map(partBox).filter(isFinite3);
-    let box: Box = this.store.program.box;
+    let box: Box = tightBox(this.store.program);
     if (chosen.length) {
       const own = chosen.reduce(joinBoxes, EMPTY);
       box = [toUnit(this.store.frame, own[0]), toUnit(this.store.frame, own[1])];

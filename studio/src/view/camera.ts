@@ -1,8 +1,9 @@
 /** Where the picture is taken from: an orbit around a target, in the unit frame. */
 
-import { type Box, type Vec3, add, cross, dot, length, middle, mul, sub, unit } from "../model/vectors";
+import { type Box, type Vec3, add, corners, cross, dot, middle, mul, sub, unit } from "../model/vectors";
 
 export const FIELD_OF_VIEW = 26; // degrees of the picture's height
+const FILLED = 0.92; // of the picture's width or height, by what is framed
 
 // Up axis -> the side that azimuth 0 looks at.
 const FRONTS: Record<string, Vec3> = { x: [0, -1, 0], y: [0, 0, 1], z: [0, -1, 0] };
@@ -72,9 +73,12 @@ export class Camera {
   /** So that a box fills the picture; directions stay. */
   frame(box: Box, aspect: number): void {
     this.target = middle(box);
-    const radius = Math.max(length(sub(box[1], box[0])) / 2, 0.02);
-    const half = Math.sin((FIELD_OF_VIEW * Math.PI) / 360) * Math.min(1, aspect);
-    this.distance = (radius / half) * 0.98;
+    const { right, up, back, half } = this.view(aspect);
+    const needed = corners(box).map((corner) => {
+      const at = sub(corner, this.target);
+      return dot(at, back) + Math.max(Math.abs(dot(at, right)) / half[0], Math.abs(dot(at, up)) / half[1]) / FILLED;
+    });
+    this.distance = Math.max(...needed, 0.05);
   }
 }
 
