@@ -277,9 +277,13 @@ def _named(name: str) -> Path:
     paths = [p for p in _candidates() if p.stem == name or (p.stem == "model" and p.parent.name == name)]
     if not paths:
         known = ", ".join(sorted({p.stem for p in _candidates() if p.stem != "model"})) or "none"
+        path = Path(name)
+        if path.is_dir():
+            why = f"{name}: a folder without model{SUFFIX}"
+        else:
+            why = f"{name}: no model's file" if path.exists() else f"no model is named {name!r}"
         raise ModelError(
-            f"no model is named {name!r}; here are: {known}. Give a model's file ({SUFFIX}), "
-            f"or name its folder in ${FOLDERS}"
+            f"{why}; here are: {known}. Give a model's file ({SUFFIX}), or name its folder in ${FOLDERS}"
         )
     return paths[0]
 

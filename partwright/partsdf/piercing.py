@@ -1,8 +1,9 @@
 """Parts that come through others, as the edge of a blade through the wall of its tube: found, and drawn back.
 
-What a part shows beside the others falls into pieces where they cut it. A small one beside a large one is a
-tip that came out on the far side. To draw it back, latent and pose of the part move until the tip's surface
-is outside of the part, while the rest of what is seen stays where it is.
+What a part shows beside the others falls into pieces where they cut it. A small one beside a large one that
+can be seen from outside is a tip that came out on the far side; one in a slit between parts is none. To draw
+it back, latent and pose of the part move until the tip's surface is outside of the part, while the rest of
+what is seen stays where it is.
 """
 
 from __future__ import annotations
@@ -20,12 +21,15 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.unknowns import FamilyUnknowns
+from partwright.render.raycast import Scene
 
 if TYPE_CHECKING:
     import trimesh
 
 _TIP = 0.1  # of its part's surface, at most: what is more is no tip, but a side of the part
 _ALONG = np.array([0.25, 0.5, 0.75], np.float32)[:, None, None]  # where an edge is looked at for a thin wall
+_OFF = 2e-3  # unit lengths above a surface from where one looks out
+_SIDES = 64  # from which a point is looked at
 _STEPS, _PLACES = 40, 1000
 _BEYOND = 2e-3  # unit lengths that the part's surface is to end before the tip
 _HOLD = 0.3  # weight of the rest of the surface, against the tip's
@@ -47,14 +51,19 @@ class Tip:
 def tips(shape: NeuralShape, parts: dict[str, trimesh.Trimesh]) -> list[Tip]:
     """Of all parts that come through others, by the parts' own meshes (unit frame); the least area first: of
     two that cross, each cuts the other, and the smaller tip belongs to the one that went too far."""
+    if not parts:
+        return []
+    scene = _scene(parts)
     found = [
-        _tip(shape, number, name, parts[name]) for number, name in enumerate(shape.names()) if name in parts
+        _tip(shape, number, name, parts[name], scene)
+        for number, name in enumerate(shape.names())
+        if name in parts
     ]
     return sorted((tip for tip in found if tip.share > 0), key=lambda tip: tip.area)
 
 
-def _tip(shape: NeuralShape, number: int, name: str, mesh: trimesh.Trimesh) -> Tip:
-    """Of the part that is the `number`th of those that are there."""
+def _tip(shape: NeuralShape, number: int, name: str, mesh: trimesh.Trimesh, scene: Scene) -> Tip:
+    """Of the part that is the `number`th of those that are there; scene: of all parts."""
     points, edges = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.edges_unique)
 
     def outside(places: np.ndarray) -> np.ndarray:
@@ -79,8 +88,28 @@ def _tip(shape: NeuralShape, number: int, name: str, mesh: trimesh.Trimesh) -> T
             largest[whole] = one
     main = np.isin(piece, list(largest.values()))
     tip = seen & ~main & (areas[piece] <= _TIP * area.sum())
+    tip[tip] = _open(scene, points[tip], np.asarray(mesh.vertex_normals)[tip])
     there = float(area[tip].sum())
     return Tip(name, there / float(area.sum()), there, points[tip], points[seen & main])
+
+
+def _scene(parts: dict[str, trimesh.Trimesh]) -> Scene:
+    ends = np.cumsum([0] + [len(mesh.vertices) for mesh in parts.values()])
+    faces = [mesh.faces + end for mesh, end in zip(parts.values(), ends, strict=False)]
+    return Scene(np.concatenate([mesh.vertices for mesh in parts.values()]), np.concatenate(faces))
+
+
+def _open(scene: Scene, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(T,) bool: whether a point of the surface is seen from far away, from some side at least."""
+    start = points + _OFF * normals
+    free = np.zeros(len(points), dtype=bool)
+    height = (2 * np.arange(_SIDES) + 1) / _SIDES - 1
+    around = np.pi * (3 - np.sqrt(5)) * np.arange(_SIDES)  # by the golden angle, evenly over the sphere
+    wide = np.sqrt(1 - height**2)
+    for side in np.stack([wide * np.cos(around), wide * np.sin(around), height], axis=1):
+        hidden = ~free
+        free[hidden] = ~scene.occluded(start[hidden], np.tile(side, (int(hidden.sum()), 1)))
+    return free
 
 
 def _pieces(count: int, edges: np.ndarray) -> np.ndarray:

@@ -1,5 +1,5 @@
 """New shapes that hang together: what a generator makes, and makes anew where parts came apart; those that
-came through others are drawn back."""
+came through others are drawn back, and those that stand out of others put back."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 
 from partwright.methods import check_count
 from partwright.partsdf.generator import Draw, Generator
+from partwright.partsdf.insets import put_back
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.piercing import drawn_back
 from partwright.partsdf.soundness import Judge, Soundness
 
 TRIES = 8  # with half of the shapes unsound, one of 256 stays so
 _DRAWN_BACK = 6  # times at most, each of one part
+_PUT_BACK = 3  # times at most, all parts that lie in others
 _CHANGES = (0.6, 0.7, 0.8, 0.9)  # of the first one, in the tries after it; then nothing of it is left
 ShareDone = Callable[[float], None]  # told how much is done, from 0 to 1, at most
 
@@ -77,9 +79,17 @@ def sound_samples(
 
 
 def _mended(sample: Sample, judge: Judge, keep: Sequence[str], keep_layout: bool) -> Sample:
-    """The sample with parts that came through others drawn back, one by one; one for which that does not help
-    stays, and the others have their turn."""
+    """The sample with parts that stand out of others put back, all together, and those that came through
+    others drawn back, one by one; one for which that does not help stays, and the others have their turn."""
     kept = set(keep)
+    for _ in range(_PUT_BACK):
+        if not set(sample.soundness.standing_out) - kept:
+            break
+        shape = put_back(sample.shape, sample.soundness.insets, kept, move_pose=not keep_layout)
+        new = replace(sample, shape=shape, soundness=judge(shape))
+        if new.soundness.rank >= sample.soundness.rank:
+            break
+        sample = new
     for _ in range(_DRAWN_BACK):
         free = [tip for tip in sample.soundness.through if tip.part not in kept]
         if not free:

@@ -1,8 +1,9 @@
 """Whether a new shape hangs together as those of its family do: what an eye would call broken, measured.
 
-Four things are looked for: a part that is said to be there and has no surface; a piece of a part that is
+Five things are looked for: a part that is said to be there and has no surface; a piece of a part that is
 apart from all others; two parts that lie to each other as in no training shape, as a leg that ends above its
-seat; and a part that comes through another, as a blade through the wall of its tube.
+seat; a part that comes through another, as a blade through the wall of its tube; and one that stands out of
+those that it lies in, as a window above a roof.
 """
 
 from __future__ import annotations
@@ -12,24 +13,22 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import cKDTree
-from torch import Tensor
 
 from partwright.errors import NoSurfaceError
+from partwright.partsdf.insets import Inset, Reach, insets, reaches
 from partwright.partsdf.meshing import mesh_shape, resolution_for_wall
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.offsets import beyond_range
 from partwright.partsdf.piercing import Tip, tips
-from partwright.partsdf.poses import PoseTensors, rotation_matrices
 
 if TYPE_CHECKING:
     import trimesh
 
 # Measured by benchmarks/partsdf_soundness.py, and chosen by looking at pictures of 100 new shapes.
 GAP, OFFSET = 0.02, 0.03  # unit lengths
-_SLACK = 0.1  # of the training shapes' range, by which two parts may lie beyond it
 _PIECE = 0.01  # of its part's surface: what is less is a crumb of the mesh
 THROUGH = 0.005  # of a part's surface, beyond what comes through in training shapes
 _SEEN = 0.02  # of a part's surface, that an eye sees come through
@@ -42,7 +41,8 @@ class Soundness:
     """empty: parts without a surface. gap: the widest that is left when all pieces of parts are joined by the
     narrowest, and the parts on its sides. allowed: a gap that is none for this family. offset: how far beyond
     the training shapes' range two parts lie to each other, and these two. Unit lengths. through: what
-    of parts came through others, more than in training shapes, the least area first."""
+    of parts came through others, more than in training shapes, the least area first. insets: parts that lie
+    in others, and by how much they stand out of them."""
 
     empty: tuple[str, ...]
     gap: float
@@ -51,11 +51,18 @@ class Soundness:
     offset: float
     offset_between: tuple[str, ...]
     through: tuple[Tip, ...] = ()
+    insets: tuple[Inset, ...] = ()
+
+    @property
+    def standing_out(self) -> tuple[str, ...]:
+        """Parts that lie in others, but for more than is seen."""
+        return tuple(one.part for one in self.insets if one.stands_out)
 
     def faults(self) -> list[str]:
         """What is broken or seen to come through, a few words each; nothing where it is sound."""
         seen = [tip.part for tip in self.through if tip.share > _SEEN]
-        return self.breaks() + [f"{part} comes through another part" for part in seen[:1]]
+        through = [f"{part} comes through another part" for part in seen[:1]]
+        return self.breaks() + through + [f"{part} stands out of the others" for part in self.standing_out]
 
     def breaks(self) -> list[str]:
         """What is apart or missing, a few words each: worth another try. What comes through is not, as that
@@ -72,7 +79,9 @@ class Soundness:
     def badness(self) -> float:
         """By how much the worst of it exceeds what is allowed, 1 where it just does."""
         through = 1.0 + sum(tip.share for tip in self.through) if self.through else 0.0
-        return 2.0 * len(self.empty) + max(self.gap / self.allowed, self.offset / OFFSET, through)
+        out = sum(one.share for one in self.insets if one.stands_out)
+        seen = through + out if through or not out else 1.0 + out
+        return 2.0 * len(self.empty) + max(self.gap / self.allowed, self.offset / OFFSET, seen)
 
     @property
     def rank(self) -> tuple[bool, float]:
@@ -97,7 +106,12 @@ class Judge:
         if through:
             known = self._own_tips
             through = tuple(tip for tip in through if tip.share > THROUGH + known.get(tip.part, 0.0))
-        return Soundness(empty, gap, between, allowed, *largest_offset(shape), through)
+        lying = insets(shape, parts, self._reaches)
+        return Soundness(empty, gap, between, allowed, *largest_offset(shape), through, lying)
+
+    @cached_property
+    def _reaches(self) -> dict[str, Reach]:
+        return reaches(self._trained)
 
     @cached_property
     def _trained(self) -> list[tuple[NeuralShape, dict[str, trimesh.Trimesh]]]:
@@ -142,27 +156,11 @@ def largest_offset(shape: NeuralShape) -> tuple[float, tuple[str, ...]]:
     """How far beyond the range of the training shapes the sides of two parts' boxes lie to each other, along
     an axis of the family's frame, unit lengths; and these parts. At most 0 where all are within."""
     model = shape.model
-    first, second = torch.triu_indices(len(model.parts), len(model.parts), 1)
-    there = (model.present[:, first] & model.present[:, second])[..., None]
-    known = _sides(model.poses, first, second)
-    low = torch.where(there, known, torch.inf).amin(dim=0)
-    high = torch.where(there, known, -torch.inf).amax(dim=0)
-    own = _sides(shape.poses.map(lambda t: t[None]), first, second)[0]
-    beyond = torch.maximum(low - own, own - high) - _SLACK * (high - low)
-    both = shape.present[first] & shape.present[second] & there.any(dim=0).squeeze(-1)
-    if not both.any():
+    beyond, first, second = beyond_range(model, shape.poses, shape.present)
+    if not beyond.numel() or not beyond.isfinite().any():
         return 0.0, ()
-    worst = beyond.amax(dim=-1).masked_fill(~both, -torch.inf)
-    pair = int(worst.argmax())
-    return float(worst[pair]), (model.parts[int(first[pair])], model.parts[int(second[pair])])
-
-
-def _sides(poses: PoseTensors, first: Tensor, second: Tensor) -> Tensor:
-    """(S, Q, 12) of poses (S, P, ...): by how much the low and high sides of the first parts' boxes (Q,) lie
-    beyond those of the second ones', along each axis."""
-    half = (rotation_matrices(poses.rotation).abs() @ poses.scale[..., None]).squeeze(-1)
-    sides = torch.stack([poses.translation - half, poses.translation + half], dim=-2)  # (S, P, 2, 3)
-    return (sides[:, first, :, None] - sides[:, second, None]).flatten(2)
+    pair = int(beyond.argmax())
+    return float(beyond[pair]), (model.parts[int(first[pair])], model.parts[int(second[pair])])
 
 
 def _meshes(shape: NeuralShape) -> dict[str, trimesh.Trimesh]:

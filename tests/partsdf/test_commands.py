@@ -257,6 +257,8 @@ def test_interpolate(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["edit", "{}", "-o", "a.json"], "`parts reconstruct MODEL FILE` makes one of a mesh"),
         (["edit", "{}:lamp99", "-o", "a.json"], "was not trained on 'lamp99'"),
         (["edit", "sofas:1", "-o", "a.json"], "no model is named 'sofas'"),
+        (["generate", "--model", ".", "-o", "out"], ".: a folder without model.safetensors; here are: cars,"),
+        (["generate", "--model", "/dev/null", "-o", "out"], "/dev/null: no model's file; here are: cars,"),
         (["interpolate", "{}:1", "{}:2", "-o", "a.avi"], "written as .gif"),
         (["reconstruct", "{}", "none.ply"], "none.ply"),
         (

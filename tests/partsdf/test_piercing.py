@@ -64,6 +64,16 @@ def test_what_came_through_is_measured(beyond: float) -> None:
         assert tips(none, none.meshes()) == []
 
 
+def test_what_nobody_can_see_did_not_come_through() -> None:
+    """The same end of the rod, within a closed shell."""
+    rod: Any = Rod(-0.05)
+    meshes = rod.meshes()
+    assert [tip.part for tip in tips(rod, meshes)] == ["rod"]
+    meshes["plate"] = trimesh.util.concatenate([meshes["plate"], trimesh.creation.box((0.6, 0.6, 0.3))])
+    assert "rod" not in [tip.part for tip in tips(rod, meshes)]
+    assert tips(rod, {}) == []
+
+
 def test_a_ball_that_came_through_its_plate_is_drawn_back(
     model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
