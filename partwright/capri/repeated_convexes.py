@@ -8,7 +8,7 @@ costs two fifths count: by so much, less a whole primitive for each copy, the er
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,7 +28,8 @@ _SLACK = np.radians(np.linspace(-2.0, 2.0, 9))  # turns about an axis that are t
 _MAX_RATIO = 2.5  # of the weights that two convexes cover
 _TAKEN_OVER = 0.6  # share of what a convex covers that a copy has to cover to replace it
 _MAX_POWERS = 40  # times that a step is taken
-_MAX_CHAINS = 80  # rows of steps that are tried
+_MAX_CHAINS = 400  # rows of steps that are tried
+_SHORTEST = 8  # steps that lead on from each copy
 _FURTHEST = 0.95  # unit lengths: the middle of a convex is no further out than that
 _SAME_PLACE = 0.01  # unit lengths
 _FORGIVEN = 0.6  # of what a convex costs: so much more error is allowed until all copies are fitted
@@ -38,11 +39,15 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """A convex by its rows of the table, the motions of its copies, and what it and each of them cover."""
+    """A convex by its rows of the table, the motions of its copies, and what it and each of them cover.
+
+    offered: it stays only where it and its copies pay at the whole of the prices.
+    """
 
     convex: Convex
     motions: tuple[Motion, ...] = ()
     masks: tuple[Mask, ...] = ()
+    offered: bool = False
 
 
 _Layers = list[list[_Group]]
@@ -55,16 +60,20 @@ def with_repeated_convexes(
     convex_price: float,
     pause: Callable[[], None] = lambda: None,
     further: bool = True,
+    own: Sequence[int] | None = None,
 ) -> CsgTree:
     """The tree with alike convexes as copies of one, and `copies` that say so.
 
     price, convex_price: as in the settings. pause: called now and then, and may raise. further: copies also
-    where the motions between others lead on, as where a tooth was missed.
+    where the motions between others lead on, as where a tooth was missed. own: of each layer, how many
+    convexes pay by themselves; those after them are offered, and stay where they pay with their copies, as
+    the many holes of a vented wall do. All of them, if not given.
     """
-    search = _Search(tree, samples, price, convex_price, pause, further)
+    search = _Search(tree, samples, price, convex_price, pause, further, own)
     for at in range(len(tree.layers)):
         search.gather(at)
     search.extend()
+    search.drop_unpaid()
     return search.tree()
 
 
@@ -77,6 +86,7 @@ class _Search:
         convex_price: float,
         pause: Callable[[], None],
         further: bool,
+        own: Sequence[int] | None = None,
     ) -> None:
         self.given, self.samples, self.pause, self.further = tree, samples, pause, further
         self.price, self.convex_price = (_CAUTION * p * samples.volume for p in (price, convex_price))
@@ -84,7 +94,11 @@ class _Search:
         self.monomials = rows.monomials(samples.points)
         self.weight = samples.weight.astype(np.float64)
         self.layers: _Layers = [
-            [_Group(c, masks=(self.covered(tree.rows[list(c)]),)) for c in layer] for layer in tree.layers
+            [
+                _Group(c, masks=(self.covered(tree.rows[list(c)]),), offered=own is not None and i >= own[at])
+                for i, c in enumerate(layer)
+            ]
+            for at, layer in enumerate(tree.layers)
         ]
         self.place_price = price * samples.volume
         used = sorted({k for layer in tree.layers for convex in layer for k in convex})
@@ -109,11 +123,11 @@ class _Search:
             self.samples, [[m for group in layer for m in group.masks] for layer in layers], at
         )
 
-    def length(self, group: _Group) -> float:
-        """What a group costs."""
+    def length(self, group: _Group, factor: float = 1.0) -> float:
+        """What a group costs, its copies, and at so many times the prices that count here all else."""
         convexes = 1 + int(self.given.complement[list(group.convex)].sum())
         places = self.place_price * len(group.motions)
-        return places + self.price * len(group.convex) + self.convex_price * convexes
+        return places + factor * (self.price * len(group.convex) + self.convex_price * convexes)
 
     def cost(self, layers: _Layers) -> float:
         return self.error(layers) + sum(self.length(group) for layer in layers for group in layer)
@@ -206,6 +220,22 @@ class _Search:
                 layers, group = changed, made
         return layers, group
 
+    def drop_unpaid(self) -> None:
+        """Without convexes that were only offered and do not pay at the whole of the prices, the worst
+        first."""
+        while True:
+            self.pause()
+            error = self.error(self.layers)
+            offered = [(at, g) for at, layer in enumerate(self.layers) for g in layer if g.offered]
+            lost = [
+                self.length(group, 1 / _CAUTION) - self.error(_replaced(self.layers, at, {group})) + error
+                for at, group in offered
+            ]
+            if max(lost, default=0.0) <= 0:
+                return
+            at, group = offered[int(np.argmax(lost))]
+            self.layers = _replaced(self.layers, at, {group})
+
     def thinned(self, layers: _Layers, at: int, group: _Group) -> _Layers:
         """Without copies that no longer pay, the latest first."""
         for i in reversed(range(len(group.motions))):
@@ -240,7 +270,8 @@ class _Search:
         )
         if not convex or set(convex) == set(group.convex):
             return layers, group
-        made = _Group(convex, masks=(self.covered(self.given.rows[list(convex)]),))
+        masks = (self.covered(self.given.rows[list(convex)]),)
+        made = replace(group, convex=convex, motions=(), masks=masks)
         for motion in group.motions:
             made = self.with_copy(made, motion)
         changed = _replaced(rest, at, set(), made)
@@ -299,11 +330,12 @@ def _replaced(layers: _Layers, at: int, gone: set[_Group], *new: _Group) -> _Lay
 
 def _led_on_to(known: list[Motion], middle: NDArray[np.float64]) -> Iterator[Motion]:
     """Places that steps between the known ones, the first of them where the convex is, lead on to: again and
-    again from the first, and once from the others."""
+    again from the first, and once from the others, there the shortest steps first."""
     seen = list(known)
     steps = [*known[1:], *(motion.inverse() for motion in known[1:])]
     chains = [(step, known[0], _MAX_POWERS) for step in steps]
-    chains += [(step, start, 1) for start in known[1:] for step in steps]
+    steps.sort(key=lambda step: float(np.linalg.norm(step(middle) - middle)))
+    chains += [(step, start, 1) for step in steps[:_SHORTEST] for start in known[1:]]
     for step, motion, most in chains[:_MAX_CHAINS]:
         for _ in range(most):
             motion = step @ motion

@@ -33,6 +33,8 @@ from partwright.shapes import Shape
 _MAX_CONVEXES = 64  # convexes: the paper's c (section 4.1)
 _PRICE_FACTOR = 1.5  # factor between the prices that are tried for a budget or a target
 _PRICE_STEPS = 16  # prices that are tried at most
+_OFFERED_PRICE = 0.3  # times the prices, at which convexes are found that may pay as one with copies
+_MAX_OFFERED = 24  # of these: more of a pattern are where the motions between them lead on
 _SEARCHED = 0.9  # of the expected work, where copies are sought after the search
 
 
@@ -248,13 +250,28 @@ class TreeSearch:
             self.report_repeats(copied or found, 2)
         return overlapped(copied or found, self.samples)
 
+    def with_offered(self) -> CsgTree | None:
+        """The tree and convexes that would pay at lower prices, as each of many small holes would; None where
+        there are none."""
+        assert self.best is not None
+        count = sum(map(len, self.best))
+        most = min(count + _MAX_OFFERED, _MAX_CONVEXES)
+        layers = selection.fill(self.problem(_OFFERED_PRICE * self.dearer), self.best, 1.0, most)
+        if sum(map(len, layers)) == count:
+            return None
+        return CsgTree(self.pool.rows, self.pool.complement, tuple(map(tuple, layers))).closed(*self.box)
+
     def with_copies(self, tree: CsgTree) -> CsgTree | None:
-        """The tree with copies; without further ones where these go beyond a demand, None where all do."""
+        """The tree with copies, with more convexes where these pay as one; without more of them, and then
+        without further copies, where either goes beyond a demand, None where all do."""
         s, factor = self.settings, self.dearer
         least = 0.0 if s.min_iou is None else min(s.min_iou, self.iou(tree.occupancy(self.samples.points)))
-        for further in (True, False):
+        own = tuple(map(len, tree.layers))
+        for start, further in ((self.with_offered(), True), (tree, True), (tree, False)):
+            if start is None:
+                continue
             copied = with_repeated_convexes(
-                tree, self.samples, factor * s.price, factor * s.convex_price, self.pause, further
+                start, self.samples, factor * s.price, factor * s.convex_price, self.pause, further, own
             )
             # Fitting to all places may drop what ended a convex where no sample is.
             copied = copied.closed(*self.box)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import product
 
 import numpy as np
 import pytest
@@ -225,16 +226,37 @@ def test_what_a_fit_to_all_places_leaves_open_is_closed(monkeypatch) -> None:
 def test_where_further_copies_break_a_budget_the_others_stay(monkeypatch) -> None:
     asked = []
 
-    def sought(tree: CsgTree, samples, price, convex_price, pause, further) -> CsgTree:
+    def sought(tree: CsgTree, samples, price, convex_price, pause, further, own) -> CsgTree:
         asked.append(further)
         if further:
             return with_a_speck(tree)
-        return with_repeated_convexes(tree, samples, price, convex_price, pause, further)
+        return with_repeated_convexes(tree, samples, price, convex_price, pause, further, own)
 
     monkeypatch.setattr(tree_search, "with_repeated_convexes", sought)
     fitted = quick(load_shape(two_steps()), max_parts=18)
     assert asked == [True, False]
     assert [copy is None for copy in fitted.tree.copies[0]].count(False) == 1
+
+
+def perforated_plate() -> trimesh.Trimesh:
+    """With 30 small holes."""
+    plate = trimesh.creation.box((1.8, 1.4, 0.12))
+    cuts = []
+    for x, y in product(np.linspace(-0.75, 0.75, 6), np.linspace(-0.5, 0.5, 5)):
+        cuts.append(trimesh.creation.cylinder(0.036, 0.5, sections=48))
+        cuts[-1].apply_translation((x, y, 0))
+    return trimesh.boolean.difference([plate, *cuts])
+
+
+def test_holes_that_are_too_small_to_pay_one_by_one_are_drilled_at_once(monkeypatch) -> None:
+    shape, mesh = load_shape(perforated_plate()), perforated_plate()
+    fitted = quick(shape, surface=20_000, near=20_000, uniform=10_000)
+    assert fitted.details["convexes"] == 2
+    assert fitted.details["primitives"] == 7
+    assert solid(fitted.assembly).euler_number == 2 - 2 * 30
+    assert solid(fitted.assembly).volume == pytest.approx(mesh.volume, rel=0.002)
+    monkeypatch.setattr(tree_search, "_MAX_OFFERED", 0)
+    assert quick(shape, symmetry=False).details["convexes"] < 2 + 30 / 2
 
 
 def test_copies_are_sought_at_the_price_at_which_a_demand_was_met(monkeypatch) -> None:
@@ -248,7 +270,7 @@ def test_copies_are_sought_at_the_price_at_which_a_demand_was_met(monkeypatch) -
     shape, own = load_shape(two_steps()), Settings(**FAST)
     quick(shape, max_parts=8)
     quick(shape)
-    dearer, plain = prices
+    dearer, plain = dict.fromkeys(prices)  # asked once more where more convexes break the budget
     assert plain == (own.price, own.convex_price)
     assert dearer[0] / plain[0] == pytest.approx(dearer[1] / plain[1])
     assert dearer[0] > plain[0]

@@ -199,3 +199,46 @@ def test_faces_tell_the_motion(mirror: bool) -> None:
     points = np.random.default_rng(0).uniform(-1, 1, (20, 3))
     off = [np.abs(candidate(points) - motion(points)).max() for candidate in found]
     assert min(off) < 1e-6
+
+
+def perforated() -> tuple[CsgTree, OccupancySamples]:
+    """A plate, a third of its 24 holes, and its one slot."""
+    low, high = (0.77, -0.06, -0.2), (0.81, 0.06, 0.2)
+    places = [(x, y) for x in np.linspace(-0.7, 0.5, 6) for y in np.linspace(-0.5, 0.5, 4)]
+    cuts = [trimesh.creation.cylinder(0.036, 0.3, sections=48) for _ in places]
+    for cut, place in zip(cuts, places, strict=True):
+        cut.apply_translation((*place, 0))
+    cuts.append(trimesh.creation.box(bounds=(low, high)))
+    block = trimesh.creation.box(bounds=[(-0.9, -0.7, -0.06), (0.9, 0.7, 0.06)])
+    found = [places[i] for i in (0, 1, 5, 10, 11, 14, 17, 23)]
+    holes = [rows.cylinder((x, y, 0), (0, 0, 1), 0.036) for x, y in found]
+    table = np.stack([*slab(*block.bounds), *holes, *slab(low, high)])
+    alone = range(6, 6 + len(holes))
+    layers = (tuple(range(6)),), (*((k,) for k in alone), tuple(range(6 + len(holes), len(table))))
+    tree = CsgTree(table, np.zeros(len(table), dtype=bool), layers)
+    return tree, samples_of(trimesh.boolean.difference([block, *cuts]))
+
+
+def test_holes_that_pay_only_together_stay_with_their_copies() -> None:
+    tree, samples = perforated()
+
+    def error(*layers: tuple[tuple[int, ...], ...]) -> float:
+        occupied = CsgTree(tree.rows, tree.complement, layers).occupancy(samples.points)
+        return float(samples.weight[occupied != samples.inside].sum()) / samples.volume
+
+    plate, cuts = tree.layers
+    for cut in cuts:
+        assert error(plate) - error(plate, (cut,)) < len(cut) * PRICES[0] + PRICES[1]
+    found = with_repeated_convexes(tree, samples, *PRICES, own=(1, 0))
+    assert [copy is None for copy in found.copies[1]].count(True) == 1
+    assert len(found.layers[1]) == 24
+    wrong = samples.weight[found.occupancy(samples.points) != samples.inside].sum() / samples.volume
+    assert wrong < 0.2 * error(*tree.layers)
+
+
+def test_what_is_offered_and_pays_nothing_goes() -> None:
+    tree, samples = perforated()
+    few = CsgTree(tree.rows, tree.complement, (tree.layers[0], tree.layers[1][-1:]))
+    found = with_repeated_convexes(few, samples, *PRICES, own=(1, 0))
+    assert found.layers == (tree.layers[0], ())
+    assert with_repeated_convexes(few, samples, *PRICES, own=(1, 1)).layers == few.layers
