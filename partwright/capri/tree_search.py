@@ -138,9 +138,12 @@ class TreeSearch:
     def cost(self) -> float:
         """Of the tree: weight on the wrong side as a share of the shape's, and the description length."""
         tree, s = self.tree(), self.settings
+        return self.error(tree) + s.price * tree.primitives + s.convex_price * tree.convexes
+
+    def error(self, tree: CsgTree) -> float:
+        """The weight on the wrong side as a share of the shape's."""
         wrong = self.samples.weight[tree.occupancy(self.samples.points) != self.samples.inside]
-        error = float(wrong.sum(dtype=np.float64)) / self.samples.volume
-        return error + s.price * tree.primitives + s.convex_price * tree.convexes
+        return float(wrong.sum(dtype=np.float64)) / self.samples.volume
 
     def problem(self, dearer: float = 1.0) -> Problem:
         """The selection at the settings' prices, times a factor."""
@@ -262,24 +265,39 @@ class TreeSearch:
         return CsgTree(self.pool.rows, self.pool.complement, tuple(map(tuple, layers))).closed(*self.box)
 
     def with_copies(self, tree: CsgTree) -> CsgTree | None:
-        """The tree with copies, with more convexes where these pay as one; without more of them, and then
-        without further copies, where either goes beyond a demand, None where all do."""
+        """The tree with copies, or with more convexes that pay as one with theirs, whichever is the cheaper;
+        without further copies where both go beyond a demand, None where that does, too."""
+        offered = self.with_offered()
+        starts = (tree,) if offered is None else (offered, tree)
+        met = [copied for start in starts if (copied := self.copied(tree, start, True)) is not None]
+        return min(met, key=self.cost_of_copied, default=None) or self.copied(tree, tree, False)
+
+    def copied(self, tree: CsgTree, start: CsgTree, further: bool) -> CsgTree | None:
+        """start, which is the tree and perhaps more convexes, with copies; None where it goes beyond a
+        demand."""
         s, factor = self.settings, self.dearer
         least = 0.0 if s.min_iou is None else min(s.min_iou, self.iou(tree.occupancy(self.samples.points)))
         own = tuple(map(len, tree.layers))
-        for start, further in ((self.with_offered(), True), (tree, True), (tree, False)):
-            if start is None:
-                continue
-            copied = with_repeated_convexes(
-                start, self.samples, factor * s.price, factor * s.convex_price, self.pause, further, own
-            )
-            # Fitting to all places may drop what ended a convex where no sample is.
-            copied = copied.closed(*self.box)
-            if s.max_parts is not None and copied.primitives > s.max_parts:
-                continue
-            if self.iou(copied.occupancy(self.samples.points)) >= least:
-                return copied
-        return None
+        found = with_repeated_convexes(
+            start, self.samples, factor * s.price, factor * s.convex_price, self.pause, further, own
+        )
+        # Fitting to all places may drop what ended a convex where no sample is.
+        found = found.closed(*self.box)
+        if s.max_parts is not None and found.primitives > s.max_parts:
+            return None
+        return found if self.iou(found.occupancy(self.samples.points)) >= least else None
+
+    def cost_of_copied(self, tree: CsgTree) -> float:
+        """As `cost`, with a copy at the price of a primitive and the prices at which demands are met."""
+        s, length = self.settings, 0.0
+        for k, layer in enumerate(tree.layers):
+            for i, convex in enumerate(layer):
+                if tree.copies and tree.copies[k][i] is not None:
+                    length += s.price
+                else:
+                    convexes = 1 + int(tree.complement[list(convex)].sum())
+                    length += s.price * len(convex) + s.convex_price * convexes
+        return self.error(tree) + self.dearer * length
 
     def report_repeats(self, tree: CsgTree, round_: int) -> None:
         """Progress of the search for copies; a tree before it, and after."""

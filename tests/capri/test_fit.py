@@ -259,6 +259,26 @@ def test_holes_that_are_too_small_to_pay_one_by_one_are_drilled_at_once(monkeypa
     assert quick(shape, symmetry=False).details["convexes"] < 2 + 30 / 2
 
 
+def test_more_convexes_are_not_taken_where_they_cost_more_than_they_save(monkeypatch) -> None:
+    """With a speck that is offered the copies of all else may be lost."""
+
+    def sought(tree: CsgTree, *rest) -> CsgTree:
+        return with_a_speck(tree) if tree is offered else tree
+
+    monkeypatch.setattr(tree_search, "with_repeated_convexes", sought)
+    monkeypatch.setattr(tree_search.TreeSearch, "with_offered", lambda search: offer(search))
+    offered = None
+
+    def offer(search: tree_search.TreeSearch) -> CsgTree:
+        nonlocal offered
+        offered = search.tree().closed(*search.box)
+        return offered
+
+    shape = load_shape(two_steps())
+    plain = quick(shape, symmetry=False).tree
+    assert quick(shape).tree.convexes == plain.convexes
+
+
 def test_copies_are_sought_at_the_price_at_which_a_demand_was_met(monkeypatch) -> None:
     prices = []
 
