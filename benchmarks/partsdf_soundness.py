@@ -17,6 +17,7 @@ from partwright.datasets.inputs import MadeShape
 from partwright.errors import NoSurfaceError
 from partwright.metrics.sets import chamfer_matrix, scores_of_distances
 from partwright.partsdf.generator import load_generator
+from partwright.partsdf.insets import STANDS_OUT
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
 from partwright.partsdf.neural import NeuralShape
@@ -37,14 +38,17 @@ def sounding(arguments: argparse.Namespace) -> None:
         f"more than in training shapes; odd: two parts lie by more than {OFFSET} beyond the range of the "
         f"training shapes to each other (for trained ones: of those of the other {_FOLDS - 1} eighths); "
         f"empty: a part has no surface; through: more than {100 * THROUGH:.1f} % of a part's surface came "
-        "out of another part's far side, beyond the most in a few training shapes. Anew: parts that came "
-        f"through are drawn back, and each shape is made up to {TRIES} times. MMD-CD and COV-CD against "
+        "out of another part's far side, beyond the most in a few training shapes; out: more than "
+        f"{100 * STANDS_OUT:.0f} % of the surface of a part that lies in others, as a window, is farther "
+        "from them than in those. Anew: parts that came through are drawn back, what stands out is put "
+        f"back, and each shape is made up to {TRIES} times. MMD-CD and COV-CD against "
         f"{count} held-out shapes, made with another seed, {POINTS} points each, meshes of {_RESOLUTION}^3. "
         f"After the coverage: its standard deviation over {_DRAWS} draws of three quarters of either set. "
         "Seconds of the processor a shape, to make and to judge.", "",
         command_line(), "",
-        "| family | shapes | broken % | apart | odd | empty | through | tries | MMD-CD x1e4 | COV-CD % | s |",
-        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+        "| family | shapes | broken % | apart | odd | empty | through | out | tries "
+        "| MMD-CD x1e4 | COV-CD % | s |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]  # fmt: skip
     for name in arguments.names.split(","):
         model = load_model(name)
@@ -76,6 +80,7 @@ def cells(samples: Sequence[Sample], held: list[np.ndarray]) -> str:
         [one.offset > OFFSET for one in judged],
         [bool(one.empty) for one in judged],
         [bool(one.through) for one in judged],
+        [bool(one.standing_out) for one in judged],
     )
     shares = " | ".join(f"{100 * np.mean(one):.0f}" for one in broken)
     tries = np.mean([one.tries for one in samples])

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 HULL = "hull"
 _SHARE, _LEAST_SHARE = 0.02, 0.003  # of the longest sides of link and robot: the tolerance that none gave
+_AIM = 0.85  # of a tolerance that was given: hulls of fewer corners and faces are off by some of it on top
 _EXTRA = 0.08  # of its volume: what the hulls of a link may add
 _WORTH = 0.7  # two chords for one save three quarters
 _FINER = 1  # times a link's tolerance is halved where it overlaps a neighbour more than its mesh did
@@ -114,6 +115,10 @@ class CollideOptions:
             raise SettingError(f"tolerance: expected a length above 0, got {self.tolerance!r}")
         return length
 
+    def aim(self, length: float) -> float:
+        """What the search keeps to, so that its shapes keep to a tolerance of this length."""
+        return length if self.tolerance is None else _AIM * length
+
 
 @dataclass(frozen=True)
 class Collided:
@@ -166,9 +171,10 @@ def collide(
     corners = [np.reshape(_in_world(link, before[link.name].solid).bounding_box(), (2, 3)) for link in links]
     whole = float(np.ptp(np.concatenate(corners), axis=0).max()) if links else 0.0
     volumes = {name: body.volume() for name, body in bodies.items()}
+    tolerances = {name: options.length(target.size, whole) for name, target in wanted.items()}
     wishes = {
         name: Wishes(
-            options.length(target.size, whole),
+            options.aim(tolerances[name]),
             kinds,
             hulls,
             options.max_parts,
@@ -176,7 +182,7 @@ def collide(
             options.mode,
             options.worth,
         )
-        for name, target in wanted.items()
+        for name in wanted
     }
     shapes: dict[str, list[Shape]] = {}
     made: dict[tuple[Target, Wishes], list[Shape]] = {}
@@ -212,7 +218,8 @@ def collide(
             unions[link.name],
             wanted[link.name],
             before[link.name],
-            wishes[link.name],
+            tolerances[link.name],
+            options,
         )
         for link in links
     ]
@@ -340,7 +347,13 @@ def _spheres(
 
 
 def _measured(
-    link: Link, shapes: Sequence[Shape], union: Manifold, target: Target, before: Target, wishes: Wishes
+    link: Link,
+    shapes: Sequence[Shape],
+    union: Manifold,
+    target: Target,
+    before: Target,
+    tolerance: float,
+    options: CollideOptions,
 ) -> LinkReport:
     own = target.solid.volume()
     common = (target.solid ^ union).volume()  # of what touches all along, differences may have no sense
@@ -356,9 +369,9 @@ def _measured(
         missing=max(own - common, 0.0) / own,
         extra=max(union.volume() - common, 0.0) / own,
         farthest=largest_deviation(target.solid, union),
-        tolerance=wishes.tolerance,
-        sticking_out=sticking_out(shapes, target) if wishes.mode == "around" else None,
-        most=wishes.most,
+        tolerance=tolerance,
+        sticking_out=sticking_out(shapes, target) if options.enclose else None,
+        most=options.max_parts,
         notes=tuple(dict.fromkeys((*before.notes, *target.notes))),
     )
 

@@ -99,8 +99,8 @@ def warnings(links: Sequence[LinkReport]) -> list[str]:
             wrong = "lack" if link.farthest.missing else "add"
             result.append(
                 f"link {link.link!r}: the shapes are {1000 * link.deviation:.1f} mm off at ({place}) m of "
-                f"the link, where they {wrong} something, and {1000 * link.tolerance:.1f} mm were asked for; "
-                f"{nearer} would be nearer"
+                f"the link, where they {wrong} something: more than the tolerance of "
+                f"{1000 * link.tolerance:.1f} mm; {nearer} would be nearer"
             )
         if link.sticking_out:
             result.append(

@@ -16,8 +16,8 @@ from partwright.robots import CollideOptions, collide
 from partwright.robots.containment import outside_of, shape_solid
 from partwright.robots.model import Shape
 from partwright.robots.report import warnings
-from partwright.robots.shaping import shapes_for
-from partwright.robots.solids import Solids
+from partwright.robots.shaping import Wishes, shapes_for
+from partwright.robots.solids import Solids, Target
 from tests.robots.robots import mjcf, urdf
 
 KINDS = ["box", "cylinder", "sphere", "capsule", "ellipsoid", "hull"]
@@ -196,8 +196,27 @@ def test_a_tighter_tolerance_comes_nearer_with_more_shapes(tmp_path: Path) -> No
         found.append(next(link for link in result.links if link.link == "arm"))
     assert found[0].count < found[1].count
     assert found[1].extra < found[0].extra
-    assert found[1].deviation <= 0.0101
+    assert all(link.deviation <= link.tolerance for link in found)
     assert found[1].count <= 16
+
+
+def test_a_link_is_held_to_the_tolerance_that_was_given(tmp_path: Path, monkeypatch) -> None:
+    """Also where it was made finer, since it overlapped a neighbour."""
+    asked = []
+
+    def overlapping(*rest) -> list[tuple[str, str]]:
+        return [("base", "arm")]
+
+    def measured(name: str, target: Target, wishes: Wishes) -> list[Shape]:
+        asked.append(wishes.tolerance)
+        return shapes_for(name, target, wishes)
+
+    module = sys.modules["partwright.robots.collide"]
+    monkeypatch.setattr(module, "too_near", overlapping)
+    monkeypatch.setattr(module, "shapes_for", measured)
+    result = collide(urdf(tmp_path), CollideOptions(tolerance="10mm"))
+    assert {link.tolerance for link in result.links} == {0.01}
+    assert min(asked) == max(asked) / 2 < 0.005
 
 
 def test_native_shapes_alone_are_taken_to_the_number_allowed(tmp_path: Path) -> None:
