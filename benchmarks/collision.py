@@ -40,7 +40,7 @@ from partwright.meshing.manifolds import as_manifold, as_mesh
 from partwright.meshing.mass import MassProperties, mass_properties
 from partwright.robots import CollideOptions
 from partwright.robots.model import Link, MeshUse
-from partwright.robots.shaping import Wishes, shapes_for
+from partwright.robots.shaping import shapes_for
 from partwright.robots.solids import Solids
 from partwright.shapes import Shape
 
@@ -117,9 +117,7 @@ def covered(mesh: trimesh.Trimesh, kind: str, options: CollideOptions) -> Body:
     link = Link("mesh", np.eye(4), (), (use,))
     target = Solids().target(link, link.collisions)
     tolerance = options.length(target.size, target.size)
-    wishes = Wishes(
-        tolerance, GEOMS, True, options.max_parts, options.most_extra, options.mode, options.worth
-    )
+    wishes = options.wishes(tolerance, GEOMS, True)
     shapes = shapes_for("mesh", target, wishes)
     seconds = time.process_time() - start
 

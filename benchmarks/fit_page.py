@@ -77,11 +77,11 @@ def summary(rows: list[Run]) -> Run:
     if not good:
         return total
     means = {name: mean(getattr(row, name) for row in good) for name in SCORES}
-    spent = {name: [value for row in good if (value := getattr(row, name)) is not None] for name in SECONDS}
+    timed = [name for name in SECONDS if all(getattr(row, name) is not None for row in good)]
     return replace(
         total,
         **means,
-        **{name: median(seconds) if seconds else None for name, seconds in spent.items()},
+        **{name: median(getattr(row, name) for row in good) for name in timed},
         peak_mb=max(row.peak_mb for row in good),
     )
 

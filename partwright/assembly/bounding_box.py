@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _AXES = np.vstack([-np.eye(3), np.eye(3)])
 _AT_ONCE = 4096  # copies of a part
-_PAIRS = 48  # members of a union that are looked at in pairs; of more, each may reach as far as its own blend
+_PAIRS = 32  # parts and copies of a union that are looked at in pairs
 
 
 def bounding_box(node: Node, level: float = 0.0) -> np.ndarray:
@@ -42,16 +42,17 @@ def _united(children: Sequence[Node], level: float) -> np.ndarray:
 
     The smooth minimum of a and b with a blend of k lies below both where these differ by less than k, by at
     most k/4. So it is below a level L where a or b is, and beyond these only where one is below L + k/4
-    and the other below L + k: within what both boxes share at those levels.
+    and the other below L + k: within what both boxes share at those levels. Pairs are looked at among a few
+    parts; of more, and of groups, where that would take pairs of pairs, each may reach to L + k.
     """
     own = [_boxes_of(child, level) for child in children]
     boxes = np.concatenate(own)
     blends = np.repeat([child.blend for child in children], [len(of) for of in own])
     blends[0] = 0.0
-    if len(boxes) > _PAIRS:
-        melted = [_boxes_of(child, level + child.blend) for child in children if child.blend]
-        return _joined(np.concatenate([boxes, *melted]))
-    members = [one for child in children for one in (child.copies if child.is_part else (child,))]
+    members = [copy for child in children if child.is_part and len(boxes) <= _PAIRS for copy in child.copies]
+    if len(members) < len(boxes):
+        melted = [_boxes_of(child, level + child.blend) for child in children]
+        return _joined(np.concatenate([boxes, np.concatenate(melted)[blends > 0]]))
     lowered = np.cumsum(blends) / 4  # by how much the union of all up to each may lie below its members
     result = boxes[0]
     for last in range(1, len(members)):

@@ -52,7 +52,7 @@ def load_assembly(path: str | Path) -> Assembly:
             raise AssemblyFileError(f"{path}: not UTF-8 text, so not an assembly file") from error
         raise AssemblyFileError(f"{path}: {_NONE}") from error
     except AssemblyFileError as error:
-        if path.suffix.lower() != SUFFIX and not isinstance(error, NewerVersionError):
+        if path.suffix.lower() != SUFFIX and FORMAT.encode() not in data:
             raise AssemblyFileError(f"{path}: {_NONE}") from error
         raise type(error)(f"{path}: {error}") from error
 

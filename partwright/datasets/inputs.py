@@ -1,7 +1,8 @@
 """Shapes made of named parts, as they come: a family of our own, or a folder of yours.
 
 A folder holds one shape an entry: a scene whose nodes are the parts (GLB, glTF, 3MF, STEP, OBJ with groups),
-a folder of part meshes with perhaps the whole as `_whole`, or a mesh with `FILE.labels.json` beside it.
+a folder of parts (meshes, or STEP files alone) with perhaps the whole as `_whole`, or a mesh with
+`FILE.labels.json` beside it.
 """
 
 from __future__ import annotations
@@ -111,7 +112,8 @@ class SceneFile:
 
 @dataclass(frozen=True)
 class PartFolder:
-    """A folder with a mesh a part; `_whole` is the surface of all of them together, if it is there."""
+    """A folder with a mesh a part, or a STEP file a part where there is none; `_whole` is the surface of all
+    of them together, if it is there."""
 
     path: Path
 
@@ -203,14 +205,14 @@ def _unread(folder: Path) -> Iterator[Path]:
 
 
 def _is_shapes_folder(entry: Path) -> bool:
-    return entry.is_dir() and not entry.name.startswith(".")
+    return entry.is_dir() and not entry.name.startswith(".") and bool(_meshes(entry))
 
 
 def _sources(folder: Path) -> Iterator[PartedSource]:
     for entry in folder.iterdir():
         if entry.name.startswith("."):
             continue
-        if _is_shapes_folder(entry) and _meshes(entry):
+        if _is_shapes_folder(entry):
             yield PartFolder(entry)
         elif entry.suffix.lower() in (*MESH_SUFFIXES, *STEP_SUFFIXES):
             # A scene that `segment` wrote has labels too, but in another order: its nodes say the same.
@@ -219,12 +221,10 @@ def _sources(folder: Path) -> Iterator[PartedSource]:
 
 
 def _meshes(folder: Path) -> list[Path]:
-    """Files of parts; a STEP file only where no mesh has its name: that would be made of it."""
+    """Files of parts; STEP files where there are no meshes, which may be made of the whole in one."""
     files = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     meshes = [path for path in files if path.suffix.lower() in MESH_SUFFIXES]
-    stems = {path.stem for path in meshes}
-    exact = [path for path in files if path.suffix.lower() in STEP_SUFFIXES and path.stem not in stems]
-    return sorted([*meshes, *exact])
+    return meshes or [path for path in files if path.suffix.lower() in STEP_SUFFIXES]
 
 
 def _joined(path: Path) -> Piece:

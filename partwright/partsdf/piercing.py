@@ -107,6 +107,8 @@ def _open(scene: Scene, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     around = np.pi * (3 - np.sqrt(5)) * np.arange(_SIDES)  # by the golden angle, evenly over the sphere
     wide = np.sqrt(1 - height**2)
     for side in np.stack([wide * np.cos(around), wide * np.sin(around), height], axis=1):
+        if free.all():
+            break
         hidden = ~free
         free[hidden] = ~scene.occluded(start[hidden], np.tile(side, (int(hidden.sum()), 1)))
     return free

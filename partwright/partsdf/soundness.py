@@ -78,9 +78,8 @@ class Soundness:
     @property
     def badness(self) -> float:
         """By how much the worst of it exceeds what is allowed, 1 where it just does."""
-        through = 1.0 + sum(tip.share for tip in self.through) if self.through else 0.0
-        out = sum(one.share for one in self.insets if one.stands_out)
-        seen = through + out if through or not out else 1.0 + out
+        out = [one.share for one in self.insets if one.stands_out]
+        seen = sum(tip.share for tip in self.through) + sum(out) + (1.0 if self.through or out else 0.0)
         return 2.0 * len(self.empty) + max(self.gap / self.allowed, self.offset / OFFSET, seen)
 
     @property
@@ -157,7 +156,7 @@ def largest_offset(shape: NeuralShape) -> tuple[float, tuple[str, ...]]:
     an axis of the family's frame, unit lengths; and these parts. At most 0 where all are within."""
     model = shape.model
     beyond, first, second = beyond_range(model, shape.poses, shape.present)
-    if not beyond.numel() or not beyond.isfinite().any():
+    if not beyond.isfinite().any():
         return 0.0, ()
     pair = int(beyond.argmax())
     return float(beyond[pair]), (model.parts[int(first[pair])], model.parts[int(second[pair])])

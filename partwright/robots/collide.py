@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 
 HULL = "hull"
 _SHARE, _LEAST_SHARE = 0.02, 0.003  # of the longest sides of link and robot: the tolerance that none gave
-_AIM = 0.85  # of a tolerance that was given: hulls of fewer corners and faces are off by some of it on top
+# Of a tolerance that was given: what makes meshes and hulls simpler is off by a tenth of it each, on top.
+_AIM = 0.85
 _EXTRA = 0.08  # of its volume: what the hulls of a link may add
 _WORTH = 0.7  # two chords for one save three quarters
 _FINER = 1  # times a link's tolerance is halved where it overlaps a neighbour more than its mesh did
@@ -115,9 +116,11 @@ class CollideOptions:
             raise SettingError(f"tolerance: expected a length above 0, got {self.tolerance!r}")
         return length
 
-    def aim(self, length: float) -> float:
-        """What the search keeps to, so that its shapes keep to a tolerance of this length."""
-        return length if self.tolerance is None else _AIM * length
+    def wishes(self, tolerance: float, kinds: tuple[type[Field], ...], hulls: bool) -> Wishes:
+        """What is asked of a link's shapes, so that they keep to this tolerance, in metres."""
+        aimed = self.tolerance is not None and self.mode == "nearest"
+        aim = _AIM * tolerance if aimed else tolerance
+        return Wishes(aim, kinds, hulls, self.max_parts, self.most_extra, self.mode, self.worth)
 
 
 @dataclass(frozen=True)
@@ -172,18 +175,7 @@ def collide(
     whole = float(np.ptp(np.concatenate(corners), axis=0).max()) if links else 0.0
     volumes = {name: body.volume() for name, body in bodies.items()}
     tolerances = {name: options.length(target.size, whole) for name, target in wanted.items()}
-    wishes = {
-        name: Wishes(
-            options.aim(tolerances[name]),
-            kinds,
-            hulls,
-            options.max_parts,
-            options.most_extra,
-            options.mode,
-            options.worth,
-        )
-        for name in wanted
-    }
+    wishes = {name: options.wishes(tolerances[name], kinds, hulls) for name in wanted}
     shapes: dict[str, list[Shape]] = {}
     made: dict[tuple[Target, Wishes], list[Shape]] = {}
     todo = {link.name for link in links}

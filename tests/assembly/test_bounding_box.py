@@ -56,6 +56,37 @@ def test_a_hundred_thousand_copies_are_bounded_at_once() -> None:
     assert time.process_time() - start < 5.0  # one by one they took half a minute
 
 
+def test_groups_in_groups_are_bounded_at_once() -> None:
+    """Pairs of groups would take pairs of their members, and so on down."""
+    rng = np.random.default_rng(0)
+
+    def group(depth: int) -> Part | Assembly:
+        if depth == 0:
+            field = SuperFrustum(tuple(rng.uniform(0.1, 0.4, 3)), 0.5, 0.05, 0.9, 0.3)
+            return Part(field, tuple(rng.uniform(-1, 1, 3)), tuple(rng.normal(size=4)), blend=0.2)
+        return Assembly(tuple(group(depth - 1) for _ in range(3)), blend=0.2)
+
+    start = time.process_time()
+    assert np.isfinite(group(4).bounds()).all()
+    assert time.process_time() - start < 3.0
+
+
+def test_nothing_lies_outside_of_many_that_melt_together() -> None:
+    """Two at one place reach a quarter of their blend farther than either."""
+    rng = np.random.default_rng(3)
+    for count in (12, 40):
+        places = np.repeat(0.5 * rng.normal(size=(count, 3)), 2, axis=0)
+        parts = tuple(Part(Sphere(0.2), tuple(place), blend=0.4) for place in places)
+        lower, upper = Assembly(parts).bounds()
+        points = rng.uniform(lower - 0.3, upper + 0.3, (200_000, 3))
+        outside = ((points < lower) | (points > upper)).any(axis=1)
+        distance = Assembly(parts).distance(points)
+        assert distance[outside].min() > -1e-6
+        alone = np.concatenate([part.bounds() for part in parts])
+        melted = points[distance < 0]
+        assert (melted.min(axis=0) < alone.min(axis=0) - 0.05).all()
+
+
 def test_half_ring() -> None:
     """bulge 1: an arc of a half circle around (0, 0, 0) with radius sz/2, towards -x."""
     bounds = Part(SuperFrustum((0.2, 0.2, 2.0), roundness=1.0, bulge=1.0)).bounds()

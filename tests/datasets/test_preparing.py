@@ -193,20 +193,23 @@ def test_products_of_a_step_file_are_its_parts(tmp_path: Path) -> None:
     np.testing.assert_allclose(exact.translation, meshes.translation, atol=0.02)
 
 
-def test_a_part_in_a_shapes_folder_may_be_a_step_file(tmp_path: Path) -> None:
-    """But not the one that the mesh beside it was made of."""
+def test_parts_in_a_shapes_folder_may_be_step_files(tmp_path: Path) -> None:
+    """But not beside meshes: those were made of them, of each or of all in one."""
     pytest.importorskip("OCP")
     source = folders_of_parts(tmp_path / "in", 2)
     foot = pw.Part(Box(size=(2 * FOOT[0], 2 * FOOT[1], 2 * FOOT[2])), name="foot")
-    (source / "thing_0" / "foot.ply").unlink()
-    for number in range(2):
-        pw.export(pw.Assembly((foot,), unit="mm"), source / f"thing_{number}" / "foot.step")
+    for mesh in (source / "thing_0").glob("*.ply"):
+        mesh.unlink()
+    for name in ("thing_0/foot.step", "thing_1/foot.step", "thing_1/thing.step"):
+        pw.export(pw.Assembly((foot,), unit="mm"), source / name)
     made = prepare(source, tmp_path / "out", samples=SAMPLES, workers=1)
     assert made.refused == ()
     assert made.family.parts == ("foot", "head")
     exact = made.family.load(0)
-    assert exact.present.tolist() == [1, 1]
-    np.testing.assert_allclose(np.sort(exact.scale[0]) / exact.scale[0].max(), np.sort(FOOT), atol=0.05)
+    assert exact.present.tolist() == [1, 0]
+    np.testing.assert_allclose(
+        np.sort(exact.scale[0]) / exact.scale[0].max(), np.sort(FOOT) / max(FOOT), atol=0.05
+    )
 
 
 def test_files_that_are_not_read_are_named_in_one_line(tmp_path: Path) -> None:

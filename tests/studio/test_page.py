@@ -254,8 +254,8 @@ def test_the_size_is_that_of_the_surface(shared: Callable[..., Page]) -> None:
     halved = Assembly((Part(Box((40, 40, 16))), Part(Box((100, 100, 100)), (0, 0, 52))), "difference")
     for parts, operation, size in (
         ((block, slot), "difference", "30 × 20 × 10 mm"),
-        ((block, turned_ball), "union", "65 × 20 × 20 mm"),
-        ((halved, Part(Sphere(1))), "union", "40 × 40 × 10 mm"),
+        ((block, turned_ball), "union", "≈ 65 × 20 × 20 mm"),
+        ((halved, Part(Sphere(1))), "union", "≈ 40 × 40 × 10 mm"),
     ):
         page = shared(Assembly(parts, operation, unit="mm"))
         sides = page.page.locator("dt:text-is('Size') + dd")

@@ -11,7 +11,7 @@ const ALIKE = 0.1; // cells: a side of the parts' own box is exact where the sur
 
 export interface Side {
   length: number;
-  /** Of the parts' own numbers; else measured, to a thousandth or two of the longest. */
+  /** Of the parts' own numbers; else measured on a grid, where what is thinner than a cell may be missed. */
   exact: boolean;
 }
 

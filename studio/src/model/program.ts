@@ -9,7 +9,7 @@ import { programDistance } from "./distance";
 import { fieldBox, quadric, superfrustum } from "./fields";
 import { isLearned } from "./learned";
 import { type Swept, swept } from "./profiles";
-import { type Group, type Node, type Part, bodies, isGroup, leaves, poses } from "./tree";
+import { type Group, type Node, type Part, isGroup, leaves, poses } from "./tree";
 import {
   type Box,
   type Vec3,
@@ -120,21 +120,14 @@ export function solidBox(node: Node): Box {
 
 /** A frame in which all that ends is centred, with a longest side of 1.8; extra: what it holds instead. */
 export function unitFrame(root: Group, extra: Box | null = null): Frame {
-  const solid = [...bodies(root)];
-  const boxes = solid.map(partBox).filter(isFinite3);
-  let box = boxes.reduce(joinBoxes, EMPTY);
-  if (extra) box = extra;
-  else if (boxes.length < solid.length) {
-    const rough = roughBox(root);
-    if (rough) box = boxes.length ? sharedBoxOr(joinBoxes(box, rough), rough) : rough;
-  }
+  let box = extra ?? solidBox(root);
+  if (!isFinite3(box)) box = ([...leaves(root)].length && roughBox(root)) || EMPTY;
+  if (isEmpty(box)) box = [...leaves(root)].map(partBox).filter(isFinite3).reduce(joinBoxes, EMPTY);
   const side = isEmpty(box) ? 0 : longestSide(box);
   if (!(side > 0)) return { scale: 1, offset: [0, 0, 0] };
   const scale = 1.8 / side;
   return { scale, offset: mul(middle(box), -scale) };
 }
-
-const sharedBoxOr = (box: Box, otherwise: Box): Box => (isEmpty(box) ? otherwise : box);
 
 /** Where an assembly with unbounded leaves lies, found by subdivision from ever larger cubes. */
 function roughBox(root: Group): Box | null {

@@ -173,12 +173,6 @@ export function* leaves(node: Node): Generator<Part> {
   else for (const child of node.children) yield* leaves(child);
 }
 
-/** The leaves that are not taken away from anything. */
-export function* bodies(node: Node): Generator<Part> {
-  if (!isGroup(node)) yield node;
-  else for (const child of node.operation === "difference" ? node.children.slice(0, 1) : node.children) yield* bodies(child);
-}
-
 export function* nodes(node: Node): Generator<Node> {
   yield node;
   if (isGroup(node)) for (const child of node.children) yield* nodes(child);

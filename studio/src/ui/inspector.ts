@@ -85,16 +85,23 @@ export class Inspector {
 
   /** Measured once all is still, as that takes a moment. */
   private measure(): void {
+    const { root, selected, program, size } = this.store;
+    if (selected.length || !program.parts.length || this.measured === root) return;
+    this.measured = root;
+    this.sides.textContent = "…";
     clearTimeout(this.measuring);
-    if (this.store.selected.length || !this.store.program.parts.length || this.measured === this.store.root) return;
     this.measuring = setTimeout(async () => {
-      const { root } = this.store;
-      const measured = await extent(this.store).catch(() => []);
-      if (root !== this.store.root) return;
-      this.measured = root;
-      const { size } = this.store;
-      const sides = measured.map(({ length, exact }) => formatLength(length, exact ? size : ROUGH * size));
-      this.sides.textContent = sides.length ? `${sides.join(" × ")} ${root.unit ?? ""}` : "?";
+      const say = (text: string) => {
+        if (this.measured === root) this.sides.textContent = text;
+      };
+      try {
+        const sides = await extent(this.store);
+        const about = sides.every(({ exact }) => exact) ? "" : "≈ ";
+        const lengths = sides.map(({ length, exact }) => formatLength(length, exact ? size : ROUGH * size));
+        say(sides.length ? `${about}${lengths.join(" × ")} ${root.unit ?? ""}` : "nothing is there");
+      } catch (error) {
+        say(`not measured: ${error}`);
+      }
     }, STILL);
   }
 
