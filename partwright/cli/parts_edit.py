@@ -49,7 +49,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     def option(name: str, metavar: str, text: str) -> None:
         edits.add_argument(name, metavar=metavar, action=_Edit, dest="edits", default=[], help=text)
 
-    option("--swap", "PART=SHAPE", "take the part's form from another shape of the same model")
+    option(
+        "--swap", "PART=SHAPE", "take the part's form from MODEL:SHAPE, or a file or folder of the same model"
+    )
     option("--resample", "PART=SEED", "give the part a random form")
     option("--move", "PART=X,Y,Z", "move the part")
     option("--turn", "PART=X,Y,Z,DEGREES", "turn the part about its centre, around an axis")
@@ -59,7 +61,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def _reads(arguments: argparse.Namespace) -> list[Path]:
-    others = [shape_text(text.partition("=")[2]) for name, text in arguments.edits if name == "swap"]
+    named = [text.partition("=")[2] for name, text in arguments.edits if name == "swap"]
+    others = [shape_text(text) for text in named if text]
     return given(arguments.shape, arguments.model, *others)
 
 

@@ -48,7 +48,7 @@ class Reach(NamedTuple):
 
 @dataclass(frozen=True)
 class Inset:
-    """A part that lies in others. reach: of training shapes; share: of its surface that is farther than any;
+    """A part that lies in others. reach: of training shapes; share: of its mesh's vertices, farther than any;
     points (K, 3): of its surface, unit frame."""
 
     part: str

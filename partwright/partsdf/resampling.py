@@ -42,10 +42,10 @@ def sound_samples(
 ) -> list[Sample]:
     """As `Generator.generate`, each made anew until it is sound, up to `tries` times in all.
 
-    What is sound at once is what `generate` makes; 1 try takes all as they come. A part that comes through
-    another is drawn back, unless it is to stay. What is broken else is made anew: new noise takes over more
-    of it with each try, then all. Replaced by anything, shapes that often come apart, as benches, would be
-    rare.
+    What is sound at once is what `generate` makes; 1 try takes all as they come. Parts that stand out of
+    others are put back, and one that comes through another is drawn back, unless it is to stay. What is
+    broken else is made anew: new noise takes over more of it with each try, then all. Replaced by anything,
+    shapes that often come apart, as benches, would be rare.
 
     Raises:
         SettingError: no try is allowed; else as `Generator.generate`.
