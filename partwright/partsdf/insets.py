@@ -70,7 +70,7 @@ def reaches(trained: Iterable[tuple[NeuralShape, dict[str, trimesh.Trimesh]]]) -
     """Of the parts that lie in others in all training shapes, by name."""
     found: dict[str, list[float]] = {}
     for shape, parts in trained:
-        for name, far in _distances(shape, parts).items():
+        for name, far in _distances(shape, parts, parts).items():
             found.setdefault(name, []).append(float(np.quantile(far, _MOST)))
     return {
         name: Reach(float(np.median(far)) + _SLACK, max(far) + _SLACK)
@@ -85,20 +85,21 @@ def insets(
     """The parts that are known to lie in others, by the parts' own meshes (unit frame)."""
     rng = np.random.default_rng(0)
     found = []
-    for name, far in _distances(shape, parts).items():
-        if name in known:
-            points = rng.permutation(np.asarray(parts[name].vertices, np.float32))[:_PLACES]
-            share = float((far > known[name].most).mean())
-            found.append(Inset(name, known[name], share, points))
+    for name, far in _distances(shape, parts, known).items():
+        points = rng.permutation(np.asarray(parts[name].vertices, np.float32))[:_PLACES]
+        share = float((far > known[name].most).mean())
+        found.append(Inset(name, known[name], share, points))
     return tuple(found)
 
 
-def _distances(shape: NeuralShape, parts: dict[str, trimesh.Trimesh]) -> dict[str, np.ndarray]:
-    """(V,) of the vertices of each part's mesh from all other parts, by name."""
+def _distances(
+    shape: NeuralShape, parts: dict[str, trimesh.Trimesh], names: Collection[str]
+) -> dict[str, np.ndarray]:
+    """(V,) of the vertices of the mesh of each part of these names from all other parts, by name."""
     return {
         name: np.delete(shape.part_distances(np.asarray(parts[name].vertices)), number, axis=0).min(axis=0)
         for number, name in enumerate(shape.names())
-        if name in parts and len(parts) > 1
+        if name in names and name in parts and len(parts) > 1
     }
 
 
