@@ -43,17 +43,26 @@ def _united(children: Sequence[Node], level: float) -> np.ndarray:
     The smooth minimum of a and b with a blend of k lies below both where these differ by less than k, by at
     most k/4. So it is below a level L where a or b is, and beyond these only where one is below L + k/4
     and the other below L + k: within what both boxes share at those levels. Pairs are looked at among a few
-    parts; of more, and of groups, where that would take pairs of pairs, each may reach to L + k.
+    members; of more, each may reach to L + k. What a group adds to is seen at the highest of the levels
+    alone: asked at each, groups in groups would take pairs of pairs.
     """
     own = [_boxes_of(child, level) for child in children]
     boxes = np.concatenate(own)
     blends = np.repeat([child.blend for child in children], [len(of) for of in own])
     blends[0] = 0.0
-    members = [copy for child in children if child.is_part and len(boxes) <= _PAIRS for copy in child.copies]
-    if len(members) < len(boxes):
+    if not blends.any():
+        return _joined(boxes)
+    if len(boxes) > _PAIRS:
         melted = [_boxes_of(child, level + child.blend) for child in children]
         return _joined(np.concatenate([boxes, np.concatenate(melted)[blends > 0]]))
+    members = [copy for child in children for copy in (child.copies if child.is_part else (child,))]
     lowered = np.cumsum(blends) / 4  # by how much the union of all up to each may lie below its members
+    highest = level + float(blends.max() + lowered[-1])
+    groups = {index: bounding_box(node, highest) for index, node in enumerate(members) if not node.is_part}
+
+    def below(index: int, level: float) -> np.ndarray:
+        return groups[index] if index in groups else bounding_box(members[index], level)
+
     result = boxes[0]
     for last in range(1, len(members)):
         result = _joined([result, boxes[last]])
@@ -62,13 +71,13 @@ def _united(children: Sequence[Node], level: float) -> np.ndarray:
         reach = bounding_box(members[last], level + blend)
         if _holds(result, reach):
             continue
-        near = bounding_box(members[last], level + blend / 4)
+        near = _shared(below(last, level + blend / 4), reach)
         for one in range(last):
             drop = float(lowered[last - 1] - (lowered[one - 1] if one else 0.0))
-            far = _shared(bounding_box(members[one], level + blend + drop), reach)
+            far = _shared(below(one, level + blend + drop), reach)
             if _is_empty(far) or _holds(result, far):
                 continue
-            close = _shared(bounding_box(members[one], level + blend / 4 + drop), reach)
+            close = _shared(below(one, level + blend / 4 + drop), reach)
             shared = [box for box in (close, _shared(far, near)) if not _is_empty(box)]
             result = _joined([result, *shared])
     return result
