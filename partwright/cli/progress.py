@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from partwright.cli.terminal import counted, note, printable
 
 _QUIET = 1.0  # seconds between plain lines of one stage
+_PATIENT = 10.0  # the same, where they tell nothing but the time
 # Where on the bar each begins: reading takes what is before the fit, writing what is left.
 _FIT, _SCORES, _WRITING = 0.1, 0.75, 0.85
 
@@ -82,6 +83,14 @@ class Display(_Shown):
             self._bar.update(self._task, description=name, completed=done)
         else:
             note(name)
+
+    def wait(self, name: str, seconds: float) -> None:
+        """A stage of which nothing is known but how long it has been at work."""
+        if self._bar:
+            self._bar.update(self._task, description=name, detail=f"{seconds:.0f} s")
+        elif seconds > _PATIENT and time.monotonic() - self._last_time > _PATIENT:
+            note(f"{name}: {seconds:.0f} s")
+            self._last_time = time.monotonic()
 
 
 class Count(_Shown):

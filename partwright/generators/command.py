@@ -59,13 +59,12 @@ class Command:
             CancelledError: it was cancelled.
         """
         with TemporaryDirectory() as place, TemporaryFile() as said:
-            folder = Path(place) / "folder"
-            folder.mkdir()
-            output = Path(place) / "output.glb"
-            paths = {"input": str(image.absolute()), "output": str(output), "folder": str(folder)}
+            folder = Path(place)
+            output = folder / "output.glb"
+            paths = {"input": str(image.absolute()), "output": str(output), "folder": place}
             words = [_PLACEHOLDER.sub(lambda found: paths[found[1]], word) for word in self.words]
             self._run(words, said, deadline)
-            return self._written(output, folder, said)
+            return self._written(output, said)
 
     def _run(self, words: list[str], said: IO[bytes], deadline: Deadline) -> None:
         try:
@@ -89,14 +88,17 @@ class Command:
             )
             raise GeneratorError(f"{self.name} failed with {how}{_last_words(said)}")
 
-    def _written(self, output: Path, folder: Path, said: IO[bytes]) -> bytes:
-        there = [output] if output.is_file() else sorted(p for p in folder.rglob("*.glb") if p.is_file())
-        if not there:
-            raise GeneratorError(f"{self.name} ended well but wrote no GLB{_last_words(said)}")
-        if len(there) > 1:
-            names = ", ".join(str(path.relative_to(folder)) for path in there[:5])
+    def _written(self, output: Path, said: IO[bytes]) -> bytes:
+        """The GLB where it was to be, or the only one in that folder, as many programs choose the name."""
+        left = [output] if output.is_file() else sorted(p for p in output.parent.rglob("*") if p.is_file())
+        there = [path for path in left if path.suffix.lower() == ".glb"]
+        if len(there) == 1:
+            return there[0].read_bytes()
+        names = ", ".join(str(path.relative_to(output.parent)) for path in (there or left)[:5])
+        if there:
             raise GeneratorError(f"{self.name} left {len(there)} GLB files ({names}); expected one")
-        return there[0].read_bytes()
+        place = f"where it was to be are {names}" if left else "nothing is where {output} or {folder} said"
+        raise GeneratorError(f"{self.name} ended well but wrote no GLB: {place}{_last_words(said)}")
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import time
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from partwright.atomic_io import replacing_files
-from partwright.errors import UnreadableFileError
+from partwright.errors import PartwrightError, UnreadableFileError
 from partwright.generators.command import Command
 from partwright.generators.deadline import Deadline
 from partwright.generators.glb import check_glb
@@ -31,6 +32,7 @@ def shape_from_image(
     up: str | None = None,
     thickness: Length | None = None,
     cancel: Cancellation | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Shape:
     """The shape that a generator makes of a picture (SuperFrusta, section 5).
 
@@ -41,9 +43,11 @@ def shape_from_image(
             leaves one GLB; or the address of a service, http:// or https://, which takes a POST of
             `{"image": "<base64>"}` and answers with a GLB.
         time_limit: seconds after which the generator is ended, with all that it has started.
-        keep: where its mesh is written (.glb), as soon as it could be read; its folder is made if need be.
+        keep: where its mesh is written (.glb), as soon as it is there and though it may be none that can be
+            fitted; its folder is made if need be.
         unit, up, thickness: as of `load_shape`; a GLB is in metres with Y up, where nothing else is said.
         cancel: ends the generator, from any thread.
+        progress: called with the seconds that the generator has been at work, some twenty times a second.
 
     Returns:
         A shape with the picture's name, whose `repairs` begin with where it is from.
@@ -60,16 +64,22 @@ def shape_from_image(
     check_number("time limit", time_limit, low=0.1)
     generator = Service.of(via) if is_address(via) else Command.of(via)
     check_image(image)
-    deadline = Deadline(time_limit, cancel or Cancellation())
+    deadline = Deadline(time_limit, cancel or Cancellation(), progress)
     data = generator.mesh_of(image, deadline)
     check_glb(data, generator.name)
+    if (
+        keep is not None
+    ):  # first: what is no shape yet may be one with other options, and took minutes to make
+        with replacing_files(Path(keep).parent) as staging:
+            (staging / Path(keep).name).write_bytes(data)
     with TemporaryDirectory() as folder:
         made = Path(folder) / f"{image.stem or 'image'}.glb"
         made.write_bytes(data)
-        shape = load_shape(made, unit, up, thickness)
-    if keep is not None:
-        with replacing_files(Path(keep).parent) as staging:
-            (staging / Path(keep).name).write_bytes(data)
+        try:
+            shape = load_shape(made, unit, up, thickness)
+        except PartwrightError as error:
+            kept = f", kept as {keep}" if keep is not None else ""
+            raise type(error)(f"what {generator.name} made{kept}: {error}") from error
     shape.name, shape.file = image.stem, image.name
     shape.repairs = (f"a generator made this shape of {image.name}", *shape.repairs)
     shape.reading_seconds = time.perf_counter() - started

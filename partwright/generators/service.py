@@ -114,7 +114,8 @@ class _Asking(threading.Thread):
         self._connection.request("POST", self._service.target, self._body, headers)
         response = self._connection.getresponse()
         if response.status != 200:
-            said = quoted(response.read(_CHUNK))
+            elsewhere = response.getheader("Location")
+            said = f"it sends to {quoted(elsewhere.encode())}" if elsewhere else quoted(response.read(_CHUNK))
             raise GeneratorError(
                 f"{self._service.name} answered {response.status} {response.reason}"
                 + (f": {said}" if said else "")

@@ -9,6 +9,7 @@ import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from partwright.errors import EmptyShapeError, NotFiniteError, UnreadableFileError
 from partwright.shapes.array_files import check_shape_file
+from partwright.shapes.cleaning import counted
 from partwright.shapes.gltf_tree import check_gltf
 from partwright.shapes.point_cloud import source_of_points
 from partwright.shapes.source import Piece, Source, in_utf8, unique_names
@@ -55,20 +57,34 @@ def read_mesh(path: Path) -> Source:
     stem = in_utf8(path.stem)
     scene = load_scene(path, suffix)
     pieces = tuple(unique_names(_pieces(scene, stem)))
-    if not pieces:
-        return _source_without_faces(stem, list(scene.geometry.values()))
+    clouds = _clouds(scene, stem)
+    if pieces:
+        points = sum(map(len, clouds))
+        note = (
+            (f"left out {counted(points, 'point')} that came without faces beside the mesh",)
+            if points
+            else ()
+        )
+        source = Source(stem, pieces, repairs=note)
+    elif clouds:
+        normals = _ply_normals(next(iter(scene.geometry.values()))) if len(scene.geometry) == 1 else None
+        source = source_of_points(stem, np.concatenate(clouds), normals)
+    else:
+        raise EmptyShapeError(f"{stem}: holds no triangles; export the shape again with its mesh")
     is_gltf = suffix in (".glb", ".gltf")
-    return Source(stem, pieces, "m" if is_gltf else None, "y" if is_gltf else None)
+    return replace(source, unit="m", up="y") if is_gltf else source
 
 
-def _source_without_faces(name: str, geometries: list[Any]) -> Source:
-    """The points of a file that holds nothing else, with the normals that a PLY's header names."""
-    clouds = [g for g in geometries if len(getattr(g, "vertices", ()))]
-    if not clouds:
-        raise EmptyShapeError(f"{name}: holds no triangles; export the shape again with its mesh")
-    points = np.concatenate([np.asarray(cloud.vertices, dtype=np.float64) for cloud in clouds])
-    normals = _ply_normals(clouds[0]) if len(clouds) == 1 else None
-    return source_of_points(name, points, normals)
+def _clouds(scene: trimesh.Scene, stem: str) -> list[NDArray[np.float64]]:
+    """Points (N, 3) in world space of each node that has vertices and no faces, as a scan has."""
+    clouds = []
+    for node in scene.graph.nodes_geometry:
+        geometry = str(scene.graph[node][1])
+        if not len(getattr(scene.geometry[geometry], "faces", ())):
+            points, _ = _placed(scene, node, geometry, stem)
+            if len(points):
+                clouds.append(points)
+    return clouds
 
 
 def _ply_normals(cloud: Any) -> NDArray[np.float64] | None:

@@ -61,6 +61,13 @@ def main(way: str, picture: str, place: str) -> None:
             (out / "0").mkdir()
             (out / "0" / "input.png").write_bytes(taken)
             (out / "0" / "mesh.glb").write_bytes(glb_of(taken))
+        case "names it itself":  # beside the path that it was given
+            out.with_name("shape_00.GLB").write_bytes(glb_of(taken))
+        case "makes a folder of it":
+            out.mkdir()
+            (out / "mesh.glb").write_bytes(glb_of(taken))
+        case "leaves an OBJ":
+            out.with_name("mesh.obj").write_text("v 0 0 0")
         case "leaves two":
             for name in ("a.glb", "b.glb"):
                 (out / name).write_bytes(glb_of(taken))

@@ -46,7 +46,16 @@ def command(way: str, place: str = "{output}") -> str:
     return f"{shlex.quote(sys.executable)} {shlex.quote(str(STAND_IN))} {shlex.quote(way)} {{input}} {place}"
 
 
-@pytest.mark.parametrize(("way", "place"), [("writes", "{output}"), ("leaves", "{folder}")])
+@pytest.mark.parametrize(
+    ("way", "place"),
+    [
+        ("writes", "{output}"),
+        ("leaves", "{folder}"),
+        ("names it itself", "{output}"),
+        ("makes a folder of it", "{output}"),
+        ("names it itself", "{folder}/out.glb"),
+    ],
+)
 def test_a_command_makes_the_shape(photo: Path, tmp_path: Path, way: str, place: str) -> None:
     kept = tmp_path / "new" / "mesh.glb"
     shape = pw.shape_from_image(photo, command(way, place), keep=kept)
@@ -74,9 +83,9 @@ def test_fit_keeps_the_mesh_beside_the_result(method: BoxMethod, photo: Path, tm
         (command("empty"), "answered with nothing"),
         (command("cut"), "of which 200 are there"),
         (command("old"), "version 1; expected version 2"),
-        (command("flat"), "photo of a box"),
         (command("fails"), "failed with exit code 1: CUDA out of memory"),
-        (command("nothing"), "wrote no GLB: all is well"),
+        (command("nothing"), r"wrote no GLB: nothing is where \{output\} or \{folder\} said: all is well"),
+        (command("leaves an OBJ"), r"wrote no GLB: where it was to be are mesh\.obj"),
         (command("leaves two", "{folder}"), r"2 GLB files \(a.glb, b.glb\)"),
         ("/no/such/program {input} {output}", "cannot be started: No such file"),
         ("program {input}", "{output} for the GLB"),
@@ -94,6 +103,24 @@ def test_what_goes_wrong_is_one_line_and_leaves_nothing(
     assert len(errors) == 1
     assert re.search(said, errors[0])
     assert not (tmp_path / "out").exists()
+
+
+def test_a_mesh_that_cannot_be_fitted_is_kept_and_named(
+    photo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept = tmp_path / "out" / GENERATED
+    assert main(["fit", str(photo), "--via", command("flat"), "-o", str(kept.parent)]) == 2
+    assert f"made, kept as {kept}: photo of a box: " in capsys.readouterr().err
+    assert kept.read_bytes() == stand_in.box_glb(3, 2, 0)
+    assert list(kept.parent.iterdir()) == [kept]
+
+
+def test_waiting_is_told(
+    photo: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("partwright.cli.progress._PATIENT", 0.2)
+    assert main(["fit", str(photo), "--via", command("sleeps"), "--via-timeout", "0.7"]) == 2
+    assert capsys.readouterr().err.count("generating: ") > 1
 
 
 def test_a_command_that_takes_too_long_is_ended_with_its_children(photo: Path) -> None:
@@ -159,6 +186,11 @@ class Handler(BaseHTTPRequestHandler):
                 kind, body = "application/json", b'{"uid": "7"}'
             case "/empty":
                 body = b""
+            case "/moved":
+                self.send_response(302)
+                self.send_header("Location", "/generate")
+                self.end_headers()
+                return
             case "/slow":
                 time.sleep(3)
                 return
@@ -196,6 +228,7 @@ def test_a_service_makes_the_shape(service: str, photo: Path) -> None:
     [
         ("page", r"an HTML page \(Welcome\)"),
         ("refuses", r"answered 404 Not Found: .*NETWORK ERROR"),
+        ("moved", "answered 302 Found: it sends to /generate"),
         ("json", r'JSON: \{"uid": "7"\}'),
         ("empty", "answered with nothing"),
         ("slow", r"not done after 0\.5 s"),

@@ -158,6 +158,28 @@ def test_point_clouds_and_vertices_without_faces_are_points():
     assert load_shape((points, np.zeros((0, 3), int))).volume == volume
 
 
+def test_points_in_a_glb_lie_where_their_nodes_put_them_in_metres(tmp_path):
+    points, _ = cloud(trimesh.creation.box((1, 2, 3)))
+    scene = trimesh.Scene()
+    for x in (0, 4):  # two boxes of one scan, apart, each twice as large
+        move = trimesh.transformations.translation_matrix((x, 10, 0)) @ np.diag([2, 2, 2, 1])
+        scene.add_geometry(trimesh.PointCloud(points), node_name=f"scan {x}", transform=move)
+    scene.export(tmp_path / "scan.glb")
+    shape = load_shape(tmp_path / "scan.glb")
+    assert (shape.unit, shape.up) == ("m", "y")
+    assert shape.points.min(axis=0) == pytest.approx([-1, 8, -3], abs=0.05)
+    assert shape.points.max(axis=0) == pytest.approx([5, 12, 3], abs=0.05)
+
+
+def test_points_beside_a_mesh_are_left_out_and_told(tmp_path):
+    scene = trimesh.Scene([trimesh.creation.box((1, 2, 3))])
+    scene.add_geometry(trimesh.PointCloud(np.full((700, 3), 5.0)))
+    scene.export(tmp_path / "both.glb")
+    shape = load_shape(tmp_path / "both.glb")
+    assert shape.volume == pytest.approx(6)
+    assert any("left out 700 points" in note for note in shape.repairs)
+
+
 def test_the_same_points_give_the_same_mesh():
     points, _ = cloud(tee())
     first, second = load_shape(points), load_shape(points.copy())

@@ -76,4 +76,5 @@ def _shape(arguments: argparse.Namespace, display: Display, cancel: Cancellation
             up=arguments.up,
             thickness=arguments.thickness,
             cancel=cancel,
+            progress=lambda seconds: display.wait("generating", seconds),
         )
