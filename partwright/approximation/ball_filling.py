@@ -114,7 +114,7 @@ class _Search:
         chosen = self._rng.permutation(len(self._places))[:most]
         chosen = np.unique(np.append(chosen, self._deep.argmax()))
         centres = self._at(self._places[chosen])
-        reach = 2 * self._deep[chosen] + 2 * self._cell
+        reach = self._reach(centres, 2 * self._deep[chosen] + 2 * self._cell)
         waiting = [(-self._best(c, r)[1], i) for i, (c, r) in enumerate(zip(centres, reach, strict=True))]
         heapq.heapify(waiting)
         while waiting and len(self._balls) < count:
@@ -148,9 +148,8 @@ class _Search:
             self._count(ball, -1)
             tried = self._rng.choice(left, min(_TRIED, len(left)), replace=False)
             centres = self._at(self._places[tried])
-            found = [
-                self._best(c, 2 * d + 2 * self._cell) for c, d in zip(centres, self._deep[tried], strict=True)
-            ]
+            reach = self._reach(centres, 2 * self._deep[tried] + 2 * self._cell)
+            found = [self._best(c, r) for c, r in zip(centres, reach, strict=True)]
             best = max(range(len(found)), key=lambda i: found[i][1])
             if found[best][1] > max(ball.gain, 0.0):
                 ball.centre, (ball.radius, ball.gain), moved = centres[best], found[best], True
@@ -166,10 +165,10 @@ class _Search:
 
     def _move(self, ball: _Ball) -> None:
         self._count(ball, -1)
-        reach = 1.3 * ball.radius + 2 * self._cell
-        ball.radius, ball.gain = self._best(ball.centre, reach)
         places = ball.centre + ball.step * _MOVES
-        found = [self._best(place, reach) for place in places]
+        own, *reach = self._reach(np.vstack([ball.centre, places]), 1.3 * ball.radius + 2 * self._cell)
+        ball.radius, ball.gain = self._best(ball.centre, own)
+        found = [self._best(place, most) for place, most in zip(places, reach, strict=True)]
         best = max(range(len(found)), key=lambda i: found[i][1])
         if found[best][1] > ball.gain:
             ball.centre, (ball.radius, ball.gain) = places[best], found[best]
@@ -177,14 +176,20 @@ class _Search:
             ball.step /= 2
         self._count(ball, 1)
 
+    def _reach(self, centres: np.ndarray, most: np.ndarray | float) -> list[float]:
+        """How large balls about centres (N, 3) may be: at most so large (N,), and as their place allows."""
+        reach = np.broadcast_to(most, len(centres))
+        if self._place == "within":
+            reach = self._depth(centres)
+        elif self._place == "in":
+            reach = np.minimum(reach, _OUT * self._depth(centres))
+        return [float(one) for one in reach]
+
     def _best(self, centre: np.ndarray, reach: float) -> tuple[float, float]:
         """The radius up to `reach` that gains most at a place of what no ball covers yet, and how many cells
         that is."""
-        if self._place != "anywhere":
-            depth = float(self._depth(centre[None])[0])
-            reach = depth if self._place == "within" else min(reach, _OUT * depth)
-            if reach <= 0:
-                return 0.0, 0.0
+        if reach <= 0:
+            return 0.0, 0.0
         box, far = self._around(centre, reach)
         bins = int(np.ceil(reach / self._cell * _BINS))
         which = (far * (_BINS / self._cell)).astype(np.intp).ravel()

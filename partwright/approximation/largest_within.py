@@ -93,6 +93,8 @@ def _maximised(
             bend = weight * (sums.T * (powers / terms**2)) @ sums + (rows.T / slack**2) @ rows
             step = np.linalg.solve(bend, slope)
             gain = float(slope @ step)
+            if gain < _BETTER * max(weight, 1.0):
+                break
             here, share = value(x, weight), 1.0
             for _ in range(_HALVINGS):
                 if value(x + share * step, weight) >= here + 0.1 * share * gain:
@@ -101,8 +103,6 @@ def _maximised(
             else:
                 break
             x = x + share * step
-            if gain < _BETTER * max(weight, 1.0):
-                break
         if len(limits) / weight < _GAP:
             return x
         weight *= _STEEPER

@@ -212,21 +212,32 @@ class Deviation:
 def largest_deviation(solid: Manifold, shapes: Manifold) -> Deviation:
     """By points about an eightieth of the size apart."""
     size = float(np.ptp(np.reshape(solid.bounding_box(), (2, 3)), axis=0).max())
-    lacks, where_it_lacks = _beyond(solid - shapes, shapes, size)
-    adds, where_it_adds = _beyond(shapes - solid, solid, size)
+    solid, shapes = solid.as_original(), shapes.as_original()
+    lacks, where_it_lacks = _beyond(solid, shapes, size)
+    adds, where_it_adds = _beyond(shapes, solid, size)
     missing = lacks > adds
     x, y, z = (where_it_lacks if missing else where_it_adds).tolist()
     return Deviation(max(lacks, adds), (x, y, z), missing)
 
 
-def _beyond(left: Manifold, solid: Manifold, size: float) -> tuple[float, np.ndarray]:
-    """left: what is not in the solid; what of its surface is the solid's own is at no distance from it. In
-    double precision: in single, the nearest place of a narrow triangle is up to a thousandth of the size off.
+def _beyond(one: Manifold, other: Manifold, size: float) -> tuple[float, np.ndarray]:
+    """How far what of one solid, an original, is not in another reaches from that, and where (3,).
+
+    Only its own surface is looked at: what bounds the rest else is the other's, at no distance, and often
+    nearly all. In double precision: in single, the nearest place of a narrow triangle is up to a thousandth
+    of the size off.
     """
     import igl
 
+    left = one - other
     if left.is_empty():
         return 0.0, np.zeros(3)
-    points = surface_of(left.refine_to_length(size / 80))[0]
-    squared, *_ = igl.point_mesh_squared_distance(points, *surface_of(solid))
+    mesh = left.refine_to_length(size / 80).to_mesh64()
+    ends = np.asarray(mesh.run_index) // 3
+    runs = zip(mesh.run_original_id, ends, ends[1:], strict=False)
+    own = [mesh.tri_verts[first:last] for of, first, last in runs if of == one.original_id()]
+    if not own:
+        return 0.0, np.zeros(3)
+    points = np.asarray(mesh.vert_properties, dtype=np.float64)[np.unique(np.concatenate(own)), :3]
+    squared, *_ = igl.point_mesh_squared_distance(points, *surface_of(other))
     return float(np.sqrt(squared.max())), points[squared.argmax()]

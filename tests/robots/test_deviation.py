@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from manifold3d import Manifold
+from manifold3d import Manifold, OpType
 
 from partwright.meshing.hulls import file_hull, hull_of
 from partwright.meshing.manifolds import surface_of
 from partwright.robots.solids import largest_deviation
+from partwright.shapes import MeshDistance
 
 
 def test_what_is_missing_and_what_is_added_is_told_with_its_place() -> None:
@@ -32,3 +33,27 @@ def test_narrow_triangles_are_measured_as_they_are() -> None:
     ]
     drum = hull_of(np.concatenate(rings) @ np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0])
     assert largest_deviation(drum, file_hull(surface_of(drum)[0])).length < 1e-5
+
+
+def test_what_lies_between_is_measured_on_its_own_surface_as_on_all_of_it() -> None:
+    """What bounds a gap else is the other's surface, at no distance."""
+    rng = np.random.default_rng(0)
+    block = Manifold.cube((4, 4, 4), True)
+    rods = Manifold.batch_boolean(
+        [
+            Manifold.cylinder(4.5, 0.4, circular_segments=12, center=True)
+            .rotate(tuple(rng.uniform(0, 180, 3)))
+            .translate(tuple(rng.uniform(-1, 1, 3)))
+            for _ in range(6)
+        ],
+        OpType.Add,
+    )
+    found = largest_deviation(block, rods)
+    for solid, other in ((block, rods), (rods, block)):
+        vertices, faces = surface_of(other)
+        points = surface_of((solid - other).refine_to_length(4 / 80))[0]
+        farthest = MeshDistance(vertices, faces, faces, True).exact(points).max()
+        assert largest_deviation(solid, other).length >= farthest - 1e-9
+        assert found.length >= farthest - 1e-9
+        if found.missing is (solid is block):
+            assert found.length == pytest.approx(farthest)

@@ -42,7 +42,7 @@ def test_enclosing_shapes_contain_every_point_of_the_visual_mesh(tmp_path: Path,
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_shapes_inside_reach_nowhere_beyond_the_mesh(tmp_path: Path, kind: str) -> None:
-    result = collide(mjcf(tmp_path), CollideOptions(inside=True, kinds=(kind,)))
+    result = collide(mjcf(tmp_path), CollideOptions(inside=True, kinds=(kind,), max_parts=12))
     base = next(link for link in result.robot.links if link.name == "base")
     solid = Solids().target(base, base.collisions).solid
     for shape in result.shapes["base"]:
@@ -120,7 +120,7 @@ def test_a_tolerance_tells_how_many_shapes_there_are() -> None:
 def test_native_solids_alone_are_not_stacked_thinner_and_thinner(tmp_path: Path) -> None:
     """Each has to save some volume, where no tolerance asks for more; the report says what is not kept."""
     path = urdf(tmp_path)
-    cone = trimesh.creation.cone(0.5, 1.0, sections=32)
+    cone = trimesh.creation.cone(0.5, 1.0, sections=12)
     cone.apply_translation((0, 0, 5))  # clear of the base
     cone.export(tmp_path / "meshes" / "rod.stl")
     found = {}
@@ -129,7 +129,7 @@ def test_native_solids_alone_are_not_stacked_thinner_and_thinner(tmp_path: Path)
         result = collide(path, options)
         found[tolerance] = next(link for link in result.links if link.link == "arm")
     few, many = found[None], found["0.1%"]
-    assert 4 <= few.count <= 24 < many.count == 48
+    assert 4 <= few.count <= 30 < many.count == 48
     assert few.missing + few.extra < many.missing + many.extra + 0.05
     assert few.deviation > few.tolerance
     (warning,) = [line for line in warnings([few]) if few.link in line]

@@ -15,7 +15,7 @@ from partwright.export import export
 from partwright.fields import Box, Sphere, SuperFrustum, Tube
 from partwright.meshing import mesh_assembly, mesh_part
 from partwright.shapes.corner_normals import corner_normals
-from partwright.textures import bake, load_colours, part_map
+from partwright.textures import Colours, bake, load_colours, part_map
 from partwright.textures.coordinates import directions, folded, frames
 from partwright.textures.likeness import likeness, map_normals, without_relief
 from partwright.textures.maps import RELIEF
@@ -43,6 +43,16 @@ def wavy(path: Path) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def colours(tmp_path_factory: pytest.TempPathFactory) -> Colours:
+    return load_colours(wavy(tmp_path_factory.mktemp("wavy") / "a.glb"))
+
+
+@pytest.fixture(scope="module")
+def baked(colours: Colours) -> Assembly:
+    return bake(BALL, colours, 96)
+
+
 @pytest.mark.parametrize(
     "field",
     [SuperFrustum((1, 2, 3), 0.5, 0.1, 0.7, 0.4), Sphere(1), Box((1, 2, 3)), Tube(2, 0.4, 3)],
@@ -68,9 +78,7 @@ def test_frames_follow_the_map(field: object) -> None:
     assert np.median(np.abs(step[:, 1]) / step[:, 0]) < 1e-2
 
 
-def test_a_balls_known_normals_come_back(tmp_path: Path) -> None:
-    colours = load_colours(wavy(tmp_path / "a.glb"))
-    baked = bake(BALL, colours, 64)
+def test_a_balls_known_normals_come_back(colours: Colours, baked: Assembly) -> None:
     mesh = mesh_assembly(BALL)
     points, smooth = np.asarray(mesh.vertices), np.asarray(mesh.vertices) - np.array(POSE.translation)
     smooth = smooth / np.linalg.norm(smooth, axis=1, keepdims=True)
@@ -99,9 +107,7 @@ def test_smooth_inputs_get_no_normal_map(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("options", [{}, {"joined": True}])
-def test_glb_is_read_back_with_the_normals(tmp_path: Path, options: dict) -> None:
-    colours = load_colours(wavy(tmp_path / "a.glb"))
-    baked = bake(BALL, colours, 96)
+def test_glb_is_read_back_with_the_normals(tmp_path: Path, baked: Assembly, options: dict) -> None:
     export(baked, tmp_path / "b.glb", **options)
     again = load_colours(tmp_path / "b.glb")
     assert len(again.reliefs) == 1
@@ -138,8 +144,7 @@ def test_a_normal_map_of_the_input_is_read(tmp_path: Path) -> None:
     assert np.allclose(found, wanted / np.linalg.norm(wanted), atol=0.01)
 
 
-def test_usd_and_blenders_script_have_them(tmp_path: Path) -> None:
-    baked = bake(BALL, load_colours(wavy(tmp_path / "a.glb")), 32)
+def test_usd_and_blenders_script_have_them(tmp_path: Path, baked: Assembly) -> None:
     baked = replace(baked, name="ball")
     export(baked, tmp_path / "b.blender.py")
     text = (tmp_path / "b.blender.py").read_text("ascii")
