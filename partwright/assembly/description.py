@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly.instance_patterns import Circle, Grid, Line, pattern
-from partwright.assembly.metadata import GUESSED
+from partwright.assembly.metadata import GUESSED, thread_names
 from partwright.assembly.placed import placed_quadric
 from partwright.assembly.profile_numbers import profile_numbers
 from partwright.assembly.repeated_groups import children_once
@@ -59,7 +59,7 @@ def _leaf(part: Part, digits: int) -> str:
         own = " ".join([part.field.kind, ", ".join(numbers), f"at {_numbers(part.translation, digits)}"])
     copies = f", {_copies(part, digits)}" if part.instances else ""
     blend = f", blend {_number(part.blend, digits)}" if part.blend else ""
-    thread = f", thread {part.metadata['thread']}" if "thread" in part.metadata else ""
+    thread = "".join(f", thread {name}" for name in thread_names(part.metadata))
     guess = ", a guess" if GUESSED in part.metadata else ""
     return f"{part.name + ': ' if part.name else ''}{own}{thread}{copies}{blend}{guess}"
 

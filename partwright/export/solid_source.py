@@ -15,6 +15,7 @@ from partwright.approximation.nearest import Approximation
 from partwright.approximation.recognise import SAME, exact_solid
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.instance_patterns import Circle, Grid, Line, Pattern, Poses, Row, pattern
+from partwright.assembly.metadata import thread_names
 from partwright.assembly.motion import Motion
 from partwright.assembly.repeated_groups import children_once, repeats
 from partwright.assembly.similarity import rotation_matrix
@@ -107,10 +108,9 @@ class SourcePart:
 
     @property
     def title(self) -> str:
-        """The part's name, its thread if it has one, and how often it is there."""
+        """The part's name, its threads if it has any, and how often it is there."""
         times = f", {len(self.part.copies)} times" if self.copies else ""
-        said = self.part.metadata.get("thread")
-        thread = f", thread {comment(str(said))}" if said else ""
+        thread = "".join(f", thread {comment(name)}" for name in thread_names(self.part.metadata))
         return f"{comment(self.part.name)}{thread}{times}"
 
     def variables(self) -> dict[str, str]:

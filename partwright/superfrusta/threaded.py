@@ -5,13 +5,16 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import count
+from typing import Any
 
 import numpy as np
 from manifold3d import Manifold, Mesh
 
 from partwright.approximation.sketches.threads import Thread, without_threads
 from partwright.assembly import Assembly, Part
+from partwright.assembly.metadata import THREAD, thread_key
 from partwright.meshing.manifolds import surface_of
 from partwright.methods import Fitted
 from partwright.shapes import Shape, load_shape
@@ -20,6 +23,8 @@ from partwright.superfrusta.thread_standards import standard_thread
 _NEAR = 0.08  # of the thread's depth, that a part's wall may be away from its crests
 _ALONG, _AROUND = 7, 8  # places that are looked at
 _DIGITS = 4
+_TOLD_APART = "_kind", "_hand", "_diameter", "_pitch"  # by which threads of a part are told apart
+_ALIKE = 0.03  # of a number, by which it is measured differently on threads that are alike
 
 
 def plain_shape(shape: Shape) -> tuple[Shape, list[Thread]]:
@@ -61,10 +66,28 @@ def with_threads(fitted: Fitted, threads: Sequence[Thread]) -> Fitted:
             f"crests: its grooves, {depth:.2g} deep, count as deviation"
         ] += 1
         if part is not None:
-            noted = dataclasses.replace(part, metadata={**part.metadata, **said})
+            noted = dataclasses.replace(part, metadata=_noted(part.metadata, said))
             whole = whole.replace_part(part.name, noted)
     lines = [f"{line} ({count} times)" if count > 1 else line for line, count in counts.items()]
     return dataclasses.replace(fitted, assembly=whole, warnings=(*fitted.warnings, *lines))
+
+
+def _noted(metadata: Mapping[str, Any], said: Mapping[str, str | float]) -> dict[str, Any]:
+    """With what is said of a thread: under `thread_2` and so on where there is another on the part already,
+    as at the ends of a stud, but not where one is like it, as in holes that are copies."""
+    for key in map(thread_key, count(1)):
+        own = {key + name.removeprefix(THREAD): value for name, value in said.items()}
+        if key not in metadata:
+            return {**metadata, **own}
+        if all(_is_like(metadata.get(key + end), own[key + end]) for end in _TOLD_APART):
+            break
+    return dict(metadata)
+
+
+def _is_like(one: object, other: str | float) -> bool:
+    if isinstance(one, float) and isinstance(other, float):
+        return abs(one - other) <= _ALIKE * abs(other)
+    return one == other
 
 
 def description(thread: Thread, unit: str | None) -> dict[str, str | float]:

@@ -88,6 +88,22 @@ def test_a_thread_is_one_though_coarse_and_fine_faces_tell_its_pitch_differently
     assert len(without_threads(threaded())[1]) == 1
 
 
+@pytest.mark.parametrize(
+    ("around", "shank", "other"), [(60, RADIUS, 1.0), (60, RADIUS, 1.5), (24, INNER, 1.0)]
+)
+def test_both_ends_of_a_stud_are_threads_of_their_own(around: int, shank: float, other: float) -> None:
+    """Those of coarse chords came as flanks of one, and one went; fine ones went over into one another along
+    the shank, and came as one thread of both and a pitch that neither had."""
+    above = LENGTH / 2 + 0.3
+    rod = Manifold.cylinder(0.3 + 2e-3, shank, shank, around).translate((0, 0, LENGTH / 2 - 1e-3))
+    ends = threaded(around=around), threaded(other * PITCH, around).translate((0, 0, above + LENGTH / 2))
+    plain, found = without_threads(turned_askew(ends[0] + ends[1] + rod))
+    assert sorted(thread.pitch for thread in found) == pytest.approx([PITCH, other * PITCH], rel=0.01)
+    assert [thread.length for thread in found] == pytest.approx([LENGTH, LENGTH], abs=PITCH)
+    volume = math.pi * (2 * RADIUS**2 * LENGTH + shank**2 * 0.3)
+    assert plain.volume() == pytest.approx(volume, rel=5e-3 if around > 24 else 0.02)  # of 24 chords 1 %
+
+
 def test_a_tapped_hole_becomes_as_narrow_as_its_crests() -> None:
     block = Manifold.cube((1.4, 1.4, 0.9), True)
     nut = block - threaded()

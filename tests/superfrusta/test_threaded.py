@@ -66,6 +66,27 @@ def test_holes_that_are_alike_are_one_line() -> None:
     assert with_threads(Fitted(plate, "converged", {}), [away]).assembly == plate
 
 
+def test_a_stud_says_the_threads_of_both_its_ends(tmp_path) -> None:
+    """What was said of the last thread took the place of what was said of the others."""
+    stud = Assembly((Part(Cylinder(4.0, 60), name="stud"),), unit="mm")
+    up = np.array([0.0, 0.0, 1.0])
+    coarse = Thread(np.array([0.0, 0.0, 20.0]), up, 1.25, 3.2, 4.0, 16.0, False)
+    fine = dataclasses.replace(coarse, axis=-coarse.axis, pitch=1.0, length=20.0)
+    like_it = dataclasses.replace(fine, pitch=1.01)
+    part = with_threads(Fitted(stud, "converged", {}), [coarse, fine, like_it]).assembly["stud"]
+    assert (part.metadata["thread"], part.metadata["thread_length"]) == ("M8", 16.0)
+    assert (part.metadata["thread_2"], part.metadata["thread_2_length"]) == ("M8x1", 20.0)
+    assert "thread_3" not in part.metadata
+    by_hand = Assembly((dataclasses.replace(stud.parts[0], metadata={"thread": "as told"}),), unit="mm")
+    kept = with_threads(Fitted(by_hand, "converged", {}), [fine]).assembly["stud"].metadata
+    assert (kept["thread"], kept["thread_2"]) == ("as told", "M8x1")
+    whole = Assembly((part,), unit="mm")
+    assert ", thread M8, thread M8x1" in whole.describe()
+    out = tmp_path / "stud.scad"
+    pw.export(whole, out)
+    assert ", thread M8, thread M8x1" in out.read_text()
+
+
 def test_threads_by_their_standard_names() -> None:
     assert standard_thread(7.9, 1.25, "mm") == "M8"
     assert standard_thread(8.0, 1.0, "mm") == "M8x1"

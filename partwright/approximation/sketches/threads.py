@@ -106,20 +106,46 @@ def _candidates(mesh: trimesh.Trimesh, smooth: float) -> list[Thread]:
         if screw is None:
             continue
         corners = mesh.vertices[np.unique(mesh.faces[faces])]
-        thread = _between_ends(screw, corners)
-        depth, climb = thread.outer - thread.inner, abs(thread.pitch)
-        if (
-            thread.length > _TURNS * climb
-            and _DEPTH[0] * thread.outer < depth < _DEPTH[1] * thread.outer
-            and _CLIMB[0] * depth < climb < min(_CLIMB[1] * depth, _STEEP * thread.outer)
-        ):
-            flanks = _flanks(thread, mesh)
-            thread = _between_ends(_screw(mesh, flanks) or screw, corners)
-            thread = _as_long_as(thread, mesh.vertices[np.unique(mesh.faces[flanks])])
-            thread = _with_even_turns(thread, mesh, flanks)
-            if not any(_is_same(thread, other) for other in found):
+        whole = _between_ends(screw, corners)
+        if not _is_like_a_thread(whole):
+            continue
+        for flanks in _apart(whole, mesh, _flanks(whole, mesh)):
+            thread = _measured(whole, screw, mesh, corners, flanks)
+            if _is_like_a_thread(thread) and not any(_is_same(thread, other) for other in found):
                 found.append(thread)
     return found
+
+
+def _is_like_a_thread(thread: Thread) -> bool:
+    """Whether it goes around often enough, and is as deep and as steep as one may be."""
+    depth, climb = thread.outer - thread.inner, abs(thread.pitch)
+    return (
+        thread.length > _TURNS * climb
+        and _DEPTH[0] * thread.outer < depth < _DEPTH[1] * thread.outer
+        and _CLIMB[0] * depth < climb < min(_CLIMB[1] * depth, _STEEP * thread.outer)
+    )
+
+
+def _apart(thread: Thread, mesh: trimesh.Trimesh, flanks: np.ndarray) -> list[np.ndarray]:
+    """The flanks of each thread, where a plain piece of the rod as long as a turn lies between: those of both
+    ends of a stud go over into one another along its shank."""
+    heights = (mesh.triangles[flanks] - thread.axis) @ thread.direction
+    order = np.argsort(heights.min(axis=1))
+    lowest, highest = heights.min(axis=1)[order], np.maximum.accumulate(heights.max(axis=1)[order])
+    gaps = np.flatnonzero(lowest[1:] - highest[:-1] > abs(thread.pitch)) + 1
+    return [flanks[piece] for piece in np.split(order, gaps)]
+
+
+def _measured(
+    whole: Thread, screw: Screw, mesh: trimesh.Trimesh, corners: np.ndarray, flanks: np.ndarray
+) -> Thread:
+    """The thread of these flanks, with the radii of the patch's corners (N, 3) that lie between its ends."""
+    own = mesh.vertices[np.unique(mesh.faces[flanks])]
+    low, high = (end((own - whole.axis) @ whole.direction) for end in (np.min, np.max))
+    along = (corners - whole.axis) @ whole.direction
+    beside = corners[(along >= low - _OVERLAP) & (along <= high + _OVERLAP)]
+    thread = _between_ends(_screw(mesh, flanks) or screw, beside if len(beside) else own)
+    return _with_even_turns(_as_long_as(thread, own), mesh, flanks)
 
 
 def _between_ends(screw: Screw, corners: np.ndarray) -> Thread:
@@ -202,8 +228,10 @@ def _screw(mesh: trimesh.Trimesh, faces: np.ndarray) -> Screw | None:
 
 
 def _is_same(one: Thread, other: Thread) -> bool:
-    """Whether they are flanks of one thread."""
-    return _is_coaxial(one, other) and abs(one.pitch - other.pitch) < _SAME * abs(other.pitch)
+    """Whether they are flanks of one thread: those of both ends of a stud lie apart."""
+    apart = abs(float((one.axis - other.axis) @ other.direction))
+    beside = apart < (one.length + other.length) / 2
+    return beside and _is_coaxial(one, other) and abs(one.pitch - other.pitch) < _SAME * abs(other.pitch)
 
 
 def _overlap(one: Thread, other: Thread) -> bool:
