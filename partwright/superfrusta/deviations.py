@@ -69,8 +69,11 @@ def norm(off: NDArray[np.float64]) -> float:
 def deviations(samples: FitSamples, rows: Rows) -> Deviations:
     """Of an assembly, over points of its parts' surfaces and of the shape's."""
     added = np.flatnonzero(rows[:, Column.SIGN] > 0)
+    surfaces = surface_points(rows)
     found = zip(
-        *(find(samples, rows, added) for find in (_of_parts, _of_shape, _of_voxels)),
+        _of_parts(samples, rows, added, surfaces),
+        _of_shape(samples, rows, added),
+        _of_voxels(samples, rows, added, surfaces),
         strict=True,
     )
     points, distance, off, part = (np.concatenate(one) for one in found)
@@ -80,9 +83,11 @@ def deviations(samples: FitSamples, rows: Rows) -> Deviations:
     return Deviations(points[kept], distance[kept], off[kept], part[kept].astype(np.int64), len(rows))
 
 
-def _of_parts(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
+def _of_parts(
+    samples: FitSamples, rows: Rows, added: NDArray[np.int64], surfaces: NDArray[np.float64]
+) -> tuple[NDArray[Any], ...]:
     """Points on the assembly's surface that stick out of the shape, or enclose a gap inside it."""
-    points = surface_points(rows).astype(np.float32)
+    points = surfaces.astype(np.float32)
     part = np.repeat(np.arange(len(rows)), points.shape[1])
     points = points.reshape(-1, 3)
     field = samples.distance_of(rows, points)
@@ -137,7 +142,9 @@ def _arrived(samples: FitSamples, rows: Rows, points: Floats, field: Floats) -> 
     return place, np.abs(field) < _CLOSE
 
 
-def _of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
+def _of_voxels(
+    samples: FitSamples, rows: Rows, added: NDArray[np.int64], surfaces: NDArray[np.float64]
+) -> tuple[NDArray[Any], ...]:
     """Places inside the shape that no part fills, and outside that one does.
 
     Where blends wall a void no part's surface is near it, and a hole may lie between the points of a face. A
@@ -150,7 +157,7 @@ def _of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tup
     onto, arrived = _arrived(samples, rows, points[beside], field[beside])
     wrong = np.where(distance < 0, field, -field) > np.where(distance < -_DEEP, _SLIVER, _BESIDE / 2)
     onto = onto[arrived]
-    chips, far = samples.chips(rows)
+    chips, far = samples.chips(rows, surfaces[added].reshape(-1, 3))
     wrong_points = np.concatenate([points[wrong], chips])
     deepest = samples.parts_of(rows[added], wrong_points).argmin(axis=0)
     nearest = np.abs(samples.parts_of(rows[added], onto)).argmin(axis=0)

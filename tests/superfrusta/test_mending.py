@@ -128,15 +128,16 @@ def test_a_chip_beyond_all_voxels_is_off(samples: FitSamples, exact: np.ndarray)
     bar, cut = box_row((1.0, 0.3, 0.3), (1.3, 0.0, 0.0)), box_row((0.55, 0.5, 0.5), (1.175, 0.0, 0.0))
     cut[Column.SIGN] = -1
     rows = np.vstack([exact, bar, cut])
-    points, distance = samples.chips(rows)
+    own = surface_points(rows[:-1]).reshape(-1, 3)
+    points, distance = samples.chips(rows, own)
     assert len(points) > 100
     assert np.abs(points[:, 0] - 1.625).max() < 0.18
     assert distance == pytest.approx(points[:, 0] - 0.9, abs=0.02)
-    assert len(samples.chips(exact)[0]) == 0
+    assert len(samples.chips(exact, surface_points(exact).reshape(-1, 3))[0]) == 0
     # Growth, which comes first, makes samples of such places; they are off all the same.
     after = samples.with_stray_samples(rows)
     assert len(after.points) > len(samples.points)
-    assert np.array_equal(after.chips(rows)[0], points)
+    assert np.array_equal(after.chips(rows, own)[0], points)
     found = deviations(after, rows)
     assert {tuple(point) for point in points.tolist()} <= {tuple(point) for point in found.points.tolist()}
 
