@@ -23,6 +23,7 @@ from partwright.partsdf.views import SIDE
 _LARGEST = 1024  # pixels along the longer side: more than anything here looks at
 _LEAST = 16  # pixels
 _OPAQUE = 128  # of 255
+_BLANK = 4 / 255  # levels between the darkest and the brightest pixel of what shows nothing
 _FILLED = 0.9  # of the picture that the silhouette is cut out to, as views are
 _CLOSER = 2  # times that it is cut out anew
 _SMALLEST = 6  # cells of a silhouette along its longer side, of SIDE / 2
@@ -36,6 +37,11 @@ class Photo:
 
     pixels: np.ndarray
     shape: np.ndarray | None
+
+    @property
+    def blank(self) -> bool:
+        """Whether it is of one colour all over, where an encoder sees a shape all the same."""
+        return self.shape is None and bool(np.ptp(self.pixels, axis=(0, 1)).max() <= _BLANK)
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,11 @@ _SEGMENTS = 64
 
 def sticking_out(shapes: Sequence[Shape], target: Target, seed: int = 1_000) -> float:
     """How far the target's surface sticks out of the shapes, by fresh points and all its corners; 0 for not
-    at all."""
-    points = _left_out(shapes, target.samples(_POINTS, seed))
-    return float(np.min([outside_of(shape, points) for shape in shapes], axis=0).max(initial=0.0))
+    at all, or for less than numbers in single precision, as mesh files have them, tell apart there."""
+    samples = target.samples(_POINTS, seed)
+    points = _left_out(shapes, samples)
+    farthest = float(np.min([outside_of(shape, points) for shape in shapes], axis=0).max(initial=0.0))
+    return farthest if farthest > np.spacing(np.float32(np.abs(samples).max())) else 0.0
 
 
 def _left_out(shapes: Sequence[Shape], points: np.ndarray) -> np.ndarray:

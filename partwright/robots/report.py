@@ -104,7 +104,7 @@ def warnings(links: Sequence[LinkReport]) -> list[str]:
             )
         if link.sticking_out:
             result.append(
-                f"link {link.link!r}: its mesh sticks out of the shapes by {1000 * link.sticking_out:.3f} mm"
+                f"link {link.link!r}: its mesh sticks out of the shapes by {1000 * link.sticking_out:.3g} mm"
             )
     return result
 

@@ -123,7 +123,7 @@ def sphere_warnings(spheres: Sequence[LinkSpheres]) -> list[str]:
             )
         if each.sticking_out:
             result.append(
-                f"link {each.link!r}: its mesh sticks out of the spheres by {1000 * each.sticking_out:.3f} mm"
+                f"link {each.link!r}: its mesh sticks out of the spheres by {1000 * each.sticking_out:.3g} mm"
             )
     return result
 

@@ -206,6 +206,9 @@ def test_pictures_that_are_none_are_told(
     Image.new("RGBA", (40, 40)).save(tmp_path / "nothing.png")
     with pytest.raises(EmptyShapeError, match="transparent all over"):
         reconstruct_photo(model, tmp_path / "nothing.png")
+    Image.new("RGB", (40, 40), (250, 250, 250)).save(tmp_path / "blank.png")
+    with pytest.raises(EmptyShapeError, match="of one colour all over"):
+        reconstruct_photo(model, tmp_path / "blank.png")
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
     with pytest.raises(UnreadableFileError, match="too many pixels"):
         reconstruct_photo(model, tmp_path / "nothing.png")

@@ -10,9 +10,14 @@ import trimesh
 from manifold3d import Manifold, OpType
 
 from partwright.approximation.hull_faces import faces_of
+from partwright.assembly import Part
+from partwright.fields import Box
 from partwright.meshing.manifolds import surface_of
 from partwright.robots import CollideOptions, collide, save
+from partwright.robots.containment import sticking_out
 from partwright.robots.enclosing import containing, nearest_hulls, outer_hull
+from partwright.robots.model import Shape
+from partwright.robots.solids import Target
 from tests.robots.robots import urdf
 
 
@@ -118,3 +123,13 @@ def test_enclosing_adds_no_more_than_pieces_do(tmp_path: Path) -> None:
     assert arm.sticking_out == 0
     assert arm.missing < 1e-3
     assert arm.extra < 0.6 * (bowl.convex_hull.volume / bowl.volume - 1)
+
+
+@pytest.mark.parametrize(("beyond", "told"), [(0.0, 0.0), (1e-8, 0.0), (1e-6, 1e-6)])
+def test_what_single_precision_cannot_tell_does_not_stick_out(beyond: float, told: float) -> None:
+    """Meshes are written by numbers with 3e-8 between them there."""
+    box = Shape("box", part=Part(Box((0.6, 0.6, 0.6))))
+    corners = np.array([[0.3 + beyond, 0, 0], [0, 0.3, 0], [0, 0, 0.3]])
+    solid = Manifold.cube((0.6, 0.6, 0.6), True)
+    target = Target(solid, solid, corners, np.array([[0, 1, 2]]), ())
+    assert sticking_out([box], target) == pytest.approx(told, abs=1e-12)
