@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.assembly import Assembly
+from partwright.assembly import Assembly, Node
 from partwright.errors import SettingError
 from partwright.shapes import Shape
 
@@ -29,6 +29,8 @@ def segment(
 
     within: one coarse label a face, strings or integers. Sub-parts never cross them: every label is then a
     pair "COARSE/PART", and only pairs that occur are listed, in the order of coarse labels and of parts.
+    Where the assembly has a group or part of a coarse label's name, as fits by node do, only its parts stand
+    for those faces.
 
     Raises:
         SettingError: `within` has another length than the shape has faces, or holds no strings or integers.
@@ -54,11 +56,13 @@ def segment_paths(
     within: Sequence[str] | Sequence[int] | NDArray | None = None,
 ) -> tuple[NDArray[np.int64], list[tuple[str, ...]]]:
     """`segment_faces` with each name as a path: (PART,), or (COARSE, PART)."""
-    labels = _nearest_part(vertices, faces, assembly)
     names = [part.name for part in assembly.parts]
     if within is None:
-        return labels, [(name,) for name in names]
-    coarse_names, coarse = np.unique(check_within(within, len(labels)), return_inverse=True)
+        whole, every = np.zeros(len(faces), np.int64), np.ones((1, len(names)), bool)
+        return _nearest_part(vertices, faces, assembly, whole, every), [(name,) for name in names]
+    coarse_names, coarse = np.unique(check_within(within, len(faces)), return_inverse=True)
+    allowed = _allowed(assembly, [str(name) for name in coarse_names])
+    labels = _nearest_part(vertices, faces, assembly, coarse, allowed)
     pairs, crossed = np.unique(coarse * len(names) + labels, return_inverse=True)
     paths: list[tuple[str, ...]] = [
         (str(coarse_names[pair // len(names)]), names[pair % len(names)]) for pair in pairs
@@ -88,9 +92,26 @@ def check_within(within: Sequence[str] | Sequence[int] | NDArray, faces: int) ->
     return coarse
 
 
+def _allowed(assembly: Assembly, labels: Sequence[str]) -> NDArray[np.bool_]:
+    """(C, M) which parts may stand for faces of each label: those of the nodes of its name, else all."""
+
+    def found(node: Node, label: str) -> list[str]:
+        if node.name == label:
+            return [part.name for part in node.parts]
+        return [] if node.is_part else [name for child in node.children for name in found(child, label)]
+
+    own = [found(assembly, label) if label else [] for label in labels]  # nodes may have no name
+    return np.array([[not names or part.name in names for part in assembly.parts] for names in own])
+
+
 def _nearest_part(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], assembly: Assembly
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    assembly: Assembly,
+    coarse: NDArray[np.int64],
+    allowed: NDArray[np.bool_],
 ) -> NDArray[np.int64]:
+    """(F,) of those parts that are allowed (C, M) for a face's coarse label (F,)."""
     corners = vertices[faces]
     longest = float(np.ptp(corners, axis=(0, 1)).max())
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
@@ -102,7 +123,9 @@ def _nearest_part(
         for chunk in np.array_split(members, -(-len(members) * len(barycentric) // _CHUNK)):
             points = np.einsum("sk,fkx->fsx", barycentric, corners[chunk])
             away = np.abs(assembly.part_distances(points.reshape(-1, 3)))
-            labels[chunk] = _elected(away.reshape(len(assembly), *points.shape[:2]), _SAME * longest)
+            away = away.reshape(len(assembly), *points.shape[:2])
+            own = allowed[coarse[chunk]].T[:, :, None]
+            labels[chunk] = _elected(np.where(own, away, np.inf), _SAME * longest)
     return labels
 
 

@@ -61,7 +61,7 @@ class Familiarity:
             said.append(f"{part} is {self.latents[part]:.1f} times as odd as any that was trained on")
         return [
             f"this may be no shape of the family that {self.model} knows{unsure}: {', and '.join(said)}; "
-            "look at preview.png, or take another model or method"
+            "look at the picture, or take another model or method"
         ]
 
 

@@ -160,7 +160,7 @@ def warnings_of(name: str, looked: Looked, standpoint: Standpoint) -> list[str]:
         return []
     return [
         f"this may be no picture of a shape of the family that {name} knows: {', and '.join(said)}; look at "
-        "preview.png, or cut the shape out of the picture"
+        "the picture of the parts, or cut the shape out of the picture"
     ]
 
 

@@ -45,13 +45,18 @@ def sound_samples(
     What is sound at once is what `generate` makes; 1 try takes all as they come. Parts that stand out of
     others are put back, and one that comes through another is drawn back, unless it is to stay. What is
     broken else is made anew: new noise takes over more of it with each try, then all. Replaced by anything,
-    shapes that often come apart, as benches, would be rare.
+    shapes that often come apart, as benches, would be rare. What a layout that is kept has wrong itself is no
+    reason for another try: all would have it.
 
     Raises:
         SettingError: no try is allowed; else as `Generator.generate`.
     """
     check_count("tries", tries, low=1)
-    judge = Judge(generator.model)
+    whole = Judge(generator.model)
+
+    def judge(shape: NeuralShape) -> Soundness:
+        return whole(shape).of_forms() if keep_layout else whole(shape)
+
     first = generator.generate(count, seed, source, keep, keep_layout, change)
 
     def made(number: int, attempt: int) -> NeuralShape:
@@ -78,7 +83,9 @@ def sound_samples(
     return best
 
 
-def _mended(sample: Sample, judge: Judge, keep: Sequence[str], keep_layout: bool) -> Sample:
+def _mended(
+    sample: Sample, judge: Callable[[NeuralShape], Soundness], keep: Sequence[str], keep_layout: bool
+) -> Sample:
     """The sample with parts that stand out of others put back, all together, and those that came through
     others drawn back, one by one; one for which that does not help stays, and the others have their turn."""
     kept = set(keep)

@@ -8,7 +8,7 @@ those that it lies in, as a window above a roof.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -70,10 +70,11 @@ class Soundness:
         said = [f"{name} has no surface" for name in self.empty]
         if self.gap > self.allowed:
             said.append(f"{' and '.join(dict.fromkeys(self.gap_between))} are {self.gap:.2f} apart")
-        if self.offset > OFFSET:
-            first, second = self.offset_between
-            said.append(f"{first} and {second} lie as in no training shape, by {self.offset:.2f}")
-        return said
+        return said + _of_layout(self.offset, self.offset_between)
+
+    def of_forms(self) -> Soundness:
+        """The same, but for what is of its layout: where that is given no form can mend it."""
+        return replace(self, offset=0.0, offset_between=())
 
     @property
     def badness(self) -> float:
@@ -149,6 +150,17 @@ def widest_gap(parts: dict[str, trimesh.Trimesh]) -> tuple[float, tuple[str, ...
     joined = minimum_spanning_tree(apart).toarray()
     i, j = np.unravel_index(joined.argmax(), joined.shape)
     return float(joined[i, j]), (pieces[j][0], pieces[i][0])
+
+
+def layout_faults(shape: NeuralShape) -> list[str]:
+    """What is unlike the family in how its parts' boxes lie, a few words; nothing where they are like it."""
+    return _of_layout(*largest_offset(shape))
+
+
+def _of_layout(offset: float, between: tuple[str, ...]) -> list[str]:
+    return (
+        [f"{' and '.join(between)} lie as in no training shape, by {offset:.2f}"] if offset > OFFSET else []
+    )
 
 
 def largest_offset(shape: NeuralShape) -> tuple[float, tuple[str, ...]]:

@@ -103,6 +103,17 @@ def test_parts_never_cross_given_labels() -> None:
     assert len(names) == len(set(wanted)) == 6
 
 
+def test_faces_of_a_node_are_of_its_own_parts() -> None:
+    """However near another node's part lies; faces of labels that no node has go to any."""
+    shape, assembly, truth = dumbbell()
+    left, right, bar = assembly.parts
+    nodes = Assembly((Assembly((left, bar), name="near"), Assembly((right,), name="far")))
+    labels, names = segment(shape, nodes, np.where(truth == 0, "other", "near"))
+    named = np.array(names)[labels]
+    assert (named[truth == 0] == "other/left").all()
+    assert (named[truth > 0] == "near/bar").all()  # the right ball's faces, too
+
+
 def test_nodes_of_a_scene_are_labels(tmp_path: Path) -> None:
     scene = trimesh.Scene()
     for z, name in enumerate(("cup", "lid")):

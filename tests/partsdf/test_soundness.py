@@ -18,7 +18,15 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.piercing import Tip
 from partwright.partsdf.resampling import sound_samples
-from partwright.partsdf.soundness import GAP, OFFSET, Judge, Soundness, largest_offset, widest_gap
+from partwright.partsdf.soundness import (
+    GAP,
+    OFFSET,
+    Judge,
+    Soundness,
+    largest_offset,
+    layout_faults,
+    widest_gap,
+)
 
 
 def box(size: float, x: float) -> trimesh.Trimesh:
@@ -126,6 +134,27 @@ def test_what_is_broken_is_made_anew_and_the_least_broken_stays(
     assert generator.changes == [0.0, 0.6, 0.7, 0.8, 0.9, 0.0, 0.0]  # then nothing of it is left
     with pytest.raises(SettingError, match="tries: expected a whole number of at least 1"):
         sound_samples(generator, 3, tries=0)  # type: ignore[arg-type]
+
+
+def test_what_a_given_layout_has_wrong_is_no_reason_for_another_try(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Odd(Judge):
+        def __call__(self, shape: NeuralShape) -> Soundness:
+            gap = 0.3 if len(generator.asked) < 2 else 0.0
+            return Soundness((), gap, ("plate", "ball"), GAP, 2 * OFFSET, ("plate", "ball"))
+
+    monkeypatch.setattr("partwright.partsdf.resampling.Judge", Odd)
+    given = moved(NeuralShape.trained(model, "lamp2"), "ball", (0.0, 0.0, 0.8))
+    offset = largest_offset(given)[0]
+    assert layout_faults(given) == [f"plate and ball lie as in no training shape, by {offset:.2f}"]
+    assert layout_faults(NeuralShape.trained(model, "lamp2")) == []
+    generator = Scripted(model, {})
+    (made,) = sound_samples(generator, 1, source=given, keep_layout=True)  # type: ignore[arg-type]
+    assert (made.tries, made.soundness.faults()) == (2, [])  # apart once, which other forms mend
+    generator = Scripted(model, {})
+    (made,) = sound_samples(generator, 1, tries=5)  # type: ignore[arg-type]
+    assert made.tries == 5
 
 
 def test_each_try_has_noise_of_its_own(model: Model) -> None:

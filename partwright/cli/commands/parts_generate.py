@@ -23,6 +23,7 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
 from partwright.partsdf.pictures import picture
 from partwright.partsdf.resampling import Sample, sound_samples
+from partwright.partsdf.soundness import layout_faults
 from partwright.partsdf.sources import found_in, open_source
 from partwright.render import Camera, sheet, write_png
 from partwright.shapes import PICTURE_SUFFIXES, SUFFIXES
@@ -39,6 +40,13 @@ def run(arguments: argparse.Namespace) -> int:
     change = (CHANGE if arguments.change is None else arguments.change) if arguments.like else 0.0
     with Work("reading") as work:
         source, keep = _kept(arguments, model)
+        if arguments.poses and source is not None:
+            warn(
+                [
+                    f"in {arguments.poses} {fault}; so they do in all samples"
+                    for fault in layout_faults(source)
+                ]
+            )
         work.stage("making")
         made = sound_samples(
             generator, arguments.count, arguments.seed, source, keep,
