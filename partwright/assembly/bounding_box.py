@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _AXES = np.vstack([-np.eye(3), np.eye(3)])
 _AT_ONCE = 4096  # copies of a part
-_PAIRS = 32  # parts and copies of a union that are looked at in pairs
+_PAIRS = 32  # parts, copies and groups of a union that are looked at in pairs
 
 
 def bounding_box(node: Node, level: float = 0.0) -> np.ndarray:
@@ -58,10 +58,14 @@ def _united(children: Sequence[Node], level: float) -> np.ndarray:
     members = [copy for child in children for copy in (child.copies if child.is_part else (child,))]
     lowered = np.cumsum(blends) / 4  # by how much the union of all up to each may lie below its members
     highest = level + float(blends.max() + lowered[-1])
-    groups = {index: bounding_box(node, highest) for index, node in enumerate(members) if not node.is_part}
+    groups: dict[int, np.ndarray] = {}
 
     def below(index: int, level: float) -> np.ndarray:
-        return groups[index] if index in groups else bounding_box(members[index], level)
+        if members[index].is_part:
+            return bounding_box(members[index], level)
+        if index not in groups:
+            groups[index] = bounding_box(members[index], highest)
+        return groups[index]
 
     result = boxes[0]
     for last in range(1, len(members)):

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from itertools import count, takewhile
 
 GUESSED = "guessed"  # of a part that the input does not show: why it is there
-THREAD = (
-    "thread"  # of a part that stands for a screw thread: its name; what else is said of it goes on from there
-)
+# Of a part that stands for a screw thread: its name; what else is said of it goes on from there.
+THREAD = "thread"
 
 
 def thread_key(number: int) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.assembly import Assembly, Node
+from partwright.assembly import Assembly
 from partwright.errors import SettingError
 from partwright.shapes import Shape
 
@@ -29,8 +29,8 @@ def segment(
 
     within: one coarse label a face, strings or integers. Sub-parts never cross them: every label is then a
     pair "COARSE/PART", and only pairs that occur are listed, in the order of coarse labels and of parts.
-    Where the assembly has a group or part of a coarse label's name, as fits by node do, only its parts stand
-    for those faces.
+    Where the assembly joins groups, as fits by node do, and one has a coarse label's name, only its parts
+    stand for those faces.
 
     Raises:
         SettingError: `within` has another length than the shape has faces, or holds no strings or integers.
@@ -93,15 +93,13 @@ def check_within(within: Sequence[str] | Sequence[int] | NDArray, faces: int) ->
 
 
 def _allowed(assembly: Assembly, labels: Sequence[str]) -> NDArray[np.bool_]:
-    """(C, M) which parts may stand for faces of each label: those of the nodes of its name, else all."""
-
-    def found(node: Node, label: str) -> list[str]:
-        if node.name == label:
-            return [part.name for part in node.parts]
-        return [] if node.is_part else [name for child in node.children for name in found(child, label)]
-
-    own = [found(assembly, label) if label else [] for label in labels]  # nodes may have no name
-    return np.array([[not names or part.name in names for part in assembly.parts] for names in own])
+    """(C, M) which parts may stand for faces of each label: those of the group of its name, else all."""
+    every = {part.name for part in assembly.parts}
+    groups = {
+        child.name: {part.name for part in child.parts} for child in assembly.children if not child.is_part
+    }
+    own = [groups.get(label, every) for label in labels]
+    return np.array([[part.name in names for part in assembly.parts] for names in own])
 
 
 def _nearest_part(

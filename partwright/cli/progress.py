@@ -80,7 +80,7 @@ class Display(_Shown):
     def stage(self, name: str, done: float = _WRITING) -> None:
         """A stage without rounds, as a rule after the method's own; done: share of the work before it."""
         if self._bar:
-            self._bar.update(self._task, description=name, completed=done)
+            self._bar.update(self._task, description=name, completed=done, detail="")
         else:
             note(name)
 

@@ -67,9 +67,8 @@ def shape_from_image(
     deadline = Deadline(time_limit, cancel or Cancellation(), progress)
     data = generator.mesh_of(image, deadline)
     check_glb(data, generator.name)
-    if (
-        keep is not None
-    ):  # first: what is no shape yet may be one with other options, and took minutes to make
+    # First: what is no shape yet may be one with other options, and took minutes to make.
+    if keep is not None:
         with replacing_files(Path(keep).parent) as staging:
             (staging / Path(keep).name).write_bytes(data)
     with TemporaryDirectory() as folder:

@@ -12,7 +12,7 @@ import numpy as np
 
 from partwright.assembly import Assembly
 from partwright.atomic_io import replacing_files, write_bytes
-from partwright.errors import EmptyShapeError, ModelError
+from partwright.errors import ModelError
 from partwright.export import export
 from partwright.export.ply import write_mesh
 from partwright.partsdf.assemblies import to_assembly
@@ -110,8 +110,6 @@ def reconstruct_seen(
 ) -> PhotoParts:
     """As `reconstruct_photo`, of a photo in memory. name: of its file."""
     start, model = time.perf_counter(), encoder.model
-    if photo.blank:
-        raise EmptyShapeError("no shape is seen in the picture: it is of one colour all over")
     looked = look_at(encoder, photo)
     shape, seen = looked.sight.shape, time.perf_counter()
     meshed = mesh_shape(shape, resolution, parts=False)

@@ -23,7 +23,7 @@ from partwright.partsdf.views import SIDE
 _LARGEST = 1024  # pixels along the longer side: more than anything here looks at
 _LEAST = 16  # pixels
 _OPAQUE = 128  # of 255
-_BLANK = 4 / 255  # levels between the darkest and the brightest pixel of what shows nothing
+_BLANK = 4 / 255  # of full scale, between the darkest and the brightest pixel of what shows nothing
 _FILLED = 0.9  # of the picture that the silhouette is cut out to, as views are
 _CLOSER = 2  # times that it is cut out anew
 _SMALLEST = 6  # cells of a silhouette along its longer side, of SIDE / 2
@@ -37,11 +37,6 @@ class Photo:
 
     pixels: np.ndarray
     shape: np.ndarray | None
-
-    @property
-    def blank(self) -> bool:
-        """Whether it is of one colour all over, where an encoder sees a shape all the same."""
-        return self.shape is None and bool(np.ptp(self.pixels, axis=(0, 1)).max() <= _BLANK)
 
 
 @dataclass(frozen=True)
@@ -95,8 +90,10 @@ def look_at(encoder: ImageEncoder, photo: Photo) -> Looked:
     """What the encoder sees in a photo, where the shape is.
 
     Raises:
-        EmptyShapeError: it sees none.
+        EmptyShapeError: it sees none, or the photo is of one colour all over, where it sees one all the same.
     """
+    if photo.shape is None and np.ptp(photo.pixels, axis=(0, 1)).max() <= _BLANK:
+        raise EmptyShapeError("no shape is seen in the picture: it is of one colour all over")
     height, width = photo.pixels.shape[:2]
     box = np.array([0.0, 0.0, height, width])
     if photo.shape is not None:

@@ -53,9 +53,10 @@ def sound_samples(
     """
     check_count("tries", tries, low=1)
     whole = Judge(generator.model)
+    given = whole(source) if keep_layout and source is not None else None
 
     def judge(shape: NeuralShape) -> Soundness:
-        return whole(shape).of_forms() if keep_layout else whole(shape)
+        return whole(shape) if given is None else whole(shape).of_forms(given)
 
     first = generator.generate(count, seed, source, keep, keep_layout, change)
 

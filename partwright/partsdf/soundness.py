@@ -72,9 +72,9 @@ class Soundness:
             said.append(f"{' and '.join(dict.fromkeys(self.gap_between))} are {self.gap:.2f} apart")
         return said + _of_layout(self.offset, self.offset_between)
 
-    def of_forms(self) -> Soundness:
-        """The same, but for what is of its layout: where that is given no form can mend it."""
-        return replace(self, offset=0.0, offset_between=())
+    def of_forms(self, given: Soundness) -> Soundness:
+        """The same without what is of its layout, which is that of a given shape: no form may mend that."""
+        return replace(self, offset=0.0, offset_between=(), allowed=max(self.allowed, given.gap))
 
     @property
     def badness(self) -> float:

@@ -29,7 +29,13 @@ def sticking_out(shapes: Sequence[Shape], target: Target, seed: int = 1_000) -> 
     samples = target.samples(_POINTS, seed)
     points = _left_out(shapes, samples)
     farthest = float(np.min([outside_of(shape, points) for shape in shapes], axis=0).max(initial=0.0))
-    return farthest if farthest > np.spacing(np.float32(np.abs(samples).max())) else 0.0
+    return told_apart(farthest, samples)
+
+
+def told_apart(beyond: float, points: np.ndarray) -> float:
+    """A length, or 0 where single precision, as mesh files have it, tells no such length apart at points
+    (N, 3). Files whose own origin lies farther off than the link's tell even less."""
+    return beyond if beyond > np.spacing(np.float32(np.abs(points).max())) else 0.0
 
 
 def _left_out(shapes: Sequence[Shape], points: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from partwright.approximation.convex_fit import Mode
 from partwright.errors import RobotError
 from partwright.fields import Box, Sphere
 from partwright.meshing.manifolds import surface_of
-from partwright.robots.containment import larger, shape_solid
+from partwright.robots.containment import larger, shape_solid, told_apart
 from partwright.robots.covering import balls_solid, covering_balls, outside_of_balls
 from partwright.robots.model import Link, Shape
 from partwright.robots.solids import Target
@@ -169,7 +169,8 @@ def _measured(link: str, balls: Balls, target: Target, seed: int | None) -> Link
     apart = np.abs(outside_of_balls(target.samples(_SURFACE, seed=2), balls))
     sticking = None
     if seed is not None:
-        sticking = max(float(outside_of_balls(target.samples(_FRESH, seed), balls).max()), 0.0)
+        fresh = target.samples(_FRESH, seed)
+        sticking = told_apart(float(outside_of_balls(fresh, balls).max()), fresh)
     return LinkSpheres(
         link,
         balls,

@@ -108,8 +108,8 @@ class FitSamples:
         A thin part that shoots out of the shape passes between random samples. The probes are a lattice fine
         enough to meet it; those that do become samples, with the weight of the volume that they stand for.
         """
-        own = surface_points(rows[rows[:, Column.SIGN] > 0]).reshape(-1, 3)
-        probes = np.concatenate([self.probes, self._probes_beyond(own)])
+        surfaces = surface_points(rows[rows[:, Column.SIGN] > 0]).reshape(-1, 3)
+        probes = np.concatenate([self.probes, self._probes_beyond(surfaces)])
         hit = np.flatnonzero(self.distance_of(rows, probes) < 0)
         distance = self.measure(probes[hit])
         hit, distance = hit[distance > _STRAY], distance[distance > _STRAY]
@@ -123,21 +123,27 @@ class FitSamples:
             probes=np.delete(self.probes, hit[hit < len(self.probes)], axis=0),
         )
 
-    def chips(self, rows: Rows, own: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def chips(
+        self, rows: Rows, surfaces: NDArray[np.floating]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Points (n, 3) of an assembly so far out that no voxel lies there, samples or not, and the shape's
-        distance (n,). own: points (N, 3) of the surfaces of its parts that are added."""
-        probes = self._probes_beyond(own, with_samples=True)
+        distance (n,). surfaces: points (N, 3) of the surfaces of its parts that are added."""
+        probes = self._probes_beyond(surfaces, with_samples=True)
         probes = probes[:: 1 + len(probes) // _MOST_BEYOND]
         points = probes[self.distance_of(rows, probes) < 0] if len(probes) else probes
         return points, self.measure(points).astype(np.float32)
 
-    def _probes_beyond(self, own: NDArray[np.floating], with_samples: bool = False) -> NDArray[np.float32]:
+    def _probes_beyond(
+        self, surfaces: NDArray[np.floating], with_samples: bool = False
+    ) -> NDArray[np.float32]:
         """Probes (n, 3) as dense as the others, about parts, of whose surfaces points (N, 3) are given, that
         reach out of the cube that those fill: of a body that is mostly cut away a chip may be left there.
         None that are samples already, or those too."""
-        if len(own) == 0 or np.abs(own).max() <= _HALF_SIDE:
+        if len(surfaces) == 0 or np.abs(surfaces).max() <= _HALF_SIDE:
             return NOTHING[:, :3]
-        first, last = (_cell(np.clip(end, -_FURTHEST, _FURTHEST)) for end in (own.min(0), own.max(0)))
+        first, last = (
+            _cell(np.clip(end, -_FURTHEST, _FURTHEST)) for end in (surfaces.min(0), surfaces.max(0))
+        )
         counts = last - first + 1
         cells = first + np.asarray(grid_indices(tuple(counts)))
         wanted = (np.abs(cells + 0.5).max(axis=1) > _PROBES / 2).reshape(counts)

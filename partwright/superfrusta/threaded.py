@@ -23,7 +23,7 @@ from partwright.superfrusta.thread_standards import standard_thread
 _NEAR = 0.08  # of the thread's depth, that a part's wall may be away from its crests
 _ALONG, _AROUND = 7, 8  # places that are looked at
 _DIGITS = 4
-_TOLD_APART = "_kind", "_hand", "_diameter", "_pitch"  # by which threads of a part are told apart
+_TOLD_APART = "_kind", "_hand", "_diameter", "_pitch", "_length"  # by which threads of a part are told apart
 _ALIKE = 0.03  # of a number, by which it is measured differently on threads that are alike
 
 

@@ -151,3 +151,22 @@ def test_a_spring_is_no_thread() -> None:
     body = closed(points.reshape(-1, 3), np.concatenate([*walls, *map(np.array, caps)]))
     assert abs(body.volume()) > 0
     assert without_threads(body)[1] == []
+
+
+def test_waves_that_wind_around_a_rod_are_no_thread() -> None:
+    """Too flat to have flanks, as of a corrugated tube: there was nothing to measure one by."""
+    around, along = np.meshgrid(2 * np.pi * np.arange(64) / 64, np.linspace(0, 6, 289), indexing="ij")
+    radius = 1 + 0.04 * np.sin(around + 2 * np.pi * along)
+    rings = np.stack([radius * np.cos(around), radius * np.sin(around), along], axis=-1)
+    middles = np.array([[0, 0, 0.0], [0, 0, 6.0]])
+    a = np.arange(64 * 289).reshape(64, 289)
+    b = np.roll(a, -1, axis=0)
+    sides = [np.stack([a[:, :-1], b[:, :-1], b[:, 1:]], -1), np.stack([a[:, :-1], b[:, 1:], a[:, 1:]], -1)]
+    low, high = np.full(64, a.size), np.full(64, a.size + 1)
+    ends = [np.stack([b[:, 0], a[:, 0], low], -1), np.stack([a[:, -1], b[:, -1], high], -1)]
+    faces = np.concatenate([one.reshape(-1, 3) for one in sides + ends])
+    rod = closed(np.concatenate([rings.reshape(-1, 3), middles]), faces)
+    assert rod.volume() == pytest.approx(6 * math.pi, rel=0.02)
+    plain, found = without_threads(rod)
+    assert found == []
+    assert plain.volume() == pytest.approx(rod.volume())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -107,7 +108,9 @@ def test_faces_of_a_node_are_of_its_own_parts() -> None:
     """However near another node's part lies; faces of labels that no node has go to any."""
     shape, assembly, truth = dumbbell()
     left, right, bar = assembly.parts
-    nodes = Assembly((Assembly((left, bar), name="near"), Assembly((right,), name="far")))
+    # Neither the whole nor a part is a node, whatever its name.
+    groups = (Assembly((left, bar), name="near"), Assembly((replace(right, name="other"),), name="far"))
+    nodes = Assembly(groups, name="near")
     labels, names = segment(shape, nodes, np.where(truth == 0, "other", "near"))
     named = np.array(names)[labels]
     assert (named[truth == 0] == "other/left").all()

@@ -72,7 +72,7 @@ def test_a_stud_says_the_threads_of_both_its_ends(tmp_path) -> None:
     up = np.array([0.0, 0.0, 1.0])
     coarse = Thread(np.array([0.0, 0.0, 20.0]), up, 1.25, 3.2, 4.0, 16.0, False)
     fine = dataclasses.replace(coarse, axis=-coarse.axis, pitch=1.0, length=20.0)
-    like_it = dataclasses.replace(fine, pitch=1.01)
+    like_it = dataclasses.replace(fine, pitch=1.01, length=20.2)
     part = with_threads(Fitted(stud, "converged", {}), [coarse, fine, like_it]).assembly["stud"]
     assert (part.metadata["thread"], part.metadata["thread_length"]) == ("M8", 16.0)
     assert (part.metadata["thread_2"], part.metadata["thread_2_length"]) == ("M8x1", 20.0)

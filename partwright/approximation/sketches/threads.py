@@ -109,7 +109,10 @@ def _candidates(mesh: trimesh.Trimesh, smooth: float) -> list[Thread]:
         whole = _between_ends(screw, corners)
         if not _is_like_a_thread(whole):
             continue
-        for flanks in _apart(whole, mesh, _flanks(whole, mesh)):
+        leaning = _flanks(whole, mesh)
+        if not len(leaning):  # waves are too flat to have any
+            continue
+        for flanks in _apart(whole, mesh, leaning):
             thread = _measured(whole, screw, mesh, corners, flanks)
             if _is_like_a_thread(thread) and not any(_is_same(thread, other) for other in found):
                 found.append(thread)

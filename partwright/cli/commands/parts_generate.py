@@ -40,13 +40,8 @@ def run(arguments: argparse.Namespace) -> int:
     change = (CHANGE if arguments.change is None else arguments.change) if arguments.like else 0.0
     with Work("reading") as work:
         source, keep = _kept(arguments, model)
-        if arguments.poses and source is not None:
-            warn(
-                [
-                    f"in {arguments.poses} {fault}; so they do in all samples"
-                    for fault in layout_faults(source)
-                ]
-            )
+        odd = layout_faults(source) if arguments.poses and source is not None else []
+        warn([f"in {arguments.poses} {fault}; so they do in all samples" for fault in odd])
         work.stage("making")
         made = sound_samples(
             generator, arguments.count, arguments.seed, source, keep,
@@ -68,6 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
             "model": {"name": model.name, "hash": model.hash},
             "seed": arguments.seed,
             "kept": list(keep) or ("poses" if arguments.poses else []),
+            "layout_faults": odd,
             "like": {"shape": arguments.like, "change": change} if arguments.like else None,
             "samples": [
                 {
