@@ -59,13 +59,9 @@ def read_mesh(path: Path) -> Source:
     pieces = tuple(unique_names(_pieces(scene, stem)))
     clouds = _clouds(scene, stem)
     if pieces:
-        points = sum(map(len, clouds))
-        note = (
-            (f"left out {counted(points, 'point')} that came without faces beside the mesh",)
-            if points
-            else ()
-        )
-        source = Source(stem, pieces, repairs=note)
+        points = counted(sum(map(len, clouds)), "point")
+        note = f"left out {points} that came without faces beside the mesh"
+        source = Source(stem, pieces, repairs=(note,) if clouds else ())
     elif clouds:
         normals = _ply_normals(next(iter(scene.geometry.values()))) if len(scene.geometry) == 1 else None
         source = source_of_points(stem, np.concatenate(clouds), normals)

@@ -53,7 +53,7 @@ def test_a_hundred_thousand_copies_are_bounded_at_once() -> None:
     row = Part(Sphere(0.4), instances=tuple(Similarity(translation=(i, 0, 0)) for i in range(1, 99_000)))
     start = time.process_time()
     assert np.allclose(row.bounds(), [[-0.4] * 3, [98_999.4, 0.4, 0.4]], atol=0.005)
-    assert time.process_time() - start < 10.0  # one by one they took half a minute
+    assert time.process_time() - start < 5.0  # one by one they took half a minute
 
 
 def test_groups_in_groups_are_bounded_at_once() -> None:
@@ -68,7 +68,7 @@ def test_groups_in_groups_are_bounded_at_once() -> None:
 
     start = time.process_time()
     assert np.isfinite(group(4).bounds()).all()
-    assert time.process_time() - start < 6.0
+    assert time.process_time() - start < 3.0
 
 
 def test_nothing_lies_outside_of_many_that_melt_together() -> None:

@@ -144,9 +144,8 @@ def _measured(
 ) -> Thread:
     """The thread of these flanks, with the radii of the patch's corners (N, 3) that lie between its ends."""
     own = mesh.vertices[np.unique(mesh.faces[flanks])]
-    low, high = (end((own - whole.axis) @ whole.direction) for end in (np.min, np.max))
-    along = (corners - whole.axis) @ whole.direction
-    beside = corners[(along >= low - _OVERLAP) & (along <= high + _OVERLAP)]
+    heights, along = ((points - whole.axis) @ whole.direction for points in (own, corners))
+    beside = corners[(along >= heights.min() - _OVERLAP) & (along <= heights.max() + _OVERLAP)]
     thread = _between_ends(_screw(mesh, flanks) or screw, beside if len(beside) else own)
     return _with_even_turns(_as_long_as(thread, own), mesh, flanks)
 
