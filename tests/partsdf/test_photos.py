@@ -14,7 +14,7 @@ import trimesh
 from PIL import Image
 
 from partwright.cli.main import main, parser
-from partwright.errors import ModelError, SettingError, UnreadableFileError
+from partwright.errors import EmptyShapeError, ModelError, SettingError, UnreadableFileError
 from partwright.partsdf.companions import load_companion, save_companion
 from partwright.partsdf.encoder import EncoderSettings
 from partwright.partsdf.from_photo import warnings_of
@@ -37,6 +37,23 @@ class Seeing:
         return [SimpleNamespace(silhouette=silhouette) for _ in pictures]
 
 
+GREEN, GREY = (10, 200, 10), (90, 90, 90)
+
+
+def two_colours(path: Path, width: int, height: int) -> Path:
+    """A picture, green on the left and grey on the right: one of a single colour is refused."""
+    picture = Image.new("RGB", (width, height), GREEN)
+    picture.paste(GREY, (width // 2, 0, width, height))
+    picture.save(path)
+    return path
+
+
+def test_pictures_of_one_colour_are_refused(tmp_path: Path) -> None:
+    Image.new("RGB", (64, 64), GREY).save(tmp_path / "grey.png")
+    with pytest.raises(EmptyShapeError, match="one colour all over"):
+        look_at(Seeing(), read_photo(tmp_path / "grey.png"))  # type: ignore[arg-type]
+
+
 def test_thin_shapes_have_a_silhouette(tmp_path: Path) -> None:
     rgba = np.zeros((512, 512, 4), np.uint8)
     rgba[256:258] = 255
@@ -48,11 +65,12 @@ def test_thin_shapes_have_a_silhouette(tmp_path: Path) -> None:
 
 
 def test_what_is_looked_at_may_be_outside_the_picture(tmp_path: Path) -> None:
-    Image.new("RGB", (2048, 22), (10, 200, 10)).save(tmp_path / "long.png")
-    looked = look_at(Seeing(), read_photo(tmp_path / "long.png"))  # type: ignore[arg-type]
+    looked = look_at(Seeing(), read_photo(two_colours(tmp_path / "long.png", 2048, 22)))  # type: ignore[arg-type]
     np.testing.assert_allclose(
-        looked.closely, np.broadcast_to(np.array([10, 200, 10]) / 255, (SIDE, SIDE, 3))
+        looked.closely, np.broadcast_to(looked.closely[:1], (SIDE, SIDE, 3)), atol=1e-6
     )
+    np.testing.assert_allclose(looked.closely[0, 0], np.array(GREEN) / 255, rtol=1e-6)
+    np.testing.assert_allclose(looked.closely[0, -1], np.array(GREY) / 255, rtol=1e-6)
     rows = np.repeat(np.linspace(0, 1, 100, dtype=np.float32)[:, None, None], 100, axis=1).repeat(3, axis=2)
     assert (_cut_out(rows, np.array([-20.0, 0, -5, 15])) == 0).all()  # its first row goes on
     assert (_cut_out(rows, np.array([110.0, 0, 125, 15])) == 1).all()
@@ -70,8 +88,7 @@ def test_what_is_not_seen_in_the_mirror_image_is_told(tmp_path: Path) -> None:
             sight.silhouette[:, 12:] = 0
             return [sight]
 
-    Image.new("RGB", (64, 64), (90, 90, 90)).save(tmp_path / "grey.png")
-    photo = read_photo(tmp_path / "grey.png")
+    photo = read_photo(two_colours(tmp_path / "photo.png", 64, 64))
     assert look_at(Seeing(), photo).mirrored == 1  # type: ignore[arg-type]
     looked = look_at(Left(), photo)  # type: ignore[arg-type]
     assert looked.mirrored == 0
