@@ -15,6 +15,7 @@ _BAND = 2.5  # voxels: values up to here are exact
 _SITE = 0.9  # voxels: more than half a voxel's diagonal, so that the sites leave no gaps in the surface
 _MARGIN = 2  # voxels around the bounding box
 _COARSEST = 4  # voxels: the blocks that the search for the band starts from
+_BRICK = (4, 4, 8)  # voxels: as many as the kernel takes at once
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,16 @@ class DistanceGrid:
         """(n, 3) of some of them, by their places in values.ravel()."""
         index = np.unravel_index(voxels, self.values.shape)
         return self.origin + self.spacing * np.stack(index, axis=1)
+
+    def in_bricks(self) -> NDArray[np.int64]:
+        """Places of all voxels in values.ravel(), brick by brick: what comes together lies together, so that
+        whoever looks at many points at once sees which parts are near. A row of voxels crosses the shape."""
+        brick, most = np.zeros((1, 1, 1), np.int64), 1
+        for axis, (count, length) in enumerate(zip(self.values.shape, _BRICK, strict=True)):
+            along = np.arange(count) // length
+            brick = brick * (along[-1] + 1) + along.reshape([-1 if a == axis else 1 for a in range(3)])
+            most *= int(along[-1]) + 1
+        return np.argsort(brick.ravel().astype(np.min_scalar_type(most)), kind="stable")
 
 
 def distance_grid(

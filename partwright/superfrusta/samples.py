@@ -206,6 +206,12 @@ class FitSamples:
         return self.grid.points().astype(np.float32)
 
     @cached_property
+    def _bricks(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """The order in which the kernel is quickest over the grid, and the points (X * Y * Z, 3) in it."""
+        order = self.grid.in_bricks()
+        return order, self.grid_points[order]
+
+    @cached_property
     def lattice(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Voxels (n, 3) wholly inside the shape, every second, and outside but not far, every fourth; and the
         shape's distance (n,) there."""
@@ -261,7 +267,10 @@ class FitSamples:
 
     def grid_field(self, rows: Rows) -> NDArray[np.float32]:
         """Distance (X, Y, Z) of the assembly on the grid."""
-        return self.distance_of(rows, self.grid_points).reshape(self.grid.values.shape)
+        order, points = self._bricks
+        field = np.empty(len(order), np.float32)
+        field[order] = self.distance_of(rows, points)
+        return field.reshape(self.grid.values.shape)
 
     def near_distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
         """Signed distance (n,) of the shape at points (n, 3), read off the grid."""

@@ -219,6 +219,13 @@ def test_points_of_some_voxels_are_those_of_all() -> None:
     np.testing.assert_array_equal(grid.points_of(some), grid.points()[some])
 
 
+def test_voxels_in_bricks_are_all_voxels_and_neighbours_come_together() -> None:
+    grid = DistanceGrid(np.zeros(3), 1.0, np.zeros((9, 8, 33), np.float32))
+    order = grid.in_bricks()
+    np.testing.assert_array_equal(np.sort(order), np.arange(9 * 8 * 33))
+    assert np.ptp(grid.points_of(order[:128]), axis=0).tolist() == [3, 3, 7]
+
+
 def test_a_surface_without_triangles_is_an_error_and_no_crash() -> None:
     none = MeshDistance(np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros((0, 3), np.int64), True)
     with pytest.raises(ValueError, match="without triangles"):

@@ -32,6 +32,11 @@ def bar(reach: float, radius: float = 0.04) -> np.ndarray:
     return row
 
 
+def test_the_field_on_the_grid_is_that_of_its_points(box: FitSamples) -> None:
+    field = box.distance_of(bar(1.0), box.grid_points).reshape(box.grid.values.shape)
+    np.testing.assert_array_equal(box.grid_field(bar(1.0)), field)
+
+
 def test_an_assembly_that_stays_near_the_shape_brings_no_samples(box: FitSamples) -> None:
     assert box.with_stray_samples(bar(0.3)) is box
     assert box.stray_weight(bar(0.3)).tolist() == [0.0, 0.0]
