@@ -302,7 +302,7 @@ NB_MODULE(_kernel, m) {
                                  In<float> room, In<float> unit, float reach, int octaves, int threads) {
     auto out = array<float>({local.shape(0), local.shape(1)});
     const Networks networks = networks_of(weights, shifts);
-    const Rooms rooms{scale.data(), room.data(), unit.data(), reach, octaves};
+    const Rooms rooms{scale.data(), room.data(), unit.data(), reach, octaves, false};
     nb::gil_scoped_release release;
     distances(networks, rooms, local.data(), int64_t(local.shape(1)), out.data(), threads);
     return out;
@@ -310,7 +310,8 @@ NB_MODULE(_kernel, m) {
      "Distances (G, N) at local points (G, N, 3) of parts (G, 3): of their networks near their rooms, else of these.");
 
   m.def("networks_gradients", [](In<float> local, std::vector<In<float>> weights, std::vector<In<float>> shifts, In<float> scale,
-                                 In<float> room, In<float> unit, float reach, int octaves, In<float> upstream, int threads) {
+                                 In<float> room, In<float> unit, float reach, int octaves, In<float> upstream, int threads,
+                                 bool learning) {
     auto by_local = array<float>({local.shape(0), local.shape(1), 3}), by_scale = array<float>({local.shape(0), 3});
     std::vector<Out<float>> by_weight, by_shift;
     std::vector<float*> weight_places, shift_places;
@@ -322,12 +323,14 @@ NB_MODULE(_kernel, m) {
     }
     {
       const Networks networks = networks_of(weights, shifts);
-      const Rooms rooms{scale.data(), room.data(), unit.data(), reach, octaves};
+      const Rooms rooms{scale.data(), room.data(), unit.data(), reach, octaves, learning};
       nb::gil_scoped_release release;
       distance_gradients(networks, rooms, local.data(), int64_t(local.shape(1)), upstream.data(), by_local.data(),
                          by_scale.data(), weight_places, shift_places, threads);
     }
     return nb::make_tuple(by_local, by_scale, by_weight, by_shift);
   }, "local"_a, "weights"_a, "shifts"_a, "scale"_a, "room"_a, "unit"_a, "reach"_a, "octaves"_a, "upstream"_a, "threads"_a,
-     "Derivatives of sum(upstream * distances) by local points, half-lengths, and each layer's weights and shifts.");
+     "learning"_a,
+     "Derivatives of sum(upstream * distances) by local points, half-lengths, and each layer's weights and shifts. Where "
+     "`learning`, networks that say less than the room also hear where more is wanted.");
 }

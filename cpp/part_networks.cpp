@@ -264,7 +264,8 @@ void distance_gradients(const Networks& n, const Rooms& rooms, const float* loca
         const float said = a.each.back()[size_t(i) * COLUMN_TILE];
         if (off > room.least * said) {
           by_room(place, axis);
-          continue;
+          // Else a network that once says less than its room everywhere would never learn again.
+          if (!rooms.learning || weight[place] >= 0) continue;
         }
         back.each.back()[size_t(i) * COLUMN_TILE] = weight[place] * room.least;
         by_lengths[room.shortest] += weight[place] * said * room.unit[room.shortest];

@@ -22,6 +22,7 @@ struct Rooms {
   const float *scale, *room, *unit;
   float reach;
   int octaves;
+  bool learning;  // networks that say less than the room hear of it where more is wanted
 };
 
 // Distances (G, N) at local points (G, N, 3): the network's near a part's room, else that from the room.

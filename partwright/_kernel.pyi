@@ -86,5 +86,5 @@ def networks_distances(
 ) -> _F: ...  # fmt: skip
 def networks_gradients(
     local: _F, weights: list[_F], shifts: list[_F], scale: _F, room: _F, unit: _F, reach: float, octaves: int,
-    upstream: _F, threads: int,
+    upstream: _F, threads: int, learning: bool,
 ) -> tuple[_F, _F, list[_F], list[_F]]: ...  # fmt: skip

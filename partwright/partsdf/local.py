@@ -13,9 +13,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import torch
 from torch import Tensor, nn
+from torch.autograd.function import once_differentiable
 
 from partwright.partsdf.checkpointed_linear import working_type
 from partwright.partsdf.config import DecoderSettings
@@ -104,18 +106,44 @@ class LocalDecoder(nn.Module):
                 else:
                     weight = weight.expand(len(values), -1, -1, -1)
                 layers.append((weight.flatten(0, 1), shift.flatten(0, 1)))
-        return _Local(tuple(layers), poses.scale, self.room, self.unit, self.settings.octaves, kind)
+        octaves = self.settings.octaves
+        return _Local(tuple(layers), poses.scale, self.room, self.unit, octaves, kind, self.training)
 
     def forward(self, latents: Tensor, local: Tensor, poses: PoseTensors | None = None) -> Tensor:
         """Distances (B, P, N) of latents (B, P, Z) at local points (B, P, N, 3) of poses (B, P, ...)."""
         return self.condition(latents, poses)(local)
 
 
+def larger(said: Tensor, room: Tensor) -> Tensor:
+    """The larger of what a network says and the distance from its room; where that is the room's, and the
+    loss wants more still, the network hears of it, too.
+
+    By the true derivative it would not, and one that once says less than the room everywhere never learns
+    again: thin discs, whose depth is about their room's, then stay the boxes that these are.
+    """
+    result: Tensor = _Larger.apply(said, room)
+    return result
+
+
+class _Larger(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, said: Tensor, room: Tensor) -> Tensor:
+        ctx.less = said < room
+        return torch.maximum(said, room)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, Tensor]:
+        (by,) = gradients
+        deaf = ctx.less & (by >= 0)
+        return by.masked_fill(deaf, 0.0), by.masked_fill(~ctx.less, 0.0)
+
+
 @dataclass(frozen=True)
 class _Local:
     """layers: a weight (B P, I, O) and a shift (B P, O) each. scale: half-lengths (B, P, 3). room: (P, 3),
     and unit: (P, 3) in which the networks see places, both in half-lengths. kind: of numbers in hidden
-    layers."""
+    layers. learning: whether derivatives are those of `larger`."""
 
     layers: tuple[tuple[Tensor, Tensor], ...]
     scale: Tensor
@@ -123,6 +151,7 @@ class _Local:
     unit: Tensor
     octaves: int
     kind: torch.dtype
+    learning: bool
 
     def __call__(self, local: Tensor, filled: bool | None = None) -> Tensor:
         """filled: whether segments are filled up to one length, as on a GPU; if None, by the device, and by
@@ -130,7 +159,9 @@ class _Local:
         if filled is None and self._by_kernel(local):
             count = len(self.scale)
             rooms = Rooms(self.room.repeat(count, 1), self.unit.repeat(count, 1), REACH, self.octaves)
-            found = distances(local.flatten(0, 1), self.scale.flatten(0, 1), self.layers, rooms)
+            found = distances(
+                local.flatten(0, 1), self.scale.flatten(0, 1), self.layers, rooms, self.learning
+            )
             return found.view(local.shape[:3])
         beyond = local.abs() - self.room[:, None]
         room = (beyond * self.scale.unsqueeze(-2)).amax(-1)  # the distance from it
@@ -140,7 +171,8 @@ class _Local:
         with torch.autocast(local.device.type, enabled=False):
             inside = self._network(points, near.sum(dim=1), rows // near.shape[1], filled)
         flat = room.flatten()
-        return flat.index_put((rows,), torch.maximum(inside, flat.index_select(0, rows))).view(room.shape)
+        either = larger if self.learning else torch.maximum
+        return flat.index_put((rows,), either(inside, flat.index_select(0, rows))).view(room.shape)
 
     def _network(self, points: Tensor, counts: Tensor, owner: Tensor, filled: bool | None) -> Tensor:
         """(M,) at local points (M, 3), `counts` (B P,) of each part of each shape, which stand together."""

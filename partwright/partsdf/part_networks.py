@@ -30,20 +30,24 @@ class Rooms(NamedTuple):
     octaves: int
 
 
-def distances(local: Tensor, scale: Tensor, layers: Layers, rooms: Rooms) -> Tensor:
+def distances(local: Tensor, scale: Tensor, layers: Layers, rooms: Rooms, learning: bool = False) -> Tensor:
     """(G, N) at local points (G, N, 3) of G parts with half-lengths `scale` (G, 3): what `local._Local` says.
 
-    layers: a weight (G, I, O) and a shift (G, O) each. Differentiable once.
+    layers: a weight (G, I, O) and a shift (G, O) each. learning: derivatives are those of `local.larger`.
+    Differentiable once.
     """
-    result: Tensor = _Distances.apply(local, scale, rooms, *(t for layer in layers for t in layer))
+    parameters = (t for layer in layers for t in layer)
+    result: Tensor = _Distances.apply(local, scale, rooms, learning, *parameters)
     return result
 
 
 class _Distances(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, local: Tensor, scale: Tensor, rooms: Rooms, *layers: Tensor) -> Tensor:
+    def forward(
+        ctx: Any, local: Tensor, scale: Tensor, rooms: Rooms, learning: bool, *layers: Tensor
+    ) -> Tensor:
         ctx.save_for_backward(local, scale, *layers)
-        ctx.rooms = rooms
+        ctx.rooms, ctx.learning = rooms, learning
         return torch.from_numpy(_kernel.networks_distances(**_arguments(local, scale, rooms, layers)))
 
     @staticmethod
@@ -51,10 +55,12 @@ class _Distances(torch.autograd.Function):
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, ...]:
         local, scale, *layers = ctx.saved_tensors
         by_local, by_scale, by_weight, by_shift = _kernel.networks_gradients(
-            **_arguments(local, scale, ctx.rooms, layers), upstream=_array(gradients[0])
+            **_arguments(local, scale, ctx.rooms, layers),
+            upstream=_array(gradients[0]),
+            learning=ctx.learning,
         )
         each = [torch.from_numpy(t) for pair in zip(by_weight, by_shift, strict=True) for t in pair]
-        return torch.from_numpy(by_local), torch.from_numpy(by_scale), None, *each
+        return torch.from_numpy(by_local), torch.from_numpy(by_scale), None, None, *each
 
 
 def _arguments(local: Tensor, scale: Tensor, rooms: Rooms, layers: Sequence[Tensor]) -> dict[str, Any]:

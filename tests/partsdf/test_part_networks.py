@@ -51,9 +51,12 @@ def derivatives(
 
 @pytest.mark.parametrize("width", [32, 20])
 @pytest.mark.parametrize("share", [1.0, 0.3])
-def test_values_and_derivatives_are_those_in_double_precision(width: int, share: float) -> None:
+@pytest.mark.parametrize("learning", [True, False])
+def test_values_and_derivatives_are_those_in_double_precision(
+    width: int, share: float, learning: bool
+) -> None:
     """More points a part than go through at once, some far; `share` of the distances have a weight."""
-    decoder, points = made(replace(SETTINGS, width=width)), 700
+    decoder, points = made(replace(SETTINGS, width=width)).train(learning), 700
     generator = torch.Generator().manual_seed(1)
     weight = torch.randn(2, 4, points, generator=generator)
     weight *= torch.rand(weight.shape, generator=generator) < share
@@ -78,6 +81,25 @@ def test_results_are_the_same_on_any_number_of_threads() -> None:
     finally:
         torch.set_num_threads(threads)
     assert torch.equal(*results)
+
+
+def test_a_part_that_says_less_than_its_room_everywhere_still_learns_where_more_is_wanted() -> None:
+    decoder = made(SETTINGS)
+    with torch.no_grad():
+        decoder.modulation.bias[-1] = -100.0  # the last shift: deep inside, wherever it is asked
+    points = decoder.room[None, :, None] * (2 * torch.rand(2, 4, 50, 3) - 1)
+    z, _, poses = drawn(1)
+
+    def heard(wanted: float) -> bool:
+        decoder.zero_grad()
+        (-wanted * decoder(z, points, poses)).sum().backward()
+        return bool((decoder.weights[-1].grad.abs() > 0).any())
+
+    assert (decoder(z, points, poses) <= 0).all()
+    assert heard(1.0)
+    assert not heard(-1.0)  # no part leaves its room, so less is of no use
+    decoder.eval()
+    assert not heard(1.0)  # the true derivative
 
 
 def test_parts_that_are_asked_nowhere_have_no_derivatives_by_their_networks() -> None:
