@@ -74,5 +74,5 @@ def _made(family: str, count: int) -> Iterable[Shape]:
 
 def _known(model: Model, shape: Shape, settings: ReconstructionSettings) -> Familiarity:
     target = Target.of_shape(shape)
-    found, turn = reconstruct_standing(model, target, ways_to_stand(shape.up), settings)
+    found, turn = reconstruct_standing(model, target, ways_to_stand(shape.up, model.up), settings)
     return familiarity(found, target.turned(turn))

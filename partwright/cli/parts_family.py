@@ -35,6 +35,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option("--samples", metavar="N", type=int, default=40_000, help="points a shape (default: 40000)")
     option("--threads", metavar="N", type=int, default=0, help="of the processor (default: one a core)")
     option("--workers", metavar="N", type=int, help="processes that prepare (default: one a processor)")
-    option("--up", metavar="AXIS", default="z", help="of the pictures: x, y, z, -x, -y, -z (default: z)")
+    option(
+        "--up",
+        metavar="AXIS",
+        help="points up in all shapes: x, y, z, -x, -y, -z (default: what most files say, as GLB y; else z)",
+    )
     option("--seed", metavar="S", type=int, default=0, help="of all that is drawn (default: 0)")
     command.set_defaults(run="parts_family")

@@ -29,7 +29,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--resolution",
         metavar="N",
         type=int,
-        help="cells along the unit frame, a multiple of 8 (default: 64 to 96, by the thinnest wall)",
+        help="cells along the unit frame, a multiple of 8 (default: 64 to 160, by the thinnest wall)",
     )
     command.set_defaults(run="parts_interpolate")
 

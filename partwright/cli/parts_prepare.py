@@ -34,6 +34,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     option(
         "--test", metavar="A,B", type=_names, default=(), help="shapes to test on (default: a fifth of them)"
     )
+    option(
+        "--up",
+        metavar="AXIS",
+        help="points up in all shapes: x, y, z, -x, -y, -z (default: what most files say, as GLB y; else z)",
+    )
     option("--workers", metavar="N", type=int, help="processes (default: one a processor)")
     option("--seed", metavar="S", type=int, default=0, help="of shapes, samples and the split (default: 0)")
     command.set_defaults(run="parts_prepare")

@@ -36,11 +36,13 @@ _NAMED = 5  # files, in a line
 
 @dataclass(frozen=True)
 class PartedShape:
-    """Parts by name, and the pieces that make up the whole: one of its own, or all parts. Own units."""
+    """Parts by name, and the pieces that make up the whole: one of its own, or all parts. Own units. up: the
+    axis that its file says points up, if any."""
 
     name: str
     parts: Mapping[str, Piece]
     whole: tuple[Piece, ...]
+    up: str | None = None
 
 
 class PartedSource(Protocol):
@@ -86,7 +88,8 @@ class MadeShape:
     def read(self) -> PartedShape:
         made = make_shape(self.family, recipe_of(self.family), self.seed, self.number)
         parts = {name: _piece(name, mesh.vertices, mesh.faces) for name, mesh in made.parts.items()}
-        return PartedShape(self.name, parts, (_piece(self.name, made.whole.vertices, made.whole.faces),))
+        whole = _piece(self.name, made.whole.vertices, made.whole.faces)
+        return PartedShape(self.name, parts, (whole,), "z")
 
 
 @dataclass(frozen=True)
@@ -106,8 +109,9 @@ class SceneFile:
         return tuple(piece.name for piece in read_source(self.path).pieces)
 
     def read(self) -> PartedShape:
-        parts = {piece.name: _checked(self.path, piece) for piece in read_source(self.path).pieces}
-        return PartedShape(self.name, parts, tuple(parts.values()))
+        source = read_source(self.path)
+        parts = {piece.name: _checked(self.path, piece) for piece in source.pieces}
+        return PartedShape(self.name, parts, tuple(parts.values()), source.up)
 
 
 @dataclass(frozen=True)
@@ -128,9 +132,11 @@ class PartFolder:
         return tuple(file.stem for file in self._files() if file.stem != WHOLE)
 
     def read(self) -> PartedShape:
-        pieces = {file.stem: _joined(file) for file in self._files()}
+        read = {file.stem: _joined(file) for file in self._files()}
+        pieces, ups = {name: piece for name, (piece, _) in read.items()}, {up for _, up in read.values()}
         whole = pieces.pop(WHOLE, None)
-        return PartedShape(self.name, pieces, tuple(pieces.values()) if whole is None else (whole,))
+        up = ups.pop() if len(ups) == 1 else None
+        return PartedShape(self.name, pieces, tuple(pieces.values()) if whole is None else (whole,), up)
 
     def _files(self) -> list[Path]:
         return _meshes(self.path)
@@ -153,7 +159,7 @@ class LabelledMesh:
         return tuple(_named(label) for label in np.unique(read_labels(labels_path(self.path))))
 
     def read(self) -> PartedShape:
-        whole = _joined(self.path)
+        whole, up = _joined(self.path)
         labels = read_labels(labels_path(self.path))
         if len(labels) != len(whole.faces):
             raise LabelError(
@@ -164,7 +170,7 @@ class LabelledMesh:
             _named(label): Piece(_named(label), whole.vertices, whole.faces[labels == label])
             for label in np.unique(labels)
         }
-        return PartedShape(self.name, parts, (whole,))
+        return PartedShape(self.name, parts, (whole,), up)
 
 
 def find_shapes(folder: str | Path) -> list[PartedSource]:
@@ -227,8 +233,8 @@ def _meshes(folder: Path) -> list[Path]:
     return meshes or [path for path in files if path.suffix.lower() in STEP_SUFFIXES]
 
 
-def _joined(path: Path) -> Piece:
-    """A file as one piece."""
+def _joined(path: Path) -> tuple[Piece, str | None]:
+    """A file as one piece, and the axis that it says points up."""
     source = read_source(path)
     if source.repairs:  # a surface was laid through points
         raise EmptyShapeError(f"{path}: has points but no faces; export the part with its surface")
@@ -236,7 +242,7 @@ def _joined(path: Path) -> Piece:
     offsets = np.cumsum([0] + [len(p.vertices) for p in pieces])[:-1]
     vertices = np.concatenate([p.vertices for p in pieces])
     faces = np.concatenate([p.faces + o for p, o in zip(pieces, offsets, strict=True)])
-    return _checked(path, Piece(path.stem, vertices, faces))
+    return _checked(path, Piece(path.stem, vertices, faces)), source.up
 
 
 def _checked(path: Path, piece: Piece) -> Piece:

@@ -18,13 +18,21 @@ from numpy.typing import NDArray
 
 from partwright.atomic_io import write_bytes
 from partwright.datasets.poses import Poses
-from partwright.errors import FamilyError, NewerVersionError, OutputError, UnreadableFileError
+from partwright.errors import (
+    FamilyError,
+    NewerVersionError,
+    OutputError,
+    SettingError,
+    UnreadableFileError,
+)
 from partwright.input_files import check_file
 from partwright.shapes import UnitFrame
+from partwright.shapes.units import canonical_up
 
 FORMAT, VERSION = "partwright-family", 1
 MANIFEST, SHAPES = "family.json", "shapes"
 SPLITS = ("train", "validation", "test")
+UP = "z"  # where nothing is said
 _ABOUT = "partwright"
 MOST_PARTS = 127  # the label of a sample is a signed byte
 
@@ -102,8 +110,8 @@ class PreparedFamily:
     """A prepared family, opened. Shapes are read on demand.
 
     name; parts: their names, in the order of every P axis; shapes: the entries; samples: points a shape;
-    seed; average_pose: P rows. Raises UnreadableFileError where there is no manifest, NewerVersionError, and
-    FamilyError where it breaks the format.
+    seed; average_pose: P rows; up: the axis that points up in all shapes. Raises UnreadableFileError where
+    there is no manifest, NewerVersionError, and FamilyError where it breaks the format.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -115,7 +123,8 @@ class PreparedFamily:
             self.shapes = tuple(_entry(line) for line in data["shapes"])
             self.samples, self.seed = int(data["samples"]), int(data["seed"])
             self.average_pose = _average(data["average_pose"], len(self.parts))
-        except (KeyError, TypeError, ValueError) as error:
+            self.up = canonical_up(str(data.get("up", UP)))
+        except (KeyError, TypeError, ValueError, SettingError) as error:
             raise FamilyError(
                 f"{self.folder / MANIFEST}: breaks the format ({error!r}); prepare it again"
             ) from error
@@ -209,6 +218,7 @@ def write_manifest(
     samples: int,
     average_pose: Poses,
     seed: int,
+    up: str = UP,
 ) -> None:
     """Write `family.json`, which completes the folder. Raises OutputError."""
     average = {key: _rows(getattr(average_pose, key)) for key in ("translation", "rotation", "scale")}
@@ -221,6 +231,7 @@ def write_manifest(
         "samples": samples,
         "average_pose": average,
         "seed": seed,
+        "up": up,
     }
     write_bytes(Path(folder) / MANIFEST, (json.dumps(data, indent=1) + "\n").encode())
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
@@ -30,6 +30,7 @@ from partwright.datasets.prepared import (
     MOST_PARTS,
     SHAPES,
     SPLITS,
+    UP,
     Entry,
     PreparedFamily,
     PreparedShape,
@@ -40,6 +41,7 @@ from partwright.datasets.prepared import (
 )
 from partwright.datasets.primitives import PrimitiveFit, fit_primitives
 from partwright.errors import FamilyError, OutputError, PartwrightError, SettingError
+from partwright.shapes.units import canonical_up
 
 VALIDATION, TEST = 0.2, 0.2  # shares of the shapes; the rest trains (PartSDF, B.4)
 FEWEST_SAMPLES = 1000
@@ -92,20 +94,23 @@ def prepare(
     held_out: Sequence[str] = (),
     seed: int = 0,
     workers: int | None = None,
+    up: str | None = None,
     progress: Callable[[PreparationProgress], None] | None = None,
 ) -> Preparation:
     """Prepare a folder of shapes, or `count` shapes of one of FAMILIES, for PartSDF.
 
     samples: points a shape (the paper's program has 525,000). parts: the family's parts in order; all that
     the shapes have if empty. held_out: the shapes to test on; if empty, 60 % train, 20 % validate and 20 %
-    test, drawn by seed. workers: processes; one a processor if None. Shapes that cannot be used are left out
-    and said why. Ctrl-C loses only the shapes that are being worked on: the same call goes on from there.
+    test, drawn by seed. workers: processes; one a processor if None. up: the axis that points up in all
+    shapes; if None, as most files say (GLB: y), else z. Shapes that cannot be used are left out and said why.
+    Ctrl-C loses only the shapes that are being worked on: the same call goes on from there.
 
     Raises SettingError, OutputError, and FamilyError where fewer than two shapes can be used, a part of
     `parts` is missing everywhere, or a held-out shape is not there.
     """
     if samples < FEWEST_SAMPLES:
         raise SettingError(f"{samples} samples a shape were asked for; expected {FEWEST_SAMPLES} or more")
+    stated = None if up is None else canonical_up(up)
     output = Path(output)
     name, sources, refused = _sources(source, count, seed)
     sources, names = _with_parts(sources, tuple(parts), refused)
@@ -123,7 +128,8 @@ def prepare(
     left_out = {shape.name for shape in refused}
     jobs = [job for job in jobs if job.source.name not in left_out]
     _check_enough(name, [job.source for job in jobs], refused)
-    family = _finish(output, name, jobs, splits([job.source.name for job in jobs], held_out, seed))
+    split = splits([job.source.name for job in jobs], held_out, seed)
+    family = _finish(output, name, jobs, split, stated)
     return Preparation(family, tuple(sorted(refused, key=lambda r: r.name)))
 
 
@@ -280,9 +286,10 @@ def _is_done(path: Path, key: str) -> bool:
 
 
 def _sampled(job: _Job) -> tuple[PreparedShape, dict[str, Any]]:
-    """The shape with poses that are still to be agreed on, all `fits` of each part, and what the surface's
-    `repairs` were."""
-    labelled = label_surface(job.source.read(), job.parts)
+    """The shape with poses that are still to be agreed on, all `fits` of each part, what the surface's
+    `repairs` were, and the axis that is `up` by the file."""
+    read = job.source.read()
+    labelled = label_surface(read, job.parts)
     points, sdf, part = sample(labelled, job.samples, _seed_of(job))
     fits = {number: fit_primitives(v, job.seed) for number, v in labelled.vertices.items()}
     present = np.array([number in fits for number in range(len(job.parts))], dtype=np.uint8)
@@ -300,7 +307,7 @@ def _sampled(job: _Job) -> tuple[PreparedShape, dict[str, Any]]:
         shape.frame,
     )
     rows = {job.parts[number]: [fit.to_row() for fit in found] for number, found in fits.items()}
-    return prepared, {"fits": rows, "repairs": list(shape.repairs)}
+    return prepared, {"fits": rows, "repairs": list(shape.repairs), "up": read.up}
 
 
 def _seed_of(job: _Job) -> int:
@@ -308,7 +315,9 @@ def _seed_of(job: _Job) -> int:
     return int.from_bytes(hashlib.sha256(f"{job.seed}:{job.source.name}".encode()).digest()[:4], "big")
 
 
-def _finish(output: Path, name: str, jobs: Sequence[_Job], split: dict[str, str]) -> PreparedFamily:
+def _finish(
+    output: Path, name: str, jobs: Sequence[_Job], split: dict[str, str], up: str | None
+) -> PreparedFamily:
     """Agree on poses, write them into the shapes' files, and write the manifest."""
     parts = jobs[0].parts
     about = [read_about(job.path) for job in jobs]
@@ -322,11 +331,18 @@ def _finish(output: Path, name: str, jobs: Sequence[_Job], split: dict[str, str]
     for job, has, own, said in zip(jobs, present, poses, about, strict=True):
         shape = read_shape(job.path, job.source.name)
         shape = replace(shape, poses=_filled(own, average, has))
-        extra: dict[str, Any] = {key: said[key] for key in ("key", "fits", "repairs") if key in said}
+        extra: dict[str, Any] = {key: said[key] for key in ("key", "fits", "repairs", "up") if key in said}
         digest = write_shape(job.path, shape, extra)
         entries.append(Entry(shape.name, f"{SHAPES}/{job.path.name}", split[shape.name], digest))
-    write_manifest(output, name, parts, entries, jobs[0].samples, average, jobs[0].seed)
+    up = up or _usual(one.get("up") for one in about)
+    write_manifest(output, name, parts, entries, jobs[0].samples, average, jobs[0].seed, up or UP)
     return PreparedFamily(output)
+
+
+def _usual(ups: Iterable[str | None]) -> str | None:
+    """The axis that most shapes say points up; None where none says any."""
+    told = Counter(up for up in ups if up is not None)
+    return told.most_common(1)[0][0] if told else None
 
 
 def _agreed_poses(

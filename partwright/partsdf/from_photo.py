@@ -23,7 +23,6 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.photos import Looked, Photo, look_at, read_photo
 from partwright.partsdf.pictures import picture
 from partwright.partsdf.standpoint import Standpoint, find_standpoint
-from partwright.partsdf.views import FAMILY_UP
 from partwright.render import Camera, render_mesh, sheet, write_png
 
 if TYPE_CHECKING:
@@ -67,7 +66,7 @@ class PhotoParts:
         """(H, W, 3) uint8: the picture, what is taken for the shape in it, and the parts from there and from
         beside."""
         camera = replace(self.standpoint.camera, margin=0.05)
-        aside = Camera(camera.azimuth + 60, 22.0, up=FAMILY_UP)
+        aside = Camera(camera.azimuth + 60, 22.0, up=camera.up)
         seen = np.kron(self.looked.silhouette, np.ones((2, 2)))[..., None]
         closely = self.looked.closely
         panels = [_enlarged(one) for one in (closely, closely * np.maximum(seen, _UNSEEN))]
@@ -115,7 +114,12 @@ def reconstruct_seen(
     meshed = mesh_shape(shape, resolution, parts=False)
     surface = meshed.whole
     standpoint = find_standpoint(
-        surface.vertices, surface.faces, looked.silhouette, looked.sight.azimuth, looked.sight.elevation
+        surface.vertices,
+        surface.faces,
+        looked.silhouette,
+        looked.sight.azimuth,
+        looked.sight.elevation,
+        model.up,
     )
     camera = standpoint.camera
     report = {
@@ -137,7 +141,7 @@ def reconstruct_seen(
         "seconds": {"see": round(seen - start, 3), "mesh": round(time.perf_counter() - seen, 3)},
         "warnings": warnings_of(model.name, looked, standpoint),
     }
-    assembly = to_assembly(shape, up=FAMILY_UP, source=name)
+    assembly = to_assembly(shape, up=model.up, source=name)
     return PhotoParts(shape, assembly, surface, looked, standpoint, report)
 
 

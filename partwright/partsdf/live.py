@@ -11,7 +11,7 @@ from partwright.partsdf.pictures import picture, target_picture
 from partwright.partsdf.training import EpochReport
 from partwright.render import Camera, sheet, write_png
 
-_SHAPES, _PANEL, _CELLS = 4, 240, 64
+_SHAPES, _PANEL = 4, 240
 _LEAST, _SHARE = 20.0, 0.05  # seconds between pictures, and what they may take of all time
 
 
@@ -35,7 +35,7 @@ class LivePicture:
         below = []
         for shape in self._shapes:
             made = NeuralShape.trained(model, shape.name)
-            below.append(picture(made, _CELLS, _PANEL, self._camera))
+            below.append(picture(made, None, _PANEL, self._camera))
         write_png(self._path, sheet([*self._above, *below], columns=len(below), title=_said(report)))
         took = time.monotonic() - start
         self._due = start + max(_LEAST, took / _SHARE)

@@ -57,7 +57,7 @@ class LearnedParts(Method[Settings]):
             target = Target.seen_in(shape, run.seed)
             probe = Target.of_shape(shape, _PROBED, run.seed)
             inside = probe.sdf.numpy() < 0
-            turns = ways_to_stand(shape.up) if settings.turn else [UPRIGHT]
+            turns = ways_to_stand(shape.up, model.up) if settings.turn else [UPRIGHT]
             checkpoint()
         history: list[dict[str, float | str]] = []
 

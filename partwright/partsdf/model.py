@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import glob
 import hashlib
 import json
 import os
@@ -25,6 +26,7 @@ from partwright.partsdf.local import LocalDecoder
 from partwright.partsdf.losses import aggregate
 from partwright.partsdf.poses import PoseTensors, local_points
 from partwright.partsdf.transformer import TransformerDecoder
+from partwright.shapes.units import canonical_up
 
 FORMAT, VERSION = "partwright-partsdf", 1
 SUFFIX = ".safetensors"
@@ -44,8 +46,8 @@ class Model:
 
     parts: names of the P parts. latents (S, P, Z), poses (S, P, ...), present (S, P) bool of the S training
     shapes, named `shapes`; average_pose: P rows, of parts that are missing. lipschitz: the steepest change
-    of a part's distance per length that was measured near the training shapes, with a margin. hash: of the
-    file.
+    of a part's distance per length that was measured near the training shapes, with a margin. up: the axis
+    that points up in the family. hash: of the file.
     """
 
     config: Config
@@ -57,6 +59,7 @@ class Model:
     average_pose: PoseTensors
     shapes: tuple[str, ...]
     lipschitz: float
+    up: str = "z"
     hash: str = ""
 
     @property
@@ -136,6 +139,7 @@ class Model:
             "parts": self.parts,
             "shapes": self.shapes,
             "slope": self.lipschitz,
+            "up": self.up,
         }
         tensors = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
         return save(tensors, {"partwright": json.dumps(about)})
@@ -179,21 +183,22 @@ def file_of(model: Model) -> Path | None:
 
 
 def find_model(name: str, hash: str) -> Model:
-    """The model of this name and hash: one that was loaded before, ships, or lies in a models' folder.
+    """The model of this name and hash: one that was loaded before, ships, lies in a models' folder, or in the
+    working folder or one of its folders, as a file or folder of its name.
 
     Raises:
         ModelError: there is none; the message says where one would be looked for.
     """
     if hash in _loaded:
         return _loaded[hash]
-    for path in _candidates():
+    for path in (*_candidates(), *_here(name)):
         if path.stem == name or path.parent.name == name:
             model = load_model(path)
             if model.hash == hash:
                 return model
     raise ModelError(
-        f"the parts need the model {name!r} with hash {hash[:12]}, which is not here; load it first "
-        f"(--model FILE, or partwright.partsdf.load_model), or name its folder in ${FOLDERS}"
+        f"the parts need the model {name!r} with hash {hash[:12]}, which is not here; run this where its "
+        f"folder lies, name that in ${FOLDERS}, or load the model first (partwright.partsdf.load_model)"
     )
 
 
@@ -244,7 +249,8 @@ def _model(about: dict[str, Any], tensors: dict[str, Tensor]) -> Model:
     prefix = "decoder."
     weights = {k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)}
     decoder = _decoder_of(len(parts), config.decoder, weights)
-    return Model(config, parts, decoder, latents, poses, present, average, shapes, float(about["slope"]))
+    slope, up = float(about["slope"]), canonical_up(str(about.get("up", "z")))
+    return Model(config, parts, decoder, latents, poses, present, average, shapes, slope, up)
 
 
 def _decoder_of(parts: int, settings: DecoderSettings, weights: dict[str, Tensor]) -> nn.Module:
@@ -286,6 +292,15 @@ def _named(name: str) -> Path:
             f"{why}; here are: {known}. Give a model's file ({SUFFIX}), or name its folder in ${FOLDERS}"
         )
     return paths[0]
+
+
+def _here(name: str) -> list[Path]:
+    """Files that may be a model of this name, in the working folder and those in it."""
+    if not name or name in (".", "..") or set(name) & set("/\\"):
+        return []
+    known = glob.escape(name)
+    patterns = (f"{known}{SUFFIX}", f"{known}/model{SUFFIX}")
+    return [path for p in patterns for path in (*Path().glob(p), *sorted(Path().glob(f"*/{p}")))]
 
 
 def _candidates() -> Sequence[Path]:

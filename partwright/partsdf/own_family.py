@@ -46,7 +46,7 @@ def learn_family(
     samples: int = 40_000,
     seed: int = 0,
     threads: int = 0,
-    up: str = "z",
+    up: str | None = None,
     workers: int | None = None,
     prepared: Callable[[PreparationProgress], None] | None = None,
     planned: Callable[[Plan], None] | None = None,
@@ -55,7 +55,8 @@ def learn_family(
     """Prepare the folder `source` into output/family, write output/check.md and output/training.toml, and
     train a model into `output`, with a picture of it as it learns, output/live.png.
 
-    steps: of four shapes each. samples: points a shape. up: of the picture. Told: of each shape as it is
+    steps: of four shapes each. samples: points a shape. up: the axis that points up; if None, as most of the
+    files say (GLB: y), else z. Told: of each shape as it is
     prepared, of the plan before the training begins, and of each epoch. Whatever stops it, the same call goes
     on from there.
 
@@ -72,9 +73,10 @@ def learn_family(
     if output.resolve() == source.resolve():
         raise SettingError(f"{output}: holds the shapes; write the model into another folder")
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", output.absolute().name)
-    camera = Camera(up=up)
     check_folder(output)
-    made = prepare(source, output / FAMILY, samples=samples, seed=seed, workers=workers, progress=prepared)
+    made = prepare(
+        source, output / FAMILY, samples=samples, seed=seed, workers=workers, up=up, progress=prepared
+    )
     family = made.family
     if len(family.parts) < 2:
         raise FamilyError(
@@ -96,7 +98,7 @@ def learn_family(
     total, left = learning.total, learning.total - learning.state.step
     if planned is not None:
         planned(Plan(family, tuple(findings), config, left, total, each * left))
-    picture = LivePicture(output / PICTURE, family, camera)
+    picture = LivePicture(output / PICTURE, family, Camera(up=family.up))
 
     def told(report: EpochReport) -> None:
         picture.show(report)
@@ -118,7 +120,7 @@ def settings_for(family: PreparedFamily, name: str, steps: int, seed: int = 0, t
         training=TrainingSettings(
             epochs=epochs, batch=_BATCH, points=256, balance=0.25, validation=True, rate=4e-3,
             latent_rate=5e-3, warmup=min(150, 1 + steps // 10), anneal=1.0,
-            threads=threads, ease=0.2, validate=epochs, validate_shapes=1, checkpoint=1, seed=seed,
+            threads=threads, ease=0.2, validate=epochs, validate_shapes=3, checkpoint=1, seed=seed,
         ),
     )  # fmt: skip
 

@@ -20,7 +20,7 @@ from partwright.render.output import write
 if TYPE_CHECKING:
     import trimesh
 
-_COARSE, _FINE = 64, 96  # cells along the unit frame of a picture, by its thinnest wall; files have more
+_COARSE, _FINE, _FILM = 64, 192, 160  # cells along the unit frame of a picture, by its thinnest wall
 _MAX_SHEET_PICTURES = 8  # pictures of a contact sheet
 _FRAME_MILLISECONDS = 60  # milliseconds
 _PAUSE_FRAMES = 8  # frames' time at either end
@@ -48,7 +48,7 @@ def picture(
 ) -> np.ndarray:
     """(size, size, 3) uint8, each part in its colour; blank where the shape has no surface.
 
-    resolution: cells along the unit frame, a multiple of 8; if not given, 64 to 96 by the thinnest wall.
+    resolution: cells along the unit frame, a multiple of 8; if not given, 64 to 192 by the thinnest wall.
     """
     resolution = resolution or picture_resolution(shape)
     try:
@@ -70,9 +70,10 @@ def target_picture(shape: PreparedShape, size: int, camera: Camera | None = None
 
 
 def picture_resolution(*shapes: NeuralShape) -> int:
-    """Cells along the unit frame that show the shapes' thinnest wall, as far as a picture's cost allows."""
+    """Cells along the unit frame that show the shapes' thinnest wall, as far as the cost of a picture, or of
+    all between two shapes, allows."""
     thinnest = min(float(shape.walls().min(initial=np.inf)) for shape in shapes)
-    return min(_FINE, resolution_for_wall(thinnest, _COARSE))
+    return min(_FINE if len(shapes) == 1 else _FILM, resolution_for_wall(thinnest, _COARSE))
 
 
 def blank(size: int) -> np.ndarray:

@@ -44,7 +44,7 @@ def found_in(
     """
     shape = load_shape(path)
     target = Target.seen_in(shape, seed)
-    found, turn = reconstruct_standing(model, target, ways_to_stand(shape.up), settings, seed)
+    found, turn = reconstruct_standing(model, target, ways_to_stand(shape.up, model.up), settings, seed)
     return found, tuple(familiarity(found, target.turned(turn)).warnings())
 
 
@@ -71,4 +71,5 @@ def open_source(text: str, model: str | None = None) -> Source:
             f"{text!r} is no assembly file (.json), no folder with an assembly.json, and no MODEL:SHAPE, "
             f"such as mixers:0; give one of these{made}"
         )
-    return Source(NeuralShape.trained(load_model(source), shape_name), name=shape_name)
+    trained = NeuralShape.trained(load_model(source), shape_name)
+    return Source(trained, up=trained.model.up, name=shape_name)

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from partwright.partsdf.views import FAMILY_UP
 from partwright.render import Camera
 from partwright.render.raycast import Scene
 
@@ -29,12 +28,18 @@ class Standpoint:
 
 
 def find_standpoint(
-    vertices: np.ndarray, faces: np.ndarray, silhouette: np.ndarray, azimuth: float, elevation: float
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    silhouette: np.ndarray,
+    azimuth: float,
+    elevation: float,
+    up: str = "z",
 ) -> Standpoint:
     """The best near an azimuth and an elevation, in degrees: a silhouette that was badly seen is not to lead
     far away from these.
 
-    vertices (V, 3), faces (F, 3), as the family stands. silhouette (H, W) bool, True somewhere.
+    vertices (V, 3), faces (F, 3), as the family stands, with the axis `up`. silhouette (H, W) bool, True
+    somewhere.
     """
     scene, wanted = Scene(vertices, faces), boxed(silhouette)
 
@@ -42,7 +47,7 @@ def find_standpoint(
         found = outline(scene, camera)
         return Standpoint(camera, float((found & wanted).sum() / max((found | wanted).sum(), 1)))
 
-    first = Camera(azimuth, float(np.clip(elevation, _LOWEST, _HIGHEST)), _FIELDS[1], FAMILY_UP, 0.0)
+    first = Camera(azimuth, float(np.clip(elevation, _LOWEST, _HIGHEST)), _FIELDS[1], up, 0.0)
     best = judged(first)
     for step in _STEPS:
         for _ in range(_SWEEPS):

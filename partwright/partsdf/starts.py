@@ -31,7 +31,6 @@ from partwright.shapes import LONGEST_SIDE
 
 Quaternion = tuple[float, float, float, float]
 UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)
-FAMILY_UP = "z"  # of the made families, and of what `parts prepare` is given
 _HALF = math.sqrt(0.5)
 # From z up to another axis up.
 _FROM_Z: dict[str, Quaternion] = {
@@ -86,19 +85,25 @@ def find_starts(
     return [seen, *(best_starts(model, target, others, turns) if others else [])]
 
 
-def ways_to_stand(up: str | None) -> list[Quaternion]:
+def ways_to_stand(up: str | None, family: str = "z") -> list[Quaternion]:
     """Turns from how the family stands to how a shape may, the first of which is none.
 
-    All 24 where the up axis is unknown. Else those about it, for a family with the same one, and those that
-    bring `FAMILY_UP` to it.
+    up: the shape's, family: the family's axis that points up. All 24 where the shape's is unknown. Else
+    those that bring the family's to it, after those about it where the two differ: the family may not stand
+    as is said.
     """
+    if up is None:
+        others = [axis for axis in _FROM_Z if axis != family]
+        return [turn for axis in (family, *others) for turn in _raised(axis, family)]
+    return [*(_raised(up, up) if up != family else []), *_raised(up, family)]
+
+
+def _raised(up: str, family: str) -> list[Quaternion]:
+    """The four turns that bring one axis to the other."""
     half = math.pi / 4
     about = [(math.cos(k * half), 0.0, 0.0, math.sin(k * half)) for k in range(4)]
-    raised = [quaternion_product(_FROM_Z[axis], turn) for axis in ([up] if up else _FROM_Z) for turn in about]
-    if up in (None, FAMILY_UP):
-        return raised
-    w, x, y, z = _FROM_Z[up]
-    return [*(quaternion_product(turn, (w, -x, -y, -z)) for turn in raised), *raised]
+    w, x, y, z = _FROM_Z[family]
+    return [quaternion_product(quaternion_product(_FROM_Z[up], turn), (w, -x, -y, -z)) for turn in about]
 
 
 @torch.no_grad()

@@ -10,9 +10,9 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -67,11 +67,13 @@ class EpochReport:
 
 @dataclass(frozen=True)
 class Trained:
-    """model: as written to `path`. outcome: "converged" where all epochs are done, else "interrupted"."""
+    """model: as written to `path`. outcome: "converged" where all epochs are done, else "interrupted".
+    scores: of the shapes that it is validated on, once all epochs are done, by the log's names."""
 
     model: Model
     path: Path
     outcome: str
+    scores: Mapping[str, float] = field(default_factory=dict)
 
 
 def train(
@@ -136,6 +138,7 @@ class Trainer:
                 folder / CHECKPOINT, config, samples.names, self.plain, self.optimiser.optimizer
             )
         self.steps = -(-len(samples) // self.settings.batch)  # an epoch
+        self._scores: dict[str, float] = {}
         self._reporting = 0.0  # seconds that who is told of an epoch took: no part of the training
 
     def run(self, report: Callable[[EpochReport], None] | None) -> Trained:
@@ -159,7 +162,7 @@ class Trainer:
         if self.fabric.is_global_zero:
             model = model.save(path)
         self.fabric.barrier()
-        return Trained(model, path, "converged" if done else "interrupted")
+        return Trained(model, path, "converged" if done else "interrupted", self._scores if done else {})
 
     @property
     def epoch(self) -> int:
@@ -229,8 +232,8 @@ class Trainer:
         row["rate"], row["seconds"] = self.optimiser.param_groups[0]["lr"], self.state.seconds
         every = self.settings.validate
         if every and (self.epoch % every == 0 or self.epoch == self.settings.epochs):
-            scores, picture = validation.run(self.trained(), self.epoch)
-            row |= scores
+            self._scores, picture = validation.run(self.trained(), self.epoch)
+            row |= self._scores
             log.picture(self.epoch, picture)
         log.row(self.epoch, row)
         if report:
@@ -262,6 +265,7 @@ class Trainer:
             average_pose=average,
             shapes=samples.names,
             lipschitz=1.0,
+            up=self.family.up,
         )
         return replace(model, lipschitz=measured_lipschitz(model, samples))
 

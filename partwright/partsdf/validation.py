@@ -15,9 +15,9 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.pictures import picture, target_picture
 from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct
-from partwright.render import sheet, write_png
+from partwright.render import Camera, sheet, write_png
 
-ITERATIONS, RESOLUTION, PANEL = 150, 64, 240
+ITERATIONS, PANEL = 150, 240
 HELD_OUT = 5  # every fifth sample is measured at, not fitted to
 
 
@@ -28,7 +28,7 @@ class Validation:
         indices = family.split("validation") if not config.training.validation else []
         indices = (indices or family.split("test"))[: config.training.validate_shapes]
         self._shapes = [family.load(i) for i in indices] if config.training.validate else []
-        self._folder = folder
+        self._folder, self._camera = folder, Camera(up=family.up)
 
     def run(self, model: Model, epoch: int) -> tuple[dict[str, float], np.ndarray | None]:
         """Scores for the log, and the picture, which is also written to validation_EPOCH.png."""
@@ -40,7 +40,8 @@ class Validation:
             held = np.arange(len(shape.sdf)) % HELD_OUT == 0
             found = reconstruct(model, _rows(shape, ~held), settings)
             scores.append(_scores(found, _rows(shape, held)))
-            panels += [target_picture(shape, PANEL), picture(found, RESOLUTION, PANEL)]
+            panels.append(target_picture(shape, PANEL, self._camera))
+            panels.append(picture(found, None, PANEL, self._camera))
         page = sheet(panels, columns=2)
         write_png(self._folder / f"validation_{epoch:05d}.png", page)
         return {name: float(np.mean([s[name] for s in scores])) for name in scores[0]}, page

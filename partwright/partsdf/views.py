@@ -25,7 +25,6 @@ from partwright.render.raycast import Scene, cast
 from partwright.shapes import LONGEST_SIDE
 
 SIDE = 64  # pixels
-FAMILY_UP = "z"
 SHADED = 128  # added to a pixel's label where the light does not reach it
 _EACH = 4  # views of a shape once it is put together
 _ELEVATION, _FIELD = (-8.0, 50.0), (8.0, 50.0)  # degrees
@@ -106,7 +105,8 @@ def draw_views(
         framed.append(mesh[3])
         scene = Scene(mesh[0], mesh[1])
         for j in range(i * _EACH, (i + 1) * _EACH):
-            rows.append(_seen(scene, mesh[2], rng, normal[j].reshape(-1, 3), label[j].reshape(-1)))
+            seen = normal[j].reshape(-1, 3), label[j].reshape(-1)
+            rows.append(_seen(scene, mesh[2], model.up, rng, *seen))
         if told is not None:
             told(min(count, len(rows)))
         if cancel is not None and cancel.requested:
@@ -154,10 +154,10 @@ def _put_together(
 
 
 def _seen(
-    scene: Scene, labels: np.ndarray, rng: np.random.Generator, normal: np.ndarray, label: np.ndarray
+    scene: Scene, labels: np.ndarray, up: str, rng: np.random.Generator, normal: np.ndarray, label: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A view from somewhere, written to normal and label; the light, the way back, and the camera."""
-    camera = Camera(rng.uniform(0, 360), rng.uniform(*_ELEVATION), rng.uniform(*_FIELD), FAMILY_UP, 0.0)
+    camera = Camera(rng.uniform(0, 360), rng.uniform(*_ELEVATION), rng.uniform(*_FIELD), up, 0.0)
     view = _rolled(camera.fitted(scene.vertices, SIDE, SIDE), _ROLL * rng.standard_normal())
     filled = rng.uniform(*(_FILLED if rng.random() < _CLOSE else _LOOSE))
     room = 0.9 * (1 - filled) / 2

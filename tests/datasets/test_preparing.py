@@ -48,6 +48,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Preparation:
 def test_distance_and_nearest_part_are_those_of_the_solids(made: Preparation) -> None:
     family = made.family
     assert made.refused == ()
+    assert family.up == "z"  # PLY files do not say
     assert family.parts == ("foot", "head")
     for index in range(len(family)):
         shape = family.load(index)
@@ -123,6 +124,20 @@ def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
     np.testing.assert_array_equal(before.points, after.points)
     more = prepare(source, output, samples=2 * SAMPLES, workers=1).family.load(0)
     assert len(more.points) == 2 * SAMPLES
+
+
+def test_the_axis_that_points_up_is_what_the_files_say_unless_it_is_stated(tmp_path: Path) -> None:
+    source = tmp_path / "in"
+    source.mkdir()
+    for number in range(2):
+        scene = trimesh.Scene()
+        for name, mesh in parts_of(1 + 0.1 * number).items():
+            scene.add_geometry(mesh, node_name=name, geom_name=name)
+        scene.export(source / f"thing_{number}.glb")
+    output = tmp_path / "out"
+    assert prepare(source, output, samples=1000, workers=1).family.up == "y"
+    assert prepare(source, output, samples=1000, workers=1).family.up == "y"  # of what was done before
+    assert prepare(source, output, samples=1000, workers=1, up="Z").family.up == "z"
 
 
 def test_scenes_and_labelled_meshes_are_read_too(tmp_path: Path) -> None:

@@ -136,6 +136,18 @@ def test_opening_needs_the_model(
         pw.load_assembly(tmp_path / "a.json")
 
 
+def test_a_model_is_found_in_a_folder_of_its_name_where_the_command_is_run(
+    assembly: pw.Assembly, model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assembly.save(tmp_path / "a.json")
+    folder = tmp_path / "models" / "lamps"
+    folder.mkdir(parents=True)
+    (folder / "model.safetensors").write_bytes(model.to_bytes())
+    monkeypatch.setattr(models, "_loaded", {})
+    monkeypatch.chdir(tmp_path)
+    assert pw.load_assembly("a.json").parts[0].field.hash == model.hash  # type: ignore[union-attr]
+
+
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [

@@ -148,9 +148,11 @@ def test_distances_do_not_depend_on_the_number_of_cores(model: Model) -> None:
         torch.set_num_threads(before)
 
 
-@pytest.mark.parametrize(("wall", "cells"), [(0.2, 64), (0.05, 80), (0.001, 96)])
+@pytest.mark.parametrize(("wall", "cells"), [(0.2, 64), (0.05, 80), (0.001, 192)])
 def test_pictures_are_finer_for_thin_walls(
     model: Model, monkeypatch: pytest.MonkeyPatch, wall: float, cells: int
 ) -> None:
     monkeypatch.setattr(NeuralShape, "walls", lambda shape: np.array([1.0, wall]))
-    assert picture_resolution(NeuralShape.trained(model, "lamp1")) == cells
+    shape = NeuralShape.trained(model, "lamp1")
+    assert picture_resolution(shape) == cells
+    assert picture_resolution(shape, shape) == min(cells, 160)  # of a film

@@ -53,6 +53,9 @@ def test_one_command_from_a_folder_to_a_model(tmp_path: Path, capsys: pytest.Cap
     assert "| thing_2 | look at it | not watertight: filled 1 hole " in table
     model = pw.partsdf.load_model(output)  # the folder is enough
     assert (model.name, model.parts, len(model.shapes)) == ("things-model", ("head", "foot"), 3)
+    assert model.up == "y"  # as in all GLB files
+    assert "learned from 3 shapes" in said.out
+    assert "shapes that it has not seen are found, their parts being known, at an IoU" in said.out
     assert read_config(output / "training.toml").training.epochs == 3
     assert Image.open(output / "live.png").width == 2 * 240  # two are in the split that trains
 
@@ -167,7 +170,7 @@ def test_bad_folders_are_told_in_one_line(tmp_path: Path, capsys: pytest.Capture
         learn_family(tmp_path, tmp_path / "." / "")
     with pytest.raises(SettingError, match="steps is 0"):
         learn_family(tmp_path, tmp_path / "out", steps=0)
-    with pytest.raises(SettingError, match="up axis is 'w'"):
+    with pytest.raises(SettingError, match="unknown up axis 'w'"):
         learn_family(tmp_path, tmp_path / "out", up="w")
     assert not (tmp_path / "out").exists()
 

@@ -19,6 +19,7 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.starts import (
     UPRIGHT,
+    Quaternion,
     best_starts,
     errors_by_part,
     errors_of,
@@ -57,6 +58,20 @@ def test_ways_to_stand_are_turns_about_the_up_axis_and_all_axes_where_it_is_unkn
         assert len({tuple(np.round(m, 6) + 0.0) for m in matrices}) == (4 if axis == "z" else 8)
     every = {tuple(np.round(Similarity(1.0, t)(np.eye(3)), 6).flatten() + 0.0) for t in ways_to_stand(None)}
     assert len(every) == 24
+
+
+def test_ways_to_stand_of_a_family_that_has_another_axis_up() -> None:
+    """As all of GLB files, where y is up."""
+
+    def matrices(turns: list[Quaternion]) -> set[tuple[float, ...]]:
+        return {tuple(np.round(Similarity(1.0, t)(np.eye(3)), 6).flatten() + 0.0) for t in turns}
+
+    assert ways_to_stand("y", "y")[0] == pytest.approx(UPRIGHT)
+    assert matrices(ways_to_stand("y", "y")) == matrices(ways_to_stand("y")[:4])
+    assert ways_to_stand(None, "y")[0] == pytest.approx(UPRIGHT)
+    assert matrices(ways_to_stand(None, "y")) == matrices(ways_to_stand(None))
+    for turn in ways_to_stand("z", "y")[4:]:  # after those of a family that stands as the shape, by mistake
+        np.testing.assert_allclose(Similarity(1.0, turn)(np.array([[0, 1, 0]]))[0], (0, 0, 1), atol=1e-12)
 
 
 def test_a_scan_of_a_piece_is_not_taken_for_all_of_its_shape(model: Model) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 
 from partwright.cli.interrupts import INTERRUPTED, raising
 from partwright.cli.progress import Count
@@ -50,8 +51,20 @@ def run(arguments: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             note(f"interrupted; what is done is kept in {folder}, and the same command goes on from there")
             return INTERRUPTED
-    say(f"{trained.model.name}: {counted(len(trained.model.shapes), 'shape')}, written to {trained.path}")
+    learned = f"{trained.model.name}: learned from {counted(len(trained.model.shapes), 'shape')}"
+    say(f"{learned}, written to {trained.path}{_held_out(trained.scores)}")
     if trained.outcome == "interrupted":
         warn(["interrupted: the model is as good as it had become, and the same command goes on from here"])
         return INTERRUPTED
     return 0
+
+
+def _held_out(scores: Mapping[str, float]) -> str:
+    """How well shapes are found that it has not seen; nothing where that was not measured."""
+    if not scores:
+        return ""
+    whole, parts = (100 * scores[name] for name in ("val_iou", "val_part_iou"))
+    return (
+        f"; shapes that it has not seen are found, their parts being known, at an IoU near the surface of "
+        f"{whole:.0f} %, and over parts of {parts:.0f}"
+    )

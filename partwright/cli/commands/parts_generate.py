@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +16,6 @@ from partwright.errors import SettingError
 from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.from_photo import reconstruct_photo
 from partwright.partsdf.generator import load_generator
-from partwright.partsdf.meshing import resolution_for_wall
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
@@ -29,7 +27,6 @@ from partwright.render import Camera, sheet, write_png
 from partwright.shapes import PICTURE_SUFFIXES, SUFFIXES
 
 _PANEL, _COLUMNS = 240, 4  # pixels
-_COARSE, _FINEST = 64, 192  # cells
 _STALE = re.compile(r"sample_\d+\.json")
 
 
@@ -51,13 +48,13 @@ def run(arguments: argparse.Namespace) -> int:
         work.stage("comparing")
         nearest = [nearest_training_shape(one) for one in samples]
         work.stage("drawing")
-        camera, pictures = Camera(up="z"), []
+        camera, pictures = Camera(up=model.up), []
         for i, one in enumerate(samples):
-            pictures.append(picture(one, _resolution(one), _PANEL, camera))
+            pictures.append(picture(one, None, _PANEL, camera))
             work.show((i + 1) / len(samples))
         captions = [f"{i}: {100 * far:.1f} from {name}" for i, (name, far) in enumerate(nearest)]
         if arguments.like and source is not None:
-            pictures.insert(0, picture(source, _resolution(source), _PANEL, camera))
+            pictures.insert(0, picture(source, None, _PANEL, camera))
             captions.insert(0, "like this")
         about = {
             "model": {"name": model.name, "hash": model.hash},
@@ -79,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
         }
         with replacing_files(arguments.output, _STALE) as folder:
             for i, one in enumerate(samples):
-                to_assembly(one, up="z", source=f"{model.name}, seed {arguments.seed}, sample {i}").save(
+                to_assembly(one, up=model.up, source=f"{model.name}, seed {arguments.seed}, sample {i}").save(
                     folder / sample_name(i, len(samples))
                 )
             write_png(folder / "samples.png", sheet(pictures, captions, min(_COLUMNS, len(pictures))))
@@ -106,11 +103,6 @@ def _broken(made: Sequence[Sample]) -> list[str]:
         f"{counted(len(broken), 'sample')} may be broken after {made[number].tries} {tries}: in {number}, "
         f"{' and '.join(faults)}; look at samples.png"
     ]
-
-
-def _resolution(shape: NeuralShape) -> int:
-    """Cells along the unit frame that show the thinnest wall, as far as the cost allows."""
-    return min(_FINEST, resolution_for_wall(float(shape.walls().min(initial=math.inf)), _COARSE))
 
 
 def _check(arguments: argparse.Namespace) -> None:

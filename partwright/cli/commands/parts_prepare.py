@@ -23,6 +23,7 @@ def run(arguments: argparse.Namespace) -> int:
                 held_out=arguments.test,
                 seed=arguments.seed,
                 workers=arguments.workers,
+                up=arguments.up,
                 progress=lambda step: count.show(step.done, step.total, step.shape),
             )
         except KeyboardInterrupt:
