@@ -10,7 +10,7 @@ DEMO_SHAPE := examples/shapes/watering_can.ply
 
 LOWEST_TESTS := tests/shapes tests/assembly tests/meshing tests/render tests/cli
 
-.PHONY: setup demo test test-lowest lint types docs page release bench benchmarks guard clean
+.PHONY: setup demo test test-heavy test-lowest lint types docs page release bench benchmarks guard clean
 setup: $(INSTALLED)
 
 $(BIN)/python:
@@ -33,9 +33,16 @@ $(INSTALLED): .venv/torch $(BUILD_INPUTS)
 demo: $(PACKAGE)
 	$(BIN)/partwright fit $(DEMO_SHAPE) -o demo-output
 
-# PyTorch's threads are not to spin while they wait: with a process a core they would take each other's.
+# PyTorch's threads are not to spin while they wait: with a process a core they would take each other's. A file
+# is one process's, so that what its tests share is made once.
+PYTEST := OMP_WAIT_POLICY=PASSIVE $(BIN)/python -m pytest -n auto --dist loadfile
 test: setup
-	OMP_WAIT_POLICY=PASSIVE $(BIN)/python -m pytest -n auto
+	$(PYTEST)
+
+# The tests that are marked heavy: whole fits and trainings, and sweeps of all cases, that repeat in the large what
+# quick tests say. Takes some minutes, so it is not in .ci/run: before a release, and after a change to what they try.
+test-heavy: setup
+	$(PYTEST) -m heavy
 
 # The lowest versions that pyproject.toml declares. Takes some minutes, so it is not in .ci/run: before a
 # release, and when a dependency is used in a new way.

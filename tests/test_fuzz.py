@@ -14,9 +14,12 @@ import pytest
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 
-def test_sixty_cases(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("files", "commands"), [(12, 4), pytest.param(40, 20, marks=pytest.mark.heavy)], ids=["few", "sixty"]
+)
+def test_cases_end_well(files: int, commands: int, tmp_path: Path) -> None:
     table = tmp_path / "fuzz.md"
-    cases = ["--files", "40", "--commands", "20", "--seed", "4"]
+    cases = ["--files", str(files), "--commands", str(commands), "--seed", "4"]
     ended = subprocess.run(
         [sys.executable, BENCHMARKS / "fuzz.py", *cases, "--to", table],
         capture_output=True,
@@ -24,8 +27,8 @@ def test_sixty_cases(tmp_path: Path) -> None:
         check=False,
     )
     assert ended.returncode == 0, ended.stdout + ended.stderr
-    assert "**all files** | 40 |" in table.read_text()
-    assert "**all commands** | 20 |" in table.read_text()
+    assert f"**all files** | {files} |" in table.read_text()
+    assert f"**all commands** | {commands} |" in table.read_text()
 
 
 def fails(_: str) -> int:

@@ -93,7 +93,7 @@ def test_a_stopped_training_goes_on_as_if_it_had_not_been(tmp_path: Path) -> Non
 def test_it_learns_a_batch_by_heart(few: PretrainingDataset, monkeypatch: pytest.MonkeyPatch) -> None:
     same = few.draw(2, 256, True, np.random.default_rng(0))
     monkeypatch.setattr(PretrainingDataset, "draw", lambda *_: same)
-    settings = PretrainingSettings(parts=4, points=512, batch=2, steps=80, rate=0.01, coarse=0.0)
+    settings = PretrainingSettings(parts=4, points=512, batch=2, steps=60, rate=0.01, coarse=0.0)
     trainer = Trainer(few, settings, replace(TINY, primitives=64, convexes=8))
     losses = [trainer.advance() for _ in range(settings.steps)]
     assert np.mean(losses[-5:]) < 0.6 * np.mean(losses[:5])

@@ -308,9 +308,9 @@ def test_cancelled_it_leaves_the_assembly() -> None:
         clean(shaken(bracket(), 0), tolerance=TOLERANCE, cancel=cancel)
 
 
-def test_forty_parts_become_two() -> None:
+def test_sixteen_parts_become_two() -> None:
     tiles = [Box((8, 6, 10)), Cylinder(4, 10)]
-    parts = tuple(Part(tiles[i % 2], (12 * (i % 8), 15 * (i // 8), 5)) for i in range(40))
+    parts = tuple(Part(tiles[i % 2], (12 * (i % 8), 15 * (i // 8), 5)) for i in range(16))
     made = clean(shaken(Assembly(parts, unit="mm"), 0, 0.002), tolerance=0.6).assembly
     assert fields(made) == tiles
-    assert [len(part.copies) for part in made.parts] == [20, 20]
+    assert [len(part.copies) for part in made.parts] == [8, 8]

@@ -28,7 +28,7 @@ def start(*arguments: str) -> subprocess.Popen[str]:
 @pytest.fixture
 def ball(tmp_path: Path) -> Path:
     path = tmp_path / "ball.stl"
-    trimesh.creation.icosphere(6).export(path)
+    trimesh.creation.icosphere(5).export(path)
     return path
 
 

@@ -36,7 +36,13 @@ def test_named_solids_are_exact(tmp_path: Path, field: Field, volume: float) -> 
     assert np.abs(assembly.distance(corners)).max(initial=0) < 1e-5
 
 
-@pytest.mark.parametrize("field", SUPERFRUSTA, ids=str)
+@pytest.mark.parametrize(
+    "field",
+    [
+        pytest.param(field, marks=pytest.mark.heavy if field.onion and field.size[2] else (), id=str(field))
+        for field in SUPERFRUSTA
+    ],
+)
 def test_superfrusta_are_lofts(tmp_path: Path, field: SuperFrustum) -> None:
     assembly = lone(field)
     export(assembly, tmp_path / "a.build123d.py")

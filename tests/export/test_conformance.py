@@ -13,6 +13,7 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -51,6 +52,7 @@ def half_spaces() -> tuple[Part, ...]:
     return tuple(Part(Quadric.plane(n, 1.0), name=f"plane {i}") for i, n in enumerate(normals))
 
 
+@cache
 def assemblies() -> dict[str, Assembly]:
     shift = Similarity(translation=(-1.6, 0, 0))
     plate = Part(Box((2, 2, 0.5)), name="plate")
@@ -143,13 +145,19 @@ def sharp(node: Node) -> Any:
     return dataclasses.replace(node, blend=0.0, **({"children": children} if children else {}))
 
 
-def fails(assembly: Assembly, path: Path) -> PartwrightError:
+def fails(assembly: Assembly, path: Path, form: Format) -> PartwrightError:
     """The one named error, after which the folder is as it was."""
     before = sorted(path.parent.rglob("*"))
     with pytest.raises(PartwrightError) as caught:
-        export(assembly, path)
+        save(assembly, path, form)
     assert sorted(path.parent.rglob("*")) == before
     return caught.value
+
+
+@cache
+def surface(assembly: Assembly) -> trimesh.Trimesh:
+    """What all formats' files are held against, made once."""
+    return mesh_assembly(assembly, 128)
 
 
 def check_contents(path: Path, suffix: str, form: Format, assembly: Assembly) -> None:
@@ -160,7 +168,7 @@ def check_contents(path: Path, suffix: str, form: Format, assembly: Assembly) ->
     weighs = suffix in (".mjcf.xml", ".urdf", ".sdf")  # by the blended surface, whatever the geometries are
     own = assembly if weighs or Holds.BLENDS in form.holds else sharp(assembly)
     turn = {"y": to_gltf, "z": to_metres_z_up, None: lambda _: Similarity()}[form.up](assembly)
-    mesh = mesh_assembly(own, 128)
+    mesh = surface(own)
     metres = METRES[assembly.unit] if assembly.unit else 1.0
     said = found.metres if assembly.unit and found.metres is not None else metres
     if assembly.unit is None and suffix not in (".step",):
@@ -205,7 +213,7 @@ def test_every_length_unit_is_kept_or_refused(tmp_path: Path, suffix: str) -> No
     for unit in METRES:
         assembly, path = dataclasses.replace(box, unit=unit), tmp_path / f"{unit}{suffix}"
         if (form.units is not None and unit not in form.units) or (unit == "um" and form.name == "MJCF"):
-            assert isinstance(fails(assembly, path), UnitError)
+            assert isinstance(fails(assembly, path, form), UnitError)
         else:
             save(assembly, path, form)
             check_contents(path, suffix, form, assembly)
@@ -214,12 +222,12 @@ def test_every_length_unit_is_kept_or_refused(tmp_path: Path, suffix: str) -> No
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_nothing_to_export(tmp_path: Path, suffix: str) -> None:
     """But for formats of the parts' numbers themselves, which a part without volume has."""
-    chosen(suffix)
+    form = chosen(suffix)
     sheet = Assembly((Part(SuperFrustum((1, 1, 1), onion=1.0), name="sheet"),), unit="mm", up="z")
     if suffix in (".json", ".glsl", ".html"):
         export(sheet, tmp_path / f"a{suffix}")
     else:
-        assert isinstance(fails(sheet, tmp_path / f"a{suffix}"), NothingToExportError | NoSurfaceError)
+        assert isinstance(fails(sheet, tmp_path / f"a{suffix}", form), NothingToExportError | NoSurfaceError)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -232,7 +240,7 @@ def test_learned_parts_are_written_or_refused(tmp_path: Path, suffix: str) -> No
         if suffix not in (".json", ".html") and Holds.BLENDS in form.holds:
             check_contents(path, suffix, form, assembly)
     else:
-        error = fails(assembly, path)
+        error = fails(assembly, path, form)
         assert isinstance(error, UnsupportedFormatError)
         assert "'ball'" in str(error)
 
@@ -242,18 +250,18 @@ def test_learned_parts_are_written_or_refused(tmp_path: Path, suffix: str) -> No
 def test_a_file_that_cannot_be_written_leaves_nothing(
     tmp_path: Path, suffix: str, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    chosen(suffix)
+    form, assembly = chosen(suffix), assemblies()[name]
     path = tmp_path / f"a{suffix}"
-    assert "nowhere" in str(fails(assemblies()[name], tmp_path / "nowhere" / path.name))
+    assert "nowhere" in str(fails(assembly, tmp_path / "nowhere" / path.name, form))
     path.mkdir()
-    assert isinstance(fails(assemblies()[name], path), OutputError)
+    assert isinstance(fails(assembly, path, form), OutputError)
     path.rmdir()
 
     def full(*_: Any) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "replace", full)
-    assert isinstance(fails(assemblies()[name], path), OutputError)
+    assert isinstance(fails(assembly, path, form), OutputError)
 
 
 @pytest.mark.parametrize("suffix", [s for s in SUFFIXES if FORMATS[s].needs])
@@ -262,7 +270,7 @@ def test_a_missing_package_is_named_with_its_install_line(
 ) -> None:
     module, extra = FORMATS[suffix].needs or ("", "")
     monkeypatch.setitem(sys.modules, module, None)
-    error = fails(assemblies()["one box"], tmp_path / f"a{suffix}")
+    error = fails(assemblies()["one box"], tmp_path / f"a{suffix}", FORMATS[suffix])
     assert isinstance(error, MissingDependencyError)
     assert f"pip install 'partwright[{extra}]'" in str(error)
 

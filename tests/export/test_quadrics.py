@@ -216,7 +216,7 @@ def test_repeated_holes_stay_repeated_in_a_source_where_that_is_the_same(name: s
     field, places, looped = ALIKE[name]
     copies = tuple(Similarity(translation=place) for place in places)
     solid = drilled(Part(field, name="drill", instances=copies))
-    export(solid, tmp_path / "a.scad")
+    export(solid, tmp_path / "a.scad", facets=32)
     source = (tmp_path / "a.scad").read_text()
     assert (f"{len(places) + 1} times" in source) is looped
     assert rendered(tmp_path / "a.scad").volume == pytest.approx(mesh_csg(solid).volume, rel=2e-3)
@@ -225,7 +225,7 @@ def test_repeated_holes_stay_repeated_in_a_source_where_that_is_the_same(name: s
 def test_copies_that_are_turned_are_parts_of_their_own(tmp_path: Path) -> None:
     quarter = Similarity(rotation=(np.sqrt(0.5), np.sqrt(0.5), 0, 0))
     solid = drilled(Part(Quadric.cylinder(0.2), name="drill", instances=(quarter,)))
-    export(solid, tmp_path / "a.scad")
+    export(solid, tmp_path / "a.scad", facets=32)
     assert "times" not in (tmp_path / "a.scad").read_text()
     assert rendered(tmp_path / "a.scad").volume == pytest.approx(mesh_csg(solid).volume, rel=2e-3)
 

@@ -11,7 +11,7 @@ from partwright.metrics.sets import chamfer_matrix, set_scores
 
 def spheres(radii: np.ndarray, seed: int) -> list[np.ndarray]:
     rng = np.random.default_rng(seed)
-    directions = rng.standard_normal((len(radii), 400, 3))
+    directions = rng.standard_normal((len(radii), 150, 3))
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
     return list(radii[:, None, None] * directions)
 

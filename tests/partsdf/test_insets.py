@@ -60,6 +60,7 @@ def judge() -> Judge:
     return Judge(load_model("vehicles"))
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(("number", "part"), [(3, "windows_right"), (5, "lights_front")])
 def test_what_stands_out_of_new_vehicles_is_put_back(number: int, part: str, judge: Judge) -> None:
     """Windows that reach above the roof, and lights before the nose; with them goes what came through. What

@@ -23,11 +23,18 @@ from tests.robots.robots import mjcf, urdf
 KINDS = ["box", "cylinder", "sphere", "capsule", "ellipsoid", "hull"]
 
 
+def with_a_plain_tip(folder: Path) -> Path:
+    """The robot whose base is an L: nothing is asked of its tip here, and a box costs less than a ball."""
+    path = mjcf(folder)
+    trimesh.creation.box((0.3, 0.3, 0.3)).export(folder / "assets" / "ball.stl")
+    return path
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_enclosing_shapes_contain_every_point_of_the_visual_mesh(tmp_path: Path, kind: str) -> None:
     """Fresh points, by distances of the shapes' own kind; the visual L is turned and moved."""
     options = CollideOptions(enclose=True, kinds=(kind,), max_parts=6)
-    result = collide(mjcf(tmp_path), options)
+    result = collide(with_a_plain_tip(tmp_path), options)
     base = next(link for link in result.robot.links if link.name == "base")
     target = Solids().target(base, base.visuals)
     points = target.samples(50_000, seed=12345)
@@ -42,7 +49,7 @@ def test_enclosing_shapes_contain_every_point_of_the_visual_mesh(tmp_path: Path,
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_shapes_inside_reach_nowhere_beyond_the_mesh(tmp_path: Path, kind: str) -> None:
-    result = collide(mjcf(tmp_path), CollideOptions(inside=True, kinds=(kind,), max_parts=12))
+    result = collide(with_a_plain_tip(tmp_path), CollideOptions(inside=True, kinds=(kind,), max_parts=12))
     base = next(link for link in result.robot.links if link.name == "base")
     solid = Solids().target(base, base.collisions).solid
     for shape in result.shapes["base"]:

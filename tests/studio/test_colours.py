@@ -90,7 +90,7 @@ def check_picture(page: Page, assembly: Assembly) -> None:
 
 def test_the_shader_shows_the_maps_and_edits_keep_them(shared: Callable[..., Page], tmp_path: Path) -> None:
     assembly = mapped(MUG)
-    page = shared(assembly, width=800, height=500)
+    page = shared(assembly, width=800, height=500, device_scale_factor=1)
     check_picture(page, assembly)
     compiled = page.ask("() => partwright.viewport.renderer.compilations")
     page.page.locator(".row[data-name=handle]").click()
@@ -146,7 +146,7 @@ def with_normals(assembly: Assembly) -> Assembly:
 
 def test_the_shader_bends_normals_as_the_package_does(shared: Callable[..., Page]) -> None:
     assembly = with_normals(MUG)
-    page = shared(assembly, width=800, height=500)
+    page = shared(assembly, width=800, height=500, device_scale_factor=1)
     page.wait("() => partwright.viewport.maps.maps?.count === 3")
     rows = np.array(page.ask(SEEN))
     found = rows[:, 7:] / np.linalg.norm(rows[:, 7:], axis=1, keepdims=True)

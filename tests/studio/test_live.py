@@ -23,7 +23,7 @@ TABLE = Assembly(
 def test_refit_edits_and_a_server_that_is_killed(
     tmp_path: Path, serve: Callable[..., Server], new_page: Callable[..., Page]
 ) -> None:
-    mesh_assembly(TABLE, 64).export(tmp_path / "table.stl")
+    mesh_assembly(TABLE, 48).export(tmp_path / "table.stl")
     wrong = TABLE.replace_part("foot", Part(Cylinder(5, 44), (4, 0, 0)))
     wrong.save(tmp_path / "table.json")
     server = serve("table.json", "--shape=table.stl")
@@ -69,7 +69,7 @@ def test_refit_edits_and_a_server_that_is_killed(
 def test_a_fit_from_nothing_shows_its_rounds_and_stops_with_its_best(
     tmp_path: Path, serve: Callable[..., Server], new_page: Callable[..., Page]
 ) -> None:
-    mesh_assembly(TABLE, 64).export(tmp_path / "table.stl")
+    mesh_assembly(TABLE, 48).export(tmp_path / "table.stl")
     page = new_page().open(serve("table.stl").url)
     page.wait("() => live.state?.input === 'table.stl' && partwright.viewport.renderer.hasInput")
     page.page.get_by_role("button", name="Fit", exact=True).click()

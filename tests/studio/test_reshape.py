@@ -126,7 +126,7 @@ def test_a_box_is_drawn_where_a_part_is_missing_and_gets_one(table: Any) -> None
 def test_the_slider_goes_from_few_parts_to_many(
     tmp_path: Path, serve: Callable[..., Server], new_page: Callable[..., Page]
 ) -> None:
-    mesh_assembly(TABLE, 48).export(tmp_path / "table.stl")
+    mesh_assembly(Assembly((TOP, KNOB)), 48).export(tmp_path / "table.stl")
     server = serve("table.stl")
     page = new_page(1200, 700).open(server.url)
     page.wait("() => live.state?.input === 'table.stl'")

@@ -68,6 +68,7 @@ def test_a_plate_with_pockets_and_holes_is_a_box_and_two_patterns() -> None:
     assert tree.price < 3.3 * search.alpha
 
 
+@pytest.mark.heavy
 def test_a_box_that_is_hollowed_is_a_box_and_its_hollow() -> None:
     """Walls with a row of vents and posts within: not two ends, a gutter and a comb."""
     drawn = Assembly(
@@ -112,6 +113,7 @@ def test_small_holes_that_pay_only_together_are_found(monkeypatch: pytest.Monkey
     assert search.with_patterns(plain) is plain  # where no copies are found, one alone does not pay
 
 
+@pytest.mark.heavy
 def test_a_hinge_is_an_outline_with_gaps_and_countersunk_holes() -> None:
     """The gaps run along the barrel's own wall, and leave no skin of it."""
     turn = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
@@ -160,6 +162,7 @@ def test_pipes_that_meet_are_pipes_and_their_bores() -> None:
     }
 
 
+@pytest.mark.heavy
 def test_a_lid_is_a_rounded_block_its_hollow_and_its_vents() -> None:
     """Vents that are cut first are no islands of the hollow below them, posts are; arcs in many short chords
     are arcs, so that vents are alike."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from tests.superfrusta.meshes import half_torus, table
 from tests.superfrusta.rows import row
 
 
+@cache
 def draft(shape: Shape, **changes) -> Fitted:
     settings = Settings.for_quality("draft", cycles=2, **changes)
     return FitRequest(shape, settings, Run(threads=1)).fitted()
@@ -44,6 +47,7 @@ def test_cuboids_are_enough_for_a_table() -> None:
     assert fitted.history[-1]["iou"] > 0.97
 
 
+@pytest.mark.heavy
 def test_plain_unions_do_not_blend(arc: Shape) -> None:
     parts = draft(arc, family="cuboid", smooth=False).assembly.parts
     assert len(parts) > 1
@@ -58,6 +62,9 @@ def test_held_values_replace_others_and_make_starts_equal() -> None:
     assert (left[:, Column.BULGE] == 0).all()
     assert rows[0, Column.BULGE] == np.float32(0.2)
     np.testing.assert_array_equal(with_locked_values(rows, locked_values("superfrustum", smooth=True)), rows)
+    rows[:, Column.BLEND] = 0.1
+    plain = with_locked_values(rows, locked_values("superfrustum", smooth=False))
+    assert (plain[:, Column.BLEND] == 0).all()
 
 
 @pytest.mark.parametrize(

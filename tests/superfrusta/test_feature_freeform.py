@@ -25,7 +25,7 @@ from partwright.superfrusta.feature_freeform import with_freeform
 from partwright.superfrusta.feature_mending import FAR
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
-from partwright.superfrusta.featured import FeaturedFit
+from partwright.superfrusta.featured import FeaturedFit, freeform_warnings
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.solids import Settings
 
@@ -79,6 +79,11 @@ def test_two_bumps_are_one_freeform_and_its_copy() -> None:
     assert fresh
     assert all(feature.freeform and feature.added for feature in fresh)
     assert any(len(feature.part.copies) > 1 for feature in fresh)
+    shape = pw.load_shape(mesh_assembly(Assembly((PLATE, LEFT, RIGHT))), up="z")
+    named = FeatureAssembly(shape).named(tree)
+    assert "freeform_1" in [part.name for part in named.parts]
+    (told,) = freeform_warnings(shape, named)
+    assert "freeform_1 (middle)" in told  # of it and its copy
     assert off == tree.off == 0
     assert bodies == 1
 
@@ -152,6 +157,7 @@ def test_solids_that_are_right_keep_their_own_deviation() -> None:
     assert fit.mended_assembly(whole) == (whole, 0.0)
 
 
+@pytest.mark.heavy
 def test_a_fit_names_what_is_freeform(tmp_path: Path) -> None:
     ball = trimesh.creation.icosphere(3, 1.0)
     ball.apply_scale((12.0, 7.0, 9.0))

@@ -78,6 +78,7 @@ def test_no_blank_is_taken_whose_tree_is_freeform_throughout() -> None:
     assert worth(replace(asked[0], off=0.3)) == pytest.approx(asked[0].objective - 0.3)
 
 
+@pytest.mark.heavy
 def test_a_blank_that_is_worth_much_more_is_taken_with_its_freeform() -> None:
     """Two pieces of freeform ruled out a blank that was worth twenty features more."""
     asked: list[FeatureTree] = []
@@ -93,6 +94,7 @@ def test_a_blank_that_is_worth_much_more_is_taken_with_its_freeform() -> None:
     assert any(drawn is tree for tree in asked[1:])
 
 
+@pytest.mark.heavy
 def test_no_blank_is_taken_that_is_further_off(monkeypatch: pytest.MonkeyPatch) -> None:
     """Paper-thin skins cost next to nothing of R, and reach as far as the blank does."""
     real, ended = FeatureSearch.ended, []

@@ -134,6 +134,7 @@ def test_a_hook_is_turned_as_far_as_it_goes() -> None:
     assert result.scores.iou > 0.99
 
 
+@pytest.mark.heavy
 def test_rings_with_balls_are_what_they_are() -> None:
     """Which no outline is that holds cut from it: each is a body of its own."""
     outer = Part(Revolution(Profile([(33, -10), (40, -10), (40, 10), (33, 10), (33, 4), (32, 0), (33, -4)])))

@@ -13,9 +13,8 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.cli.main import main
 from partwright.fields import Sphere, SuperFrustum
 from partwright.meshing import mesh_assembly
-from partwright.textures import PartMap, bake, load_colours, part_map
+from partwright.textures import PartMap, bake, likeness, load_colours, part_map
 from partwright.textures.coordinates import directions, folded
-from partwright.textures.likeness import likeness
 from partwright.textures.texels import Texels, filled
 
 WHOLE_MOVE = Similarity(2.0, (0.5, 0.5, 0.5, 0.5), (1, 2, 3))
@@ -30,8 +29,10 @@ WHOLE = Assembly(
 )
 
 
-def checker(path: Path) -> Path:
+@pytest.fixture(scope="module")
+def checker(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Squares with edges that are finer than texels."""
+    path = tmp_path_factory.mktemp("checker") / "a.ply"
     mesh = mesh_assembly(WHOLE, 96)
     mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).subdivide_to_size(0.02, max_iter=12)
     odd = np.floor(np.asarray(mesh.vertices) / 0.2).sum(axis=1) % 2 == 1
@@ -89,10 +90,10 @@ def test_borders_of_what_is_seen_do_not_run_away() -> None:
     assert whole[seen == 0].min() > 150  # the rim tells nothing of what is around it
 
 
-def test_a_checkers_pictures_come_nearer_and_its_bytes_stay(tmp_path: Path) -> None:
-    colours = load_colours(checker(tmp_path / "a.ply"))
+def test_a_checkers_pictures_come_nearer_and_its_bytes_stay(checker: Path) -> None:
+    colours = load_colours(checker)
     plain, baked = bake(WHOLE, colours, 48, optimise=False), bake(WHOLE, colours, 48)
-    before, after = likeness([plain, baked], colours)
+    before, after = likeness.likeness([plain, baked], colours)
     assert after[1] > before[1] + 0.5  # dB of the surface
     assert after[0] > before[0]
     assert bake(WHOLE, colours, 48) == baked
@@ -102,14 +103,13 @@ def test_a_checkers_pictures_come_nearer_and_its_bytes_stay(tmp_path: Path) -> N
     assert part_map(baked["arm"]).image.std() > 20
 
 
-def test_the_command_says_how_near(tmp_path: Path) -> None:
-    checker(tmp_path / "a.ply")
+def test_the_command_says_how_near(tmp_path: Path, checker: Path) -> None:
     WHOLE.save(tmp_path / "a.json")
-    command = ["texture", str(tmp_path / "a.json"), str(tmp_path / "a.ply"), "--size", "32"]
+    command = ["texture", str(tmp_path / "a.json"), str(checker), "--size", "32"]
     assert main([*command, "-o", str(tmp_path / "b.json")]) == 0
     report = json.loads((tmp_path / "b.json.report.json").read_text())
     psnr = report["psnr"]
-    assert (psnr["views"], psnr["side"]) == (8, 512)
+    assert (psnr["views"], psnr["side"]) == (8, likeness.SIDE)
     assert psnr["after"]["surface"] > psnr["before"]["surface"]
     assert report["texels_a_side"] == 32
     assert report["cpu_seconds"] > 0

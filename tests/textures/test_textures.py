@@ -31,7 +31,7 @@ def look(points: np.ndarray) -> np.ndarray:
     return 127 + 90 * np.sin(points @ np.array([[0.8, 0.2, 0.0], [0.1, 1.0, 0.3], [0.4, 0.0, 0.9]]))
 
 
-def painted(assembly: Assembly, path: Path, resolution: int = 128) -> Path:
+def painted(assembly: Assembly, path: Path, resolution: int = 64) -> Path:
     mesh = mesh_assembly(assembly, resolution)
     for _ in range(2):
         mesh = mesh.subdivide()
@@ -39,6 +39,12 @@ def painted(assembly: Assembly, path: Path, resolution: int = 128) -> Path:
     mesh.visual.vertex_colors = np.round(each).astype(np.uint8)
     mesh.export(path)
     return path
+
+
+@pytest.fixture(scope="module")
+def baked(tmp_path_factory: pytest.TempPathFactory) -> Assembly:
+    """The two parts in the maps of their paint."""
+    return bake(WHOLE, load_colours(painted(WHOLE, tmp_path_factory.mktemp("painted") / "a.ply")), 64)
 
 
 def on_surface(mesh: trimesh.Trimesh, count: int = 4000) -> np.ndarray:
@@ -72,9 +78,7 @@ def test_no_two_places_of_a_surface_share_a_place_of_the_map(field: object) -> N
     assert max(spread) < 0.6 * side
 
 
-def test_what_is_baked_is_what_was_painted(tmp_path: Path) -> None:
-    colours = load_colours(painted(WHOLE, tmp_path / "a.ply"))
-    baked = bake(WHOLE, colours, 64)
+def test_what_is_baked_is_what_was_painted(baked: Assembly) -> None:
     mesh = mesh_assembly(WHOLE)
     points = on_surface(mesh)
     owner = np.abs(WHOLE.part_distances(points)).argmin(axis=0)
@@ -87,8 +91,7 @@ def test_what_is_baked_is_what_was_painted(tmp_path: Path) -> None:
         assert np.quantile(off, 0.99) < 16
 
 
-def test_a_map_goes_where_its_part_goes(tmp_path: Path) -> None:
-    baked = bake(WHOLE, load_colours(painted(WHOLE, tmp_path / "a.ply")), 48)
+def test_a_map_goes_where_its_part_goes(tmp_path: Path, baked: Assembly) -> None:
     arm = baked["arm"]
     mesh = mesh_part(Part(arm.field), 32)
     points = on_surface(mesh, 500)
@@ -126,7 +129,7 @@ def test_a_tube_is_another_colour_inside(tmp_path: Path) -> None:
 
 def test_glb_has_the_maps_as_images(tmp_path: Path) -> None:
     cut = Assembly((WHOLE, Part(Cylinder(0.5, 5), name="hole")), "difference", unit="m", up="y")
-    baked = bake(cut, load_colours(painted(cut, tmp_path / "a.ply", 160)), 96)
+    baked = bake(cut, load_colours(painted(cut, tmp_path / "a.ply", 80)), 96)
     export(baked, tmp_path / "a.glb")
     scene = trimesh.load_scene(tmp_path / "a.glb")
     assert all(mesh.visual.kind == "texture" for mesh in scene.geometry.values())

@@ -24,6 +24,7 @@ def test_a_fit_contains_its_shape_with_few_parts(shape: pw.Shape) -> None:
     assert 1.0 <= bound["volume_ratio"] < 1.1
 
 
+@pytest.mark.heavy
 def test_a_tolerance_takes_the_fewest_parts(shape: pw.Shape) -> None:
     result = pw.fit(shape, quality="draft", tolerance="0.06mm", threads=1)
     assert result.outcome == "target_reached"
