@@ -166,7 +166,7 @@ def _read(use: MeshUse, sheets: bool) -> _Mesh:
     solid = None
     with suppress(OpenShellError, *((FlatShapeError,) if sheets else ())):
         shape = InputShape(source)
-        solid = _manifold(shape.vertices, shape.faces)
+        solid = None if shape.sealed else _manifold(shape.vertices, shape.faces)  # wraps hold every sheet
     return _Mesh(vertices, faces, solid)
 
 

@@ -30,6 +30,11 @@ class Openings:
     share: float = 0.0
     largest: tuple[float, float, float] | None = None
 
+    def and_more(self, others: Openings) -> Openings:
+        """Both together."""
+        largest = others.largest if others.share > self.share else self.largest
+        return Openings(self.count + others.count, min(1.0, self.share + others.share), largest)
+
 
 def fill_holes(
     vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]
@@ -71,11 +76,19 @@ def with_what_stays_open(filled: Openings, vertices: NDArray[np.float64], edges:
     label = components(len(used), numbered[:, 0], numbered[:, 1])[numbered[:, 0]]
     length = np.linalg.norm(np.diff(vertices[rim], axis=1)[:, 0], axis=1)
     longest = label == np.bincount(label, length).argmax()
-    largest = filled.largest
-    if share > filled.share:
-        x, y, z = np.average(vertices[rim[longest]].mean(axis=1), axis=0, weights=length[longest]).tolist()
-        largest = (x, y, z)
-    return Openings(filled.count + int(label.max()) + 1, min(1.0, filled.share + share), largest)
+    x, y, z = np.average(vertices[rim[longest]].mean(axis=1), axis=0, weights=length[longest]).tolist()
+    return filled.and_more(Openings(int(label.max()) + 1, share, (x, y, z)))
+
+
+def openings_of(vertices: NDArray[np.float64], faces: NDArray[np.int64], made: NDArray[np.bool_]) -> Openings:
+    """Of a closed surface of which the marked triangles (F,) were made up: each connected piece is one."""
+    if not made.any():
+        return Openings()
+    area = doubled_areas(vertices, faces)
+    pieces = EdgeTable(faces[made]).bodies
+    largest = faces[made][pieces == np.bincount(pieces, area[made]).argmax()]
+    x, y, z = vertices[largest].mean(axis=(0, 1)).tolist()
+    return Openings(int(pieces.max()) + 1, float(area[made].sum() / area.sum()), (x, y, z))
 
 
 def _are_openings(source: MeshDistance, lids: list[NDArray[np.float64]]) -> list[bool]:

@@ -17,9 +17,10 @@ from partwright.shapes.cleaning import drop_doubles, merge_vertices, weld_bounda
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.frame import UnitFrame
 from partwright.shapes.hidden_faces import Ground, close_hidden, drop_sheets, lift_from_ground
-from partwright.shapes.holes import Openings, fill_holes, with_what_stays_open
+from partwright.shapes.holes import Openings, fill_holes, openings_of, with_what_stays_open
 from partwright.shapes.orientation import orient
 from partwright.shapes.sampling import sample_triangles
+from partwright.shapes.sealing import GAP, seal
 from partwright.shapes.thickening import thicken
 from partwright.shapes.topology import (
     EdgeTable,
@@ -32,7 +33,7 @@ from partwright.shapes.winding import winding_grid
 
 _SAME_FRAME = 1e-4  # of the scale, and unit lengths: vertices are welded and middles added within it
 _NO_VOLUME = 1e-9
-_LEAST_CONFIDENCE = 0.5
+_LEAST_CONFIDENCE, _SURE = 0.5, 0.8  # of the winding number
 _SIDE_STEP = 2e-5  # how far off a triangle its two sides are looked at
 _CLEAR = 0.2  # a winding number this near to 0 or 1 is clear
 _CHECK = 64  # cells along a side in the search for overlaps
@@ -47,7 +48,7 @@ class Surface:
     `faces` is the outer surface. `winding_faces` decide the inside and may hold sheets within the shape as
     well; with `closed` they have no open edge. `simple`: no point is enclosed twice, so volume is a sum over
     `faces`. `openings`: what of the surface was missing. `left_out`: share of the area that sheets took, and
-    that is no part of it.
+    that is no part of it. `sealed`: it is not of the triangles given, but of the solid that is seen in them.
     """
 
     vertices: NDArray[np.float64]
@@ -59,6 +60,7 @@ class Surface:
     confidence: float
     openings: Openings = field(default_factory=Openings)
     left_out: float = 0.0
+    sealed: bool = False
 
     def in_frame(self, old: UnitFrame) -> tuple[UnitFrame, Surface]:
         """The unit frame of the surface alone, where sheets were left out of the shape that had the old one;
@@ -88,7 +90,8 @@ def repair(
 ) -> Surface:
     """Surface of the solid that the triangles mean; vertices (V, 3) in the unit frame, faces (F, 3).
 
-    ground: where it is known, what opens onto it is closed. wall: the thickness, unit lengths, of what is
+    ground: where it is known, what opens onto it is closed. What is open in many places is sealed, where a
+    solid is seen in it. wall: the thickness, unit lengths, of what is
     still open then and of flat sheets; None: they are closed, or left out.
 
     Raises EmptyShapeError when no triangle has area, FlatShapeError when nothing is enclosed, OpenShellError
@@ -113,12 +116,13 @@ def repair(
         lying = edges.faces[:0]
     if wall is not None:
         edges = EdgeTable(np.concatenate([edges.faces, lying]))
-        return _enclosed(*thicken(vertices, edges, wall, notes), notes)
+        return _enclosed(*thicken(vertices, edges, wall, notes), ground, notes)
     if len(lying):
         notes.append("left out what lies flat on the ground")
     whole = left_out + _area(vertices, lying) + _area(vertices, edges.faces)
     vertices, edges = drop_sheets(vertices, edges, notes)
-    return replace(_enclosed(vertices, edges, notes), left_out=1 - _area(vertices, edges.faces) / whole)
+    surface = _enclosed(vertices, edges, ground, notes)
+    return replace(surface, left_out=1 - _area(vertices, edges.faces) / whole)
 
 
 def _area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
@@ -126,20 +130,60 @@ def _area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
     return float(doubled_areas(vertices, faces).sum())
 
 
-def _enclosed(vertices: NDArray[np.float64], edges: EdgeTable, notes: list[str]) -> Surface:
+def _enclosed(
+    vertices: NDArray[np.float64], edges: EdgeTable, ground: Ground | None, notes: list[str]
+) -> Surface:
     """What is inside, of triangles that are wound consistently."""
     if not edges.balance.any():
         return _surface_of_closed(vertices, edges, notes, 1.0)
     confidence = _confidence_of_open(vertices, edges.faces)
+    if confidence is None or confidence < _LEAST_CONFIDENCE:
+        sealed = _sealed(vertices, edges, ground, notes, Openings())
+        if sealed is None:
+            raise _no_solid(confidence)
+        return sealed
     vertices, edges, openings = fill_holes(vertices, edges, notes)
     if not edges.balance.any():
         return replace(_surface_of_closed(vertices, edges, notes, confidence), openings=openings)
+    # Where two half shells are a hair apart, much of what is between them has a winding number near a half.
+    if confidence < _SURE and (sealed := _sealed(vertices, edges, ground, notes, openings)) is not None:
+        return sealed
     notes.append(
         "the surface stays open; inside and outside are told apart by the generalised winding number"
     )
     openings = with_what_stays_open(openings, vertices, edges)
     surface = _surface_of_sheets(vertices, edges.faces, notes, confidence, closed=False)
     return replace(surface, openings=openings)
+
+
+def _sealed(
+    vertices: NDArray[np.float64],
+    edges: EdgeTable,
+    ground: Ground | None,
+    notes: list[str],
+    filled: Openings,
+) -> Surface | None:
+    """What is seen as a solid, where the winding number hardly tells; None where none is. filled: openings
+    that have their lids."""
+    found = seal(vertices, edges.faces, ground)
+    if found is None:
+        return None
+    notes.append(
+        f"the surface is open in many places; what is seen as a solid was taken for one, and gaps of up to "
+        f"{GAP:.1%} of the longest side were bridged"
+    )
+    surface = _surface_of_closed(found.vertices, EdgeTable(found.faces), notes, found.solid)
+    bridged = openings_of(found.vertices, found.faces, found.bridged)
+    return replace(surface, openings=filled.and_more(bridged), sealed=True)
+
+
+def _no_solid(confidence: float | None) -> FlatShapeError | OpenShellError:
+    if confidence is None:
+        return FlatShapeError(f"the surface is open and encloses no volume; close it, or {_THICKEN}")
+    return OpenShellError(
+        f"the surface is an open shell: only {confidence:.0%} of what it could enclose is clearly "
+        f"inside. Close its openings, or {_THICKEN}"
+    )
 
 
 def consistent(
@@ -244,11 +288,9 @@ def _facing(source: MeshDistance, corners: NDArray[np.float64]) -> NDArray[np.in
     return facing
 
 
-def _confidence_of_open(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
-    """Share of points near and around the surface whose winding number is clearly 0 or 1.
-
-    Raises FlatShapeError when none is inside and OpenShellError when too few are clear.
-    """
+def _confidence_of_open(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float | None:
+    """Share of points near and around the surface whose winding number is clearly 0 or 1; None where none is
+    inside."""
     rng = np.random.default_rng(0)
     source = MeshDistance(vertices, faces, faces, closed=False)
     near = sample_triangles(vertices, faces, 4000, 0)[0] + 0.02 * rng.standard_normal((4000, 3))
@@ -257,13 +299,7 @@ def _confidence_of_open(vertices: NDArray[np.float64], faces: NDArray[np.int64])
     winding = source.winding(np.concatenate([near, around]))
     inside = winding > 0.5
     if not inside.any():
-        raise FlatShapeError(f"the surface is open and encloses no volume; close it, or {_THICKEN}")
+        return None
     # Only what may be inside is in question: the wide outside must not make an open shell look sure.
     unsure = np.minimum(np.abs(winding), np.abs(winding - 1)) > _CLEAR
-    confidence = 1.0 - float(np.count_nonzero(unsure) / np.count_nonzero(inside | unsure))
-    if confidence < _LEAST_CONFIDENCE:
-        raise OpenShellError(
-            f"the surface is an open shell: only {confidence:.0%} of what it could enclose is clearly "
-            f"inside. Close its openings, or {_THICKEN}"
-        )
-    return confidence
+    return 1.0 - float(np.count_nonzero(unsure) / np.count_nonzero(inside | unsure))

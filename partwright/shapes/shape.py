@@ -65,8 +65,9 @@ class Shape:
     frame: to the unit frame and back. unit: "mm", "m" ... or None; up: "x", "y", "z", "-z" ... or None.
     points: (N, 3) as read, own units, where it came as points, else None. repairs: what was done to the
     surface, a sentence each. openings: how much of the surface the input left out, and where the most of
-    it, own units. left_out: share of the area that sheets took, and that is no part of it. confidence: 0 to
-    1, how sure inside and outside are. thickness: that its sheets were given, own units, or None.
+    it, own units. left_out: share of the area that sheets took, and that is no part of it. sealed: the
+    surface is that of the solid that is seen in triangles which are open in many places. confidence: 0 to 1,
+    how sure inside and outside are. thickness: that its sheets were given, own units, or None.
     reading_seconds: that `load_shape` took, 0 for a node. Results are cached by their arguments; returned
     arrays are read-only.
     """
@@ -101,6 +102,7 @@ class Shape:
         self.confidence = min(source.confidence, self._surface.confidence)
         self.openings = self._own(self._surface.openings)
         self.left_out = self._surface.left_out
+        self.sealed = self._surface.sealed
         self._source = self._surface.distance()
         self.reading_seconds = 0.0
         self._cache: dict[tuple[Any, ...], Any] = {}

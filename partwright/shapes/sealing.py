@@ -1,0 +1,93 @@
+"""The solid that is seen in an open surface: all that is reached from outside through narrow gaps at most.
+
+Assets for games and scans enclose nothing to the letter: a controller is two half shells a hair apart, a car
+has no floor under its seats. Who looks at one sees a solid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from partwright.shapes.contour import contour
+from partwright.shapes.distance import MeshDistance, grid_indices
+from partwright.shapes.frame import LONGEST_SIDE
+from partwright.shapes.hidden_faces import Ground
+from partwright.shapes.sampling import sample_triangles
+
+GAP = 0.014  # of the longest side: the widest that is bridged
+_REACH = GAP * LONGEST_SIDE / 2  # unit lengths: half of it
+_CELL = LONGEST_SIDE / 144
+_FAR = _REACH + 2 * _CELL  # further off no distance matters
+_OFF = 1.5 * _REACH  # what bridges a gap is nearer to its sides
+_PROBES = 4000  # points of the surface at which it is looked whether something solid is behind them
+_DEEP = 0.75  # cells: what is as deep somewhere is solid
+_NEAR = 5  # cells along a side of the cube about a probe in which it is looked
+_SOLID = 0.9  # of the probes
+
+
+@dataclass(frozen=True)
+class Sealed:
+    """A closed surface, vertices (V, 3) in the unit frame and faces (F, 3). bridged: which faces (F,) lie
+    over what is wider than gaps. solid: the share of the given surface behind which it is solid."""
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    bridged: NDArray[np.bool_]
+    solid: float
+
+
+def seal(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], ground: Ground | None = None
+) -> Sealed | None:
+    """The solid whose border triangles (F, 3) are but for gaps narrower than `GAP`; None where they are that
+    of none, as cloth and leaves. Where the ground is known, what is open below may stand on it.
+
+    vertices: (V, 3), unit frame. It is a morphological closing by exact distances: the outside is where a
+    ball as wide as the gap gets to from far away, and the solid is what no such ball covers any of. So
+    narrower grooves are filled, and inner edges rounded by as much.
+    """
+    given = MeshDistance(vertices, faces, faces, closed=False)
+    probes = sample_triangles(vertices, faces, _PROBES, 0)[0]
+    used = vertices[np.unique(faces)]
+    low, high = used.min(axis=0) - _FAR, used.max(axis=0) + _FAR
+    sides = np.ceil((high - low) / _CELL).astype(int) + 1
+    places = low + _CELL * grid_indices(sides)
+    distance = given.unsigned(places, _FAR).reshape(sides)
+    for floor in (None, ground) if ground is not None else (None,):
+        above = None if floor is None else (places @ floor.up - floor.height).reshape(sides)
+        field = _closing(places, low, distance, above)
+        near = np.rint((probes - low) / _CELL).astype(int)
+        deepest = ndimage.minimum_filter(field, _NEAR)[tuple(near.T)]
+        solid = float((deepest < -_DEEP * _CELL).mean())
+        if solid >= _SOLID:
+            made, triangles = contour(field, low, _CELL)
+            off = given.unsigned(made, _OFF)[triangles] >= _OFF
+            return Sealed(made, triangles, np.asarray(off.all(axis=1)), solid)
+    return None
+
+
+def _closing(
+    places: NDArray[np.float64],
+    low: NDArray[np.float64],
+    distance: NDArray[np.float32],
+    above: NDArray[np.float64] | None,
+) -> NDArray[np.float64]:
+    """Signed distance (X, Y, Z) of the solid at places (X * Y * Z, 3) from `low` on, right near its surface.
+
+    distance: (X, Y, Z) to the triangles; above: the ground, where that is closed.
+    """
+    free = distance if above is None else np.minimum(distance, above)
+    labels, _ = ndimage.label(free > _REACH)
+    ends = np.ix_(
+        [0, -1], [0, -1], [0, -1]
+    )  # some corner of the grid is above the ground, and all are far off
+    outside = labels == labels[ends].ravel()[free[ends].argmax()]
+    # From the surface that the ball's middle comes to, the way back is as far as it kept off.
+    reached = contour(np.where(outside, 1, -1) * np.abs(free - _REACH), low, _CELL)
+    back = MeshDistance(*reached, reached[1], closed=False).unsigned(places, _FAR).reshape(free.shape)
+    field = _REACH + np.where(outside, back, -back)
+    return field if above is None else np.maximum(field, -above)
