@@ -28,7 +28,7 @@ from partwright.shapes.step_process import STEP_SUFFIXES
 WHOLE = "_whole"
 # Of programs that people model with. What is not listed may be anything: textures, notes.
 _UNREAD = (
-    ".3dm", ".3ds", ".abc", ".blend", ".brep", ".c4d", ".dae", ".f3d", ".fbx", ".fcstd", ".iges", ".igs",
+    ".3dm", ".3ds", ".abc", ".blend", ".brep", ".c4d", ".f3d", ".fbx", ".fcstd", ".iges", ".igs",
     ".ipt", ".ma", ".max", ".mb", ".skp", ".sldprt", ".usd", ".usda", ".usdc", ".usdz", ".wrl", ".x3d",
 )  # fmt: skip
 _NAMED = 5  # files, in a line

@@ -17,10 +17,10 @@ from partwright.errors import (
     RobotError,
 )
 from partwright.meshing.manifolds import closed, surface_of
-from partwright.robots.collada import read_collada
 from partwright.robots.model import Link, MeshUse, mirrored
 from partwright.robots.wrapping import wrapped
 from partwright.shapes import Shape as InputShape
+from partwright.shapes.collada import read_collada
 from partwright.shapes.reading import read_source, source_of
 from partwright.shapes.sampling import sample_triangles
 from partwright.shapes.source import Piece, Source
@@ -179,7 +179,8 @@ def _meant(use: MeshUse) -> Source:
     if use.inline is not None:
         return source_of(use.inline)
     collada = use.source.suffix.lower() == ".dae"
-    source = read_collada(use.source) if collada else read_source(use.source)
+    # Gazebo and ROS do not ask a file for its up axis, and nothing in a link's frame is the ground.
+    source = dataclasses.replace(read_collada(use.source), up=None) if collada else read_source(use.source)
     if use.submesh is None and not collada:
         return source
     pieces = [piece for piece in source.pieces if use.submesh in (None, piece.name)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -24,10 +25,15 @@ def check_gltf(path: Path) -> None:
     """Refuse what would take for ever, or all memory, to read; other nonsense is left to the parser.
 
     Raises:
-        UnreadableFileError: nodes in a circle, with two parents or very deep below one another, elements
-            without data or instances beyond measure, compressed buffers, or a buffer that is no file.
+        UnreadableFileError: glTF 1.0, nodes in a circle, with two parents or very deep below one another,
+            elements without data or instances beyond measure, compressed buffers, or a buffer that is no
+            file.
     """
     tree = gltf_tree(path)
+    if _is_first_version(path, tree):
+        raise UnreadableFileError(
+            f"{path}: is glTF 1.0, which 2.0 has replaced; convert it (gltf-pipeline does) or export it again"
+        )
     if not isinstance(tree, dict):
         return
     compressed = {"EXT_meshopt_compression", "KHR_meshopt_compression"} & set(
@@ -59,6 +65,17 @@ def check_gltf(path: Path) -> None:
         uri = buffer.get("uri")
         if isinstance(uri, str) and not uri.startswith("data:"):
             check_file(path.parent / unquote(uri))
+
+
+def _is_first_version(path: Path, tree: Any) -> bool:
+    """By the head of a GLB, and by what a glTF says of itself."""
+    with suppress(OSError), path.open("rb") as file:
+        head = file.read(8)
+        if head[:4] == b"glTF" and len(head) == 8:
+            return bool(struct.unpack("<I", head[4:])[0] == 1)
+    asset = tree.get("asset") if isinstance(tree, dict) else None
+    version = asset.get("version") if isinstance(asset, dict) else None
+    return isinstance(version, (str, int, float)) and str(version).split(".")[0] == "1"
 
 
 def gltf_tree(path: Path) -> Any:

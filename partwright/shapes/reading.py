@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from partwright.errors import GridError, NeedsSurfaceError, UnsupportedFormatError
 from partwright.shapes.array_files import read_binvox, read_npy, read_npz, read_xyz
+from partwright.shapes.collada import read_collada
 from partwright.shapes.loading import READ_BY_TRIMESH, read_mesh, source_of_mesh
 from partwright.shapes.point_cloud import source_of_points
-from partwright.shapes.source import Source
+from partwright.shapes.source import Source, unique_names
 from partwright.shapes.step_process import STEP_SUFFIXES, read_step
 from partwright.shapes.threemf import read_threemf
 from partwright.shapes.voxels import source_of_grid
@@ -22,7 +23,7 @@ from partwright.shapes.voxels import source_of_grid
 if TYPE_CHECKING:
     import trimesh
 
-MESH_SUFFIXES = (*READ_BY_TRIMESH, ".3mf")
+MESH_SUFFIXES = (*READ_BY_TRIMESH, ".3mf", ".dae")
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".tif", ".tiff")
 _UNIT_NORMAL = (0.9, 1.1)  # lengths between which the columns behind the coordinates are normals, not colours
 
@@ -31,7 +32,7 @@ def read_source(path: Path) -> Source:
     """Read a file by its suffix, one of `SUFFIXES`.
 
     Raises UnsupportedFormatError, UnreadableFileError, EmptyShapeError, NeedsSurfaceError, NotFiniteError,
-    FlatShapeError or GridError.
+    FlatShapeError, GridError, or MissingDependencyError where a format takes a package that is not installed.
     """
     suffix = path.suffix.lower()
     if suffix in PICTURE_SUFFIXES:
@@ -54,6 +55,11 @@ def source_of(thing: trimesh.Trimesh | tuple[Any, Any] | NDArray[Any]) -> Source
     Raises what `read_source` raises for files of the same content.
     """
     return _source_of_array("array", thing) if isinstance(thing, np.ndarray) else source_of_mesh(thing)
+
+
+def _read_collada(path: Path) -> Source:
+    source = read_collada(path)
+    return replace(source, pieces=tuple(unique_names(iter(source.pieces))))
 
 
 def _read_npy(path: Path) -> Source:
@@ -126,6 +132,7 @@ def _three_columns(name: str, points: NDArray[Any]) -> NDArray[Any]:
 _READERS: dict[str, Callable[[Path], Source]] = {
     **dict.fromkeys(READ_BY_TRIMESH, read_mesh),
     ".3mf": read_threemf,
+    ".dae": _read_collada,
     **dict.fromkeys(STEP_SUFFIXES, read_step),
     ".xyz": _read_xyz,
     ".npy": _read_npy,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import trimesh
 
 from partwright.errors import EmptyShapeError, RobotError, UnreadableFileError
 from partwright.robots import CollideOptions, collide
-from partwright.robots.collada import read_collada
+from partwright.shapes.collada import read_collada
 
 pytest.importorskip("collada")
 
@@ -129,7 +130,18 @@ def test_what_it_lacks_is_told(tmp_path: Path) -> None:
     path.write_text(SDF.format("<submesh><name>handle</name></submesh>"))
     with pytest.raises(RobotError, match=r"'body': tin.dae: .* no submesh 'handle'; it has frame, lid"):
         collide(path)
-    mesh.write_text(DAE.format(geometries="", mirror=""))
+    without = DAE.format(geometries="", mirror="")
+    mesh.write_text(without)
+    with pytest.raises(UnreadableFileError, match="Geometry #box not found"):
+        read_collada(mesh)
+    mesh.write_text(
+        re.sub(
+            "<instance_geometry.*?>|</instance_geometry>|<bind_material>.*</bind_material>",
+            "",
+            without,
+            flags=re.S,
+        )
+    )
     with pytest.raises(EmptyShapeError, match="no triangles"):
         read_collada(mesh)
     mesh.write_text("<html>not found</html>")

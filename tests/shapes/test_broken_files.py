@@ -130,6 +130,18 @@ def test_a_gltf_that_would_take_for_ever(
         load_shape(path)
 
 
+@pytest.mark.parametrize("version", ["1.0", 1])
+def test_the_first_gltf_is_told_from_a_damaged_file(version: str | int, tmp_path: Path) -> None:
+    path = tmp_path / "a.gltf"
+    path.write_text(json.dumps({"asset": {"version": version}, "meshes": {}}))
+    with pytest.raises(UnreadableFileError, match=r"a\.gltf: is glTF 1\.0, .*convert it"):
+        load_shape(path)
+    path = tmp_path / "a.glb"
+    path.write_bytes(struct.pack("<4sIIII", b"glTF", 1, 24, 4, 0) + b"{}  ")
+    with pytest.raises(UnreadableFileError, match=r"a\.glb: is glTF 1\.0"):
+        load_shape(path)
+
+
 def test_nan_in_a_transform(tmp_path: Path) -> None:
     import trimesh
 

@@ -1,5 +1,4 @@
-"""COLLADA meshes (`.dae`), as Gazebo and ROS take them: in metres by the unit that the file names, whatever
-it says of its up axis, and by the names of its nodes."""
+"""COLLADA meshes (`.dae`): in metres by the unit that the file names, and by the names of its nodes."""
 
 from __future__ import annotations
 
@@ -11,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from partwright.errors import EmptyShapeError, MissingDependencyError, UnreadableFileError
-from partwright.robots.model import mirrored
-from partwright.shapes.source import Piece, Source
+from partwright.shapes.array_files import check_shape_file
+from partwright.shapes.cleaning import counted
+from partwright.shapes.source import Piece, Source, in_utf8
 
 if TYPE_CHECKING:
     from collada import Collada
@@ -20,17 +20,19 @@ if TYPE_CHECKING:
 
 def read_collada(path: Path) -> Source:
     """Its triangles in metres: a piece for each set of a node's, by the name of the nearest node that has
-    one, so that several may have the same.
+    one, so that several may have the same. They are not turned: `up` is what the file says. A body with a
+    skeleton is as it was bound to it.
 
     Raises:
         MissingDependencyError: pycollada is not installed.
-        UnreadableFileError: it is damaged. EmptyShapeError: it has no triangles.
+        UnreadableFileError: it is missing or damaged. EmptyShapeError: it has no triangles.
     """
+    check_shape_file(path)
     try:
         import collada
     except ImportError as error:
         raise MissingDependencyError(
-            "COLLADA meshes need pycollada; install it with: pip install 'partwright[robots]'"
+            "COLLADA meshes need pycollada; install it with: pip install 'partwright[collada]'"
         ) from error
     try:
         document = collada.Collada(BytesIO(_without_materials(path)), ignore=[collada.common.DaeError])
@@ -38,8 +40,17 @@ def read_collada(path: Path) -> Source:
     except (collada.common.DaeError, ValueError, KeyError, TypeError, AttributeError, SyntaxError) as error:
         raise UnreadableFileError(f"{path}: it cannot be read as COLLADA: {error}") from error
     if not pieces:
+        if document.errors:
+            raise UnreadableFileError(f"{path}: it cannot be read as COLLADA: {document.errors[0]}")
         raise EmptyShapeError(f"{path}: it has no triangles")
-    return Source(path.stem, pieces, unit="m")
+    lost = [
+        e for e in document.errors if isinstance(e, collada.common.DaeBrokenRefError) and "Geometry" in str(e)
+    ]
+    notes = (
+        f"left out {counted(len(lost), 'damaged or missing geometry', 'damaged or missing geometries')}",
+    )
+    up = (document.assetInfo.upaxis or "Y_UP")[0].lower()
+    return Source(in_utf8(path.stem), pieces, unit="m", up=up, repairs=notes if lost else ())
 
 
 def _without_materials(path: Path) -> bytes:
@@ -62,17 +73,25 @@ def _placed(document: Collada) -> Iterator[Piece]:
 
 def _of(node: Any, above: np.ndarray, name: str) -> Iterator[Piece]:
     """What is in a node. above: (4, 4) of what it is in, to metres. name: of the nearest that has one."""
+    from collada.controller import Skin
     from collada.polylist import Polylist
-    from collada.scene import GeometryNode, Node, NodeNode
+    from collada.scene import ControllerNode, GeometryNode, Node, NodeNode
     from collada.triangleset import TriangleSet
 
     if isinstance(node, Node):
         named = node.node if isinstance(node, NodeNode) else node  # a reference has the name of what it means
         for child in node.children:
             yield from _of(child, above @ node.matrix, named.xmlnode.get("name") or name)
-    if not isinstance(node, GeometryNode):
+    if isinstance(node, ControllerNode) and isinstance(node.controller, Skin):
+        geometry, above = (
+            node.controller.geometry,
+            above @ np.reshape(node.controller.bind_shape_matrix, (4, 4)),
+        )
+    elif isinstance(node, GeometryNode):
+        geometry = node.geometry
+    else:
         return
-    for primitive in node.geometry.primitives:
+    for primitive in geometry.primitives:
         triangles = primitive.triangleset() if isinstance(primitive, Polylist) else primitive
         if (
             isinstance(triangles, TriangleSet)
@@ -82,4 +101,4 @@ def _of(node: Any, above: np.ndarray, name: str) -> Iterator[Piece]:
             used, faces = np.unique(triangles.vertex_index, return_inverse=True)  # sets share all corners
             corners = np.asarray(triangles.vertex, np.float64)[used] @ above[:3, :3].T + above[:3, 3]
             faces = faces.reshape(-1, 3).astype(np.int64)
-            yield Piece(name, corners, faces[:, ::-1] if mirrored(above) else faces)
+            yield Piece(name, corners, faces[:, ::-1] if np.linalg.det(above[:3, :3]) < 0 else faces)
