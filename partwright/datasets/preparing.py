@@ -209,13 +209,13 @@ def _check_names(told: Mapping[str, tuple[str, ...]], names: tuple[str, ...]) ->
     """
     holders = {name: [shape for shape, own in told.items() if name in own] for name in names}
     plain: dict[str, str] = {}
+    pairs = []
     for name in names:
         other = plain.setdefault("".join(c for c in name.casefold() if c.isalnum()) or name, name)
         if other != name and not set(holders[other]) & set(holders[name]):
-            raise FamilyError(
-                f"the part {other!r} (as in {holders[other][0]}) and the part {name!r} (as in "
-                f"{holders[name][0]}) differ in spelling alone; name them alike"
-            )
+            pairs.append(f"{other!r} (as in {holders[other][0]}) and {name!r} (as in {holders[name][0]})")
+    if pairs:
+        raise FamilyError(f"part names that differ in spelling alone; name them alike: {'; '.join(pairs)}")
     if len(told) > 1 and all(len(having) < 2 for having in holders.values()):
         some = "; ".join(f"{shape} has {', '.join(told[shape])}" for shape in list(told)[:2])
         raise FamilyError(

@@ -66,7 +66,7 @@ def test_what_samples_are_made_after_may_be_a_mesh_or_picture(
     monkeypatch.setattr(commands + "reconstruct_photo", lambda *_: seen)
     for file, said in (("lamp.stl", "lamp.stl is odd"), ("lamp.jpg", "seen from below")):
         line = ["parts", "generate", "--model", "lamps", *option.split(), file]
-        assert _kept(parser().parse_args(line), model)[0] is lamps[0]
+        assert _kept(parser().parse_args(line), model) is lamps[0]
         assert said in capsys.readouterr().err
 
 
@@ -78,7 +78,7 @@ def test_the_folder_of_a_reconstruction_stands_for_its_assembly(
     Path("found").mkdir()
     to_assembly(shape).save("found/assembly.json")
     line = ["parts", "generate", "--model", str(file), *option.split(), "found"]
-    kept = _kept(parser().parse_args(line), model)[0]
+    kept = _kept(parser().parse_args(line), model)
     assert kept is not None
     np.testing.assert_allclose(kept.poses.translation[shape.present], shape.poses.translation[shape.present])
     assert main(["parts", "edit", "found", "--model", str(file), "-o", "found/assembly.json"]) == 2
@@ -89,6 +89,10 @@ def test_encoder_and_generator(
     file: Path, lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Both lie beside the model that they are for, and are used from there."""
+    assert main(["parts", "generate", "--model", str(file)]) == 2
+    # Wrong names of parts are told before a generator, or the shape that has them, is looked for.
+    assert main(["parts", "generate", "--model", str(file), "--keep", "seats", "--of", "nowhere.json"]) == 2
+    assert "lamps has no part 'seats'; its parts are " in capsys.readouterr().err
     assert main(["parts", "generate", "--model", str(file)]) == 2
     assert "lamps has no generator; make one with `parts train-generator`" in capsys.readouterr().err
     assert main(["parts", "train-encoder", str(file), str(lamps.folder), "--steps", "2"]) == 0
@@ -131,7 +135,7 @@ def test_encoder_and_generator(
     assert "--keep PARTS and --of SHAPE go together" in said
     assert "give one of them" in said
     assert "--change is 0.0; expected above 0" in said
-    assert "0 samples: expected 1 or more" in said
+    assert "--count: expected a whole number of at least 1, got 0" in said
     assert "tries: expected a whole number of at least 1, got 0" in said
     assert main(["parts", "train-encoder", str(file), str(lamps.folder), "-o", "encoder.bin"]) == 2
 

@@ -161,7 +161,10 @@ def test_bad_folders_are_told_in_one_line(tmp_path: Path, capsys: pytest.Capture
     assert "no part name is in two shapes: a has a2, a1; b has b2, b1" in said(
         {"a": ("a1", "a2"), "b": ("b1", "b2")}
     )
-    assert "'Foot' (as in b) differ in spelling" in said({"a": pair, "b": ("Foot", "head")})
+    twice = said({"a": pair, "b": ("Foot", "head"), "c": ("foot", "HEAD")})
+    assert "differ in spelling alone; name them alike: " in twice  # and all of them at once
+    assert "'head' (as in a) and 'HEAD' (as in c)" in twice
+    assert "'foot' (as in a) and 'Foot' (as in b)" in twice
     assert "every shape is one part, 'mesh'; name the nodes" in said({"a": ("mesh",), "b": ("mesh",)})
     assert "holds no shapes" in said({})
     with pytest.raises(FamilyError, match="no such folder"):

@@ -13,6 +13,7 @@ from partwright.cli.parts_generate import CHANGE, sample_name
 from partwright.cli.progress import Work
 from partwright.cli.terminal import counted, say, warn
 from partwright.errors import SettingError
+from partwright.methods import check_count
 from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.from_photo import reconstruct_photo
 from partwright.partsdf.generator import load_generator
@@ -31,12 +32,13 @@ _STALE = re.compile(r"sample_\d+\.json")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    model = load_model(arguments.model)
-    generator = load_generator(model)
     _check(arguments)
+    model = load_model(arguments.model)
+    keep = _names(arguments.keep, model)
+    generator = load_generator(model)
     change = (CHANGE if arguments.change is None else arguments.change) if arguments.like else 0.0
     with Work("reading") as work:
-        source, keep = _kept(arguments, model)
+        source = _kept(arguments, model)
         odd = layout_faults(source) if arguments.poses and source is not None else []
         warn([f"in {arguments.poses} {fault}; so they do in all samples" for fault in odd])
         work.stage("making")
@@ -106,6 +108,8 @@ def _broken(made: Sequence[Sample]) -> list[str]:
 
 
 def _check(arguments: argparse.Namespace) -> None:
+    check_count("--count", arguments.count, low=1)
+    check_count("--tries", arguments.tries, low=1)
     given = [name for name in ("keep", "poses", "like") if getattr(arguments, name)]
     if len(given) > 1:
         raise SettingError(
@@ -120,11 +124,18 @@ def _check(arguments: argparse.Namespace) -> None:
         raise SettingError(f"--change is {arguments.change}; expected above 0 and at most 1")
 
 
-def _kept(arguments: argparse.Namespace, model: Model) -> tuple[NeuralShape | None, list[str]]:
-    """The shape of which something stays, and its parts that do."""
+def _kept(arguments: argparse.Namespace, model: Model) -> NeuralShape | None:
+    """The shape of which something stays."""
     text = arguments.of or arguments.poses or arguments.like
-    keep = [name.strip() for name in arguments.keep.split(",")] if arguments.keep else []
-    return (_source(text, arguments, model) if text else None), keep
+    return _source(text, arguments, model) if text else None
+
+
+def _names(text: str | None, model: Model) -> list[str]:
+    """Of parts that stay, before anything is read or made; raises SettingError for what is none."""
+    names = [name.strip() for name in text.split(",")] if text else []
+    for name in names:
+        model.index(name)
+    return names
 
 
 def _source(text: str, arguments: argparse.Namespace, model: Model) -> NeuralShape:
