@@ -12,6 +12,7 @@ import numpy as np
 from partwright.errors import EmptyShapeError, MissingDependencyError, UnreadableFileError
 from partwright.shapes.array_files import check_shape_file
 from partwright.shapes.cleaning import counted
+from partwright.shapes.loading import PARSER_ERRORS
 from partwright.shapes.source import Piece, Source, in_utf8
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def read_collada(path: Path) -> Source:
     try:
         document = collada.Collada(BytesIO(_without_materials(path)), ignore=[collada.common.DaeError])
         pieces = tuple(_placed(document))
-    except (collada.common.DaeError, ValueError, KeyError, TypeError, AttributeError, SyntaxError) as error:
+    except (collada.common.DaeError, SyntaxError, *PARSER_ERRORS) as error:
         raise UnreadableFileError(f"{path}: it cannot be read as COLLADA: {error}") from error
     if not pieces:
         if document.errors:
@@ -58,7 +59,7 @@ def _without_materials(path: Path) -> bytes:
     from lxml import etree
 
     parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
-    tree = etree.parse(str(path), parser)
+    tree = etree.ElementTree(etree.fromstring(path.read_bytes(), parser))
     for tag in ("bind_material", "library_materials", "library_effects", "library_images"):
         for element in list(tree.iter(f"{{*}}{tag}")):
             element.getparent().remove(element)

@@ -31,7 +31,7 @@ READ_BY_TRIMESH = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 # What trimesh, numpy and json raise on bytes that are not what the suffix says. A parser fails
 # wherever the bytes first stop making sense, so the families are wide; none of them can come from our own
 # code here, because nothing but the parser runs inside the try.
-_PARSER_ERRORS = (
+PARSER_ERRORS = (
     OSError,
     EOFError,
     ValueError,  # includes UnicodeDecodeError and json.JSONDecodeError
@@ -42,6 +42,7 @@ _PARSER_ERRORS = (
     AssertionError,
     MemoryError,  # a header that claims more elements than memory holds
     RuntimeError,  # includes RecursionError and NotImplementedError
+    NameError,  # includes UnboundLocalError, of a branch that was not taken
     ImportError,  # a compressed glTF extension whose decoder is not installed
     struct.error,
     zlib.error,
@@ -142,7 +143,7 @@ def load_scene(
                 beside = trimesh.resolvers.FilePathResolver(str(path))
                 options |= {"file_type": suffix[1:], "resolver": beside}
             scene = trimesh.load_scene(readable if document is None else io.BytesIO(document), **options)
-    except _PARSER_ERRORS as error:
+    except PARSER_ERRORS as error:
         raise UnreadableFileError(
             f"{path}: cannot be read as {suffix[1:].upper()} ({type(error).__name__}: {error}); the file is "
             "truncated or not what its suffix says. Export it again"

@@ -56,8 +56,8 @@ def test_every_format_gives_the_same_box(tmp_path, suffix):
     np.testing.assert_allclose(shape.frame.centre, (10, 20, 30), rtol=1e-6)
     assert shape.confidence == 1.0
     assert shape.name == "part"
-    gltf = suffix in (".glb", ".gltf")
-    assert (shape.unit, shape.up) == (("m", "y") if gltf else ("mm" if suffix == ".3mf" else None, None))
+    says = {".glb": ("m", "y"), ".gltf": ("m", "y"), ".dae": ("m", "y"), ".3mf": ("mm", None)}
+    assert (shape.unit, shape.up) == says.get(suffix, (None, None))
 
 
 def test_scene_transforms_instances_and_names(tmp_path):
