@@ -38,6 +38,7 @@ _SIDE_STEP = 2e-5  # how far off a triangle its two sides are looked at
 _CLEAR = 0.2  # a winding number this near to 0 or 1 is clear
 _CHECK = 64  # cells along a side in the search for overlaps
 _THICKEN = "give its sheets a thickness (partwright fit --thickness 1%)"
+_SAY_UP = " say which way is up if it is only open below (--up z),"
 _PROBES = 8  # triangles of a patch that are looked at to see whether it is a wall
 
 
@@ -140,7 +141,7 @@ def _enclosed(
     if confidence is None or confidence < _LEAST_CONFIDENCE:
         sealed = _sealed(vertices, edges, ground, notes, Openings())
         if sealed is None:
-            raise _no_solid(confidence)
+            raise _no_solid(confidence, ground)
         return sealed
     vertices, edges, openings = fill_holes(vertices, edges, notes)
     if not edges.balance.any():
@@ -177,12 +178,12 @@ def _sealed(
     return replace(surface, openings=filled.and_more(bridged), sealed=True)
 
 
-def _no_solid(confidence: float | None) -> FlatShapeError | OpenShellError:
+def _no_solid(confidence: float | None, ground: Ground | None) -> FlatShapeError | OpenShellError:
     if confidence is None:
         return FlatShapeError(f"the surface is open and encloses no volume; close it, or {_THICKEN}")
     return OpenShellError(
         f"the surface is an open shell: only {confidence:.0%} of what it could enclose is clearly "
-        f"inside. Close its openings, or {_THICKEN}"
+        f"inside. Close its openings,{_SAY_UP if ground is None else ''} or {_THICKEN}"
     )
 
 
