@@ -171,7 +171,6 @@ def test_too_few_iterations_are_named(plate: Shape) -> None:
         fit(plate, Settings(**PAPER | {"start": "weights"}))
 
 
-@pytest.mark.heavy
 def test_searching_among_the_shipped_network_s_quadrics(plate: Shape) -> None:
     fitted = fit(plate, Settings(start="weights", surface=3000, near=3000, uniform=2500, tries=0))
     assert fitted.details["start"] == "pre-trained network"

@@ -39,7 +39,7 @@ def test_named_solids_are_exact(tmp_path: Path, field: Field, volume: float) -> 
 @pytest.mark.parametrize(
     "field",
     [
-        pytest.param(field, marks=pytest.mark.heavy if field.onion and field.size[2] else (), id=str(field))
+        pytest.param(field, marks=pytest.mark.heavy if field.taper == 1.4 else (), id=str(field))
         for field in SUPERFRUSTA
     ],
 )

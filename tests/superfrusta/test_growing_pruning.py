@@ -12,7 +12,7 @@ from partwright.fields import kernel
 from partwright.fields.columns import SIZE, WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
-from partwright.superfrusta.growing import grow
+from partwright.superfrusta.growing import Region, _guesses, grow
 from partwright.superfrusta.merging import owners
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.pruning import cheapest_removal, neighbours, prune
@@ -45,6 +45,13 @@ def test_two_blocks_grow_two_parts(pair: FitSamples, exact: np.ndarray) -> None:
     assert len(grown) == 2
     assert score(pair, grown) > 0.95
     assert np.sort(grown[:, 0]) == pytest.approx([-0.6, 0.6], abs=0.02)
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+def test_starts_blend_unless_unions_are_plain(pair: FitSamples, smooth: bool) -> None:
+    region = Region(pair.grid.values.ravel() < 0, NONE, 0.1, 0.2, 0.15)
+    blends = _guesses(pair, region, Settings.for_quality("draft", smooth=smooth))[:, Column.BLEND]
+    assert (blends > 0).all() if smooth else (blends == 0).all()
 
 
 def test_what_is_explained_already_grows_nothing(pair: FitSamples, exact: np.ndarray) -> None:

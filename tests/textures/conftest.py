@@ -11,5 +11,6 @@ import pytest
 def small_pictures() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("partwright.textures.sightings._SIDE", 128)  # pixels, of 384
-        patch.setattr("partwright.textures.likeness.SIDE", 192)  # of 512
+        for module in ("partwright.textures.likeness", "partwright.cli.commands.texture"):
+            patch.setattr(f"{module}.SIDE", 192)  # of 512
         yield

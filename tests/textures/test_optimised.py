@@ -15,6 +15,7 @@ from partwright.fields import Sphere, SuperFrustum
 from partwright.meshing import mesh_assembly
 from partwright.textures import PartMap, bake, likeness, load_colours, part_map
 from partwright.textures.coordinates import directions, folded
+from partwright.textures.likeness import SIDE
 from partwright.textures.texels import Texels, filled
 
 WHOLE_MOVE = Similarity(2.0, (0.5, 0.5, 0.5, 0.5), (1, 2, 3))
@@ -110,6 +111,7 @@ def test_the_command_says_how_near(tmp_path: Path, checker: Path) -> None:
     report = json.loads((tmp_path / "b.json.report.json").read_text())
     psnr = report["psnr"]
     assert (psnr["views"], psnr["side"]) == (8, likeness.SIDE)
+    assert SIDE == 512  # as it was before pictures were made smaller for tests
     assert psnr["after"]["surface"] > psnr["before"]["surface"]
     assert report["texels_a_side"] == 32
     assert report["cpu_seconds"] > 0
