@@ -236,7 +236,7 @@ def _meshes(folder: Path) -> list[Path]:
 def _joined(path: Path) -> tuple[Piece, str | None]:
     """A file as one piece, and the axis that it says points up."""
     source = read_source(path)
-    if source.repairs:  # a surface was laid through points
+    if source.points is not None:  # a surface was laid through points
         raise EmptyShapeError(f"{path}: has points but no faces; export the part with its surface")
     pieces = source.pieces
     offsets = np.cumsum([0] + [len(p.vertices) for p in pieces])[:-1]

@@ -47,11 +47,11 @@ def read_collada(path: Path) -> Source:
     lost = [
         e for e in document.errors if isinstance(e, collada.common.DaeBrokenRefError) and "Geometry" in str(e)
     ]
-    notes = (
-        f"left out {counted(len(lost), 'damaged or missing geometry', 'damaged or missing geometries')}",
+    left_out = (
+        f"left out {counted(len(lost), 'damaged or missing geometry', 'damaged or missing geometries')}"
     )
     up = (document.assetInfo.upaxis or "Y_UP")[0].lower()
-    return Source(in_utf8(path.stem), pieces, unit="m", up=up, repairs=notes if lost else ())
+    return Source(in_utf8(path.stem), pieces, unit="m", up=up, repairs=(left_out,) if lost else ())
 
 
 def _without_materials(path: Path) -> bytes:
@@ -68,6 +68,8 @@ def _without_materials(path: Path) -> bytes:
 
 def _placed(document: Collada) -> Iterator[Piece]:
     metres = float(document.assetInfo.unitmeter or 1.0)
+    if not 0 < metres < np.inf:
+        raise ValueError(f"its unit is {metres} metres long")
     for node in document.scene.nodes if document.scene is not None else ():
         yield from _of(node, np.diag([metres, metres, metres, 1.0]), "")
 

@@ -173,9 +173,9 @@ def _sealed(
         f"the surface is open in many places; what is seen as a solid was taken for one, and gaps of up to "
         f"{GAP:.1%} of the longest side were bridged"
     )
-    surface = _surface_of_closed(found.vertices, EdgeTable(found.faces), notes, found.solid)
-    bridged = openings_of(found.vertices, found.faces, found.bridged)
-    return replace(surface, openings=filled.and_more(bridged), sealed=True)
+    openings = filled.and_more(openings_of(found.vertices, found.faces, found.bridged))
+    surface = Surface(found.vertices, found.faces, found.faces, True, True, tuple(notes), found.solid)
+    return replace(surface, openings=openings, sealed=True)
 
 
 def _no_solid(confidence: float | None, ground: Ground | None) -> FlatShapeError | OpenShellError:

@@ -57,9 +57,9 @@ def seal(
     sides = np.ceil((high - low) / _CELL).astype(int) + 1
     places = low + _CELL * grid_indices(sides)
     distance = given.unsigned(places, _FAR).reshape(sides)
-    for floor in (None, ground) if ground is not None else (None,):
-        above = None if floor is None else (places @ floor.up - floor.height).reshape(sides)
-        field = _closing(places, low, distance, above)
+    stands = ground is not None and float((used @ ground.up).min()) - ground.height < _REACH
+    for floor in (None, ground) if stands else (None,):
+        field = _closing(places, low, distance, floor)
         near = np.rint((probes - low) / _CELL).astype(int)
         deepest = ndimage.minimum_filter(field, _NEAR)[tuple(near.T)]
         solid = float((deepest < -_DEEP * _CELL).mean())
@@ -74,20 +74,35 @@ def _closing(
     places: NDArray[np.float64],
     low: NDArray[np.float64],
     distance: NDArray[np.float32],
-    above: NDArray[np.float64] | None,
-) -> NDArray[np.float64]:
-    """Signed distance (X, Y, Z) of the solid at places (X * Y * Z, 3) from `low` on, right near its surface.
+    ground: Ground | None,
+) -> NDArray[np.floating]:
+    """Signed distance (X, Y, Z) of the solid at places (X * Y * Z, 3) from `low` on: right near its surface,
+    huge beyond.
 
-    distance: (X, Y, Z) to the triangles; above: the ground, where that is closed.
+    distance: (X, Y, Z) to the triangles. ground: where that is closed.
     """
-    free = distance if above is None else np.minimum(distance, above)
-    labels, _ = ndimage.label(free > _REACH)
-    ends = np.ix_(
-        [0, -1], [0, -1], [0, -1]
-    )  # some corner of the grid is above the ground, and all are far off
-    outside = labels == labels[ends].ravel()[free[ends].argmax()]
+    free = distance - _REACH
+    if ground is None:
+        outside = _joined(free, free > 0)
+    else:
+        above = (places @ ground.up - ground.height).reshape(free.shape)
+        free = np.minimum(free, above)
+        # The ball rolls on the ground, and does not get under a rim; then its middle sinks to the ground, as
+        # if all were mirrored in it: else an edge would grow at the foot.
+        outside = _joined(free, (free > 0) & (above > _REACH))
+        down = np.zeros((3, 3, 3), bool)
+        down[tuple(slice(None) if along else 1 for along in ground.up != 0)] = True
+        sunk = int(np.ceil(_REACH / _CELL))
+        outside = ndimage.binary_dilation(outside, down, sunk, mask=free > 0)
     # From the surface that the ball's middle comes to, the way back is as far as it kept off.
-    reached = contour(np.where(outside, 1, -1) * np.abs(free - _REACH), low, _CELL)
-    back = MeshDistance(*reached, reached[1], closed=False).unsigned(places, _FAR).reshape(free.shape)
+    vertices, faces = contour(np.where(outside, 1, -1) * np.abs(free), low, _CELL)
+    back = MeshDistance(vertices, faces, faces, closed=False).unsigned(places, _FAR).reshape(free.shape)
     field = _REACH + np.where(outside, back, -back)
-    return field if above is None else np.maximum(field, -above)
+    return field if ground is None else np.maximum(field, -above)
+
+
+def _joined(free: NDArray[np.floating], where: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What of (X, Y, Z) is joined to the corner of the grid at which most is free."""
+    labels, _ = ndimage.label(where)
+    ends = np.ix_([0, -1], [0, -1], [0, -1])
+    return np.asarray(labels == labels[ends].ravel()[free[ends].argmax()])

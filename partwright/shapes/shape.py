@@ -300,8 +300,8 @@ def load_shape(
     `thickness` makes walls of surfaces that are open or flat, half of it on either side, where they would be
     filled or left out; in own units, or text as "2mm" or "1%" of the longest side.
     Raises UnsupportedFormatError, UnreadableFileError, EmptyShapeError, NeedsSurfaceError, NotFiniteError,
-    FlatShapeError, OpenShellError, GridError, or SettingError for an unknown unit or axis, or a thickness
-    that is no length above 0.
+    FlatShapeError, OpenShellError, GridError, MissingDependencyError, or SettingError for an unknown unit or
+    axis, or a thickness that is no length above 0.
     """
     started = time.perf_counter()
     stated_unit = None if unit is None else canonical_unit(unit)

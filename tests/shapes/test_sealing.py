@@ -63,6 +63,7 @@ def test_what_is_open_below_stands_on_the_ground() -> None:
     made = trimesh.Trimesh(found.vertices, found.faces, process=False)
     assert made.is_watertight
     assert made.volume == pytest.approx(2 / 3 * np.pi * 0.45**3, rel=0.03)
+    np.testing.assert_allclose(made.extents, (0.9, 0.9, 0.45), atol=0.006)  # no rim at the foot
     below = made.area_faces[found.bridged].sum()
     assert below == pytest.approx(np.pi * 0.45**2, rel=0.15)
     bowl = half_ball()
