@@ -69,11 +69,10 @@ def target_picture(shape: PreparedShape, size: int, camera: Camera | None = None
     return render_mesh(mesh, camera, (size, size), palette(len(shape.present))[shape.label])
 
 
-def picture_resolution(*shapes: NeuralShape) -> int:
-    """Cells along the unit frame that show the shapes' thinnest wall, as far as the cost of a picture, or of
-    all between two shapes, allows."""
+def picture_resolution(*shapes: NeuralShape, most: int = _FINE) -> int:
+    """Cells along the unit frame that show the shapes' thinnest wall, at most as many as the cost allows."""
     thinnest = min(float(shape.walls().min(initial=np.inf)) for shape in shapes)
-    return min(_FINE if len(shapes) == 1 else _FILM, resolution_for_wall(thinnest, _COARSE))
+    return min(most, resolution_for_wall(thinnest, _COARSE))
 
 
 def blank(size: int) -> np.ndarray:
@@ -109,7 +108,7 @@ def film(
     from PIL import Image
 
     check_film(path, steps)
-    resolution = resolution or picture_resolution(a, b)
+    resolution = resolution or picture_resolution(a, b, most=_FILM)
     frames = []
     for i in range(steps):
 

@@ -59,7 +59,7 @@ def distance_grid(
     shape = (int(sides[0]), int(sides[1]), int(sides[2]))
     # Points are voxel centres, so none of them lies on the bounding box.
     origin = (lower + upper) / 2 - spacing * (sides - 1) / 2
-    near, distance = _near_voxels(source, origin, spacing, shape)
+    near, distance = near_voxels(source, origin, spacing, shape, _BAND * spacing)
     values = _far_distances(source, origin, spacing, shape, near[distance <= _SITE * spacing])
     values[tuple(near.T)] = distance
     inside = source.inside_grid(origin, spacing, shape)
@@ -67,20 +67,25 @@ def distance_grid(
     return DistanceGrid(origin, spacing, values)
 
 
-def _near_voxels(
-    source: DistanceSource, origin: NDArray[np.float64], spacing: float, shape: tuple[int, int, int]
+def near_voxels(
+    source: DistanceSource,
+    origin: NDArray[np.float64],
+    spacing: float,
+    shape: tuple[int, int, int],
+    band: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-    """Indices (N, 3) and unsigned distances (N,) of all voxels within the band, found by halving blocks."""
+    """Indices (N, 3) and unsigned distances (N,) of all voxels within a band, a length, found by halving
+    blocks."""
     index = _COARSEST * grid_indices([-(-n // _COARSEST) for n in shape])
     size = _COARSEST
     while size > 1:
-        reach = spacing * (_BAND + np.sqrt(3) * (size - 1) / 2)
+        reach = band + spacing * np.sqrt(3) * (size - 1) / 2
         index = index[source.unsigned(origin + spacing * (index + (size - 1) / 2), reach) <= reach]
         size //= 2
         index = (index[:, None] + size * np.array(list(product((0, 1), repeat=3)))).reshape(-1, 3)
     index = index[(index < shape).all(axis=1)]
-    distance = source.unsigned(origin + spacing * index, spacing * _BAND)
-    close = distance <= spacing * _BAND
+    distance = source.unsigned(origin + spacing * index, band)
+    close = distance <= band
     return index[close], distance[close]
 
 

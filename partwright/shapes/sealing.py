@@ -6,15 +6,16 @@ has no floor under its seats. Who looks at one sees a solid.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from partwright.shapes.contour import contour
 from partwright.shapes.distance import MeshDistance, grid_indices
 from partwright.shapes.frame import LONGEST_SIDE
+from partwright.shapes.grid import near_voxels
 from partwright.shapes.hidden_faces import Ground
 from partwright.shapes.sampling import sample_triangles
 
@@ -50,18 +51,20 @@ def seal(
     ball as wide as the gap gets to from far away, and the solid is what no such ball covers any of. So
     narrower grooves are filled, and inner edges rounded by as much.
     """
+    from scipy.ndimage import minimum_filter
+
     given = MeshDistance(vertices, faces, faces, closed=False)
     probes = sample_triangles(vertices, faces, _PROBES, 0)[0]
     used = vertices[np.unique(faces)]
     low, high = used.min(axis=0) - _FAR, used.max(axis=0) + _FAR
     sides = np.ceil((high - low) / _CELL).astype(int) + 1
     places = low + _CELL * grid_indices(sides)
-    distance = given.unsigned(places, _FAR).reshape(sides)
+    distance = _distances(given, low, sides)
     stands = ground is not None and float((used @ ground.up).min()) - ground.height < _REACH
     for floor in (None, ground) if stands else (None,):
         field = _closing(places, low, distance, floor)
         near = np.rint((probes - low) / _CELL).astype(int)
-        deepest = ndimage.minimum_filter(field, _NEAR)[tuple(near.T)]
+        deepest = minimum_filter(field, _NEAR)[tuple(near.T)]
         solid = float((deepest < -_DEEP * _CELL).mean())
         if solid >= _SOLID:
             made, triangles = contour(field, low, _CELL)
@@ -77,10 +80,12 @@ def _closing(
     ground: Ground | None,
 ) -> NDArray[np.floating]:
     """Signed distance (X, Y, Z) of the solid at places (X * Y * Z, 3) from `low` on: right near its surface,
-    huge beyond.
+    too little beyond.
 
     distance: (X, Y, Z) to the triangles. ground: where that is closed.
     """
+    from scipy.ndimage import binary_dilation
+
     free = distance - _REACH
     if ground is None:
         outside = _joined(free, free > 0)
@@ -93,16 +98,27 @@ def _closing(
         down = np.zeros((3, 3, 3), bool)
         down[tuple(slice(None) if along else 1 for along in ground.up != 0)] = True
         sunk = int(np.ceil(_REACH / _CELL))
-        outside = ndimage.binary_dilation(outside, down, sunk, mask=free > 0)
+        outside = binary_dilation(outside, down, sunk, mask=free > 0)
     # From the surface that the ball's middle comes to, the way back is as far as it kept off.
     vertices, faces = contour(np.where(outside, 1, -1) * np.abs(free), low, _CELL)
-    back = MeshDistance(vertices, faces, faces, closed=False).unsigned(places, _FAR).reshape(free.shape)
+    back = _distances(MeshDistance(vertices, faces, faces, closed=False), low, free.shape)
     field = _REACH + np.where(outside, back, -back)
     return field if ground is None else np.maximum(field, -above)
 
 
+def _distances(source: MeshDistance, low: NDArray[np.float64], sides: Sequence[int]) -> NDArray[np.float32]:
+    """Distance (X, Y, Z) of the grid's places, `_FAR` where it is more."""
+    x, y, z = (int(side) for side in sides)
+    near, close = near_voxels(source, low, _CELL, (x, y, z), _FAR)
+    distance = np.full((x, y, z), _FAR, np.float32)
+    distance[tuple(near.T)] = close
+    return distance
+
+
 def _joined(free: NDArray[np.floating], where: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """What of (X, Y, Z) is joined to the corner of the grid at which most is free."""
-    labels, _ = ndimage.label(where)
+    from scipy.ndimage import label
+
+    labels, _ = label(where)
     ends = np.ix_([0, -1], [0, -1], [0, -1])
     return np.asarray(labels == labels[ends].ravel()[free[ends].argmax()])

@@ -155,4 +155,4 @@ def test_pictures_are_finer_for_thin_walls(
     monkeypatch.setattr(NeuralShape, "walls", lambda shape: np.array([1.0, wall]))
     shape = NeuralShape.trained(model, "lamp1")
     assert picture_resolution(shape) == cells
-    assert picture_resolution(shape, shape) == min(cells, 160)  # of a film
+    assert picture_resolution(shape, shape, most=160) == min(cells, 160)  # of a film
