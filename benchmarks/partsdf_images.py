@@ -134,7 +134,8 @@ def outlines(seen: list[Looked | None]) -> tuple[np.ndarray, np.ndarray]:
 def standpoint_of(one: Looked) -> Standpoint:
     """Where what was seen is seen from, by a coarse mesh of it."""
     sight, surface = one.sight, mesh_shape(one.sight.shape, OUTLINED, parts=False).whole
-    return find_standpoint(surface.vertices, surface.faces, one.silhouette, sight.azimuth, sight.elevation)
+    toward = sight.azimuth, sight.elevation, sight.shape.model.up
+    return find_standpoint(surface.vertices, surface.faces, one.silhouette, *toward)
 
 
 def nearest(model: Model, shape: PreparedShape) -> NeuralShape:

@@ -18,6 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from partwright.atomic_io import write_bytes
+from partwright.datasets.prepared import UP
 from partwright.errors import ModelError, NewerVersionError, SettingError, UnreadableFileError
 from partwright.input_files import check_file
 from partwright.partsdf.config import Config, DecoderSettings, config_from
@@ -59,7 +60,7 @@ class Model:
     average_pose: PoseTensors
     shapes: tuple[str, ...]
     lipschitz: float
-    up: str = "z"
+    up: str = UP
     hash: str = ""
 
     @property
@@ -249,7 +250,7 @@ def _model(about: dict[str, Any], tensors: dict[str, Tensor]) -> Model:
     prefix = "decoder."
     weights = {k[len(prefix) :]: v for k, v in tensors.items() if k.startswith(prefix)}
     decoder = _decoder_of(len(parts), config.decoder, weights)
-    slope, up = float(about["slope"]), canonical_up(str(about.get("up", "z")))
+    slope, up = float(about["slope"]), canonical_up(str(about.get("up", UP)))
     return Model(config, parts, decoder, latents, poses, present, average, shapes, slope, up)
 
 

@@ -33,7 +33,7 @@ def find_standpoint(
     silhouette: np.ndarray,
     azimuth: float,
     elevation: float,
-    up: str = "z",
+    up: str,
 ) -> Standpoint:
     """The best near an azimuth and an elevation, in degrees: a silhouette that was badly seen is not to lead
     far away from these.

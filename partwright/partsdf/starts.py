@@ -18,6 +18,7 @@ import torch
 from torch import Tensor
 
 from partwright.assembly.similarity import quaternion_product
+from partwright.datasets.prepared import UP
 from partwright.errors import ModelError, SettingError
 from partwright.partsdf.encoder import Encoder, load_encoder
 from partwright.partsdf.losses import aggregate, clamped_error
@@ -85,7 +86,7 @@ def find_starts(
     return [seen, *(best_starts(model, target, others, turns) if others else [])]
 
 
-def ways_to_stand(up: str | None, family: str = "z") -> list[Quaternion]:
+def ways_to_stand(up: str | None, family: str = UP) -> list[Quaternion]:
     """Turns from how the family stands to how a shape may, the first of which is none.
 
     up: the shape's, family: the family's axis that points up. All 24 where the shape's is unknown. Else

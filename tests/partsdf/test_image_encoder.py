@@ -179,7 +179,7 @@ def test_a_standpoint_is_found_again(lamps: PreparedFamily) -> None:
     seen = outline(scene, Camera(40.0, 20.0, 25.0, "z", 0.0))
     aside = np.pad(seen, ((0, 40), (30, 10)))
     assert (boxed(aside) == seen).all()  # it does not matter where in the picture it is
-    found = find_standpoint(held.vertices, held.faces, aside, 56.0, 4.0)
+    found = find_standpoint(held.vertices, held.faces, aside, 56.0, 4.0, "z")
     assert found.iou > 0.97
     assert abs(found.camera.azimuth - 40) < 5
     assert abs(found.camera.elevation - 20) < 5

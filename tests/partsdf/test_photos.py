@@ -117,7 +117,7 @@ def test_a_standpoint_is_not_looked_for_past_the_pole(monkeypatch: pytest.Monkey
         "partwright.partsdf.standpoint.outline", lambda s, camera: tried.append(camera) or outline(s, camera)
     )
     seen = outline(Scene(box.vertices, box.faces), Camera(20.0, 96.0, 25.0, "z", 0.0))
-    found = find_standpoint(box.vertices, box.faces, seen, 20.0, 85.0)
+    found = find_standpoint(box.vertices, box.faces, seen, 20.0, 85.0, "z")
     assert max(camera.elevation for camera in tried) == _HIGHEST
     assert found.camera.elevation <= _HIGHEST
 
