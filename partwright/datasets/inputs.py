@@ -1,7 +1,7 @@
 """Shapes made of named parts, as they come: a family of our own, or a folder of yours.
 
-A folder holds one shape an entry: a scene whose nodes are the parts (GLB, glTF, 3MF, COLLADA, STEP, OBJ with groups),
-a folder of parts (meshes, or STEP files alone) with perhaps the whole as `_whole`, or a mesh with
+A folder holds one shape an entry: a scene whose nodes are the parts (GLB, glTF, 3MF, COLLADA, STEP, OBJ with
+groups), a folder of parts (meshes, or STEP files alone) with perhaps the whole as `_whole`, or a mesh with
 `FILE.labels.json` beside it.
 """
 
