@@ -33,9 +33,10 @@ $(INSTALLED): .venv/torch $(BUILD_INPUTS)
 demo: $(PACKAGE)
 	$(BIN)/partwright fit $(DEMO_SHAPE) -o demo-output
 
-# PyTorch's threads are not to spin while they wait: with a process a core they would take each other's. A file
-# is one process's, so that what its tests share is made once.
-PYTEST := OMP_WAIT_POLICY=PASSIVE $(BIN)/python -m pytest -n auto --dist loadfile
+# A process a core, so one thread each of PyTorch and BLAS, which spin while they wait: with one a core in every process
+# they take each other's, and a file of fits takes up to three times as long. The fits' own threads stay. A file is one
+# process's, so that what its tests share is made once.
+PYTEST := OMP_NUM_THREADS=1 OMP_WAIT_POLICY=PASSIVE $(BIN)/python -m pytest -n auto --dist loadfile
 test: setup
 	$(PYTEST)
 
