@@ -89,6 +89,7 @@ def about_input(shape: Shape) -> dict[str, Any]:
         "repairs": list(shape.repairs),
         "openings": asdict(shape.openings),
         "left_out": shape.left_out,
+        "sealed": shape.sealed,
         "thickness": shape.thickness,
         "confidence": shape.confidence,
     }
@@ -191,6 +192,11 @@ def warnings(shape: Shape, scores: Scores, more: str) -> list[str]:
         result.append(
             f"sheets with {shape.left_out:.0%} of the surface enclose nothing and were left out; "
             "--thickness 1% makes walls of them"
+        )
+    if shape.sealed:
+        result.append(
+            "the surface is open in many places, and the solid that is seen in it was taken for what is "
+            "meant; where sheets were meant, --thickness 1% makes walls of them"
         )
     if shape.confidence < UNSURE:
         repairs = "; ".join(shape.repairs)

@@ -16,6 +16,7 @@ from partwright.errors import FlatShapeError, NoSurfaceError
 from partwright.meshing import mesh_field
 from partwright.meshing.manifolds import closed
 from partwright.shapes import MeshDistance, UnitFrame
+from partwright.shapes.flooding import reached_from_outside
 from partwright.shapes.repair import consistent
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def wrapped(vertices: np.ndarray, faces: np.ndarray) -> tuple[Manifold, Manifold
     Raises:
         FlatShapeError: nothing is left to wrap.
     """
-    from scipy.ndimage import distance_transform_edt, label
+    from scipy.ndimage import distance_transform_edt
 
     frame = UnitFrame.of(vertices[np.unique(faces)])
     unit = frame.to_unit(vertices)
@@ -49,8 +50,7 @@ def wrapped(vertices: np.ndarray, faces: np.ndarray) -> tuple[Manifold, Manifold
     points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
     near = MeshDistance(unit, faces, faces, False).unsigned(points, within=4 * cell)
     distance = np.minimum(near, 4 * cell).reshape([2 * n + 1 for n in counts])
-    regions, _ = label(distance > thick)
-    outside = regions == regions[0, 0, 0]
+    outside = reached_from_outside(distance, distance > thick)
     around = np.where(outside, distance - thick, -np.maximum(thick - distance, 0.5 * cell))
     beyond = outside | (cell * distance_transform_edt(~outside) < thick)
     bounded = np.where(beyond, distance, -distance)

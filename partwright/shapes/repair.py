@@ -88,12 +88,13 @@ def repair(
     faces: NDArray[np.int64],
     ground: Ground | None = None,
     wall: float | None = None,
+    sealing: bool = True,
 ) -> Surface:
     """Surface of the solid that the triangles mean; vertices (V, 3) in the unit frame, faces (F, 3).
 
-    ground: where it is known, what opens onto it is closed. What is open in many places is sealed, where a
-    solid is seen in it. wall: the thickness, unit lengths, of what is
-    still open then and of flat sheets; None: they are closed, or left out.
+    ground: where it is known, what opens onto it is closed. wall: the thickness, unit lengths, of what is
+    still open then and of flat sheets; None: they are closed, or left out. sealing: whether what is open in
+    many places is sealed, where a solid is seen in it.
 
     Raises EmptyShapeError when no triangle has area, FlatShapeError when nothing is enclosed, OpenShellError
     when the openings are so large that inside and outside cannot be told apart.
@@ -117,12 +118,12 @@ def repair(
         lying = edges.faces[:0]
     if wall is not None:
         edges = EdgeTable(np.concatenate([edges.faces, lying]))
-        return _enclosed(*thicken(vertices, edges, wall, notes), ground, notes)
+        return _enclosed(*thicken(vertices, edges, wall, notes), ground, notes, sealing)
     if len(lying):
         notes.append("left out what lies flat on the ground")
     whole = left_out + _area(vertices, lying) + _area(vertices, edges.faces)
     vertices, edges = drop_sheets(vertices, edges, notes)
-    surface = _enclosed(vertices, edges, ground, notes)
+    surface = _enclosed(vertices, edges, ground, notes, sealing)
     return replace(surface, left_out=1 - _area(vertices, edges.faces) / whole)
 
 
@@ -132,14 +133,18 @@ def _area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
 
 
 def _enclosed(
-    vertices: NDArray[np.float64], edges: EdgeTable, ground: Ground | None, notes: list[str]
+    vertices: NDArray[np.float64],
+    edges: EdgeTable,
+    ground: Ground | None,
+    notes: list[str],
+    sealing: bool,
 ) -> Surface:
     """What is inside, of triangles that are wound consistently."""
     if not edges.balance.any():
         return _surface_of_closed(vertices, edges, notes, 1.0)
     confidence = _confidence_of_open(vertices, edges.faces)
     if confidence is None or confidence < _LEAST_CONFIDENCE:
-        sealed = _sealed(vertices, edges, ground, notes, Openings())
+        sealed = _sealed(vertices, edges, ground, notes, Openings()) if sealing else None
         if sealed is None:
             raise _no_solid(confidence, ground)
         return sealed
@@ -147,8 +152,10 @@ def _enclosed(
     if not edges.balance.any():
         return replace(_surface_of_closed(vertices, edges, notes, confidence), openings=openings)
     # Where two half shells are a hair apart, much of what is between them has a winding number near a half.
-    if confidence < _SURE and (sealed := _sealed(vertices, edges, ground, notes, openings)) is not None:
-        return sealed
+    if sealing and confidence < _SURE:
+        sealed = _sealed(vertices, edges, ground, notes, openings)
+        if sealed is not None:
+            return sealed
     notes.append(
         "the surface stays open; inside and outside are told apart by the generalised winding number"
     )
@@ -173,7 +180,7 @@ def _sealed(
         f"the surface is open in many places; what is seen as a solid was taken for one, and gaps of up to "
         f"{GAP:.1%} of the longest side were bridged"
     )
-    openings = filled.and_more(openings_of(found.vertices, found.faces, found.bridged))
+    openings = filled.and_more(openings_of(found.vertices, found.faces, found.made_up))
     surface = Surface(found.vertices, found.faces, found.faces, True, True, tuple(notes), found.solid)
     return replace(surface, openings=openings, sealed=True)
 

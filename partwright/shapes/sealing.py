@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from partwright.shapes.contour import contour
 from partwright.shapes.distance import MeshDistance, grid_indices
+from partwright.shapes.flooding import reached_from_outside
 from partwright.shapes.frame import LONGEST_SIDE
 from partwright.shapes.grid import near_voxels
 from partwright.shapes.hidden_faces import Ground
@@ -23,7 +24,7 @@ GAP = 0.014  # of the longest side: the widest that is bridged
 _REACH = GAP * LONGEST_SIDE / 2  # unit lengths: half of it
 _CELL = LONGEST_SIDE / 144
 _FAR = _REACH + 2 * _CELL  # further off no distance matters
-_OFF = 1.5 * _REACH  # what bridges a gap is nearer to its sides
+_OFF = 1.5 * _REACH  # what bridges a gap is nearer to its sides: what is as far off is made up
 _PROBES = 4000  # points of the surface at which it is looked whether something solid is behind them
 _DEEP = 0.75  # cells: what is as deep somewhere is solid
 _NEAR = 5  # cells along a side of the cube about a probe in which it is looked
@@ -32,12 +33,13 @@ _SOLID = 0.9  # of the probes
 
 @dataclass(frozen=True)
 class Sealed:
-    """A closed surface, vertices (V, 3) in the unit frame and faces (F, 3). bridged: which faces (F,) lie
-    over what is wider than gaps. solid: the share of the given surface behind which it is solid."""
+    """A closed surface, vertices (V, 3) in the unit frame and faces (F, 3). made_up: which faces (F,) lie
+    over what is wider than gaps, as over the ground. solid: the share of the given surface behind which it is
+    solid."""
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
-    bridged: NDArray[np.bool_]
+    made_up: NDArray[np.bool_]
     solid: float
 
 
@@ -88,13 +90,13 @@ def _closing(
 
     free = distance - _REACH
     if ground is None:
-        outside = _joined(free, free > 0)
+        outside = reached_from_outside(free, free > 0)
     else:
         above = (places @ ground.up - ground.height).reshape(free.shape)
         free = np.minimum(free, above)
         # The ball rolls on the ground, and does not get under a rim; then its middle sinks to the ground, as
         # if all were mirrored in it: else an edge would grow at the foot.
-        outside = _joined(free, (free > 0) & (above > _REACH))
+        outside = reached_from_outside(free, (free > 0) & (above > _REACH))
         down = np.zeros((3, 3, 3), bool)
         down[tuple(slice(None) if along else 1 for along in ground.up != 0)] = True
         sunk = int(np.ceil(_REACH / _CELL))
@@ -113,12 +115,3 @@ def _distances(source: MeshDistance, low: NDArray[np.float64], sides: Sequence[i
     distance = np.full((x, y, z), _FAR, np.float32)
     distance[tuple(near.T)] = close
     return distance
-
-
-def _joined(free: NDArray[np.floating], where: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """What of (X, Y, Z) is joined to the corner of the grid at which most is free."""
-    from scipy.ndimage import label
-
-    labels, _ = label(where)
-    ends = np.ix_([0, -1], [0, -1], [0, -1])
-    return np.asarray(labels == labels[ends].ravel()[free[ends].argmax()])

@@ -72,7 +72,8 @@ class Shape:
     arrays are read-only.
     """
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, sealing: bool = True) -> None:
+        """sealing: whether what is open in many places is sealed, where a solid is seen in it."""
         name, pieces = source.name, source.pieces
         offsets = np.cumsum([0] + [len(p.vertices) for p in pieces])
         ends = np.cumsum([0] + [len(p.faces) for p in pieces]).tolist()
@@ -92,9 +93,9 @@ class Shape:
         self._ground = source.ground
         if source.up is not None and source.ground is None:
             self._ground = float((corners @ axis_vector(source.up)).min())
-        self.thickness = source.thickness
+        self.thickness, self._sealing = source.thickness, sealing
         self.frame, self._surface = _named(
-            name, lambda: _repaired(corners, compact, source.up, self._ground, self.thickness)
+            name, lambda: _repaired(corners, compact, source.up, self._ground, self.thickness, sealing)
         )
         self.vertices = self.frame.from_unit(self._surface.vertices)
         self.faces = self._surface.faces
@@ -152,7 +153,7 @@ class Shape:
                 node.name, (piece,), self.unit, self.up, ground=self._ground, thickness=self.thickness
             )
             try:
-                shapes.append(Shape(alone))
+                shapes.append(Shape(alone, self._sealing))
             except PartwrightError as error:
                 failure = error
                 warnings.warn(f"node left out: {error}", NodeLeftOutWarning, stacklevel=2)
@@ -337,6 +338,7 @@ def _repaired(
     up: str | None,
     height: float | None,
     thickness: float | None,
+    sealing: bool,
 ) -> tuple[UnitFrame, Surface]:
     """The surface of corners (V, 3), own units, and faces (F, 3), and the unit frame that it is in.
 
@@ -348,7 +350,7 @@ def _repaired(
         above = axis_vector(up)
         ground = Ground(above, float(frame.to_unit(height * above) @ above))
     wall = None if thickness is None else float(frame.length_to_unit(thickness))
-    return repair(frame.to_unit(corners), faces, ground, wall).in_frame(frame)
+    return repair(frame.to_unit(corners), faces, ground, wall, sealing).in_frame(frame)
 
 
 def _checked(points: ArrayLike) -> NDArray[Any]:

@@ -20,6 +20,7 @@ from partwright.fields import Box
 from partwright.fitting import FILES, fit, fit_nodes
 from partwright.shapes import load_shape
 from tests.cli.conftest import BoxMethod
+from tests.shapes.solids import blinds
 
 
 def command(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -159,6 +160,22 @@ def test_a_large_repair_is_told(method: BoxMethod, block: Path, tmp_path: Path, 
     report = json.loads((tmp_path / "out" / "report.json").read_text())
     assert report["input"]["openings"]["share"] == pytest.approx(2 / 28)
     assert report["input"]["openings"]["largest"] == pytest.approx([12, 20, 30])
+
+
+def test_a_solid_that_is_seen_in_an_open_surface_is_told(
+    method: BoxMethod, tmp_path: Path, capsys: Any
+) -> None:
+    blinds(0.022, pitch=0.04).export(tmp_path / "blinds.stl")
+    assert main(["fit", str(tmp_path / "blinds.stl"), "-o", str(tmp_path / "out")]) == 0
+    error = capsys.readouterr().err
+    assert "warning: the surface is open in many places, and the solid that is seen in it" in error
+    assert "--thickness 1% makes walls" in error
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report["input"]["sealed"]
+    assert main(["fit", str(tmp_path / "blinds.stl"), "-o", str(tmp_path / "out"), "--thickness", "1%"]) == 0
+    assert "open in many places" not in capsys.readouterr().err
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert not report["input"]["sealed"]
 
 
 def test_an_interrupted_fit_writes_what_it_has(

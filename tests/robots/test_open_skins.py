@@ -13,6 +13,7 @@ from manifold3d import Manifold
 from partwright.robots import CollideOptions, collide, solids
 from partwright.robots.model import Link, MeshUse
 from partwright.robots.wrapping import wrapped
+from partwright.shapes import repair
 from tests.robots.robots import urdf
 
 RADIUS, HEIGHT = 0.2, 1.0
@@ -46,6 +47,21 @@ def test_a_sheet_bounds_what_wraps_it() -> None:
     inner, whole = wrapped(sheet.vertices, sheet.faces)
     assert inner is whole
     assert whole.volume() == pytest.approx(2 * 1.2 / 96, rel=0.3)
+
+
+def test_open_skins_are_not_sealed_before_they_are_wrapped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That takes seconds, and a wrap is made all the same."""
+
+    def seal(*_: object) -> None:
+        raise AssertionError("a skin was sealed")
+
+    monkeypatch.setattr(repair, "seal", seal)
+    path = tmp_path / "skin.stl"
+    trimesh.creation.icosphere(3, 0.5).slice_plane([0, 0, 0], [0, 0, 1]).export(path)
+    target = solids.Solids().target(Link("skin", np.eye(4), (), ()), [MeshUse(path, np.eye(4))])
+    assert len(target.notes) == 1
 
 
 def test_the_same_skin_in_the_same_place_is_wrapped_once(

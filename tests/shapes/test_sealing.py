@@ -9,26 +9,10 @@ import trimesh
 from partwright.errors import OpenShellError
 from partwright.shapes import Shape, load_shape
 from partwright.shapes.hidden_faces import Ground
+from partwright.shapes.reading import source_of
 from partwright.shapes.sealing import GAP, Sealed, seal
 from partwright.shapes.source import Piece, Source
-
-SIDES = np.array([1.8, 1.2, 0.9])  # unit lengths
-
-
-def blinds(gap: float, pitch: float = 0.05, sides: np.ndarray = SIDES) -> trimesh.Trimesh:
-    """A box of slats, `gap` of each `pitch` along x or y left out of every side, its own edges too."""
-    slats = []
-    for axis in range(3):
-        across, along = (1, 2) if axis == 0 else (0, 3 - axis)
-        starts = np.arange(-sides[across] / 2, sides[across] / 2 - 1e-9, pitch)
-        for end in (-1, 1):
-            for start in starts + gap / 2:
-                corners = np.zeros((4, 3))
-                corners[:, axis] = end * sides[axis] / 2
-                corners[:, across] = start + (pitch - gap) * np.array([0, 1, 1, 0])
-                corners[:, along] = (sides[along] - gap) / 2 * np.array([-1, -1, 1, 1])
-                slats.append(trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False))
-    return trimesh.util.concatenate(slats)
+from tests.shapes.solids import SIDES, blinds
 
 
 def sealed(mesh: trimesh.Trimesh, ground: Ground | None = None) -> Sealed | None:
@@ -48,7 +32,7 @@ def test_what_gaps_leave_open_is_the_solid_that_is_seen(gap: float) -> None:
     assert made.volume == pytest.approx(SIDES.prod(), rel=0.002 + gap)  # less what sags between slats
     np.testing.assert_allclose(made.extents, SIDES, atol=0.01)
     assert found.solid == 1
-    assert not found.bridged.any()
+    assert not found.made_up.any()
 
 
 def test_wider_gaps_are_openings() -> None:
@@ -64,7 +48,7 @@ def test_what_is_open_below_stands_on_the_ground() -> None:
     assert made.is_watertight
     assert made.volume == pytest.approx(2 / 3 * np.pi * 0.45**3, rel=0.03)
     np.testing.assert_allclose(made.extents, (0.9, 0.9, 0.45), atol=0.006)  # no rim at the foot
-    below = made.area_faces[found.bridged].sum()
+    below = made.area_faces[found.made_up].sum()
     assert below == pytest.approx(np.pi * 0.45**2, rel=0.15)
     bowl = half_ball()
     bowl.apply_transform(np.diag([1, 1, -1, 1]))
@@ -80,6 +64,8 @@ def test_a_box_of_blinds_is_a_box_that_had_openings() -> None:
     assert shape.confidence == 1
     assert shape.sealed
     assert not load_shape(trimesh.creation.box(SIDES)).sealed
+    with pytest.raises(OpenShellError):
+        Shape(source_of(mesh), sealing=False)
     assert (shape.signed_distance([[0, 0, 0], [0.8, 0.5, 0.4]]) < 0).all()
     assert (shape.signed_distance([[0, 0, 0.5], [0.95, 0, 0]]) > 0).all()
 
