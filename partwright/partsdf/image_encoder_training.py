@@ -54,6 +54,7 @@ def train_image_encoder(
     seed: int = 0,
     device: str = "auto",
     settings: ImageSettings | None = None,
+    workers: int = 1,
     drawn: Callable[[int, int], None] | None = None,
     told: Callable[[ImageStep], None] | None = None,
     cancel: Cancellation | None = None,
@@ -61,8 +62,8 @@ def train_image_encoder(
     """An image encoder for a model, from the prepared family that it was trained on; after a cancellation, as
     far as it has come.
 
-    drawn: told how many of the `views` there are, of which steps then take `batch` each. device: "auto",
-    "cpu" or "cuda".
+    workers: processes that draw the views, which are the same by however many. drawn: told how many of the
+    `views` there are, of which steps then take `batch` each. device: "auto", "cpu" or "cuda".
 
     Raises:
         FamilyError: it is another family, or was prepared without surfaces.
@@ -76,7 +77,8 @@ def train_image_encoder(
     views = min(views, steps * batch)  # no more than are looked at
     count = (lambda done: drawn(done, views)) if drawn else None
     meshes = PartMeshes.of(family, model)
-    seen = draw_views(meshes, model, views, torch.Generator().manual_seed(seed), count, cancel).to(place)
+    random = torch.Generator().manual_seed(seed)
+    seen = draw_views(meshes, model, views, random, count, cancel, workers).to(place)
     metric, known, own = felt(model, vectors).to(place), vectors.to(place), model.to(place)
     torch.manual_seed(seed)
     with place:

@@ -8,13 +8,18 @@ whether a light reaches it), so that each view can be lit and coloured many time
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from partwright.datasets.poses import Poses
 from partwright.datasets.prepared import PreparedFamily
 from partwright.methods import Cancellation
 from partwright.partsdf.clouds import donors_of, training_shapes
@@ -27,6 +32,7 @@ from partwright.shapes import LONGEST_SIDE
 SIDE = 64  # pixels
 SHADED = 128  # added to a pixel's label where the light does not reach it
 _EACH = 4  # views of a shape once it is put together
+_WORTH = 64  # shapes, whose views take as long as a process needs to start
 _ELEVATION, _FIELD = (-8.0, 50.0), (8.0, 50.0)  # degrees
 _ROLL = math.radians(2.5)
 _STRETCH = 0.1  # standard deviation of the logarithm
@@ -91,34 +97,101 @@ def draw_views(
     generator: torch.Generator,
     told: Callable[[int], None] | None = None,
     cancel: Cancellation | None = None,
+    workers: int = 1,
 ) -> Views:
-    """`count` views, or those that there are once it is cancelled, but `_EACH` at least."""
+    """`count` views, or those that there are once it is cancelled, but `_EACH` at least.
+
+    workers: processes; the views are the same by however many.
+    """
     shapes = torch.randint(len(model.shapes), (-(-count // _EACH),), generator=generator)
     donors = donors_of(model, shapes, meshes.seen(), generator)
     poses = _stretched(model.poses.map(lambda t: t[shapes]), generator)
-    rng = np.random.default_rng(int(torch.randint(1 << 40, (), generator=generator)))
-    label = np.zeros((len(shapes) * _EACH, SIDE, SIDE), np.uint8)
-    normal = np.zeros((*label.shape, 3), np.int8)
-    rows, framed = [], []
-    for i in range(len(shapes)):
-        mesh = _put_together(meshes, donors[i].tolist(), model.present[shapes[i]], poses, i)
-        framed.append(mesh[3])
-        scene = Scene(mesh[0], mesh[1])
-        for j in range(i * _EACH, (i + 1) * _EACH):
-            seen = normal[j].reshape(-1, 3), label[j].reshape(-1)
-            rows.append(_seen(scene, mesh[2], model.up, rng, *seen))
-        if told is not None:
-            told(min(count, len(rows)))
-        if cancel is not None and cancel.requested:
-            break
-    made = len(rows)
-    each = torch.arange(made) // _EACH
-    light, back, camera = (torch.tensor(np.array(a), dtype=torch.float32) for a in zip(*rows, strict=True))
+    seed = int(torch.randint(1 << 40, (), generator=generator))
+    orders = [
+        _Order(
+            donors[i].tolist(), model.present[s].tolist(), poses.map(lambda t, i=i: t[i]).numpy(), (seed, i)
+        )
+        for i, s in enumerate(shapes)
+    ]
+    made: list[_Made] = []
+    with _drawing(meshes, model.up, max(1, min(workers, len(orders) // _WORTH))) as drawn:
+        for one in drawn(orders):
+            made.append(one)
+            if told is not None:
+                told(min(count, _EACH * len(made)))
+            if cancel is not None and cancel.requested:
+                break
+    normal, label, light, back, camera = (
+        torch.from_numpy(np.concatenate([getattr(one, name) for one in made]))
+        for name in ("normal", "label", "light", "back", "camera")
+    )
+    each = torch.arange(_EACH * len(made)) // _EACH
+    framed = [PoseTensors.of(one.poses) for one in made]
     placed = PoseTensors(*(torch.stack(t) for t in zip(*framed, strict=True)))
     return Views(
-        torch.from_numpy(normal[:made]), torch.from_numpy(label[:made]), light, back, camera,
-        donors[each], placed.map(lambda t: t[each]), model.present[shapes][each],
+        normal, label, light, back, camera, donors[each], placed.map(lambda t: t[each]),
+        model.present[shapes][each],
     )  # fmt: skip
+
+
+class _Order(NamedTuple):
+    """A shape to be put together: each part's donor, which are there, their poses, and the seed of views."""
+
+    donors: list[int]
+    present: list[bool]
+    poses: Poses
+    seed: tuple[int, int]
+
+
+class _Made(NamedTuple):
+    """Of `Views`: the rows of one shape, and its poses."""
+
+    normal: np.ndarray
+    label: np.ndarray
+    light: np.ndarray
+    back: np.ndarray
+    camera: np.ndarray
+    poses: Poses
+
+
+@contextmanager
+def _drawing(
+    meshes: PartMeshes, up: str, workers: int
+) -> Iterator[Callable[[Sequence[_Order]], Iterator[_Made]]]:
+    """What carries orders out, one after another, here or by processes, which get the meshes once."""
+    if workers == 1:
+        yield lambda orders: (_carried_out(meshes, up, order) for order in orders)
+        return
+    with ProcessPoolExecutor(workers, get_context("spawn"), _remember, (meshes, up)) as pool:
+        try:
+            yield lambda orders: pool.map(_remembered, orders, chunksize=8)
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+_kept: list[tuple[PartMeshes, str]] = []  # of a process
+
+
+def _remember(meshes: PartMeshes, up: str) -> None:
+    torch.set_num_threads(1)
+    _kept[:] = [(meshes, up)]
+
+
+def _remembered(order: _Order) -> _Made:
+    return _carried_out(*_kept[0], order)
+
+
+def _carried_out(meshes: PartMeshes, up: str, order: _Order) -> _Made:
+    """A shape, put together and seen from `_EACH` sides."""
+    corners, faces, labels, poses = _put_together(meshes, order)
+    rng, scene = np.random.default_rng(order.seed), Scene(corners, faces)
+    label = np.zeros((_EACH, SIDE, SIDE), np.uint8)
+    normal = np.zeros((*label.shape, 3), np.int8)
+    rows = [
+        _seen(scene, labels, up, rng, normal[j].reshape(-1, 3), label[j].reshape(-1)) for j in range(_EACH)
+    ]
+    light, back, camera = (np.array(a, dtype=np.float32) for a in zip(*rows, strict=True))
+    return _Made(normal, label, light, back, camera, poses)
 
 
 def _stretched(poses: PoseTensors, generator: torch.Generator) -> PoseTensors:
@@ -128,17 +201,16 @@ def _stretched(poses: PoseTensors, generator: torch.Generator) -> PoseTensors:
     return PoseTensors(poses.translation * factor, poses.rotation, poses.scale * along)
 
 
-def _put_together(
-    meshes: PartMeshes, donors: list[int], present: Tensor, poses: PoseTensors, i: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, PoseTensors]:
-    """Corners, faces and a part a face of the parts in the `i`th poses, brought to the unit frame, and the
-    poses there."""
-    matrix = rotation_matrices(poses.rotation[i]).numpy()
-    place, scale = poses.translation[i].numpy(), poses.scale[i].numpy()
+def _put_together(meshes: PartMeshes, order: _Order) -> tuple[np.ndarray, np.ndarray, np.ndarray, Poses]:
+    """Corners, faces and a part a face of the parts in their poses, brought to the unit frame, and the poses
+    there."""
+    placed = PoseTensors.of(order.poses)
+    matrix = rotation_matrices(placed.rotation).numpy()
+    place, scale = placed.translation.numpy(), placed.scale.numpy()
     corners, faces, labels, before = [], [], [], 0
-    for p, donor in enumerate(donors):
+    for p, donor in enumerate(order.donors):
         mine = meshes.faces[donor][p]
-        if not present[p] or not len(mine):
+        if not order.present[p] or not len(mine):
             continue
         corners.append((meshes.corners[donor][p] * scale[p]) @ matrix[p].T + place[p])
         faces.append(mine + before)
@@ -148,9 +220,9 @@ def _put_together(
     low, high = every.min(axis=0), every.max(axis=0)
     centre, larger = (low + high) / 2, LONGEST_SIDE / (high - low).max()
     moved = PoseTensors(
-        (poses.translation[i] - torch.from_numpy(centre)) * larger, poses.rotation[i], poses.scale[i] * larger
+        (placed.translation - torch.from_numpy(centre)) * larger, placed.rotation, placed.scale * larger
     )
-    return (every - centre) * larger, np.concatenate(faces), np.concatenate(labels), moved
+    return (every - centre) * larger, np.concatenate(faces), np.concatenate(labels), moved.numpy()
 
 
 def _seen(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 
 from partwright.cli.commands.companions import how, train_beside
 from partwright.cli.progress import Count
@@ -33,8 +34,9 @@ def run(arguments: argparse.Namespace) -> int:
             count.show(done, of, "views drawn")
 
         return train_image_encoder(
-            model, family, settings=ImageSettings.of_width(width), views=arguments.views, drawn=drawn,
-            told=told, cancel=cancel, **how(arguments),
+            model, family, settings=ImageSettings.of_width(width), views=arguments.views,
+            workers=arguments.workers or os.cpu_count() or 1, drawn=drawn, told=told, cancel=cancel,
+            **how(arguments),
         )  # fmt: skip
 
     def about(_: Model) -> str:
