@@ -176,7 +176,7 @@ def _surface(family: PreparedFamily, index: int) -> list[str]:
     found = [
         f"not watertight: {text}" for text in repairs if text.startswith(("filled", "the surface stays"))
     ]
-    return found + [text for text in repairs if text.startswith("the surface passes")]
+    return found + [text for text in repairs if text.startswith("the surface passes") or "left out" in text]
 
 
 def _pieces(shape: PreparedShape, parts: int) -> list[int]:

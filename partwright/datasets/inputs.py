@@ -22,7 +22,7 @@ from partwright.errors import EmptyShapeError, FamilyError, LabelError, NotFinit
 from partwright.shapes import MESH_SUFFIXES
 from partwright.shapes.labels import labels_path, read_labels
 from partwright.shapes.reading import read_source
-from partwright.shapes.source import Piece
+from partwright.shapes.source import Piece, Source
 from partwright.shapes.step_process import STEP_SUFFIXES
 
 WHOLE = "_whole"
@@ -37,12 +37,14 @@ _NAMED = 5  # files, in a line
 @dataclass(frozen=True)
 class PartedShape:
     """Parts by name, and the pieces that make up the whole: one of its own, or all parts. Own units. up: the
-    axis that its file says points up, if any."""
+    axis that its file says points up, if any. repairs: what its files hold and could not be read, a sentence
+    each."""
 
     name: str
     parts: Mapping[str, Piece]
     whole: tuple[Piece, ...]
     up: str | None = None
+    repairs: tuple[str, ...] = ()
 
 
 class PartedSource(Protocol):
@@ -111,7 +113,7 @@ class SceneFile:
     def read(self) -> PartedShape:
         source = read_source(self.path)
         parts = {piece.name: _checked(self.path, piece) for piece in source.pieces}
-        return PartedShape(self.name, parts, tuple(parts.values()), source.up)
+        return PartedShape(self.name, parts, tuple(parts.values()), source.up, source.repairs)
 
 
 @dataclass(frozen=True)
@@ -133,10 +135,13 @@ class PartFolder:
 
     def read(self) -> PartedShape:
         read = {file.stem: _joined(file) for file in self._files()}
-        pieces, ups = {name: piece for name, (piece, _) in read.items()}, {up for _, up in read.values()}
+        pieces = {name: piece for name, (piece, _) in read.items()}
         whole = pieces.pop(WHOLE, None)
+        shown = tuple(pieces.values()) if whole is None else (whole,)
+        ups = {source.up for _, source in read.values() if source.up is not None}  # formats may say nothing
         up = ups.pop() if len(ups) == 1 else None
-        return PartedShape(self.name, pieces, tuple(pieces.values()) if whole is None else (whole,), up)
+        repairs = tuple(f"{name}: {text}" for name, (_, source) in read.items() for text in source.repairs)
+        return PartedShape(self.name, pieces, shown, up, repairs)
 
     def _files(self) -> list[Path]:
         return _meshes(self.path)
@@ -159,7 +164,7 @@ class LabelledMesh:
         return tuple(_named(label) for label in np.unique(read_labels(labels_path(self.path))))
 
     def read(self) -> PartedShape:
-        whole, up = _joined(self.path)
+        whole, source = _joined(self.path)
         labels = read_labels(labels_path(self.path))
         if len(labels) != len(whole.faces):
             raise LabelError(
@@ -170,7 +175,7 @@ class LabelledMesh:
             _named(label): Piece(_named(label), whole.vertices, whole.faces[labels == label])
             for label in np.unique(labels)
         }
-        return PartedShape(self.name, parts, (whole,), up)
+        return PartedShape(self.name, parts, (whole,), source.up, source.repairs)
 
 
 def find_shapes(folder: str | Path) -> list[PartedSource]:
@@ -233,8 +238,8 @@ def _meshes(folder: Path) -> list[Path]:
     return meshes or [path for path in files if path.suffix.lower() in STEP_SUFFIXES]
 
 
-def _joined(path: Path) -> tuple[Piece, str | None]:
-    """A file as one piece, and the axis that it says points up."""
+def _joined(path: Path) -> tuple[Piece, Source]:
+    """A file as one piece, and as it was read."""
     source = read_source(path)
     if source.points is not None:  # a surface was laid through points
         raise EmptyShapeError(f"{path}: has points but no faces; export the part with its surface")
@@ -242,7 +247,7 @@ def _joined(path: Path) -> tuple[Piece, str | None]:
     offsets = np.cumsum([0] + [len(p.vertices) for p in pieces])[:-1]
     vertices = np.concatenate([p.vertices for p in pieces])
     faces = np.concatenate([p.faces + o for p, o in zip(pieces, offsets, strict=True)])
-    return _checked(path, Piece(path.stem, vertices, faces)), source.up
+    return _checked(path, Piece(path.stem, vertices, faces)), source
 
 
 def _checked(path: Path, piece: Piece) -> Piece:

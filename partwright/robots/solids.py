@@ -42,7 +42,7 @@ class Target:
 
     solid: closed. wrap: what contains all triangles: the solid, or more where that was told by a lattice.
     vertices (V, 3), faces (F, 3): the triangles as they were read, which are to be contained. notes: what was
-    repaired.
+    repaired, or could not be read.
     """
 
     solid: Manifold
@@ -69,11 +69,13 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class _Mesh:
-    """A file's own triangles (V, 3), (F, 3), and the solid that they bound, if they do."""
+    """A file's own triangles (V, 3), (F, 3), and the solid that they bound, if they do. repairs: what of the
+    file could not be read."""
 
     vertices: np.ndarray
     faces: np.ndarray
     solid: Manifold | None
+    repairs: tuple[str, ...]
 
 
 class Solids:
@@ -113,10 +115,13 @@ class Solids:
             for one, use in zip(read, uses, strict=True)
             if one.solid is not None
         ]
+        notes = [
+            f"{use.source.name}: {text}" for one, use in zip(read, uses, strict=True) for text in one.repairs
+        ]
         open_ = [i for i, one in enumerate(read) if one.solid is None]
         if not open_:
             solid = Manifold.batch_boolean(solids, OpType.Add)
-            return Target(solid, solid, *_together(placed), ())
+            return Target(solid, solid, *_together(placed), tuple(dict.fromkeys(notes)))
         key = _placed([uses[i] for i in open_])
         if key not in self._wraps:
             try:
@@ -128,7 +133,7 @@ class Solids:
             Manifold.batch_boolean([*solids, inner], OpType.Add),
             Manifold.batch_boolean([*solids, whole], OpType.Add),
             *_together(placed),
-            tuple(dict.fromkeys(f"{uses[i].source.name}: {_OPEN}" for i in open_)),
+            tuple(dict.fromkeys([*notes, *(f"{uses[i].source.name}: {_OPEN}" for i in open_)])),
         )
 
     def _of(self, link: Link, use: MeshUse, sheets: bool) -> _Mesh:
@@ -167,7 +172,7 @@ def _read(use: MeshUse, sheets: bool) -> _Mesh:
     with suppress(OpenShellError, *((FlatShapeError,) if sheets else ())):
         shape = InputShape(source, sealing=False)  # what stays open is wrapped, and wraps hold every sheet
         solid = _manifold(shape.vertices, shape.faces)
-    return _Mesh(vertices, faces, solid)
+    return _Mesh(vertices, faces, solid, source.repairs)
 
 
 def _meant(use: MeshUse) -> Source:

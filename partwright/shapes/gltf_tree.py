@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import struct
-from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -29,8 +28,8 @@ def check_gltf(path: Path) -> None:
             elements without data or instances beyond measure, compressed buffers, or a buffer that is no
             file.
     """
-    tree = gltf_tree(path)
-    if _is_first_version(path, tree):
+    version, tree = _read(path)
+    if version == 1 or (version is None and _is_first_version(tree)):
         raise UnreadableFileError(
             f"{path}: is glTF 1.0, which 2.0 has replaced; convert it (gltf-pipeline does) or export it again"
         )
@@ -67,12 +66,8 @@ def check_gltf(path: Path) -> None:
             check_file(path.parent / unquote(uri))
 
 
-def _is_first_version(path: Path, tree: Any) -> bool:
-    """By the head of a GLB, and by what a glTF says of itself."""
-    with suppress(OSError), path.open("rb") as file:
-        head = file.read(8)
-        if head[:4] == b"glTF" and len(head) == 8:
-            return bool(struct.unpack("<I", head[4:])[0] == 1)
+def _is_first_version(tree: Any) -> bool:
+    """By what a glTF says of itself."""
     asset = tree.get("asset") if isinstance(tree, dict) else None
     version = asset.get("version") if isinstance(asset, dict) else None
     return isinstance(version, (str, int, float)) and str(version).split(".")[0] == "1"
@@ -84,17 +79,24 @@ def gltf_tree(path: Path) -> Any:
     Raises:
         UnreadableFileError: it is nested too deep.
     """
+    return _read(path)[1]
+
+
+def _read(path: Path) -> tuple[int | None, Any]:
+    """The version that the head of a GLB names, None for others; and what `gltf_tree` gives. Raises as it."""
+    version = None
     try:
         with path.open("rb") as file:
             data = file.read(20)
             if data[:4] == b"glTF":
+                (version,) = struct.unpack("<I", data[4:8])
                 length, kind = struct.unpack("<II", data[12:20])
                 data = file.read(length) if kind == _JSON_CHUNK else b""
             else:
                 data += file.read()
-        return json.loads(data)
+        return version, json.loads(data)
     except (OSError, ValueError, struct.error):
-        return None
+        return version, None
     except RecursionError as error:
         raise UnreadableFileError(f"{path}: its JSON is nested too deep; export it again") from error
 

@@ -236,8 +236,9 @@ def _in_threes(rows: Any, kind: type, where: str) -> NDArray[Any]:
 
 def _valid(faces: NDArray[np.int64], vertex_count: int, where: str) -> NDArray[np.int64]:
     if faces.size and (faces.min() < 0 or faces.max() >= vertex_count):
+        wrong = int(faces.min() if faces.min() < 0 else faces.max())
         raise UnreadableFileError(
-            f"{where}: a triangle names vertex {int(faces.max())} of {vertex_count}; "
+            f"{where}: a triangle names vertex {wrong} of {vertex_count}; "
             "the face indices must lie within the vertices. Export the shape again"
         )
     return faces

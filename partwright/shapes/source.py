@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from partwright.errors import UnreadableFileError
+
+_MOST_PIECES = 20_000
+_MOST_TRIANGLES = 20_000_000  # of all of them together
 
 
 @dataclass(frozen=True)
@@ -38,6 +44,19 @@ class Source:
     points: NDArray[np.float64] | None = None
     ground: float | None = None
     thickness: float | None = None
+
+
+def check_extent(path: Path, pieces: int, triangles: int) -> None:
+    """Refuse a file whose objects, named again and again, make up more than memory holds.
+
+    Raises:
+        UnreadableFileError: it has too many pieces, or triangles in all of them together.
+    """
+    if pieces > _MOST_PIECES or triangles > _MOST_TRIANGLES:
+        raise UnreadableFileError(
+            f"{path}: builds {pieces:.6g} objects of {triangles:.6g} triangles in all; at most "
+            f"{_MOST_PIECES} of {_MOST_TRIANGLES} are accepted. Export less of it, or simplified"
+        )
 
 
 def in_utf8(name: str) -> str:

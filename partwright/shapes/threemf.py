@@ -22,15 +22,13 @@ from numpy.typing import NDArray
 
 from partwright.errors import EmptyShapeError, NotFiniteError, UnreadableFileError
 from partwright.shapes.array_files import check_shape_file
-from partwright.shapes.source import Piece, Source, in_utf8, unique_names
+from partwright.shapes.source import Piece, Source, check_extent, in_utf8, unique_names
 from partwright.shapes.units import canonical_unit
 
 # A 3MF is a zip archive, and a small one can claim terabytes.
 _LARGEST_UNPACKED = 1 << 29  # bytes
 _SURELY_FINE = 1 << 26  # bytes
 _TIGHTEST = 25  # times smaller; the XML of real meshes packs to a fifth or a tenth
-_MOST_PLACES = 20_000  # of objects with triangles
-_MOST_TRIANGLES = 20_000_000  # of all of them together
 _CHUNK = 1 << 20  # bytes of XML at once
 _MODEL = "3dmodel"  # how the type of the relation to the first model ends
 # What zipfile, expat, array and float raise on bytes that are not what the suffix says.
@@ -240,11 +238,7 @@ def _refuse_many(package: _Package, path: Path) -> None:
                 raise UnreadableFileError(f"{path}: object {key[1]!r:.40} contains itself; export it again")
             waiting += [k for k in below if k not in total]
     places, triangles = (sum(total[item.key][i] for item in package.items) for i in (0, 1))
-    if places > _MOST_PLACES or triangles > _MOST_TRIANGLES:
-        raise UnreadableFileError(
-            f"{path}: builds {places:.6g} objects of {triangles:.6g} triangles in all; at most "
-            f"{_MOST_PLACES} of {_MOST_TRIANGLES} are accepted. Export less of it, or simplified"
-        )
+    check_extent(path, places, triangles)
 
 
 def _placed(one: _Object, matrix: NDArray[np.float64], name: str, path: Path) -> Piece:

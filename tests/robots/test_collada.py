@@ -147,3 +147,13 @@ def test_what_it_lacks_is_told(tmp_path: Path) -> None:
     mesh.write_text("<html>not found</html>")
     with pytest.raises((UnreadableFileError, EmptyShapeError)):
         read_collada(mesh)
+
+
+def test_what_of_a_mesh_could_not_be_read_is_told(tmp_path: Path) -> None:
+    tin(tmp_path)
+    dae = tmp_path / "tin.dae"
+    dae.write_text(dae.read_text().replace('url="#ball"', 'url="#gone"'))
+    path = tmp_path / "tin.sdf"
+    path.write_text(SDF.format(""))
+    (link,) = collide(path, CollideOptions()).links
+    assert link.notes == ("tin.dae: left out 1 damaged or missing body",)
