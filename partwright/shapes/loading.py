@@ -77,7 +77,7 @@ def _clouds(scene: trimesh.Scene, stem: str) -> list[NDArray[np.float64]]:
     clouds = []
     for node in scene.graph.nodes_geometry:
         geometry = str(scene.graph[node][1])
-        if not len(getattr(scene.geometry[geometry], "faces", ())):
+        if not _has_faces(scene.geometry[geometry]):
             points, _ = _placed(scene, node, geometry, stem)
             if len(points):
                 clouds.append(points)
@@ -191,8 +191,11 @@ def _pieces(scene: trimesh.Scene, stem: str) -> Iterator[Piece]:
         owner = scene.graph.transforms.parents.get(node, node) if is_primitive else node
         groups.setdefault(owner, []).append((node, str(geometry)))
     for owner, members in groups.items():
-        placed = [_placed(scene, node, geometry, stem) for node, geometry in members]
-        placed = [(v, f) for v, f in placed if len(f)]
+        placed = [
+            _placed(scene, node, geometry, stem)
+            for node, geometry in members
+            if _has_faces(scene.geometry[geometry])
+        ]
         if not placed:
             continue
         offsets = np.cumsum([0] + [len(v) for v, _ in placed])
@@ -204,6 +207,11 @@ def _pieces(scene: trimesh.Scene, stem: str) -> Iterator[Piece]:
             np.concatenate([v for v, _ in placed]),
             np.concatenate([f + o for (_, f), o in zip(placed, offsets[:-1], strict=True)]),
         )
+
+
+def _has_faces(geometry: Any) -> bool:
+    """Points and lines have none."""
+    return len(getattr(geometry, "faces", ())) > 0
 
 
 def _placed(

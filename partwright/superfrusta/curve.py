@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from partwright.assembly import Assembly, Part
+from partwright.shapes.grid import grid_indices
 
 _PER_SIDE = 12
 
@@ -28,8 +29,7 @@ def with_parents(larger: Assembly, smaller: Assembly) -> Assembly:
 def _points_in(part: Part) -> np.ndarray:
     """Points (n, 3) inside a part, or all of its box's where it is thinner than the lattice."""
     low, high = part.bounds()
-    steps = (np.arange(_PER_SIDE) + 0.5) / _PER_SIDE
-    lattice = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    lattice = (grid_indices((_PER_SIDE,) * 3) + 0.5) / _PER_SIDE
     points = low + lattice * (high - low)
     inside = Assembly((part,)).distance(points) < 0
     return points[inside] if inside.any() else points

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from partwright.assembly import Assembly, Part
 from partwright.assembly.tree import Node
 from partwright.errors import SettingError
+from partwright.shapes.grid import grid_indices
 
 _PER_SIDE = 20  # lattice points along each side of a box in which two parts may meet
 _MEETS = -1e-4  # unit lengths: shallower than this, two parts only touch
@@ -89,8 +90,7 @@ def _meet(a: Part, b: Part) -> bool:
     low, high = boxes[:, 0].max(axis=0), boxes[:, 1].min(axis=0)
     if not (low < high).all():
         return False
-    steps = (np.arange(_PER_SIDE) + 0.5) / _PER_SIDE
-    lattice = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    lattice = (grid_indices((_PER_SIDE,) * 3) + 0.5) / _PER_SIDE
     points = (low + lattice * (high - low)).astype(np.float32)
     return bool((np.maximum(a.distance(points), b.distance(points)) < _MEETS).any())
 
