@@ -347,8 +347,10 @@ def _measured(
     tolerance: float,
     options: CollideOptions,
 ) -> LinkReport:
-    own = target.solid.volume()
-    common = (target.solid ^ union).volume()  # of what touches all along, differences may have no sense
+    # What enclosing shapes lack of a thickness that sheets do not have is nothing.
+    solid = target.solid ^ union if options.enclose and target.sheets else target.solid
+    own = solid.volume()
+    common = (solid ^ union).volume()  # of what touches all along, differences may have no sense
     kinds: dict[str, int] = {}
     for shape in shapes:
         kinds[shape.kind] = kinds.get(shape.kind, 0) + 1
@@ -360,7 +362,7 @@ def _measured(
         volume=own,
         missing=max(own - common, 0.0) / own,
         extra=max(union.volume() - common, 0.0) / own,
-        farthest=largest_deviation(target.solid, union),
+        farthest=largest_deviation(solid, union),
         tolerance=tolerance,
         sticking_out=sticking_out(shapes, target) if options.enclose else None,
         most=options.max_parts,

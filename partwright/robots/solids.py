@@ -42,7 +42,9 @@ class Target:
 
     solid: closed. wrap: what contains all triangles: the solid, or more where that was told by a lattice.
     vertices (V, 3), faces (F, 3): the triangles as they were read, which are to be contained. notes: what was
-    repaired, or could not be read.
+    repaired, or could not be read. loose: whether some of the triangles bound no solid by themselves, so that
+    the wrap stands off them. sheets: whether they bound nothing but what wraps them, whose thickness is the
+    wrap's alone.
     """
 
     solid: Manifold
@@ -50,11 +52,8 @@ class Target:
     vertices: np.ndarray
     faces: np.ndarray
     notes: tuple[str, ...]
-
-    @property
-    def loose(self) -> bool:
-        """Whether the triangles bound no solid by themselves."""
-        return self.wrap is not self.solid and self.wrap.volume() > self.solid.volume()
+    loose: bool = False
+    sheets: bool = False
 
     @property
     def size(self) -> float:
@@ -134,6 +133,8 @@ class Solids:
             Manifold.batch_boolean([*solids, whole], OpType.Add),
             *_together(placed),
             tuple(dict.fromkeys([*notes, *(f"{uses[i].source.name}: {_OPEN}" for i in open_)])),
+            loose=True,
+            sheets=inner is whole and not solids,
         )
 
     def _of(self, link: Link, use: MeshUse, sheets: bool) -> _Mesh:

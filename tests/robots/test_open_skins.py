@@ -12,6 +12,7 @@ from manifold3d import Manifold
 
 from partwright.robots import CollideOptions, collide, solids
 from partwright.robots.model import Link, MeshUse
+from partwright.robots.report import warnings
 from partwright.robots.wrapping import wrapped
 from partwright.shapes import repair
 from tests.robots.robots import urdf
@@ -47,6 +48,24 @@ def test_a_sheet_bounds_what_wraps_it() -> None:
     inner, whole = wrapped(sheet.vertices, sheet.faces)
     assert inner is whole
     assert whole.volume() == pytest.approx(2 * 1.2 / 96, rel=0.3)
+
+
+def test_a_bent_sheet_is_enclosed_without_the_thickness_of_what_wraps_it(tmp_path: Path) -> None:
+    """An eighth of a tube's wall: the wrap that its pieces are cut from stands off it on both sides."""
+    path = urdf(tmp_path, arm="meshes/ell.stl")
+    wall = tube(2)
+    around = np.arctan2(*wall.triangles_center[:, 1::-1].T)
+    sheet = wall.submesh([np.abs(around) < np.pi / 8], append=True)
+    sheet.export(tmp_path / "meshes" / "seen.stl")
+    options = CollideOptions(enclose=True, max_parts=1, kinds=("hull",))
+    found = collide(path, options)
+    (base,) = (one for one in found.links if one.link == "base")
+    assert base.sticking_out == 0
+    assert base.missing < 1e-9
+    assert not [told for told in warnings(found.links) if "'base'" in told]
+    (shape,) = found.shapes["base"]
+    assert shape.mesh is not None
+    assert shape.mesh.volume == pytest.approx(sheet.convex_hull.volume, rel=0.05)
 
 
 def test_open_skins_are_not_sealed_before_they_are_wrapped(
