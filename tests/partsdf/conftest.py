@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from partwright.datasets.prepared import PreparedFamily
+from partwright.partsdf import pictures
 from partwright.partsdf.model import Model
 from partwright.partsdf.training import train
 from tests.partsdf.lamps import small_config, write_lamps
@@ -22,3 +23,10 @@ def model(lamps: PreparedFamily, tmp_path_factory: pytest.TempPathFactory) -> Mo
     torch.set_num_threads(1)
     config = small_config(lamps, epochs=100, batch=8, points=512, rate=5e-3, latent_rate=5e-3)
     return train(config, tmp_path_factory.mktemp("trained")).model
+
+
+@pytest.fixture(autouse=True)
+def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was trained for seconds has walls as thin as can be, everywhere: pictures as fine as these take most
+    of a minute. How fine they are otherwise is tried in test_meshing.py."""
+    monkeypatch.setattr(pictures, "picture_resolution", lambda *_, **__: 64)

@@ -143,7 +143,8 @@ def test_a_model_is_found_in_a_folder_of_its_name_where_the_command_is_run(
     folder = tmp_path / "models" / "lamps"
     folder.mkdir(parents=True)
     (folder / "model.safetensors").write_bytes(model.to_bytes())
-    monkeypatch.setattr(models, "_loaded", {})
+    for known in ("_loaded", "_files"):  # whoever comes later is not to look in this folder
+        monkeypatch.setattr(models, known, {})
     monkeypatch.chdir(tmp_path)
     assert pw.load_assembly("a.json").parts[0].field.hash == model.hash  # type: ignore[union-attr]
 
