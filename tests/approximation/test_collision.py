@@ -81,7 +81,7 @@ def test_a_solid_is_taken_where_its_hull_is_no_nearer() -> None:
     assert len(found) == 1
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(0.12, 0.3), st.floats(0.0, 1.5))
 def test_any_hole(x: float, y: float, radius: float, turn: float) -> None:
     hole = Part(Cylinder(radius, 3), (x, y, 0), (np.cos(turn / 2), np.sin(turn / 2), 0, 0))

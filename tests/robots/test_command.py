@@ -13,7 +13,7 @@ from tests.robots.robots import urdf
 
 def test_a_table_a_summary_and_the_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = urdf(tmp_path / "in")
-    words = ["--enclose", "--tolerance", "20mm", "--kinds", "box,cylinder"]
+    words = ["--enclose", "--tolerance", "60mm", "--kinds", "box,cylinder"]
     assert main(["collide", str(path), "-o", str(tmp_path / "out"), *words]) == 0
     said = capsys.readouterr().out
     assert "2 of 2 links contained" in said
