@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import signal
+from functools import partial
 
+import pytest
 from hypothesis import settings
 
 # Here, not where it is used: Playwright runs once a process, so a process has one fixture of it.
@@ -20,3 +23,11 @@ settings.load_profile("patient")
 
 # A shell starts background jobs with Ctrl-C ignored, and Python then leaves it so.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def coarse_scores(monkeypatch: pytest.MonkeyPatch) -> None:
+    """IoU and overlap of an eighth of the cells: networks take seconds for all of them."""
+    monkeypatch.setattr(importlib.import_module("partwright.metrics.iou"), "RESOLUTION", 64)
+    overlap = importlib.import_module("partwright.metrics.overlap")
+    monkeypatch.setattr(overlap, "overlap", partial(overlap.overlap, resolution=64))

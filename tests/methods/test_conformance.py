@@ -214,6 +214,7 @@ def test_its_settings_stand_for_its_name(case: Case) -> None:
         pw.fit(case.shape, case.settings, colour=1)
 
 
+@pytest.mark.usefixtures("coarse_scores")
 def test_a_result_is_one_type_and_one_folder(
     case: Case, tmp_path: Path, told: tuple[Fitted, list[Progress]]
 ) -> None:

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from partwright.datasets.prepared import PreparedFamily
-from partwright.partsdf import pictures
+from partwright.partsdf import pictures, validation
 from partwright.partsdf.model import Model
 from partwright.partsdf.training import train
 from tests.partsdf.lamps import small_config, write_lamps
@@ -26,7 +26,8 @@ def model(lamps: PreparedFamily, tmp_path_factory: pytest.TempPathFactory) -> Mo
 
 
 @pytest.fixture(autouse=True)
-def coarse_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was trained for seconds has walls as thin as can be, everywhere: pictures as fine as these take most
-    of a minute. How fine they are otherwise is tried in test_meshing.py."""
+def coarse(coarse_scores: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was trained for seconds has walls as thin as can be, everywhere: pictures as fine as these take up
+    to a minute. How fine they are otherwise is tried in test_meshing.py."""
     monkeypatch.setattr(pictures, "picture_resolution", lambda *_, **__: 64)
+    monkeypatch.setattr(validation, "ITERATIONS", 15)

@@ -86,9 +86,12 @@ def test_the_folder_of_a_reconstruction_stands_for_its_assembly(
 
 
 def test_encoder_and_generator(
-    file: Path, lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+    file: Path, lamps: PreparedFamily, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
     """Both lie beside the model that they are for, and are used from there."""
+    monkeypatch.setattr("partwright.partsdf.soundness._FINE", 64)  # as its pictures, see conftest.py
+    monkeypatch.setattr("partwright.partsdf.soundness._JUDGES", 2)
     assert main(["parts", "generate", "--model", str(file)]) == 2
     # Wrong names of parts are told before a generator, or the shape that has them, is looked for.
     assert main(["parts", "generate", "--model", str(file), "--keep", "seats", "--of", "nowhere.json"]) == 2
@@ -96,7 +99,7 @@ def test_encoder_and_generator(
     assert main(["parts", "generate", "--model", str(file)]) == 2
     assert "lamps has no generator; make one with `parts train-generator`" in capsys.readouterr().err
     assert main(["parts", "train-encoder", str(file), str(lamps.folder), "--steps", "2"]) == 0
-    assert main(["parts", "train-generator", str(file), "--steps", "60"]) == 0
+    assert main(["parts", "train-generator", str(file), "--steps", "20"]) == 0
     assert sorted(p.name for p in tmp_path.glob("*.safetensors")) == [
         "lamps.encoder.safetensors",
         "lamps.generator.safetensors",
@@ -143,7 +146,7 @@ def test_encoder_and_generator(
 def test_a_mesh_of_something_else_is_told_first(file: Path) -> None:
     """Before what is off, and what to try against that."""
     trimesh.creation.torus(1.0, 0.2).export("ring.ply")
-    quick = ["--quality", "draft", "--iterations", "5", "--resolution", "48", "--as-it-stands"]
+    quick = ["--quality", "draft", "--iterations", "5", "--resolution", "32", "--as-it-stands"]
     assert main(["parts", "reconstruct", str(file), "ring.ply", "-o", "out", *quick]) == 0
     warnings = json.loads(Path("out/report.json").read_text())["warnings"]
     assert warnings[0].startswith("this may be no shape of the family that lamps knows")
@@ -159,7 +162,7 @@ def test_points_are_told_of_and_shown_as_points(
     points = mesh.sample(3000, seed=1)
     points += 0.01 * np.random.default_rng(0).standard_normal(points.shape)
     trimesh.PointCloud(points).export("scan.ply")
-    quick = ["--quality", "draft", "--iterations", "60", "--resolution", "48", "--as-it-stands"]
+    quick = ["--quality", "draft", "--iterations", "40", "--resolution", "32", "--as-it-stands"]
     assert main(["parts", "reconstruct", str(file), "scan.ply", "-o", "out", *quick]) == 0
     said = capsys.readouterr()
     assert "points off, mean" in said.out
