@@ -282,6 +282,20 @@ def test_commands(
     assert "which model's parts?" in capsys.readouterr().err
 
 
+def test_an_encoder_of_pictures_is_trained_by_a_command(
+    saved: Model, lamps: PreparedFamily, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Not of points, as without --from images; as wide and of as many steps as is asked for."""
+    seen = str(tmp_path / "seen.safetensors")
+    train = ["parts", "train-encoder", str(file_of(saved)), str(lamps.folder), "--from", "images", "-o", seen]
+    few = ["--steps", "2", "--batch", "4", "--views", "8", "--width", "32", "--workers", "1"]
+    assert main([*train, *few]) == 0
+    assert "2/2" in capsys.readouterr().err
+    found = load_image_encoder(saved, seen)
+    assert found is not None
+    assert found.settings == ImageSettings.of_width(32)
+
+
 @pytest.mark.heavy
 def test_commands_that_train(
     trained: Learnt, lamps: PreparedFamily, photo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
