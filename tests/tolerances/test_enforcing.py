@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import pytest
 
 import partwright as pw
 from partwright.fields import Extrusion, Profile
 from partwright.meshing import mesh_part
+from partwright.tolerances import enforcing
+from partwright.tolerances.distance_bounds import DistanceBounds
 from tests.tolerances.shapes import boss
 
 
@@ -22,6 +27,58 @@ def test_a_fit_contains_its_shape_with_few_parts(shape: pw.Shape) -> None:
     assert len(result.assembly) <= 2
     assert result.assembly.distance(shape.vertices).max() <= 1e-4
     assert 1.0 <= bound["volume_ratio"] < 1.1
+
+
+@dataclass(frozen=True)
+class Parts:
+    """So many parts, of which three keep the bounds."""
+
+    count: int
+    complete: bool = True
+
+    @property
+    def satisfied(self) -> bool:
+        return self.count >= 3
+
+    def improves_on(self, other: Parts) -> bool:
+        return self.count > other.count
+
+
+@pytest.mark.parametrize(
+    ("start", "made", "tolerance", "asked", "pruned", "end"),
+    [
+        (1, {1 / 3: 2, 1 / 10: 5}, 0.1, [1 / 3, 1 / 10], [5], (3, "target_reached")),
+        (1, {1 / 3: 4}, 0.1, [1 / 3], [4], (3, "target_reached")),
+        (4, {}, 0.1, [], [4], (3, "target_reached")),
+        (2, {1 / 3: 1, 1 / 10: 1}, 0.1, [1 / 3, 1 / 10], [], (2, "budget_reached")),
+        (1, {}, 0.1, [1 / 3], [], (1, "budget_reached")),
+        (4, {}, None, [], [], (4, "converged")),
+    ],
+    ids=["twice", "once", "at once", "no better", "no more", "no tolerance"],
+)
+def test_more_parts_are_made_until_a_tolerance_is_kept_and_then_the_fewest_stay(
+    start: int, made: dict[float, int], tolerance: float | None, asked: list[float], pruned: list[int],
+    end: tuple[int, str], monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    shares: list[float] = []
+    minimised: list[int] = []
+
+    def refit(share: float) -> Any:
+        shares.append(share)
+        return made.get(share)
+
+    def fewest(best: Parts, *_: Any) -> Parts:
+        minimised.append(best.count)
+        return Parts(3)
+
+    monkeypatch.setattr(enforcing, "satisfy", lambda count, *_: Parts(count))
+    monkeypatch.setattr(enforcing, "minimise_parts", fewest)
+    bounds = DistanceBounds(tolerance=tolerance, contain=None if tolerance else 0.0)
+    given: Any = start
+    shape: Any = None
+    found: Any = enforcing.enforce(given, shape, bounds, "converged", refit)
+    assert (found[0].count, found[1]) == end
+    assert (shares, minimised) == (asked, pruned)
 
 
 @pytest.mark.heavy
