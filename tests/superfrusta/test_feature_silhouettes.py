@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from partwright.approximation.sketches.candidates import candidates, silhouettes
 from partwright.assembly import Assembly, Part
 from partwright.fields import Box, Extrusion, Profile
 from partwright.meshing import mesh_assembly
+from partwright.superfrusta import feature_blanks
 from partwright.superfrusta.feature_blanks import worth
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import FeatureTree
@@ -76,6 +78,55 @@ def test_no_blank_is_taken_whose_tree_is_freeform_throughout() -> None:
     assert len(asked) > 1
     assert drawn is asked[0]
     assert worth(replace(asked[0], off=0.3)) == pytest.approx(asked[0].objective - 0.3)
+
+
+@dataclass(frozen=True)
+class Tree:
+    """What is looked at of a tree, at prices of which a plain feature's is 0.01."""
+
+    key: str
+    objective: float
+    off: float = 0.0
+    freeform: int = 0
+    price: float = 0.1
+    score: float = 0.9
+
+    @property
+    def steps(self) -> list[Any]:
+        return [SimpleNamespace(chosen=SimpleNamespace(key=self.key))] * 4
+
+    @property
+    def features(self) -> list[Any]:
+        return [SimpleNamespace(freeform=i < self.freeform, parts=[]) for i in range(4)]
+
+
+BEST = Tree("section", 0.8, off=0.02)
+
+
+@pytest.mark.parametrize(
+    ("rival", "is_taken"),
+    [
+        (Tree("blank", 0.82), True),
+        (Tree("blank", 0.78), False),
+        (Tree("blank", 0.95, off=0.03), False),
+        (Tree("blank", 0.87, off=0.02, freeform=2), False),
+        (Tree("blank", 0.91, off=0.02, freeform=2), True),
+        (Tree("section", 0.95), False),
+    ],
+    ids=["better", "worse", "further off", "freeform", "worth its freeform", "the same steps"],
+)
+def test_a_tree_from_a_blank_is_taken_if_no_further_off_and_worth_its_freeform(
+    rival: Tree, is_taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(feature_blanks, "silhouettes", lambda *_: [SimpleNamespace(key="blank")])
+    search: Any = SimpleNamespace(
+        body=None, frames=[], empty=None, alpha=0.01, tie=0.001,
+        gains=lambda *_: np.ones(1), extended=lambda *_: None, grown=lambda *_, **__: rival,
+        ended=lambda tree, _: tree, mend=lambda tree: tree,
+    )  # fmt: skip
+    best: Any = BEST
+    assert (feature_blanks.cut_from_blanks(search, best, [], []) is rival) == is_taken
+    assert feature_blanks.cut_from_blanks(search, best, [], ["blank"]) is best  # it began with that already
 
 
 @pytest.mark.heavy
