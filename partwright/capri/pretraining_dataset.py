@@ -54,6 +54,11 @@ class PretrainingDataset:
         moved = self.points[parts][:, chosen].float()[..., axes] * torch.from_numpy(signs).float().to(device)
         return turned[:, None].contiguous().float(), moved, self.inside[parts][:, chosen].float()
 
+    def rows(self, rows: slice) -> tuple[Tensor, Tensor, Tensor]:
+        """Some parts as they stand, with all their points: voxels, points and inside as of `draw`."""
+        voxels = _unpacked(self.voxels[rows]).view(-1, 1, VOXELS, VOXELS, VOXELS)
+        return voxels.float(), self.points[rows].float(), self.inside[rows].float()
+
     def save(self, path: Path, parts: int, seed: int) -> None:
         """As safetensors, beside what it was made by."""
         from safetensors.numpy import save

@@ -6,6 +6,7 @@ the encoder of points, hear of what it saw. The paper's tells neither silhouette
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -112,6 +113,9 @@ class Sight:
     """About 1 where the network knows from which side it looks, less where several come into question."""
     oddness: float
     """Root mean square of the poses' numbers, off the family's mean and each in its spread there."""
+    doubt: float
+    """Mean entropy, in bits, of whether each part is there: about 0 where the network is sure, 1 where it
+    knows nothing."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +143,7 @@ class ImageEncoder:
             torch.rad2deg(camera[:, 2]),
             camera[:, :2].norm(dim=1),  # the mean of unit vectors is shorter, the more they differ
             places.square().mean(dim=(1, 2)).sqrt(),
+            torch.distributions.Bernoulli(logits=logits).entropy().mean(dim=1) / math.log(2),
         )
         rows = zip(shapes, silhouette.sigmoid(), *(n.tolist() for n in numbers), strict=True)
         return [Sight(*row) for row in rows]

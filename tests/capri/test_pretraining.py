@@ -41,6 +41,10 @@ def test_points_have_the_part_s_own_side(few: PretrainingDataset) -> None:
     shape = load_shape(cad_part(1).mesh)
     distance = shape.unit_distance(few.points[1].float().numpy() / UNIT_TO_PAPER)
     np.testing.assert_array_equal(few.inside[1], distance < 0)
+    voxels, points, inside = few.rows(slice(1, 2))
+    np.testing.assert_array_equal(voxels[0, 0] > 0, shape.unit_occupancy(64))
+    np.testing.assert_array_equal(inside[0] > 0, distance < 0)
+    assert torch.equal(points[0], few.points[1].float())
     assert (np.abs(distance[:256]) < 0.25).all()
     assert np.abs(distance[256:]).max() > 0.4
 

@@ -176,6 +176,29 @@ def test_it_learns_and_sees_a_held_out_lamp(
         assert (model.latents[model.present[:, p], p] == found.shape.latents[p]).all(dim=1).any()
 
 
+def test_doubt_is_about_the_parts_that_may_be_there(trained: Learnt) -> None:
+    """A bit a part where the network knows nothing, none where it is sure of all."""
+    encoder, _ = trained
+
+    class Saying(torch.nn.Module):
+        def __init__(self, logits: list[float]) -> None:
+            super().__init__()
+            self.logits = torch.tensor(logits)
+
+        def forward(self, pictures: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+            told = torch.zeros(1, 3, encoder.vectors.width + 13)
+            told[0, :, -1] = self.logits
+            return told, torch.zeros(1, SIDE // 2, SIDE // 2), torch.tensor([[1.0, 0.0, 0.0]])
+
+    def doubt(*logits: float) -> float:
+        network = Saying([*logits])
+        return replace(encoder, network=network).see(torch.zeros(1, 3, SIDE, SIDE))[0].doubt  # type: ignore[arg-type]
+
+    assert doubt(0, 0, 0) == pytest.approx(1)
+    assert doubt(30, -30, 30) == pytest.approx(0, abs=1e-6)
+    assert doubt(30, 0, 30) == pytest.approx(1 / 3)
+
+
 def test_a_standpoint_is_found_again(lamps: PreparedFamily) -> None:
     held = lamps.load(0)
     scene = Scene(held.vertices, held.faces)

@@ -92,11 +92,14 @@ def test_what_is_not_seen_in_the_mirror_image_is_told(tmp_path: Path) -> None:
     assert look_at(Seeing(), photo).mirrored == 1  # type: ignore[arg-type]
     looked = look_at(Left(), photo)  # type: ignore[arg-type]
     assert looked.mirrored == 0
-    sight = SimpleNamespace(certainty=1.0, oddness=0.0)
+    sight = SimpleNamespace(certainty=1.0, oddness=0.0, doubt=0.0)
     standing = Standpoint(Camera(0, 0), 1.0)
     assert warnings_of("chairs", replace(looked, sight=sight, mirrored=1.0), standing) == []  # type: ignore[arg-type]
     (line,) = warnings_of("chairs", replace(looked, sight=sight), standing)  # type: ignore[arg-type]
     assert "something else is seen in its mirror image" in line
+    unsure = SimpleNamespace(certainty=1.0, oddness=0.0, doubt=0.3)
+    (line,) = warnings_of("chairs", replace(looked, sight=unsure, mirrored=1.0), standing)  # type: ignore[arg-type]
+    assert "not clear which parts there are" in line
 
 
 def test_damaged_pictures(tmp_path: Path) -> None:
