@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +15,7 @@ from torch import Tensor
 
 from partwright.capri.network import UNIT_TO_PAPER, VOXELS
 from partwright.errors import UnreadableFileError
+from partwright.processes import carried_out
 
 _NEAR_SIGMAS = (0.02, 0.06)  # unit lengths: of the points near the surface
 _FORMAT = "partwright-capri-collection-1"
@@ -96,11 +95,7 @@ def make_pretraining_dataset(parts: int, points: int, seed: int, workers: int = 
     """The first `parts` CAD parts of a seed, `points` points each; the same by however many processes."""
     jobs = [range(parts)[first : first + _AT_ONCE] for first in range(0, parts, _AT_ONCE)]
     make = partial(_made, points=points, seed=seed)
-    if workers > 1:
-        with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-            made = list(pool.map(make, jobs))
-    else:
-        made = [make(job) for job in jobs]
+    made = list(carried_out(make, jobs, workers))
     return _dataset(*(np.concatenate(each) for each in zip(*made, strict=True)))
 
 

@@ -36,7 +36,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="with --from images: views that are ray cast, to be lit anew each step (default: %(default)s)",
     )
     command.add_argument(
-        "--workers", metavar="N", type=int, help="processes that draw views (default: one a processor)"
+        "--workers",
+        metavar="N",
+        type=int,
+        help="with --from images: processes that draw the views (default: one a processor)",
     )
     command.add_argument(
         "family", metavar="FAMILY", type=Path, help="the prepared family that it was trained on"

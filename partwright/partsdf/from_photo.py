@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 # there are at most, IoU with what is seen in the mirror image at least. A hint: most pictures of the family
 # keep to them, few others do. Doubt tells most: of pictures of new chairs 48 of 60 are under it, of others 16
 # of 108.
-COVERED, CERTAIN, ODD, UNSURE, MIRRORED = 0.5, 0.6, 1.2, 0.02, 0.8
+COVERED, CERTAIN, ODD, DOUBTFUL, MIRRORED = 0.5, 0.6, 1.2, 0.02, 0.8
 FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
 _PANEL = 320  # pixels
 _UNSEEN = 0.25  # of its light that is left of what is not the shape, in the preview
@@ -159,7 +159,7 @@ def warnings_of(name: str, looked: Looked, standpoint: Standpoint) -> list[str]:
         )
     if sight.certainty < CERTAIN:
         said.append("it is not clear from which side it is seen")
-    if sight.doubt > UNSURE:
+    if sight.doubt > DOUBTFUL:
         said.append("it is not clear which parts there are")
     if sight.oddness > ODD:
         said.append("its parts are placed unlike those of the family")

@@ -62,16 +62,18 @@ def train_image_encoder(
     """An image encoder for a model, from the prepared family that it was trained on; after a cancellation, as
     far as it has come.
 
-    workers: processes that draw the views, which are the same by however many. drawn: told how many of the
-    `views` there are, of which steps then take `batch` each. device: "auto", "cpu" or "cuda".
+    workers: processes that draw the views, which are the same by however many; a script with more than one
+    needs `if __name__ == "__main__":`. drawn: told how many of the `views` there are, of which steps then
+    take `batch` each. device: "auto", "cpu" or "cuda".
 
     Raises:
         FamilyError: it is another family, or was prepared without surfaces.
-        SettingError: fewer than one step, view or picture, a model of one part, which has no poses, or no
-            such device.
+        SettingError: fewer than one step, view, picture or worker, a model of one part, which has no poses,
+            or no such device, or a process that draws was ended.
     """
     check_trainable(model, steps, batch, "an encoder predicts")
     check_count("views", views, low=1)
+    check_count("workers", workers, low=1)
     place, settings = device_of(device), settings or ImageSettings()
     vectors = PartVectors.of(model)
     views = min(views, steps * batch)  # no more than are looked at

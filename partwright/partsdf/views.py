@@ -8,11 +8,10 @@ whether a light reaches it), so that each view can be lit and coloured many time
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
-from multiprocessing import get_context
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +24,7 @@ from partwright.methods import Cancellation
 from partwright.partsdf.clouds import donors_of, training_shapes
 from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, local_points, rotation_matrices
+from partwright.processes import carried_out
 from partwright.render.camera import Camera, View
 from partwright.render.raycast import Scene, cast
 from partwright.shapes import LONGEST_SIDE
@@ -101,7 +101,7 @@ def draw_views(
 ) -> Views:
     """`count` views, or those that there are once it is cancelled, but `_EACH` at least.
 
-    workers: processes; the views are the same by however many.
+    workers: processes, as of `carried_out`; the views are the same by however many.
     """
     shapes = torch.randint(len(model.shapes), (-(-count // _EACH),), generator=generator)
     donors = donors_of(model, shapes, meshes.seen(), generator)
@@ -113,24 +113,28 @@ def draw_views(
         )
         for i, s in enumerate(shapes)
     ]
-    made: list[_Made] = []
-    with _drawing(meshes, model.up, max(1, min(workers, len(orders) // _WORTH))) as drawn:
-        for one in drawn(orders):
-            made.append(one)
+    label = np.zeros((_EACH * len(orders), SIDE, SIDE), np.uint8)
+    normal = np.zeros((*label.shape, 3), np.int8)
+    light, back, camera = np.zeros((3, len(label), 3), np.float32)
+    framed: list[PoseTensors] = []
+    draw = partial(_drawn, meshes, model.up)
+    with closing(carried_out(draw, orders, max(1, min(workers, len(orders) // _WORTH)), 8)) as drawn:
+        for one in drawn:
+            rows = slice(_EACH * len(framed), _EACH * (len(framed) + 1))
+            label[rows], normal[rows] = one.label, one.normal
+            light[rows], back[rows], camera[rows] = one.light, one.back, one.camera
+            framed.append(PoseTensors.of(one.poses))
             if told is not None:
-                told(min(count, _EACH * len(made)))
+                told(min(count, rows.stop))
             if cancel is not None and cancel.requested:
                 break
-    normal, label, light, back, camera = (
-        torch.from_numpy(np.concatenate([getattr(one, name) for one in made]))
-        for name in ("normal", "label", "light", "back", "camera")
-    )
-    each = torch.arange(_EACH * len(made)) // _EACH
-    framed = [PoseTensors.of(one.poses) for one in made]
+    made = _EACH * len(framed)
+    each = torch.arange(made) // _EACH
     placed = PoseTensors(*(torch.stack(t) for t in zip(*framed, strict=True)))
+    pixels = torch.from_numpy(normal[:made]), torch.from_numpy(label[:made])
+    ways = torch.from_numpy(light[:made]), torch.from_numpy(back[:made]), torch.from_numpy(camera[:made])
     return Views(
-        normal, label, light, back, camera, donors[each], placed.map(lambda t: t[each]),
-        model.present[shapes][each],
+        *pixels, *ways, donors[each], placed.map(lambda t: t[each]), model.present[shapes][each],
     )  # fmt: skip
 
 
@@ -154,34 +158,7 @@ class _Made(NamedTuple):
     poses: Poses
 
 
-@contextmanager
-def _drawing(
-    meshes: PartMeshes, up: str, workers: int
-) -> Iterator[Callable[[Sequence[_Order]], Iterator[_Made]]]:
-    """What carries orders out, one after another, here or by processes, which get the meshes once."""
-    if workers == 1:
-        yield lambda orders: (_carried_out(meshes, up, order) for order in orders)
-        return
-    with ProcessPoolExecutor(workers, get_context("spawn"), _remember, (meshes, up)) as pool:
-        try:
-            yield lambda orders: pool.map(_remembered, orders, chunksize=8)
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-_kept: list[tuple[PartMeshes, str]] = []  # of a process
-
-
-def _remember(meshes: PartMeshes, up: str) -> None:
-    torch.set_num_threads(1)
-    _kept[:] = [(meshes, up)]
-
-
-def _remembered(order: _Order) -> _Made:
-    return _carried_out(*_kept[0], order)
-
-
-def _carried_out(meshes: PartMeshes, up: str, order: _Order) -> _Made:
+def _drawn(meshes: PartMeshes, up: str, order: _Order) -> _Made:
     """A shape, put together and seen from `_EACH` sides."""
     corners, faces, labels, poses = _put_together(meshes, order)
     rng, scene = np.random.default_rng(order.seed), Scene(corners, faces)

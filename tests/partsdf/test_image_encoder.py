@@ -16,6 +16,7 @@ import partwright as pw
 from partwright.cli.main import main
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import EmptyShapeError, ModelError, SettingError, UnreadableFileError
+from partwright.methods import Cancellation
 from partwright.partsdf.companions import beside
 from partwright.partsdf.encoder import EncoderSettings, load_encoder
 from partwright.partsdf.from_photo import FILES, reconstruct_photo
@@ -80,7 +81,14 @@ def test_views_see_the_parts_where_their_poses_say(
     monkeypatch.setattr("partwright.partsdf.views._WORTH", 10)
     again = draw_views(meshes, saved, 80, torch.Generator().manual_seed(0), workers=2)
     assert all(torch.equal(a, b) for a, b in zip(views.poses, again.poses, strict=True))
-    assert torch.equal(views.label, again.label)
+    for name in ("normal", "label", "light", "back", "camera", "donors", "present"):
+        assert torch.equal(getattr(views, name), getattr(again, name))
+    cancel = Cancellation()
+    few = draw_views(
+        meshes, saved, 80, torch.Generator().manual_seed(0), lambda _: cancel.request(), cancel, workers=2
+    )
+    assert torch.equal(few.label, views.label[: len(few.label)])
+    assert len(few.label) == len(few.donors) == 4
     assert len(views.label) == 80
     part = (views.label % SHADED).long()
     assert part.max() == 3

@@ -33,10 +33,10 @@ def run(arguments: argparse.Namespace) -> int:
         def drawn(done: int, of: int) -> None:
             count.show(done, of, "views drawn")
 
+        workers = (os.cpu_count() or 1) if arguments.workers is None else arguments.workers
         return train_image_encoder(
-            model, family, settings=ImageSettings.of_width(width), views=arguments.views,
-            workers=arguments.workers or os.cpu_count() or 1, drawn=drawn, told=told, cancel=cancel,
-            **how(arguments),
+            model, family, settings=ImageSettings.of_width(width), views=arguments.views, workers=workers,
+            drawn=drawn, told=told, cancel=cancel, **how(arguments),
         )  # fmt: skip
 
     def about(_: Model) -> str:

@@ -1,0 +1,69 @@
+"""Orders that processes of their own carry out: begun anew, and deaf to Ctrl-C, which who began them hears.
+
+A script that has orders carried out so, by more than one process, needs `if __name__ == "__main__":`.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import get_context
+from typing import Any, TypeVar
+
+from partwright.errors import SettingError
+
+Order = TypeVar("Order")
+Made = TypeVar("Made")
+
+_work: list[Callable[[Any], Any]] = []  # of a process
+
+
+def carried_out(
+    work: Callable[[Order], Made], orders: Sequence[Order], workers: int, at_once: int = 1
+) -> Generator[Made, None, None]:
+    """What `work` makes of each order, as the orders stand; here, where one worker is enough.
+
+    work: is sent to each process once, with all that is bound to it. at_once: orders that a process takes.
+    Close the iterator to end early.
+
+    Raises SettingError where a process is ended from outside, as for want of memory.
+    """
+    workers = min(workers, -(-len(orders) // at_once))
+    if workers <= 1:
+        yield from map(work, orders)
+        return
+    with ProcessPoolExecutor(workers, get_context("spawn"), _remember, (work,)) as pool:
+        try:
+            with _deaf():  # while they begin: they are as deaf as the thread that begins them
+                made = pool.map(_remembered, orders, chunksize=at_once)
+            yield from made
+        except BrokenProcessPool as error:
+            raise SettingError(
+                f"one of {workers} processes was ended, perhaps for want of memory; take fewer workers"
+            ) from error
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _remember(work: Callable[[Any], Any]) -> None:
+    _work[:] = [work]
+
+
+def _remembered(order: Any) -> Any:
+    return _work[0](order)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Ctrl-C waits; nothing where a system has no such masks."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
