@@ -11,8 +11,8 @@ from partwright.partsdf.model import load_model
 
 HEAD = [
     "# PartSDF: the models that ship", "",
-    "Trained by `partwright parts train configs/NAME.toml --half`, on one core; those of NAME-first are "
-    "what NAME begins with. Errors are means "
+    "Trained by `partwright parts train configs/NAME.toml --half`, on one core, vehicles on an H200 GPU "
+    "beside five other trainings; those of NAME-first are what NAME begins with. Errors are means "
     "over the last epoch's samples, clamped at 0.1 of the unit frame (longest side 1.8); IoUs those "
     "of the first held-out shape, reconstructed with known parts, at samples near the surface that "
     "were not fitted. Minutes are by the clock, whatever else ran. Logs: partsdf-training-NAME.csv.", "",
