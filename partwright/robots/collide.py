@@ -347,10 +347,10 @@ def _measured(
     tolerance: float,
     options: CollideOptions,
 ) -> LinkReport:
+    shared = target.solid ^ union  # of what touches all along, differences may have no sense
     # What enclosing shapes lack of a thickness that sheets do not have is nothing.
-    solid = target.solid ^ union if options.enclose and target.sheets else target.solid
-    own = solid.volume()
-    common = (solid ^ union).volume()  # of what touches all along, differences may have no sense
+    solid = shared if options.enclose and target.sheets else target.solid
+    own, common = solid.volume(), shared.volume()
     kinds: dict[str, int] = {}
     for shape in shapes:
         kinds[shape.kind] = kinds.get(shape.kind, 0) + 1

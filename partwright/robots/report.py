@@ -16,10 +16,11 @@ from partwright.robots.spheres import LinkSpheres, sphere_warnings
 class LinkReport:
     """One link. Lengths are in metres, as robots are.
 
-    shapes: how many of each kind. stands_for: which meshes. missing, extra: volume that the shapes lack and
-    add, over that of the meshes. farthest: where the surface of either reaches farthest beyond the other, in
-    the link's frame. sticking_out: how far the meshes reach beyond the shapes, by fresh points; None where
-    they may. most: shapes that it could have.
+    shapes: how many of each kind. stands_for: which meshes. volume: of the solid that they bound; of sheets
+    that are enclosed, of what the shapes contain of their wrap, so that these lack none of it. missing,
+    extra: volume that the shapes lack and add, over that of the meshes. farthest: where the surface of
+    either reaches farthest beyond the other, in the link's frame. sticking_out: how far the meshes reach
+    beyond the shapes, by fresh points; None where they may. most: shapes that it could have.
     """
 
     link: str

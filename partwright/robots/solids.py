@@ -171,7 +171,8 @@ def _read(use: MeshUse, sheets: bool) -> _Mesh:
     vertices, faces = _together([(piece.vertices, piece.faces) for piece in source.pieces])
     solid = None
     with suppress(OpenShellError, *((FlatShapeError,) if sheets else ())):
-        shape = InputShape(source, sealing=False)  # what stays open is wrapped, and wraps hold every sheet
+        # What stays open is wrapped, and wraps hold every sheet.
+        shape = InputShape(dataclasses.replace(source, sealing=False))
         solid = _manifold(shape.vertices, shape.faces)
     return _Mesh(vertices, faces, solid, source.repairs)
 

@@ -149,9 +149,13 @@ def _with_natives(natives: Sequence[Part], target: Target | None) -> Target:
         faces.append(triangles + start)
         start += len(corners)
     solid = Manifold.batch_boolean([*([target.solid] if target is not None else []), *plain], OpType.Add)
-    notes = target.notes if target is not None else ()
-    wrap = Manifold.batch_boolean([target.wrap, *plain], OpType.Add) if target is not None else solid
-    return Target(solid, wrap, np.concatenate(vertices), np.concatenate(faces), notes)
+    corners, triangles = np.concatenate(vertices), np.concatenate(faces)
+    if target is None:
+        return Target(solid, solid, corners, triangles, ())
+    wrap = Manifold.batch_boolean([target.wrap, *plain], OpType.Add)
+    return dataclasses.replace(  # native solids are more than sheets
+        target, solid=solid, wrap=wrap, vertices=corners, faces=triangles, sheets=False
+    )
 
 
 def _rounded(part: Part) -> Part:

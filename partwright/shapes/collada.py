@@ -13,8 +13,9 @@ import numpy as np
 from partwright.errors import EmptyShapeError, MissingDependencyError, UnreadableFileError
 from partwright.shapes.array_files import check_shape_file
 from partwright.shapes.cleaning import counted
+from partwright.shapes.extent import check_extent
 from partwright.shapes.loading import PARSER_ERRORS
-from partwright.shapes.source import Piece, Source, check_extent, in_utf8
+from partwright.shapes.source import Piece, Source, in_utf8
 
 if TYPE_CHECKING:
     from collada import Collada
@@ -56,7 +57,7 @@ def read_collada(path: Path) -> Source:
         raise UnreadableFileError(f"{path}: it cannot be read as COLLADA: {error}") from error
     if not pieces:
         if document.errors or scene.lost:
-            why = document.errors[0] if document.errors else "all of its bodies are damaged"
+            why = document.errors[0] if document.errors else "none of its bodies could be read"
             raise UnreadableFileError(f"{path}: it cannot be read as COLLADA: {why}")
         raise EmptyShapeError(f"{path}: it has no triangles")
     up = (document.assetInfo.upaxis or "Y_UP")[0].lower()
@@ -104,7 +105,7 @@ class _Scene:
     def told(self) -> Iterator[str]:
         """A sentence for each kind of what was not read."""
         if self.lost:
-            yield f"left out {counted(self.lost, 'damaged or missing body', 'damaged or missing bodies')}"
+            yield f"left out {counted(self.lost, 'body', 'bodies')} that could not be read"
         if self.misplaced:
             yield (
                 f"left out {counted(self.misplaced, 'transform')} of nodes that cannot be read, so that what "

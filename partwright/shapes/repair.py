@@ -88,6 +88,7 @@ def repair(
     faces: NDArray[np.int64],
     ground: Ground | None = None,
     wall: float | None = None,
+    *,
     sealing: bool = True,
 ) -> Surface:
     """Surface of the solid that the triangles mean; vertices (V, 3) in the unit frame, faces (F, 3).
@@ -118,12 +119,12 @@ def repair(
         lying = edges.faces[:0]
     if wall is not None:
         edges = EdgeTable(np.concatenate([edges.faces, lying]))
-        return _enclosed(*thicken(vertices, edges, wall, notes), ground, notes, sealing)
+        return _enclosed(*thicken(vertices, edges, wall, notes), ground, notes, sealing=sealing)
     if len(lying):
         notes.append("left out what lies flat on the ground")
     whole = left_out + _area(vertices, lying) + _area(vertices, edges.faces)
     vertices, edges = drop_sheets(vertices, edges, notes)
-    surface = _enclosed(vertices, edges, ground, notes, sealing)
+    surface = _enclosed(vertices, edges, ground, notes, sealing=sealing)
     return replace(surface, left_out=1 - _area(vertices, edges.faces) / whole)
 
 
@@ -137,6 +138,7 @@ def _enclosed(
     edges: EdgeTable,
     ground: Ground | None,
     notes: list[str],
+    *,
     sealing: bool,
 ) -> Surface:
     """What is inside, of triangles that are wound consistently."""

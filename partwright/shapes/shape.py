@@ -72,8 +72,7 @@ class Shape:
     arrays are read-only.
     """
 
-    def __init__(self, source: Source, sealing: bool = True) -> None:
-        """sealing: whether what is open in many places is sealed, where a solid is seen in it."""
+    def __init__(self, source: Source) -> None:
         name, pieces = source.name, source.pieces
         offsets = np.cumsum([0] + [len(p.vertices) for p in pieces])
         ends = np.cumsum([0] + [len(p.faces) for p in pieces]).tolist()
@@ -93,9 +92,9 @@ class Shape:
         self._ground = source.ground
         if source.up is not None and source.ground is None:
             self._ground = float((corners @ axis_vector(source.up)).min())
-        self.thickness, self._sealing = source.thickness, sealing
+        self.thickness, self._sealing = source.thickness, source.sealing
         self.frame, self._surface = _named(
-            name, lambda: _repaired(corners, compact, source.up, self._ground, self.thickness, sealing)
+            name, lambda: _repaired(corners, compact, replace(source, ground=self._ground))
         )
         self.vertices = self.frame.from_unit(self._surface.vertices)
         self.faces = self._surface.faces
@@ -150,10 +149,16 @@ class Shape:
         for node in self.nodes:
             piece = Piece(node.name, self.input_vertices, self.input_faces[node.start : node.stop])
             alone = Source(
-                node.name, (piece,), self.unit, self.up, ground=self._ground, thickness=self.thickness
+                node.name,
+                (piece,),
+                self.unit,
+                self.up,
+                ground=self._ground,
+                thickness=self.thickness,
+                sealing=self._sealing,
             )
             try:
-                shapes.append(Shape(alone, self._sealing))
+                shapes.append(Shape(alone))
             except PartwrightError as error:
                 failure = error
                 warnings.warn(f"node left out: {error}", NodeLeftOutWarning, stacklevel=2)
@@ -333,24 +338,18 @@ def _wall(thickness: Length, source: Source) -> float:
 
 
 def _repaired(
-    corners: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    up: str | None,
-    height: float | None,
-    thickness: float | None,
-    sealing: bool,
+    corners: NDArray[np.float64], faces: NDArray[np.int64], source: Source
 ) -> tuple[UnitFrame, Surface]:
-    """The surface of corners (V, 3), own units, and faces (F, 3), and the unit frame that it is in.
-
-    height: of the ground along the up axis, own units. thickness: of sheets, own units.
-    """
+    """The surface of corners (V, 3), own units, and faces (F, 3), and the unit frame that it is in. source:
+    what they are of, and what is known and wanted of it."""
     frame = UnitFrame.of(corners)
     ground = None
-    if up is not None and height is not None:
-        above = axis_vector(up)
-        ground = Ground(above, float(frame.to_unit(height * above) @ above))
-    wall = None if thickness is None else float(frame.length_to_unit(thickness))
-    return repair(frame.to_unit(corners), faces, ground, wall, sealing).in_frame(frame)
+    if source.up is not None and source.ground is not None:
+        above = axis_vector(source.up)
+        ground = Ground(above, float(frame.to_unit(source.ground * above) @ above))
+    wall = None if source.thickness is None else float(frame.length_to_unit(source.thickness))
+    surface = repair(frame.to_unit(corners), faces, ground, wall, sealing=source.sealing)
+    return surface.in_frame(frame)
 
 
 def _checked(points: ArrayLike) -> NDArray[Any]:

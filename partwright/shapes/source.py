@@ -4,15 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-
-from partwright.errors import UnreadableFileError
-
-_MOST_PIECES = 20_000
-_MOST_TRIANGLES = 20_000_000  # of all of them together
 
 
 @dataclass(frozen=True)
@@ -31,7 +25,8 @@ class Source:
     `repairs` and `confidence`: how the surface was made where the file holds none, and how sure it is. file:
     the file's name with its suffix, None for what was in memory. points: (N, 3) that the surface was laid
     through, where it was. ground: its height along the up axis, own units; None: as low as anything lies.
-    thickness: of its sheets, own units, if they are to have one.
+    thickness: of its sheets, own units, if they are to have one. sealing: whether what is open in many
+    places is sealed, where a solid is seen in it.
     """
 
     name: str
@@ -44,19 +39,7 @@ class Source:
     points: NDArray[np.float64] | None = None
     ground: float | None = None
     thickness: float | None = None
-
-
-def check_extent(path: Path, pieces: int, triangles: int) -> None:
-    """Refuse a file whose objects, named again and again, make up more than memory holds.
-
-    Raises:
-        UnreadableFileError: it has too many pieces, or triangles in all of them together.
-    """
-    if pieces > _MOST_PIECES or triangles > _MOST_TRIANGLES:
-        raise UnreadableFileError(
-            f"{path}: builds {pieces:.6g} objects of {triangles:.6g} triangles in all; at most "
-            f"{_MOST_PIECES} of {_MOST_TRIANGLES} are accepted. Export less of it, or simplified"
-        )
+    sealing: bool = True
 
 
 def in_utf8(name: str) -> str:

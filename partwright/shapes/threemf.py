@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from partwright.errors import EmptyShapeError, NotFiniteError, UnreadableFileError
 from partwright.shapes.array_files import check_shape_file
-from partwright.shapes.source import Piece, Source, check_extent, in_utf8, unique_names
+from partwright.shapes.extent import check_extent
+from partwright.shapes.source import Piece, Source, in_utf8, unique_names
 from partwright.shapes.units import canonical_unit
 
 # A 3MF is a zip archive, and a small one can claim terabytes.

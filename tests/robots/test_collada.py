@@ -156,4 +156,4 @@ def test_what_of_a_mesh_could_not_be_read_is_told(tmp_path: Path) -> None:
     path = tmp_path / "tin.sdf"
     path.write_text(SDF.format(""))
     (link,) = collide(path, CollideOptions()).links
-    assert link.notes == ("tin.dae: left out 1 damaged or missing body",)
+    assert link.notes == ("tin.dae: left out 1 body that could not be read",)

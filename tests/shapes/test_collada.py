@@ -54,7 +54,7 @@ def test_what_is_damaged_is_told(tmp_path: Path) -> None:
     path.write_text(whole[: arrays[0]] + whole[arrays[0] :].replace(">", ">x", 1))
     shape = load_shape(path)
     assert shape.volume == pytest.approx(BALL, rel=1e-5)
-    assert "left out 1 damaged or missing body" in shape.repairs
+    assert "left out 1 body that could not be read" in shape.repairs
     path.write_text(re.sub(r"(<float_array[^>]*>)", r"\1x", whole))
     with pytest.raises(UnreadableFileError, match=r"a\.dae: it cannot be read as COLLADA: .*float"):
         load_shape(path)
@@ -124,7 +124,7 @@ def test_a_body_with_morph_targets_is_as_without_them(
 def test_a_body_behind_a_lost_controller_is_told(tmp_path: Path) -> None:
     shape = load_shape(rigged(tmp_path / "a.dae", SKIN, instance="another"))
     assert shape.volume == pytest.approx(BALL, rel=1e-5)
-    assert read_collada(tmp_path / "a.dae").repairs == ("left out 1 damaged or missing body",)
+    assert read_collada(tmp_path / "a.dae").repairs == ("left out 1 body that could not be read",)
 
 
 def test_lights_and_comments_are_no_bodies(tmp_path: Path) -> None:
@@ -151,7 +151,7 @@ def test_indices_below_zero_do_not_count_from_the_end(tmp_path: Path) -> None:
     path.write_text(f"{text[: first.start(1)]}-1{text[first.end(1) :]}")
     shape = load_shape(path)
     assert shape.volume == pytest.approx(BALL, rel=1e-5)
-    assert read_collada(tmp_path / "a.dae").repairs == ("left out 1 damaged or missing body",)
+    assert read_collada(tmp_path / "a.dae").repairs == ("left out 1 body that could not be read",)
 
 
 def test_instances_that_double_are_counted_before_they_are_made(tmp_path: Path) -> None:
