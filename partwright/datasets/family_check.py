@@ -62,9 +62,10 @@ def check_family(family: PreparedFamily, refused: Iterable[Refused] = ()) -> lis
     """What is odd, shape by shape, those that were left out first; nothing where all is well.
 
     Of the family: too few shapes, parts that too few have. Of each shape: names that look like a copy's of
-    another part's, parts in other length units, openings that had to be closed, a surface that passes through
-    itself, parts that nearly all others have, or that come with others of its parts, and it has not, in more
-    pieces than is usual, several times as large or small, elsewhere, or turned.
+    another part's, parts in other length units, openings that had to be closed, what of its files was not
+    read, a surface that passes through itself, parts that nearly all others have, or that come with others
+    of its parts, and it has not, in more pieces than is usual, several times as large or small, elsewhere,
+    or turned.
     """
     found = [Finding(one.name, LEFT_OUT, one.reason.removeprefix(f"{one.name}: ")) for one in refused]
     if len(family) < FEW:
@@ -171,12 +172,14 @@ def _cell(text: str) -> str:
 
 
 def _surface(family: PreparedFamily, index: int) -> list[str]:
-    """What the repair of the whole surface says that is more than tidying."""
-    repairs = read_about(family.folder / family.shapes[index].file).get("repairs", [])
+    """What the repair of the whole surface says that is more than tidying, and what was not read of it."""
+    about = read_about(family.folder / family.shapes[index].file)
+    repairs = about.get("repairs", [])
     found = [
         f"not watertight: {text}" for text in repairs if text.startswith(("filled", "the surface stays"))
     ]
-    return found + [text for text in repairs if text.startswith("the surface passes") or "left out" in text]
+    found += [text for text in repairs if text.startswith("the surface passes")]
+    return found + about.get("unread", [])
 
 
 def _pieces(shape: PreparedShape, parts: int) -> list[int]:

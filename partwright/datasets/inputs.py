@@ -37,14 +37,14 @@ _NAMED = 5  # files, in a line
 @dataclass(frozen=True)
 class PartedShape:
     """Parts by name, and the pieces that make up the whole: one of its own, or all parts. Own units. up: the
-    axis that its file says points up, if any. repairs: what its files hold and could not be read, a sentence
+    axis that its file says points up, if any. unread: what its files hold and could not be read, a sentence
     each."""
 
     name: str
     parts: Mapping[str, Piece]
     whole: tuple[Piece, ...]
     up: str | None = None
-    repairs: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
 
 
 class PartedSource(Protocol):
@@ -140,8 +140,8 @@ class PartFolder:
         shown = tuple(pieces.values()) if whole is None else (whole,)
         ups = {source.up for _, source in read.values() if source.up is not None}  # formats may say nothing
         up = ups.pop() if len(ups) == 1 else None
-        repairs = tuple(f"{name}: {text}" for name, (_, source) in read.items() for text in source.repairs)
-        return PartedShape(self.name, pieces, shown, up, repairs)
+        unread = tuple(f"{name}: {text}" for name, (_, source) in read.items() for text in source.repairs)
+        return PartedShape(self.name, pieces, shown, up, unread)
 
     def _files(self) -> list[Path]:
         return _meshes(self.path)

@@ -45,7 +45,7 @@ def label_surface(parted: PartedShape, parts: Sequence[str]) -> LabelledShape:
             f"{parted.name}: has {', '.join(strange)}, which the family has not ({', '.join(parts)}); "
             "rename or leave it out"
         )
-    shape = Shape(Source(parted.name, parted.whole, repairs=parted.repairs))
+    shape = Shape(Source(parted.name, parted.whole))
     numbers = {parts.index(name): piece for name, piece in parted.parts.items()}
     label, distance = _nearest_part(shape, numbers)
     if distance.max() > _APART:

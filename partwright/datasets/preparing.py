@@ -45,7 +45,7 @@ from partwright.shapes.units import canonical_up
 
 VALIDATION, TEST = 0.2, 0.2  # shares of the shapes; the rest trains (PartSDF, B.4)
 FEWEST_SAMPLES = 1000
-_REVISION = 1  # of what a shape's file holds: another number prepares it again
+_REVISION = 2  # of what a shape's file holds: another number prepares it again
 
 
 @dataclass(frozen=True)
@@ -287,7 +287,7 @@ def _is_done(path: Path, key: str) -> bool:
 
 def _sampled(job: _Job) -> tuple[PreparedShape, dict[str, Any]]:
     """The shape with poses that are still to be agreed on, all `fits` of each part, what the surface's
-    `repairs` were, and the axis that is `up` by the file."""
+    `repairs` were, what of its files is `unread`, and the axis that is `up` by them."""
     read = job.source.read()
     labelled = label_surface(read, job.parts)
     points, sdf, part = sample(labelled, job.samples, _seed_of(job))
@@ -307,7 +307,12 @@ def _sampled(job: _Job) -> tuple[PreparedShape, dict[str, Any]]:
         shape.frame,
     )
     rows = {job.parts[number]: [fit.to_row() for fit in found] for number, found in fits.items()}
-    return prepared, {"fits": rows, "repairs": list(shape.repairs), "up": read.up}
+    return prepared, {
+        "fits": rows,
+        "repairs": list(shape.repairs),
+        "unread": list(read.unread),
+        "up": read.up,
+    }
 
 
 def _seed_of(job: _Job) -> int:
@@ -331,7 +336,8 @@ def _finish(
     for job, has, own, said in zip(jobs, present, poses, about, strict=True):
         shape = read_shape(job.path, job.source.name)
         shape = replace(shape, poses=_filled(own, average, has))
-        extra: dict[str, Any] = {key: said[key] for key in ("key", "fits", "repairs", "up") if key in said}
+        kept = ("key", "fits", "repairs", "unread", "up")
+        extra: dict[str, Any] = {key: said[key] for key in kept if key in said}
         digest = write_shape(job.path, shape, extra)
         entries.append(Entry(shape.name, f"{SHAPES}/{job.path.name}", split[shape.name], digest))
     up = up or _usual(one.get("up") for one in about)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from partwright.datasets import family_check
 from partwright.datasets.family_check import LEFT_OUT, ODD, check_family, write_check
 from partwright.datasets.family_names import copied_names, missing, rare_parts
 from partwright.datasets.poses import Poses, average_poses
@@ -41,6 +42,22 @@ def test_a_family_in_which_all_is_well_has_no_findings(plain: list[PreparedShape
     assert check_family(family) == []
     write_check(tmp_path / "check.md", family, [])
     assert "Nothing stands out." in (tmp_path / "check.md").read_text()
+
+
+def test_what_was_not_read_is_told_and_harmless_repairs_are_not(
+    plain: list[PreparedShape], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    crossing = "the surface passes through itself"
+    about = {
+        "repairs": ["left out 2 loose flat sheets", "merged 3 vertices", crossing],
+        "unread": ["took 1 body with morph targets without them"],
+    }
+    monkeypatch.setattr(family_check, "read_about", lambda path: about if path.stem == "lamp03" else {})
+    findings = check_family(family_of(tmp_path / "f", plain))
+    assert [(one.shape, one.severity, one.text) for one in findings] == [
+        ("lamp03", ODD, crossing),
+        ("lamp03", ODD, "took 1 body with morph targets without them"),
+    ]
 
 
 def test_each_odd_shape_is_told_by_part_and_number(plain: list[PreparedShape], tmp_path: Path) -> None:

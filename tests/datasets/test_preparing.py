@@ -12,8 +12,6 @@ import trimesh
 import partwright as pw
 from partwright.cli.main import main
 from partwright.datasets import PreparedFamily, prepare
-from partwright.datasets.inputs import find_shapes
-from partwright.datasets.prepared import read_about
 from partwright.datasets.preparing import Preparation, splits
 from partwright.errors import FamilyError, OutputError, SettingError
 from partwright.fields import Box, Sphere
@@ -141,29 +139,6 @@ def test_the_axis_that_points_up_is_what_the_files_say_unless_it_is_stated(tmp_p
     assert prepare(source, output, samples=1000, workers=1, up="Z").family.up == "z"
 
 
-def test_a_part_whose_format_names_no_axis_leaves_it_to_the_others(tmp_path: Path) -> None:
-    folder = tmp_path / "thing"
-    folder.mkdir()
-    (foot, *others) = parts_of(1).items()
-    foot[1].export(folder / f"{foot[0]}.stl")
-    for name, mesh in others:
-        mesh.export(folder / f"{name}.glb")
-    (source,) = find_shapes(tmp_path)
-    assert source.read().up == "y"
-
-
-def test_what_of_a_scene_was_not_read_is_kept(tmp_path: Path) -> None:
-    (tmp_path / "in").mkdir()
-    for number in range(2):
-        scene = trimesh.Scene(parts_of(1 + 0.1 * number))
-        scene.add_geometry(trimesh.PointCloud(np.eye(3)), geom_name="dust")
-        scene.export(tmp_path / "in" / f"thing_{number}.glb")
-    told = "left out 3 points that came without faces beside the mesh"
-    assert [source.read().repairs for source in find_shapes(tmp_path / "in")] == [(told,)] * 2
-    family = prepare(tmp_path / "in", tmp_path / "out", samples=1000, workers=1).family
-    assert told in read_about(family.folder / family.shapes[0].file)["repairs"]
-
-
 def test_scenes_and_labelled_meshes_are_read_too(tmp_path: Path) -> None:
     folder = tmp_path / "in"
     folder.mkdir()
@@ -273,12 +248,6 @@ def test_files_that_are_not_read_are_named_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "none" / "chair.blend").write_bytes(b"")
     with pytest.raises(FamilyError, match=f"holds no shapes; .*; chair.blend {UNREAD}"):
         prepare(tmp_path / "none", tmp_path / "out")
-
-
-def test_files_are_told_by_their_suffixes(tmp_path: Path) -> None:
-    for name in ("a.step", "b.STP", "c.glb", "d.txt"):
-        (tmp_path / name).write_bytes(b"")
-    assert [source.name for source in find_shapes(tmp_path)] == ["a", "b", "c"]
 
 
 def test_open_parts_of_a_closed_whole_are_told_apart(tmp_path: Path) -> None:
