@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from itertools import product
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +13,7 @@ from partwright.assembly import Assembly, Part
 from partwright.capri import Settings, tree_search
 from partwright.capri import quadric_rows as rows
 from partwright.capri.csg_tree import CsgTree
-from partwright.capri.detection import DetectedQuadric, detect
 from partwright.capri.method import Found, found
-from partwright.capri.oriented_points import OrientedPoints
 from partwright.capri.repeated_convexes import with_repeated_convexes
 from partwright.capri.tree_search import TreeSearch
 from partwright.errors import (
@@ -32,29 +29,9 @@ from partwright.methods import Cancellation, FitRequest, Progress, Run
 from partwright.shapes import Shape, load_shape
 from tests.capri.meshes import bracket, drilled_plate, tilted_rod
 
+pytestmark = pytest.mark.usefixtures("detected_once")
+
 FAST = {"surface": 6000, "near": 6000, "uniform": 5000, "tries": 2, "least": 20}
-
-
-@pytest.fixture(autouse=True)
-def detected_once(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most of a quick fit is the detection of quadrics, the same for a shape whatever else is asked."""
-    if "detected_anew" not in request.fixturenames:
-        monkeypatch.setattr(tree_search, "detect", remembered)
-
-
-@pytest.fixture
-def detected_anew() -> None:
-    """For what is to find the same twice."""
-
-
-def remembered(surface: OrientedPoints, *rest: Any) -> list[DetectedQuadric]:
-    key = surface.points.tobytes(), surface.normals.tobytes(), rest
-    if key not in _detected:
-        _detected[key] = detect(surface, *rest)
-    return list(_detected[key])
-
-
-_detected: dict[Any, list[DetectedQuadric]] = {}
 
 
 def quick(shape: Shape, run: Run | None = None, **changes) -> Found:
