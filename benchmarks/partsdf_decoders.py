@@ -14,6 +14,7 @@ import torch
 from partsdf_scores import command_line, write
 
 from partwright.datasets.prepared import PreparedFamily
+from partwright.metrics.iou import occupancy_iou
 from partwright.partsdf.config import Config, read_config
 from partwright.partsdf.familiarity import familiarity
 from partwright.partsdf.meshing import mesh_shape
@@ -22,7 +23,6 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct
 from partwright.partsdf.targets import Target
 from partwright.partsdf.training import train
-from partwright.partsdf.validation import occupancy_iou
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 ROWS = (

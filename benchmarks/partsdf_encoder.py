@@ -13,13 +13,13 @@ from partsdf_scores import command_line, scale_of, write
 
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import SettingError
+from partwright.metrics.iou import occupancy_iou
 from partwright.partsdf.encoder import load_encoder
 from partwright.partsdf.model import load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct_unknown
 from partwright.partsdf.starts import nearest_trained
 from partwright.partsdf.targets import Target
-from partwright.partsdf.validation import occupancy_iou
 from partwright.shapes.sampling import sample_triangles
 
 NEAR = 0.05  # unit lengths: occupancies are compared there

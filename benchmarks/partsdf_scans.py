@@ -16,6 +16,7 @@ from partsdf_scores import command_line, scale_of, write
 import partwright as pw
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import PartwrightError
+from partwright.metrics.iou import occupancy_iou
 from partwright.partsdf import unseen
 from partwright.partsdf.encoder import load_encoder
 from partwright.partsdf.meshing import mesh_shape
@@ -23,7 +24,6 @@ from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.reconstruction import ReconstructionSettings, reconstruct_unknown
 from partwright.partsdf.targets import Target
-from partwright.partsdf.validation import occupancy_iou
 from partwright.shapes import Shape
 from partwright.shapes.sampling import sample_triangles
 

@@ -22,6 +22,7 @@ from partwright.capri import stages
 from partwright.capri.network import CapriNet, distances, load_network
 from partwright.capri.paper import SHIPPED
 from partwright.capri.pretraining_dataset import PretrainingDataset, make_pretraining_dataset
+from partwright.metrics.iou import occupancy_iou
 
 _PARTS, _POINTS, _SEED = 48, 8192, 99  # of a seed that nothing is trained on
 _AT_ONCE = 4
@@ -43,14 +44,10 @@ def scores(network: CapriNet, parts: PretrainingDataset) -> tuple[float, float, 
         losses.append(float(stages.weighted_loss(found, inside)))
         said, true = (found.left > stages.BETA) & (found.right <= stages.BETA), inside > 0
         half = said.shape[1] // 2
-        for s, t in zip(said, true, strict=True):
-            ious.append([iou(s, t), iou(s[half:], t[half:])])
+        for s, t in zip(said.numpy(), true.numpy(), strict=True):
+            ious.append([occupancy_iou(s, t), occupancy_iou(s[half:], t[half:])])
     every, anywhere = np.mean(ious, axis=0)
     return float(np.mean(losses)), every, anywhere
-
-
-def iou(said: torch.Tensor, true: torch.Tensor) -> float:
-    return float((said & true).sum() / (said | true).sum().clamp(min=1))
 
 
 def main() -> int:

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
+from partwright.metrics.iou import occupancy_iou
 from partwright.partsdf.config import Config
 from partwright.partsdf.losses import clamped_error
 from partwright.partsdf.model import Model
@@ -66,9 +67,3 @@ def _scores(found: NeuralShape, shape: PreparedShape) -> dict[str, float]:
         "val_iou": occupancy_iou(whole < 0, inside),
         "val_part_iou": float(np.mean(parts)),
     }
-
-
-def occupancy_iou(a: np.ndarray, b: np.ndarray) -> float:
-    """Of two occupancies (N,) of the same samples; 1 where both are empty."""
-    union = np.count_nonzero(a | b)
-    return np.count_nonzero(a & b) / union if union else 1.0
