@@ -84,9 +84,7 @@ def test_views_see_the_parts_where_their_poses_say(
     for name in ("normal", "label", "light", "back", "camera", "donors", "present"):
         assert torch.equal(getattr(views, name), getattr(again, name))
     cancel = Cancellation()
-    few = draw_views(
-        meshes, saved, 80, torch.Generator().manual_seed(0), lambda _: cancel.request(), cancel, workers=2
-    )
+    few = draw_views(meshes, saved, 80, torch.Generator().manual_seed(0), lambda _: cancel.request(), cancel)
     assert torch.equal(few.label, views.label[: len(few.label)])
     assert len(few.label) == len(few.donors) == 4
     assert len(views.label) == 80
