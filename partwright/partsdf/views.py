@@ -118,7 +118,7 @@ def draw_views(
     light, back, camera = np.zeros((3, len(label), 3), np.float32)
     framed: list[PoseTensors] = []
     draw = partial(_drawn, meshes, model.up)
-    with closing(carried_out(draw, orders, max(1, min(workers, len(orders) // _WORTH)), 8)) as drawn:
+    with closing(carried_out(draw, orders, min(workers, len(orders) // _WORTH), 8)) as drawn:
         for one in drawn:
             rows = slice(_EACH * len(framed), _EACH * (len(framed) + 1))
             label[rows], normal[rows] = one.label, one.normal
