@@ -1,6 +1,8 @@
 # Every target sets up what it needs: a fresh clone only wants Python 3.11 or newer and a C++ compiler.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
+# Python compiles what it imports; pip would compile all sixteen thousand files, for longer than it installs them.
+PIP := $(BIN)/pip install --quiet --no-compile
 BUILD_INPUTS := pyproject.toml CMakeLists.txt $(wildcard cpp/*)
 # An editable install knows the Python files of its day, so it is named after their list.
 FILES := $(shell find partwright -name '*.py' | LC_ALL=C sort | cksum | cut -d' ' -f1)
@@ -18,16 +20,16 @@ $(BIN)/python:
 
 # The package alone: what it needs is a fraction of what its tests do.
 $(PACKAGE): $(BUILD_INPUTS) | $(BIN)/python
-	$(BIN)/pip install --quiet -e .
+	$(PIP) -e .
 	touch $@
 
 # torch first and alone: it is the one big download, and stays when the package is rebuilt.
 .venv/torch: | $(BIN)/python
-	$(BIN)/pip install --quiet torch==2.13.0
+	$(PIP) torch==2.13.0
 	touch $@
 
 $(INSTALLED): .venv/torch $(BUILD_INPUTS)
-	$(BIN)/pip install --quiet -e ".[test,dev]"
+	$(PIP) -e ".[test,dev]"
 	touch $(PACKAGE) $@
 
 demo: $(PACKAGE)
@@ -35,8 +37,8 @@ demo: $(PACKAGE)
 
 # A process a core, so one thread each of PyTorch and BLAS, which spin while they wait: with one a core in every process
 # they take each other's, and a file of fits takes up to three times as long. The fits' own threads stay. A file is one
-# process's, so that what its tests share is made once.
-PYTEST := OMP_NUM_THREADS=1 OMP_WAIT_POLICY=PASSIVE $(BIN)/python -m pytest -n auto --dist loadfile
+# process's, so that what its tests share is made once; files are begun in the order of tests/conftest.py.
+PYTEST := OMP_NUM_THREADS=1 OMP_WAIT_POLICY=PASSIVE $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 test: setup
 	$(PYTEST)
 
@@ -84,7 +86,7 @@ release: .venv/release
 	CC=false CXX=false build/try/bin/python release/try_wheel.py
 
 .venv/release: pyproject.toml | $(BIN)/python
-	$(BIN)/pip install --quiet build "cyclonedx-python-lib[json-validation]" nanobind packaging
+	$(PIP) build "cyclonedx-python-lib[json-validation]" nanobind packaging
 	touch $@
 
 bench: setup
@@ -92,7 +94,7 @@ bench: setup
 
 # Every table of the documentation: quick ones of our own shapes, or, with FULL=1 DATA=FOLDER, as they are committed.
 benchmarks: setup
-	$(BIN)/pip install --quiet -e ".[bench]"
+	$(PIP) -e ".[bench]"
 	$(BIN)/python benchmarks/tables.py $(if $(FULL),--full --data $(DATA))
 
 # Quality and relative speed of a few fits against committed references; in .ci/run.

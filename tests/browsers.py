@@ -16,6 +16,9 @@ ARGUMENTS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--disable-background-networking",
+    # What is around the picture the processor draws faster as such than as a graphics card.
+    "--disable-gpu-compositing",
+    "--disable-gpu-rasterization",
 ]
 PATIENCE = 180.0  # seconds, on a machine that does much else
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import signal
+from collections.abc import Generator
 from functools import partial
 
 import pytest
@@ -23,6 +25,22 @@ settings.load_profile("patient")
 
 # A shell starts background jobs with Ctrl-C ignored, and Python then leaves it so.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The studio's tests first: they take longest and wait much, and files are begun in this order."""
+    items.sort(key=lambda item: not item.nodeid.startswith("tests/studio/"))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """What all files import stays: the collector of cycles would go through all of it again and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture

@@ -68,8 +68,8 @@ def new_page(browser: Any) -> Iterator[Callable[..., Page]]:
     contexts = []
 
     def make(width: int = 900, height: int = 400, **options: Any) -> Page:
-        # Half as many pixels each way: a processor draws them here, and the page is as large.
-        few = {"device_scale_factor": 0.5, **options}
+        # A quarter as many pixels each way: a processor draws them here, and the page is as large.
+        few = {"device_scale_factor": 0.25, **options}
         context = browser.new_context(viewport={"width": width, "height": height}, **few)
         contexts.append(context)
         return Page(context.new_page())

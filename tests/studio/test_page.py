@@ -118,7 +118,7 @@ def test_the_graphics_card_finds_the_packages_distances(shared: Callable[..., Pa
 
 
 def test_tiles_and_balls_that_leave_parts_out_change_no_pixel(shared: Callable[..., Page]) -> None:
-    page = shared(many_kinds(), width=780, height=300)
+    page = shared(many_kinds(), width=780, height=300, device_scale_factor=0.5)
     different = page.ask(
         """() => {
             const { renderer } = partwright.viewport, { gl } = renderer;
