@@ -17,6 +17,7 @@ from partwright.capri import quadric_rows as rows
 from partwright.capri.oriented_points import OrientedPoints
 from partwright.capri.quadric_kinds import HYPOTHESES, LEAST_SQUARES_FITS, MinimalSets
 from partwright.capri.quadric_rows import Row
+from partwright.rows import dots, lengths
 
 _HYPOTHESES_PER_KIND = 48  # hypotheses of each kind in one draw
 _PROBE_POINTS = 1500  # points that sift hypotheses
@@ -149,8 +150,8 @@ def _support(
     at the tolerance (Torr & Zisserman 2000), and 0 where the normals do not agree up to sign."""
     value = rows.values(np.stack(made), points).T
     slope = np.stack([rows.gradients(row, points) for row in made])
-    length = np.maximum(np.linalg.norm(slope, axis=2), 1e-9)
-    along = np.abs((slope * normals).sum(axis=2))
+    length = np.maximum(lengths(slope), 1e-9)
+    along = np.abs(dots(slope, normals))
     near = 1 - (value / (tolerance * length)) ** 2
     return np.where(along > _MIN_NORMAL_COSINE * length, np.maximum(near, 0.0), 0.0)
 

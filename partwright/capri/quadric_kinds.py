@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 
 from partwright.capri import quadric_rows as rows
 from partwright.capri.quadric_rows import Row
+from partwright.rows import crosses, dots, lengths
 
 _MAX_RADIUS = 4.0  # radius, unit frame
 _MIN_CURVATURE_RATIO = 0.02  # smaller curvatures, as a share of the largest, are none
@@ -122,8 +123,8 @@ def _closest_approach(
     p: NDArray[np.float64], n: NDArray[np.float64], q: NDArray[np.float64], m: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     """s, t (N,) that bring p + s n and q + t m closest, and whether the lines are not parallel."""
-    w, b = p - q, (n * m).sum(axis=1)
-    d, e = (n * w).sum(axis=1), (m * w).sum(axis=1)
+    w, b = p - q, dots(n, m)
+    d, e = dots(n, w), dots(m, w)
     bottom = 1 - b * b
     ok = bottom > 2e-3
     bottom = np.where(ok, bottom, 1.0)
@@ -162,12 +163,12 @@ def _fit_cylinder(row: Row, points: NDArray[np.float64], normals: NDArray[np.flo
 
 def _cylinder_residuals(x: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     axis = x[3:6] / np.linalg.norm(x[3:6])
-    return np.linalg.norm(np.cross(points - x[:3], axis), axis=1) - x[6]
+    return lengths(crosses(points - x[:3], axis)) - x[6]
 
 
 def _cone_residuals(x: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     axis, rays = x[3:6] / np.linalg.norm(x[3:6]), points - x[:3]
-    across = np.linalg.norm(np.cross(rays, axis), axis=1)
+    across = lengths(crosses(rays, axis))
     return np.asarray(across * np.cos(x[6]) - np.abs(rays @ axis) * np.sin(x[6]))
 
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from partwright.rows import lengths
+
 Row = NDArray[np.float64]
 Points = NDArray[np.floating]
 
@@ -38,7 +40,7 @@ def gradients(row: Row, points: Points) -> NDArray[np.float64]:
 
 def distances(row: Row, points: Points) -> NDArray[np.float64]:
     """First-order distance f / |grad f| (N,) of one row at points (N, 3)."""
-    slope = np.linalg.norm(gradients(row, points), axis=1)
+    slope = lengths(gradients(row, points))
     return np.asarray(values(row, points)[:, 0] / np.maximum(slope, _MIN_GRADIENT))
 
 

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.rows import lengths
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid
 from partwright.superfrusta.settings import Settings
@@ -197,7 +198,7 @@ def _sampled(grid: DistanceGrid, points: Floats) -> Floats:
     cell = (points - grid.origin) / grid.spacing
     within = np.clip(cell, 0, np.array(grid.values.shape) - 1)
     values = map_coordinates(grid.values, within.T, order=1, mode="nearest")
-    return np.asarray(values + grid.spacing * np.linalg.norm(cell - within, axis=1), np.float64)
+    return np.asarray(values + grid.spacing * lengths(cell - within), np.float64)
 
 
 def refined(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from partwright.assembly import Assembly, Part
 from partwright.errors import NoSurfaceError
 from partwright.methods import check_count
+from partwright.rows import crosses, dots, lengths, sums
 from partwright.shapes.sampling import sample_triangles
 from partwright.textures.colours import Colours
 from partwright.textures.coordinates import directions, folded, frames, is_hollow, of_nearest_copy
@@ -109,8 +110,8 @@ class _Sums:
         )
         towards, inner = directions(field, points)
         across, turned = frames(field, points, smooth)
-        up = turned[:, None] * np.cross(smooth, across)
-        bent = np.stack([(normals * axis).sum(axis=1) for axis in (across, up, smooth)], axis=1)
+        up = turned[:, None] * crosses(smooth, across)
+        bent = np.stack([dots(normals, axis) for axis in (across, up, smooth)], axis=1)
         bent[bent[:, 2] < _STEEP] = (0, 0, 1)
         place, values = folded(towards), np.column_stack([colours, _SPAN * (bent + 1)])
         if seen.held:
@@ -144,7 +145,7 @@ class _Sums:
         """Squared error of colours in views that no map is made of."""
         return float(
             sum(
-                weights @ ((values[:, :3] - read(image, place, inner)) ** 2).sum(axis=1)
+                weights @ sums((values[:, :3] - read(image, place, inner)) ** 2)
                 for place, inner, values, weights in self.held
             )
         )
@@ -154,9 +155,9 @@ class _Sums:
         flat = bent = total = 0.0
         for place, inner, values, weights in self.held:
             found, wanted = read(image, place, inner) / _SPAN - 1, values[:, 3:] / _SPAN - 1
-            found /= np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-20)
-            flat += float(weights @ ((wanted - (0, 0, 1)) ** 2).sum(axis=1))
-            bent += float(weights @ ((wanted - found) ** 2).sum(axis=1))
+            found /= np.maximum(lengths(found)[:, None], 1e-20)
+            flat += float(weights @ sums((wanted - (0, 0, 1)) ** 2))
+            bent += float(weights @ sums((wanted - found) ** 2))
             total += float(weights.sum())
         return flat > _SMOOTH**2 * total and bent < _GAIN * flat
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.errors import NoColoursError
+from partwright.rows import crosses, dots, lengths, sums
 from partwright.shapes.corner_normals import corner_normals
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.loading import READ_BY_TRIMESH, load_scene
@@ -136,8 +137,8 @@ class Colours:
         (e, f), (g, h) = ((one[:, 1] - one[:, 0], one[:, 2] - one[:, 0]) for one in (corners, uv))
         turned = np.where(g[:, 0] * h[:, 1] - h[:, 0] * g[:, 1] < 0, -1.0, 1.0)[:, None]
         across = turned * (h[:, 1:] * e - g[:, 1:] * f)
-        across = _unit(across - (across * normals).sum(axis=1, keepdims=True) * normals)
-        return across, turned * np.cross(normals, across)
+        across = _unit(across - dots(across, normals)[:, None] * normals)
+        return across, turned * crosses(normals, across)
 
 
 def load_colours(path: str | Path) -> Colours:
@@ -291,7 +292,7 @@ def _normals(mesh: Any, matrix: Floats) -> Floats:
 
 
 def _unit(vectors: Floats) -> Floats:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-20)
+    return vectors / np.maximum(lengths(vectors)[..., None], 1e-20)
 
 
 def _texel(index: Floats, count: int, wrap: str) -> NDArray[np.int64]:
@@ -314,4 +315,4 @@ def barycentric(corners: Floats, points: Floats) -> Floats:
     det = np.maximum(uu * vv - uv * uv, 1e-300)
     second, third = (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det
     weights = np.clip(np.stack([1 - second - third, second, third], axis=1), 0, 1)
-    return np.asarray(weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12))
+    return np.asarray(weights / np.maximum(sums(weights)[:, None], 1e-12))

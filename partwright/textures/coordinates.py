@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from partwright.assembly import Part
 from partwright.fields import Field, SuperFrustum
+from partwright.rows import crosses, dots, lengths, sums
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +50,7 @@ def folded(directions: Floats, sign: Floats | None = None) -> Floats:
     sign (N, 3): of the octants that are meant, for directions on the boundary of several.
     """
     sign = np.where(directions < 0, -1.0, 1.0) if sign is None else sign
-    n = directions / np.maximum(np.abs(directions).sum(axis=1, keepdims=True), _LEAST)
+    n = directions / np.maximum(sums(np.abs(directions))[:, None], _LEAST)
     flat = np.where(sign[:, 2:] < 0, (1 - np.abs(n[:, 1::-1])) * sign[:, :2], n[:, :2])
     return np.asarray(flat / 2 + 0.5)
 
@@ -72,10 +73,10 @@ def frames(
         axis=2,
     )
     slope -= (slope @ normals[:, :, None]) * normals[:, None]
-    across = np.cross(slope[:, 1], normals)
-    across *= np.where((across * slope[:, 0]).sum(axis=1) < 0, -1.0, 1.0)[:, None]
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
-    turned = (np.cross(normals, across) * slope[:, 1]).sum(axis=1)
+    across = crosses(slope[:, 1], normals)
+    across *= np.where(dots(across, slope[:, 0]) < 0, -1.0, 1.0)[:, None]
+    across /= np.maximum(lengths(across)[:, None], 1e-300)
+    turned = dots(crosses(normals, across), slope[:, 1])
     return across, np.where(turned < 0, -1.0, 1.0)
 
 
@@ -112,7 +113,7 @@ def _is_inner(solid: SuperFrustum, unbent: Floats) -> NDArray[np.bool_]:
     m = min(half_x, half_y)
     radius = solid.roundness * m
     off = np.abs(unbent[:, :2]) - (half_x, half_y) + radius
-    q = np.linalg.norm(np.maximum(off, 0), axis=1) + np.minimum(off.max(axis=1), 0) - radius
+    q = lengths(np.maximum(off, 0)) + np.minimum(np.maximum(off[:, 0], off[:, 1]), 0) - radius
     t = np.clip((unbent[:, 2] / max(half_z, _LEAST) + 1) / 2, 0, 1)
     outer = m * (solid.taper - 1) * t
     bottom, top = m * (solid.onion - 1), m * (solid.taper * solid.onion - 1)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
+from partwright.rows import crosses, dots, lengths
 from partwright.textures.colours import Colours
 from partwright.textures.coordinates import frames, of_nearest_copy
 from partwright.textures.cut_outs import all_three, first_shown
@@ -95,11 +96,11 @@ def map_normals(assembly: Assembly, points: Floats, smooth: Floats) -> Floats:
         axes = (np.broadcast_to(axis, (len(mine), 3)) for axis in np.eye(3))
         own, away, *axes_there = of_nearest_copy(part, points[mine], smooth[mine], *axes)
         across, turned = frames(part.field, own, away)
-        up = turned[:, None] * np.cross(away, across)
+        up = turned[:, None] * crosses(away, across)
         x, y, z = (relief.at(part.field, own) / 127.5 - 1).T[:, :, None]
         bent = x * across + y * up + z * away
-        bent /= np.maximum(np.linalg.norm(bent, axis=1, keepdims=True), 1e-20)
-        result[mine] = np.stack([(bent * axis).sum(axis=1) for axis in axes_there], axis=1)
+        bent /= np.maximum(lengths(bent)[:, None], 1e-20)
+        result[mine] = np.stack([dots(bent, axis) for axis in axes_there], axis=1)
     return result
 
 
@@ -137,7 +138,7 @@ def likeness(
             want = picture(pixel, shaded(np.full((len(pixel), 3), 255.0), normals, view))
             white = np.full((len(own), 3), 255.0)
             smooth = np.einsum("nc,ncd->nd", shares, parts.corner_normals[mine].astype(np.float64))
-            smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1e-20)
+            smooth /= np.maximum(lengths(smooth)[:, None], 1e-20)
             each = [picture(own, shaded(white, map_normals(one, places, smooth), view)) for one in assemblies]
         else:
             want = picture(pixel, colours.on_faces(face, weights))

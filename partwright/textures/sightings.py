@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
+from partwright.rows import dots, lengths
 from partwright.shapes.sampling import sample_triangles
 from partwright.textures.colours import Colours, barycentric
 from partwright.textures.cut_outs import all_three, first_shown
@@ -61,7 +62,7 @@ def sightings(assembly: Assembly, colours: Colours, size: int, seed: int, views:
     def at(points: Floats, own: _Place, its: _Place, weight: float, held: bool = False) -> Sightings:
         smooth = _unit(np.einsum("nc,ncd->nd", own[1], here.corner_normals[own[0]].astype(np.float64)))
         # A side that faces inwards counts as its other one does.
-        turned = (here.face_normals[own[0]] * there.face_normals[its[0]]).sum(axis=1, keepdims=True)
+        turned = dots(here.face_normals[own[0]], there.face_normals[its[0]])[:, None]
         normals = np.where(turned < 0, -1.0, 1.0) * colours.normals_on_faces(*its)
         weights = np.full(len(points), weight)
         return Sightings(points, smooth, colours.on_faces(*its), normals, weights, weight < 1, held)
@@ -84,7 +85,7 @@ def sightings(assembly: Assembly, colours: Colours, size: int, seed: int, views:
         mine, distance, weights = here.first_hit(eyes, rays)
         struck, far, others = first_shown(there, colours, eyes, rays)
         with np.errstate(invalid="ignore"):  # inf - inf, of rays that miss both
-            met = np.flatnonzero(np.abs(distance - far) * np.linalg.norm(rays, axis=1) < reach)
+            met = np.flatnonzero(np.abs(distance - far) * lengths(rays) < reach)
         on = mine[met].astype(np.int64), all_three(weights[met])
         seen = struck[met], others[met]
         yield at(view.eye + distance[met, None] * rays[met], on, seen, 1.0, held)
@@ -99,4 +100,4 @@ def _camera(i: int, count: int, start: float) -> Camera:
 
 
 def _unit(vectors: Floats) -> Floats:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-20)
+    return vectors / np.maximum(lengths(vectors)[:, None], 1e-20)

@@ -94,8 +94,8 @@ def corners(place: Floats, size: int) -> tuple[NDArray[np.int64], Floats]:
     step = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
     texel = np.minimum(low[:, None] + step, size - 1).astype(np.int64)
     part = (at - low)[:, None]
-    share = np.where(step, part, 1 - part).prod(axis=2)
-    return texel, share
+    across, up = np.where(step, part, 1 - part).transpose(2, 0, 1)
+    return texel, across * up
 
 
 def read(image: NDArray[np.uint8], place: Floats, side: NDArray[np.bool_]) -> Floats:

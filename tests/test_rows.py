@@ -1,0 +1,29 @@
+"""Rows with few columns: the same bits as NumPy's own reductions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from partwright.rows import crosses, dots, lengths, sums
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("shape", [(0, 3), (1, 3), (500, 3), (500, 2), (4, 50, 3), (3,)])
+def test_the_bits_are_those_of_numpy(shape: tuple[int, ...], dtype: type) -> None:
+    rng = np.random.default_rng(0)
+    one, other = (rng.normal(size=shape).astype(dtype) * 10.0 ** rng.integers(-8, 8) for _ in range(2))
+    one, other = one.astype(dtype), other.astype(dtype)
+    wanted = [one.sum(axis=-1), (one * other).sum(axis=-1), np.linalg.norm(one, axis=-1)]
+    for found, want in zip((sums(one), dots(one, other), lengths(one)), wanted, strict=True):
+        assert found.dtype == want.dtype
+        np.testing.assert_array_equal(found, want)
+    if shape[-1] == 3:
+        np.testing.assert_array_equal(crosses(one, other), np.cross(one, other))
+
+
+def test_one_row_goes_with_many() -> None:
+    rows, one = np.random.default_rng(1).normal(size=(20, 3)), np.array([1.0, -2.0, 0.5])
+    np.testing.assert_array_equal(dots(rows, one), (rows * one).sum(axis=1))
+    np.testing.assert_array_equal(crosses(rows, one), np.cross(rows, one))
+    np.testing.assert_array_equal(lengths(rows[:, ::-1]), np.linalg.norm(rows[:, ::-1], axis=1))
