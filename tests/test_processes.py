@@ -22,6 +22,12 @@ def _interrupted(order: int) -> int:
     return order
 
 
+def _refused(order: int) -> int:
+    if order == 1:
+        raise SettingError(f"{order} is refused")
+    return order
+
+
 def _killed(order: int) -> int:
     os.kill(os.getpid(), signal.SIGKILL)
     return order
@@ -43,6 +49,13 @@ def test_they_are_deaf_to_ctrl_c_and_end_when_they_are_no_longer_asked() -> None
     with closing(carried_out(_interrupted, range(40), 2)) as made:
         assert [next(made) for _ in range(3)] == [0, 1, 2]
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, set())  # who began them is not
+
+
+def test_what_an_order_raises_there_is_raised_here() -> None:
+    made = carried_out(_refused, range(4), 2)
+    assert next(made) == 0
+    with pytest.raises(SettingError, match=r"^1 is refused$"):
+        next(made)
 
 
 def test_a_process_that_is_ended_is_told() -> None:

@@ -72,6 +72,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="also N spheres at most for each link that collides, for planners: ROBOT.spheres.yml (cuRobo's) "
         "and ROBOT.spheres.json; in its material, or around or inside it as the shapes are",
     )
+    option(
+        "--workers",
+        metavar="N",
+        type=int,
+        help="processes that shape the links of a robot that takes long (default: one a processor)",
+    )
     command.set_defaults(run="collide")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import shutil
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +24,8 @@ from partwright.robots.opening import open_robot
 from partwright.robots.overlaps import Pair, overlaps, too_near
 from partwright.robots.picture import picture
 from partwright.robots.report import LinkReport, report
-from partwright.robots.shaping import LIGHT, Wishes, numbered, shapes_for
+from partwright.robots.shaping import LIGHT, Wishes, numbered
+from partwright.robots.side_by_side import Order, made_side_by_side
 from partwright.robots.solids import Solids, Target, largest_deviation
 from partwright.robots.spheres import LinkSpheres, as_json, curobo, spheres_for
 from partwright.shapes.cleaning import counted
@@ -141,11 +143,13 @@ def collide(
     options: CollideOptions | None = None,
     packages: Sequence[str | Path] = (),
     told: Told = lambda _: None,
+    workers: int = 1,
 ) -> Collided:
     """Shapes for every link of the robot that has collision meshes, and spheres, if they are asked for, for
     every one that collides.
 
-    told: gets a line a link.
+    told: gets a line a link. workers: processes, as of `carried_out`, that shape the links of a robot that
+    takes long.
 
     Raises:
         UnreadableFileError, UnsupportedFormatError, RobotError: of `open_robot`; no link has a collision
@@ -163,12 +167,9 @@ def collide(
     kinds, hulls = kinds_of(robot, options.kinds)
     solids = Solids()
     before = {link.name: solids.target(link, link.collisions) for link in links}
-    wanted = {
-        link.name: solids.target(link, link.visuals, sheets=True)
-        if options.enclose and link.visuals
-        else before[link.name]
-        for link in links
-    }
+    seen = {link.name for link in links if options.enclose and link.visuals}
+    uses = {link.name: link.visuals if link.name in seen else link.collisions for link in links}
+    wanted = {link.name: solids.target(link, uses[link.name], link.name in seen) for link in links}
     bodies = _bodies(colliding, {name: target.solid for name, target in before.items()})
     pairs_before = overlaps(bodies)
     corners = [np.reshape(_in_world(link, before[link.name].solid).bounding_box(), (2, 3)) for link in links]
@@ -180,12 +181,17 @@ def collide(
     made: dict[tuple[Target, Wishes], list[Shape]] = {}
     todo = {link.name for link in links}
     for turn in range(1 + _FINER):
+        keys = {link.name: (wanted[link.name], wishes[link.name]) for link in links if link.name in todo}
+        orders: dict[tuple[Target, Wishes], Order] = {}
         for link in links:
-            if link.name in todo:
-                key = wanted[link.name], wishes[link.name]  # one target, as of four legs alike: made once
-                made[key] = made.get(key) or _shaped(link, *key)
-                shapes[link.name] = numbered(_stem(link.name), made[key])
-                told(f"{link.name}: {counted(len(shapes[link.name]), 'shape')}")
+            if link.name in todo and (key := keys[link.name]) not in made:  # four legs alike are made once
+                orders.setdefault(key, Order(link, uses[link.name], link.name in seen, wishes[link.name]))
+        with closing(made_side_by_side(solids, [*orders.values()], workers)) as found:
+            for name, key in keys.items():
+                if key not in made:
+                    made[key] = next(found)
+                shapes[name] = numbered(_stem(name), made[key])
+                told(f"{name}: {counted(len(shapes[name]), 'shape')}")
         if options.enclose:
             apart = _kept_apart(links, shapes, wanted, wishes, pairs_before)
             for name in (name for name in apart if len(apart[name]) != len(shapes[name])):
@@ -289,13 +295,6 @@ def _kept_apart(
 def _stem(link: str) -> str:
     """What the names of a link's shapes start with."""
     return "".join(c if c.isascii() and (c.isalnum() or c in "_-.") else "_" for c in link) + "_collision"
-
-
-def _shaped(link: Link, target: Target, wishes: Wishes) -> list[Shape]:
-    shapes = shapes_for(_stem(link.name), target, wishes)
-    if not shapes:
-        raise RobotError(f"link {link.name!r}: no shape lies inside of its mesh; it is too thin")
-    return shapes
 
 
 def _union(shapes: Sequence[Shape]) -> Manifold:

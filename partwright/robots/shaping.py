@@ -39,7 +39,7 @@ _NATIVE_PIECE = 5e-4  # of the link's volume: the same for one of several, which
 _SAVED = 2e-3  # of the link's volume: what each native solid more has to save where there are no hulls
 LIGHT = 0.1  # of the tolerance: what a hull may lose for fewer corners, or add for fewer faces
 _LOST, _MOST_LOST = 1e-5, 0.01  # of the link's volume, and of its own: what a hull of fewer corners may lack
-_FLAWS = 1e-3  # of its volume: what a hull may add to a convex link
+FLAWS = 1e-3  # of its volume: what a hull may add to a convex link
 _ROUNDING = 1e-9  # of its volume: what a hull adds to a link without a dent
 _CORNERS = 1024  # of a convex link's exact hull
 _FACES = 64  # of an enclosing hull, and more as long as a corner is out by a share of the tolerance
@@ -116,7 +116,7 @@ def _inside(target: Target, wishes: Wishes) -> list[Shape]:
 def _convex(target: Target, wishes: Wishes) -> Shape | None:
     """A convex solid as a native one that is near, or its own hull, exact; None where it is not convex."""
     solid, whole = target.solid, Piece(target.solid)
-    if not wishes.hulls or whole.extra > _FLAWS * solid.volume() or whole.hull.num_vert() > _CORNERS:
+    if not wishes.hulls or whole.extra > FLAWS * solid.volume() or whole.hull.num_vert() > _CORNERS:
         return None
     dented = whole.extra > _ROUNDING * solid.volume()
     if dented and not whole.within(wishes.tolerance):

@@ -78,7 +78,13 @@ class _Mesh:
 
 
 class Solids:
-    """Reads each mesh file once; links that have the same meshes in the same places share one target."""
+    """Reads each mesh file once; links that have the same meshes in the same places share one target.
+
+    Another process gets none of what was read: a solid that is built again from its triangles is not always
+    quite the same, so it reads what it needs."""
+
+    def __reduce__(self) -> tuple[type[Solids], tuple[()]]:
+        return Solids, ()
 
     def __init__(self) -> None:
         self._meshes: dict[tuple[_Key, bool], _Mesh] = {}

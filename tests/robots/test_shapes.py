@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from partwright.errors import SettingError
-from partwright.robots import CollideOptions, collide
+from partwright.robots import CollideOptions, collide, side_by_side
 from partwright.robots.containment import outside_of, shape_solid
 from partwright.robots.model import Shape
 from partwright.robots.report import warnings
@@ -70,7 +70,7 @@ def test_links_of_the_same_mesh_have_the_same_shapes_which_are_made_once(
         made.append(name)
         return shapes_for(name, *rest)
 
-    monkeypatch.setattr(sys.modules["partwright.robots.collide"], "shapes_for", counted)
+    monkeypatch.setattr(side_by_side, "shapes_for", counted)
     path = urdf(tmp_path)
     legs = "".join(
         f"""<link name="{name}"><collision><geometry>
@@ -85,7 +85,7 @@ def test_links_of_the_same_mesh_have_the_same_shapes_which_are_made_once(
     result = collide(path, CollideOptions(kinds=("hull",), spheres=2))
     shapes, balls = result.shapes, {each.link: each.balls for each in result.spheres}
     assert balls["front"] is balls["left"] is not balls["right"]
-    assert made == ["base_collision", "arm_collision", "left_collision", "right_collision"]
+    assert made == ["base", "arm", "left", "right"]
     assert [shape.name for shape in shapes["front"]] == ["front_collision_1", "front_collision_2"]
     for one, other in zip(shapes["left"], shapes["front"], strict=True):
         assert np.array_equal(one.mesh.vertices, other.mesh.vertices)
@@ -218,9 +218,8 @@ def test_a_link_is_held_to_the_tolerance_that_was_given(tmp_path: Path, monkeypa
         asked.append(wishes.tolerance)
         return shapes_for(name, target, wishes)
 
-    module = sys.modules["partwright.robots.collide"]
-    monkeypatch.setattr(module, "too_near", overlapping)
-    monkeypatch.setattr(module, "shapes_for", measured)
+    monkeypatch.setattr(sys.modules["partwright.robots.collide"], "too_near", overlapping)
+    monkeypatch.setattr(side_by_side, "shapes_for", measured)
     result = collide(urdf(tmp_path), CollideOptions(tolerance="10mm"))
     assert {link.tolerance for link in result.links} == {0.01}
     assert min(asked) == max(asked) / 2 < 0.005

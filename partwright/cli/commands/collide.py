@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
@@ -24,7 +25,8 @@ def run(arguments: argparse.Namespace) -> int:
         spheres=arguments.spheres,
         kinds=tuple(filter(None, arguments.kinds.split(","))),
     )
-    result = collide(arguments.robot, options, arguments.packages, told=note)
+    workers = (os.cpu_count() or 1) if arguments.workers is None else arguments.workers
+    result = collide(arguments.robot, options, arguments.packages, told=note, workers=workers)
     save(result, arguments.output)
     for line in (*_table(result.links), *_sphere_table(result.spheres)):
         say(line)
