@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from partwright.shapes.cleaning import counted
 from partwright.shapes.distance import MeshDistance
@@ -130,6 +129,8 @@ def _loose(
     flat: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
     """Which of the open bodies are flat and run along no other, those left out that are loose themselves."""
+    from scipy.spatial import cKDTree
+
     rims = [_rim_points(vertices, EdgeTable(edges.faces[one])) for one in bodies]
     of = np.repeat(np.arange(len(rims)), [len(rim) for rim in rims])
     pairs = cKDTree(np.concatenate(rims)).query_pairs(_ALONG, output_type="ndarray")
