@@ -14,7 +14,7 @@ TRIES = 8  # of `--tries`: with half of the shapes unsound, one of 256 stays so
 _EPILOG = """\
 SHAPE is an assembly of neural parts (.json), or a folder with one; MODEL:NAME for a shape that the model was
 trained on, by name or number: mixers:3; or a mesh, points or a picture, for what is found in it. The same
-seed makes the same shapes, and fewer of them the first of more.
+seed makes the same shapes, and fewer of them the first of more. Ctrl-C keeps the samples that are done.
 """
 
 

@@ -26,6 +26,7 @@ from partwright.partsdf.diffusion import denoised
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import POSE, PartVectors
+from partwright.partsdf.pose_range import within_range
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.seeds import mixed
 
@@ -154,11 +155,11 @@ class Generator:
         noise = _noise(draws, seed, (len(kept), POSE + 1 + self.vectors.width))
         layout, latents = noise[..., : POSE + 1], noise[..., POSE + 1 :]
         if source is None:
-            layout = denoised(self.layouts, layout)
+            layout = self._within(denoised(self.layouts, layout))
             latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents)
         elif change:
             near = self.layout_of(source.poses, source.present).expand_as(layout)
-            layout = denoised(self.layouts, layout, like=near, since=change)
+            layout = self._within(denoised(self.layouts, layout, like=near, since=change))
             form = self.vectors.of_latents(source.latents).expand_as(latents)
             latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents, like=form, since=change)
             source = None
@@ -166,6 +167,7 @@ class Generator:
             known = self.layout_of(source.poses, source.present).expand_as(layout)
             fixed = torch.ones_like(kept) if keep_layout else kept
             layout = denoised(self.layouts, layout, known, fixed[:, None].expand_as(layout))
+            layout = self._within(layout, fixed)
             form = self.vectors.of_latents(source.latents).expand_as(latents)
             same = kept[:, None].expand_as(latents)
             latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents, form, same)
@@ -174,6 +176,10 @@ class Generator:
     def layout_of(self, poses: PoseTensors, present: Tensor) -> Tensor:
         """(..., P, 13) of poses (..., P, ...) and presence (..., P)."""
         return tidy(torch.cat([self.vectors.of_poses(poses), 2.0 * present[..., None] - 1], dim=-1))
+
+    def _within(self, layout: Tensor, fixed: Tensor | None = None) -> Tensor:
+        still = torch.zeros(layout.shape[1], dtype=torch.bool) if fixed is None else fixed
+        return within_range(self.model, self.vectors, layout, still)
 
     def _check(self, source: NeuralShape | None, kept: Tensor, keep_layout: bool, change: float) -> None:
         name = self.model.name

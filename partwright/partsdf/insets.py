@@ -17,6 +17,7 @@ import torch
 from torch import Tensor
 
 from partwright.partsdf.cores import one_core_each
+from partwright.partsdf.decoded import Decoded
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.offsets import beyond_range
 from partwright.partsdf.poses import PoseTensors, local_points, rotation_matrices
@@ -66,12 +67,14 @@ class Inset:
         return self.reach.usual if self.stands_out else self.reach.most
 
 
-def reaches(trained: Iterable[tuple[NeuralShape, dict[str, trimesh.Trimesh]]]) -> dict[str, Reach]:
-    """Of the parts that lie in others in all training shapes, by name."""
+def reaches(trained: Iterable[Mapping[str, np.ndarray]]) -> dict[str, Reach]:
+    """Of the parts that lie in others in all training shapes, by name. trained: of each of these, how far the
+    vertices of its parts' meshes are from the other parts."""
     found: dict[str, list[float]] = {}
-    for shape, parts in trained:
-        for name, far in _distances(shape, parts, parts).items():
-            found.setdefault(name, []).append(float(np.quantile(far, _MOST)))
+    for off in trained:
+        for name, far in off.items():
+            if np.isfinite(far).all():  # there is another part
+                found.setdefault(name, []).append(float(np.quantile(far, _MOST)))
     return {
         name: Reach(float(np.median(far)) + _SLACK, max(far) + _SLACK)
         for name, far in found.items()
@@ -80,27 +83,19 @@ def reaches(trained: Iterable[tuple[NeuralShape, dict[str, trimesh.Trimesh]]]) -
 
 
 def insets(
-    shape: NeuralShape, parts: dict[str, trimesh.Trimesh], known: Mapping[str, Reach]
+    parts: dict[str, trimesh.Trimesh], known: Mapping[str, Reach], off: Mapping[str, np.ndarray]
 ) -> tuple[Inset, ...]:
-    """The parts that are known to lie in others, by the parts' own meshes (unit frame)."""
+    """The parts that are known to lie in others, by the parts' own meshes (unit frame); off: how far the
+    vertices of each are from the other parts."""
     rng = np.random.default_rng(0)
     found = []
-    for name, far in _distances(shape, parts, known).items():
+    for name, far in off.items():
+        if name not in known or len(off) < 2:
+            continue
         points = rng.permutation(np.asarray(parts[name].vertices, np.float32))[:_PLACES]
         share = float((far > known[name].most).mean())
         found.append(Inset(name, known[name], share, points))
     return tuple(found)
-
-
-def _distances(
-    shape: NeuralShape, parts: dict[str, trimesh.Trimesh], names: Collection[str]
-) -> dict[str, np.ndarray]:
-    """(V,) of the vertices of the mesh of each part of these names from all other parts, by name."""
-    return {
-        name: np.delete(shape.part_distances(np.asarray(parts[name].vertices)), number, axis=0).min(axis=0)
-        for number, name in enumerate(shape.names())
-        if name in names and name in parts and len(parts) > 1
-    }
 
 
 @one_core_each()
@@ -145,14 +140,16 @@ def put_back(
 
 
 class _Carried:
-    """Places (M, 3) of parts' surfaces, which they follow as poses and latents change. owner (M,): whose."""
+    """Places (M, 3) of parts' surfaces, which they follow as poses and latents change. owner (M,): whose;
+    those of a part stand together."""
 
     def __init__(self, shape: NeuralShape, owner: Tensor, places: Tensor) -> None:
-        self._model, self._owner, self._one = shape.model, owner, torch.arange(len(owner))
+        self._model, self._owner = shape.model, owner
+        self._parts, self._counts = (t.tolist() for t in owner.unique_consecutive(return_counts=True))
         self._hidden = ~shape.present[:, None]
-        self._local = local_points(places, shape.poses)[owner, self._one]
+        self._local = local_points(places, shape.poses)[owner, torch.arange(len(owner))]
         there = places.clone().requires_grad_()
-        own = self._own(shape.latents, shape.poses, there)
+        own = self._own(self._model.decoded(shape.latents, shape.poses), there)
         (slope,) = torch.autograd.grad(own.sum(), there)
         self._normal = torch.nn.functional.normalize(slope, dim=1)
 
@@ -161,12 +158,14 @@ class _Carried:
         turn, size, place = rotation_matrices(poses.rotation), poses.scale, poses.translation
         moved = (turn[self._owner] @ (self._local * size[self._owner])[..., None]).squeeze(-1)
         moved = moved + place[self._owner]
+        shape = self._model.decoded(latents, poses)
         # A step of Newton's along the normal: the surface moves with the latent, too.
-        off = self._own(latents, poses, moved).clamp(-_LEAP, _LEAP)
-        distance = self._model.part_distances(latents, poses, moved - off[:, None] * self._normal)
+        off = self._own(shape, moved).clamp(-_LEAP, _LEAP)
+        distance = shape.parts(moved - off[:, None] * self._normal)
         distance = distance.masked_fill(self._hidden, torch.inf)
         distance = distance.scatter(0, self._owner[None], torch.inf)
         return distance.amin(dim=0)
 
-    def _own(self, latents: Tensor, poses: PoseTensors, places: Tensor) -> Tensor:
-        return self._model.part_distances(latents, poses, places)[self._owner, self._one]
+    def _own(self, shape: Decoded, places: Tensor) -> Tensor:
+        groups = places.split(self._counts)
+        return torch.cat([shape.part(i, some) for i, some in zip(self._parts, groups, strict=True)])

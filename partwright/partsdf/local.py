@@ -11,7 +11,7 @@ which is never more than the true one, and more than what losses look at. No par
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -21,7 +21,7 @@ from torch.autograd.function import once_differentiable
 
 from partwright.partsdf.checkpointed_linear import working_type
 from partwright.partsdf.config import DecoderSettings
-from partwright.partsdf.decoder import Conditioned, positional_encoding
+from partwright.partsdf.decoder import positional_encoding
 from partwright.partsdf.part_networks import Rooms, distances
 from partwright.partsdf.poses import PoseTensors, rotation_matrices
 from partwright.partsdf.segmented_linear import filled_linear, filled_up, segmented_linear
@@ -84,7 +84,7 @@ class LocalDecoder(nn.Module):
         # A sheet that holds what lies deep below it has a room many times as thick as its cuboid.
         self.unit.copy_(self.room)
 
-    def condition(self, latents: Tensor, poses: PoseTensors | None = None) -> Conditioned:
+    def condition(self, latents: Tensor, poses: PoseTensors | None = None) -> LocalConditioned:
         """Latents (B, P, Z) and poses (B, P, ...) taken in, once for any number of points."""
         if poses is None:
             raise TypeError("a local decoder also needs the poses of the parts")
@@ -107,7 +107,9 @@ class LocalDecoder(nn.Module):
                     weight = weight.expand(len(values), -1, -1, -1)
                 layers.append((weight.flatten(0, 1), shift.flatten(0, 1)))
         octaves = self.settings.octaves
-        return _Local(tuple(layers), poses.scale, self.room, self.unit, octaves, kind, self.training)
+        return LocalConditioned(
+            tuple(layers), poses.scale, self.room, self.unit, octaves, kind, self.training
+        )
 
     def forward(self, latents: Tensor, local: Tensor, poses: PoseTensors | None = None) -> Tensor:
         """Distances (B, P, N) of latents (B, P, Z) at local points (B, P, N, 3) of poses (B, P, ...)."""
@@ -140,7 +142,7 @@ class _Larger(torch.autograd.Function):
 
 
 @dataclass(frozen=True)
-class _Local:
+class LocalConditioned:
     """layers: a weight (B P, I, O) and a shift (B P, O) each. scale: half-lengths (B, P, 3). room: (P, 3),
     and unit: (P, 3) in which the networks see places, both in half-lengths. kind: of numbers in hidden
     layers. learning: whether derivatives are those of `larger`."""
@@ -152,6 +154,20 @@ class _Local:
     octaves: int
     kind: torch.dtype
     learning: bool
+
+    def of(self, part: int) -> LocalConditioned:
+        """The same with the part of that number alone."""
+        layers = tuple(
+            (
+                weight.unflatten(0, self.scale.shape[:2])[:, part],
+                shift.unflatten(0, self.scale.shape[:2])[:, part],
+            )
+            for weight, shift in self.layers
+        )
+        row = slice(part, part + 1)
+        return replace(
+            self, layers=layers, scale=self.scale[:, row], room=self.room[row], unit=self.unit[row]
+        )
 
     def __call__(self, local: Tensor, filled: bool | None = None) -> Tensor:
         """filled: whether segments are filled up to one length, as on a GPU; if None, by the device, and by

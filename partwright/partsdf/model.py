@@ -22,10 +22,12 @@ from partwright.datasets.prepared import UP
 from partwright.errors import ModelError, NewerVersionError, SettingError, UnreadableFileError
 from partwright.input_files import check_file
 from partwright.partsdf.config import Config, DecoderSettings, config_from
+from partwright.partsdf.decoded import Decoded
 from partwright.partsdf.decoder import Conditioned, Decoder
 from partwright.partsdf.local import LocalDecoder
 from partwright.partsdf.losses import aggregate
-from partwright.partsdf.poses import PoseTensors, local_points
+from partwright.partsdf.offsets import OffsetRange
+from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.transformer import TransformerDecoder
 from partwright.shapes.units import canonical_up
 
@@ -84,6 +86,11 @@ class Model:
         return 1 if self.config.decoder.architecture == "local" else len(self.parts)
 
     @cached_property
+    def offset_range(self) -> OffsetRange:
+        """How the boxes of two parts lie to each other in the training shapes."""
+        return OffsetRange.of(self.poses, self.present)
+
+    @cached_property
     def mean_latent(self) -> Tensor:
         """(P, Z) over the training shapes that have the part."""
         weight = self.present.float()[..., None]
@@ -115,10 +122,13 @@ class Model:
         """The decoder with latents (B, P, Z) and poses (B, P, ...) taken in."""
         return self.decoder.condition(latents, poses)  # type: ignore[operator]
 
+    def decoded(self, latents: Tensor, poses: PoseTensors) -> Decoded:
+        """One shape with latents (P, Z) and poses (P, ...), taken in once for any number of points."""
+        return Decoded(self.condition(latents[None], poses.map(lambda t: t[None])), poses)
+
     def part_distances(self, latents: Tensor, poses: PoseTensors, points: Tensor) -> Tensor:
         """(P, N) at points (N, 3) of one shape with latents (P, Z) and poses (P, ...), unit frame."""
-        alone = poses.map(lambda t: t[None])
-        return self.condition(latents[None], alone)(local_points(points, poses)[None])[0]
+        return self.decoded(latents, poses).parts(points)
 
     def distances(self, latents: Tensor, poses: PoseTensors, points: Tensor) -> Tensor:
         """(N,) of the whole shape; arguments as in `part_distances`."""

@@ -2,13 +2,43 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, NamedTuple
+
 import torch
 from torch import Tensor
 
-from partwright.partsdf.model import Model
 from partwright.partsdf.poses import PoseTensors, rotation_matrices
 
+if TYPE_CHECKING:
+    from partwright.partsdf.model import Model
+
 _SLACK = 0.1  # of the training shapes' range, by which two parts may lie beyond it
+
+
+class OffsetRange(NamedTuple):
+    """Of all pairs of parts, first (Q,) and second (Q,): between what the sides of the first ones' boxes lie
+    beyond those of the second ones' in training shapes, low and high (Q, 12), with some slack; and whether a
+    training shape has both, known (Q,)."""
+
+    first: Tensor
+    second: Tensor
+    low: Tensor
+    high: Tensor
+    known: Tensor
+
+    @classmethod
+    def of(cls, poses: PoseTensors, present: Tensor) -> OffsetRange:
+        """Of training shapes' poses (S, P, ...) and which parts they have, present (S, P)."""
+        parts = present.shape[1]
+        first, second = torch.triu_indices(parts, parts, 1)
+        there = (present[:, first] & present[:, second])[..., None]
+        sides = _sides(poses, first, second)
+        known = there.any(dim=0)
+        low = torch.where(there, sides, torch.inf).amin(dim=0)
+        high = torch.where(there, sides, -torch.inf).amax(dim=0)
+        low, high = (torch.where(known, end, 0.0) for end in (low, high))
+        slack = _SLACK * (high - low)
+        return cls(first, second, low - slack, high + slack, known.squeeze(-1))
 
 
 def beyond_range(model: Model, poses: PoseTensors, present: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -18,16 +48,11 @@ def beyond_range(model: Model, poses: PoseTensors, present: Tensor) -> tuple[Ten
     At most 0 within the range; -inf of two parts that are not both there, or in no training shape together.
     poses (P, ...) and present (P,): of the shape, in the family's frame.
     """
-    first, second = torch.triu_indices(len(model.parts), len(model.parts), 1)
-    there = (model.present[:, first] & model.present[:, second])[..., None]
-    known = _sides(model.poses, first, second)
-    low = torch.where(there, known, torch.inf).amin(dim=0)
-    high = torch.where(there, known, -torch.inf).amax(dim=0)
+    first, second, low, high, known = model.offset_range
     own = _sides(poses.map(lambda t: t[None]), first, second)[0]
-    both = present[first] & present[second] & there.any(dim=0).squeeze(-1)
-    low, high = (torch.where(both[:, None], end, 0.0) for end in (low, high))
-    beyond = torch.maximum(low - own, own - high) - _SLACK * (high - low)
-    return beyond.amax(dim=-1).masked_fill(~both, -torch.inf), first, second
+    both = present[first] & present[second] & known
+    beyond = torch.maximum(low - own, own - high).amax(dim=-1)
+    return beyond.masked_fill(~both, -torch.inf), first, second
 
 
 def _sides(poses: PoseTensors, first: Tensor, second: Tensor) -> Tensor:

@@ -10,9 +10,9 @@ import numpy as np
 
 from partwright.assembly.palette import palette
 from partwright.datasets.prepared import PreparedShape
-from partwright.errors import NoSurfaceError, SettingError, UnsupportedFormatError
+from partwright.errors import SettingError, UnsupportedFormatError
 from partwright.partsdf.editing import interpolated
-from partwright.partsdf.meshing import ShareDone, mesh_shape, resolution_for_wall
+from partwright.partsdf.meshing import ShareDone, mesh_parts, resolution_for_wall
 from partwright.partsdf.neural import NeuralShape
 from partwright.render import Camera, render_mesh, sheet, write_png
 from partwright.render.output import write
@@ -26,19 +26,6 @@ _FRAME_MILLISECONDS = 60  # milliseconds
 _PAUSE_FRAMES = 8  # frames' time at either end
 
 
-def coloured_parts(
-    shape: NeuralShape, resolution: int, progress: ShareDone | None = None
-) -> tuple[trimesh.Trimesh, np.ndarray]:
-    """All parts as one mesh, unit frame, and a colour (F, 3) a face; raises NoSurfaceError."""
-    import trimesh
-
-    parts = mesh_shape(shape, resolution, progress=progress).parts
-    colours = palette(len(shape.model.parts))
-    faces = [np.tile(colours[shape.model.index(n)], (len(m.faces), 1)) for n, m in parts.items()]
-    mesh = cast("trimesh.Trimesh", trimesh.util.concatenate(list(parts.values())))
-    return mesh, np.concatenate(faces)
-
-
 def picture(
     shape: NeuralShape,
     resolution: int | None = None,
@@ -50,12 +37,15 @@ def picture(
 
     resolution: cells along the unit frame, a multiple of 8; if not given, 64 to 192 by the thinnest wall.
     """
-    resolution = resolution or picture_resolution(shape)
-    try:
-        mesh, colours = coloured_parts(shape, resolution, progress)
-    except NoSurfaceError:
+    import trimesh
+
+    parts = mesh_parts(shape, resolution or picture_resolution(shape), progress)
+    if not parts:
         return blank(size)
-    return render_mesh(mesh, camera, (size, size), colours)
+    colours = palette(len(shape.model.parts))
+    faces = [np.tile(colours[shape.model.index(n)], (len(m.faces), 1)) for n, m in parts.items()]
+    mesh = cast("trimesh.Trimesh", trimesh.util.concatenate(list(parts.values())))
+    return render_mesh(mesh, camera, (size, size), np.concatenate(faces))
 
 
 def target_picture(shape: PreparedShape, size: int, camera: Camera | None = None) -> np.ndarray:
@@ -71,7 +61,7 @@ def target_picture(shape: PreparedShape, size: int, camera: Camera | None = None
 
 def picture_resolution(*shapes: NeuralShape, most: int = _FINE) -> int:
     """Cells along the unit frame that show the shapes' thinnest wall, at most as many as the cost allows."""
-    thinnest = min(float(shape.walls().min(initial=np.inf)) for shape in shapes)
+    thinnest = min(shape.thinnest for shape in shapes)
     return min(most, resolution_for_wall(thinnest, _COARSE))
 
 

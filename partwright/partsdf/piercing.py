@@ -8,15 +8,16 @@ what is seen stays where it is.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from partwright.partsdf.cores import one_core_each
+from partwright.partsdf.nearness import components, edges_of
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
@@ -48,36 +49,42 @@ class Tip:
     rest: np.ndarray
 
 
-def tips(shape: NeuralShape, parts: dict[str, trimesh.Trimesh]) -> list[Tip]:
-    """Of all parts that come through others, by the parts' own meshes (unit frame); the least area first: of
-    two that cross, each cuts the other, and the smaller tip belongs to the one that went too far."""
-    if not parts:
-        return []
-    scene = _scene(parts)
+def tips(shape: NeuralShape, parts: dict[str, trimesh.Trimesh], off: Mapping[str, np.ndarray]) -> list[Tip]:
+    """Of all parts that come through others, by the parts' own meshes (unit frame), of whose vertices `off`
+    has how far they are from the other parts; the least area first: of two that cross, each cuts the other,
+    and the smaller tip belongs to the one that went too far."""
+    scene = cache(partial(_scene, parts))  # most parts need none
     found = [
-        _tip(shape, number, name, parts[name], scene)
+        _tip(shape, number, name, parts[name], off[name], scene)
         for number, name in enumerate(shape.names())
         if name in parts
     ]
     return sorted((tip for tip in found if tip.share > 0), key=lambda tip: tip.area)
 
 
-def _tip(shape: NeuralShape, number: int, name: str, mesh: trimesh.Trimesh, scene: Scene) -> Tip:
-    """Of the part that is the `number`th of those that are there; scene: of all parts."""
-    points, edges = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.edges_unique)
+def _tip(
+    shape: NeuralShape,
+    number: int,
+    name: str,
+    mesh: trimesh.Trimesh,
+    distance: np.ndarray,
+    scene: Callable[[], Scene],
+) -> Tip:
+    """Of the part that is the `number`th of those that are there; distance (V,) of its vertices from the
+    others; scene: of all parts."""
+    points, edges = np.asarray(mesh.vertices, np.float32), edges_of(mesh)
 
     def outside(places: np.ndarray) -> np.ndarray:
         others = np.delete(shape.part_distances(places), number, axis=0)
         return np.asarray(others.min(axis=0, initial=np.inf))
 
-    distance = outside(points)
     seen = distance > 0
     between = edges[seen[edges].all(axis=1)]
     first, second = points[between[:, 0]], points[between[:, 1]]
     near = np.flatnonzero(distance[between].sum(axis=1) < 1.2 * np.linalg.norm(first - second, axis=1))
     along = (1 - _ALONG) * first[near] + _ALONG * second[near]
     cut = (outside(along.reshape(-1, 3)).reshape(len(_ALONG), -1) < 0).any(axis=0)
-    piece, own = (_pieces(len(points), e) for e in (np.delete(between, near[cut], axis=0), edges))
+    piece, own = (components(len(points), e) for e in (np.delete(between, near[cut], axis=0), edges))
     area = np.zeros(len(points))
     np.add.at(area, np.asarray(mesh.faces), mesh.area_faces[:, None] / 3)
     areas = np.bincount(piece, area)
@@ -88,7 +95,8 @@ def _tip(shape: NeuralShape, number: int, name: str, mesh: trimesh.Trimesh, scen
             largest[whole] = one
     main = np.isin(piece, list(largest.values()))
     tip = seen & ~main & (areas[piece] <= _TIP * area.sum())
-    tip[tip] = _open(scene, points[tip], np.asarray(mesh.vertex_normals)[tip])
+    if tip.any():
+        tip[tip] = _open(scene(), points[tip], np.asarray(mesh.vertex_normals)[tip])
     there = float(area[tip].sum())
     return Tip(name, there / float(area.sum()), there, points[tip], points[seen & main])
 
@@ -114,12 +122,6 @@ def _open(scene: Scene, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return free
 
 
-def _pieces(count: int, edges: np.ndarray) -> np.ndarray:
-    """(count,) which connected piece each point belongs to."""
-    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
-
-
 @one_core_each()
 def drawn_back(shape: NeuralShape, tip: Tip, move_pose: bool = True) -> NeuralShape:
     """The shape with latent and pose of the tip's part moved along the family's directions, until the tip is
@@ -134,7 +136,7 @@ def drawn_back(shape: NeuralShape, tip: Tip, move_pose: bool = True) -> NeuralSh
     gone, held = (rng.permutation(points)[:_PLACES] for points in (tip.points, tip.rest))
     places = torch.from_numpy(np.concatenate([gone, held]))
     for _ in range(_STEPS):
-        distance = shape.model.part_distances(unknowns.latents(), unknowns.poses(), places)[part]
+        distance = shape.model.decoded(unknowns.latents(), unknowns.poses()).part(part, places)
         out = torch.relu(_BEYOND - distance[: len(gone)]).mean()
         loss = out + _HOLD * distance[len(gone) :].abs().sum() / max(1, len(held))
         optimiser.zero_grad()

@@ -3,15 +3,15 @@ came through others are drawn back, and those that stand out of others put back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from partwright.methods import check_count
 from partwright.partsdf.generator import Draw, Generator
 from partwright.partsdf.insets import put_back
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.piercing import drawn_back
-from partwright.partsdf.soundness import Judge, Soundness
+from partwright.partsdf.piercing import Tip, drawn_back
+from partwright.partsdf.soundness import Judge, Soundness, largest_offset, least_rank
 
 TRIES = 8  # with half of the shapes unsound, one of 256 stays so
 _DRAWN_BACK = 6  # times at most, each of one part
@@ -40,6 +40,25 @@ def sound_samples(
     tries: int = TRIES,
     told: ShareDone | None = None,
 ) -> list[Sample]:
+    """All of `sound_samples_one_by_one`; told: the share of them that is done."""
+    made: list[Sample] = []
+    for one in sound_samples_one_by_one(generator, count, seed, source, keep, keep_layout, change, tries):
+        made.append(one)
+        if told is not None:
+            told(len(made) / count)
+    return made
+
+
+def sound_samples_one_by_one(
+    generator: Generator,
+    count: int,
+    seed: int = 0,
+    source: NeuralShape | None = None,
+    keep: Sequence[str] = (),
+    keep_layout: bool = False,
+    change: float = 0.0,
+    tries: int = TRIES,
+) -> Iterator[Sample]:
     """As `Generator.generate`, each made anew until it is sound, up to `tries` times in all.
 
     What is sound at once is what `generate` makes; 1 try takes all as they come. Parts that stand out of
@@ -71,17 +90,13 @@ def sound_samples(
         sample = Sample(shape, judge(shape), 1)
         return _mended(sample, judge, keep, keep_layout) if tries > 1 else sample
 
-    best: list[Sample] = []
     for number, shape in enumerate(first):
         sample = judged(shape)
         while sample.soundness.breaks() and sample.tries < tries:
             new = judged(made(number, sample.tries))
             least = min(sample, new, key=lambda one: one.soundness.rank)
             sample = replace(least, tries=sample.tries + 1)
-        best.append(sample)
-        if told is not None:
-            told(len(best) / count)
-    return best
+        yield sample
 
 
 def _mended(
@@ -90,22 +105,37 @@ def _mended(
     """The sample with parts that stand out of others put back, all together, and those that came through
     others drawn back, one by one; one for which that does not help stays, and the others have their turn."""
     kept = set(keep)
+
+    def better(shape: NeuralShape) -> Sample | None:
+        """Of the changed shape, where it ranks before the sample."""
+        if not keep_layout and least_rank(largest_offset(shape)[0]) >= sample.soundness.rank:
+            return None  # whatever its meshes, which take the longest
+        new = replace(sample, shape=shape, soundness=judge(shape))
+        return new if new.soundness.rank < sample.soundness.rank else None
+
     for _ in range(_PUT_BACK):
         if not set(sample.soundness.standing_out) - kept:
             break
-        shape = put_back(sample.shape, sample.soundness.insets, kept, move_pose=not keep_layout)
-        new = replace(sample, shape=shape, soundness=judge(shape))
-        if new.soundness.rank >= sample.soundness.rank:
+        new = better(put_back(sample.shape, sample.soundness.insets, kept, move_pose=not keep_layout))
+        if new is None:
             break
         sample = new
+
+    def next_tip() -> Tip | None:
+        """Of a part that may move, unless it is hopeless: where two other parts that lie oddly are the worst
+        of it, no tip is what mends that."""
+        said = sample.soundness
+        odd = not keep_layout and least_rank(said.offset) >= said.rank
+        free = (tip for tip in said.through if tip.part not in kept)
+        return next((tip for tip in free if not odd or tip.part in said.offset_between), None)
+
     for _ in range(_DRAWN_BACK):
-        free = [tip for tip in sample.soundness.through if tip.part not in kept]
-        if not free:
+        tip = next_tip()
+        if tip is None:
             break
-        shape = drawn_back(sample.shape, free[0], move_pose=not keep_layout)
-        new = replace(sample, shape=shape, soundness=judge(shape))
-        if new.soundness.rank < sample.soundness.rank:
-            sample = new
+        new = better(drawn_back(sample.shape, tip, move_pose=not keep_layout))
+        if new is None:
+            kept.add(tip.part)
         else:
-            kept.add(free[0].part)
+            sample = new
     return sample

@@ -10,25 +10,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.sparse.csgraph import minimum_spanning_tree
-from scipy.spatial import cKDTree
 
-from partwright.errors import NoSurfaceError
 from partwright.partsdf.insets import Inset, Reach, insets, reaches
-from partwright.partsdf.meshing import mesh_shape, resolution_for_wall
+from partwright.partsdf.meshing import mesh_parts, resolution_for_wall
 from partwright.partsdf.model import Model
+from partwright.partsdf.nearness import components, edges_of, from_others, longest_bridge
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.offsets import beyond_range
 from partwright.partsdf.piercing import Tip, tips
+from partwright.partsdf.pose_range import OFFSET
 
 if TYPE_CHECKING:
     import trimesh
 
 # Measured by benchmarks/partsdf_soundness.py, and chosen by looking at pictures of 100 new shapes.
-GAP, OFFSET = 0.02, 0.03  # unit lengths
+GAP = 0.02  # unit lengths
 _PIECE = 0.01  # of its part's surface: what is less is a crumb of the mesh
 THROUGH = 0.005  # of a part's surface, beyond what comes through in training shapes
 _SEEN = 0.02  # of a part's surface, that an eye sees come through
@@ -90,6 +89,14 @@ class Soundness:
         return bool(self.breaks()), self.badness
 
 
+class _Trained(NamedTuple):
+    """A training shape, the meshes of its parts, and how far their vertices are from the other parts."""
+
+    shape: NeuralShape
+    parts: dict[str, trimesh.Trimesh]
+    off: dict[str, np.ndarray]
+
+
 class Judge:
     """Tells how sound shapes of one model are. Its training shapes are looked at once, if need be."""
 
@@ -102,36 +109,41 @@ class Judge:
         gap, between = widest_gap(parts)
         allowed = GAP if gap <= GAP else max(GAP, self._own_gap)
         empty = tuple(name for name in shape.names() if name not in parts)
-        through = tuple(tip for tip in tips(shape, parts) if tip.share > THROUGH)
+        off = from_others(shape, parts, parts)
+        through = tuple(tip for tip in tips(shape, parts, off) if tip.share > THROUGH)
         if through:
             known = self._own_tips
             through = tuple(tip for tip in through if tip.share > THROUGH + known.get(tip.part, 0.0))
-        lying = insets(shape, parts, self._reaches)
+        lying = insets(parts, self._reaches, off)
         return Soundness(empty, gap, between, allowed, *largest_offset(shape), through, lying)
 
     @cached_property
     def _reaches(self) -> dict[str, Reach]:
-        return reaches(self._trained)
+        return reaches(one.off for one in self._trained)
 
     @cached_property
-    def _trained(self) -> list[tuple[NeuralShape, dict[str, trimesh.Trimesh]]]:
-        """A few training shapes and the meshes of their parts."""
+    def _trained(self) -> list[_Trained]:
+        """A few training shapes."""
         names = self.model.shapes
         rows = np.unique(np.linspace(0, len(names) - 1, _JUDGES).round().astype(int)).tolist()
-        shapes = [NeuralShape.trained(self.model, names[i]) for i in rows]
-        return [(one, _meshes(one)) for one in shapes]
+        found = []
+        for row in rows:
+            shape = NeuralShape.trained(self.model, names[row])
+            parts = _meshes(shape)
+            found.append(_Trained(shape, parts, from_others(shape, parts, parts)))
+        return found
 
     @cached_property
     def _own_gap(self) -> float:
         """The widest gap of training shapes: parts of some families are apart from one another."""
-        return max(widest_gap(parts)[0] for _, parts in self._trained)
+        return max(widest_gap(one.parts)[0] for one in self._trained)
 
     @cached_property
     def _own_tips(self) -> dict[str, float]:
         """By part, the largest share of its surface that came through others in training shapes."""
         most: dict[str, float] = {}
-        for shape, parts in self._trained:
-            for tip in tips(shape, parts):
+        for one in self._trained:
+            for tip in tips(*one):
                 most[tip.part] = max(most.get(tip.part, 0.0), tip.share)
         return most
 
@@ -142,19 +154,18 @@ def widest_gap(parts: dict[str, trimesh.Trimesh]) -> tuple[float, tuple[str, ...
     pieces = [(name, points) for name, mesh in parts.items() for points in _pieces(mesh)]
     if len(pieces) < 2:
         return 0.0, ()
-    trees = [cKDTree(points) for _, points in pieces]
-    apart = np.zeros((len(pieces), len(pieces)))
-    for i, (_, points) in enumerate(pieces):
-        for j in range(i):  # 0 would be no edge to SciPy
-            apart[i, j] = max(float(trees[j].query(points)[0].min()), np.finfo(float).tiny)
-    joined = minimum_spanning_tree(apart).toarray()
-    i, j = np.unravel_index(joined.argmax(), joined.shape)
-    return float(joined[i, j]), (pieces[j][0], pieces[i][0])
+    gap, i, j = longest_bridge([points for _, points in pieces])
+    return gap, (pieces[j][0], pieces[i][0])
 
 
 def layout_faults(shape: NeuralShape) -> list[str]:
     """What is unlike the family in how its parts' boxes lie, a few words; nothing where they are like it."""
     return _of_layout(*largest_offset(shape))
+
+
+def least_rank(offset: float) -> tuple[bool, float]:
+    """What `Soundness.rank` is at least for a shape with such an offset, whatever its surfaces are."""
+    return offset > OFFSET, offset / OFFSET
 
 
 def _of_layout(offset: float, between: tuple[str, ...]) -> list[str]:
@@ -175,23 +186,16 @@ def largest_offset(shape: NeuralShape) -> tuple[float, tuple[str, ...]]:
 
 
 def _meshes(shape: NeuralShape) -> dict[str, trimesh.Trimesh]:
-    try:
-        return mesh_shape(shape, min(_FINE, resolution_for_wall(shape.thinnest, _COARSE))).parts
-    except NoSurfaceError:
-        return {}
+    return mesh_parts(shape, min(_FINE, resolution_for_wall(shape.thinnest, _COARSE)))
 
 
 def _pieces(mesh: trimesh.Trimesh) -> list[np.ndarray]:
     """Vertices (N, 3) of a mesh's connected pieces, without crumbs and the walls of cavities."""
-    import trimesh
-
-    corners, area = mesh.triangles, mesh.area_faces
-    volume = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-    found = trimesh.graph.connected_components(
-        mesh.face_adjacency, nodes=np.arange(len(mesh.faces)), min_len=1
-    )
-    return [
-        mesh.vertices[np.unique(mesh.faces[faces])]
-        for faces in found
-        if volume[faces].sum() > 0 and area[faces].sum() >= _PIECE * area.sum()
-    ]
+    piece = components(len(mesh.vertices), edges_of(mesh))
+    owner = piece[mesh.faces[:, 0]]
+    corners = mesh.triangles
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.bincount(owner, np.linalg.norm(normal, axis=1) / 2)
+    volume = np.bincount(owner, np.einsum("fi,fi->f", corners[:, 0], normal))
+    kept = (volume > 0) & (area >= _PIECE * area.sum())
+    return [np.asarray(mesh.vertices)[piece == i] for i in np.flatnonzero(kept)]

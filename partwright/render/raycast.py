@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -27,10 +28,18 @@ class Scene:
         self._scale = 2.0 / max(float((self.upper - self.lower).max()), np.finfo(float).tiny)
         self._embree = EmbreeScene()
         self._mesh = TriangleMesh(self._embree, self._local(self.vertices), self.faces.astype(np.int32))
-        self.corner_normals = corner_normals(self.vertices, self.faces)
+
+    @cached_property
+    def corner_normals(self) -> np.ndarray:
+        """(F, 3, 3) float, for shading, which who only asks what is hidden does not need."""
+        return corner_normals(self.vertices, self.faces)
+
+    @cached_property
+    def face_normals(self) -> np.ndarray:
+        """(F, 3) float32."""
         flat = face_normals(self.vertices, self.faces)
         length = np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), np.finfo(float).tiny)
-        self.face_normals = (flat / length).astype(np.float32)
+        return (flat / length).astype(np.float32)
 
     def _local(self, points: np.ndarray) -> np.ndarray:
         return ((points - self._centre) * self._scale).astype(np.float32)

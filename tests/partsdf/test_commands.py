@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,6 +24,8 @@ from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.config import read_config
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.resampling import Sample
+from partwright.partsdf.soundness import Soundness
 from tests.partsdf.lamps import small_config
 
 
@@ -334,3 +338,34 @@ def test_a_pipe_is_refused_at_once(
     }[what]
     assert main(["parts", *command]) == 2
     assert "is a pipe, socket or device" in capsys.readouterr().err
+
+
+def test_ctrl_c_keeps_the_samples_that_are_done(
+    file: Path, model: Model, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of three, the first, as whole files; what lay there before is gone."""
+    commands = "partwright.cli.commands.parts_generate."
+    asked: list[Callable[[], None]] = []
+
+    @contextmanager
+    def stopping(stop: Callable[[], None]) -> Iterator[None]:
+        asked.append(stop)
+        yield
+
+    def one_by_one(*_: object, **__: object) -> Iterator[Sample]:
+        sound = Soundness((), 0.0, (), 0.02, 0.0, ())
+        for name in model.shapes[:3]:
+            asked[0]()
+            yield Sample(NeuralShape.trained(model, name), sound, 1)
+
+    monkeypatch.setattr(commands + "load_generator", lambda model: None)
+    monkeypatch.setattr(commands + "stopping", stopping)
+    monkeypatch.setattr(commands + "sound_samples_one_by_one", one_by_one)
+    Path("made").mkdir()
+    Path("made/sample_02.json").write_text("{}")
+    line = ["parts", "generate", "--model", str(file), "-o", "made", "-n", "3", "--overwrite"]
+    assert main(line) == 130
+    assert "interrupted: 1 sample of 3 written" in capsys.readouterr().err
+    names = {"sample_00.json", "samples.json", "samples.png"}
+    assert {path.name for path in Path("made").iterdir()} == names
+    assert len(json.loads(Path("made/samples.json").read_text())["samples"]) == 1

@@ -12,6 +12,7 @@ import trimesh
 from partwright.partsdf.generator import Draw, load_generator
 from partwright.partsdf.insets import insets, put_back, reaches
 from partwright.partsdf.model import load_model
+from partwright.partsdf.nearness import from_others
 from partwright.partsdf.resampling import Sample, _mended
 from partwright.partsdf.soundness import Judge
 
@@ -39,18 +40,22 @@ class Pane:
         }
 
 
+def _off(pane: Any) -> dict[str, np.ndarray]:
+    return from_others(pane, pane.meshes(), pane.meshes())
+
+
 def test_what_lies_in_others_is_known_from_training_shapes() -> None:
     """A pane that reaches one to three hundredths above its block, two usually; neither the block nor the
     ball lies in anything."""
     panes: list[Any] = [Pane(height) for height in (0.0, 0.01, 0.02)]
-    known = reaches([(one, one.meshes()) for one in panes])
+    known = reaches([_off(one) for one in panes])
     assert list(known) == ["pane"]
     assert known["pane"] == pytest.approx((0.025, 0.035), abs=1e-6)
-    (found,) = insets(panes[0], panes[0].meshes(), known)
+    (found,) = insets(panes[0].meshes(), known, _off(panes[0]))
     assert (found.part, found.share, found.stands_out) == ("pane", 0.0, False)
     assert found.limit == known["pane"].most
     above: Any = Pane(0.1)
-    (found,) = insets(above, above.meshes(), known)
+    (found,) = insets(above.meshes(), known, _off(above))
     assert (found.share, found.stands_out, found.limit) == (1.0, True, known["pane"].usual)
     assert found.points.shape == (300, 3)
 

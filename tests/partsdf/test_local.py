@@ -49,6 +49,20 @@ def decoder(settings: DecoderSettings = SMALL) -> LocalDecoder:
     return made
 
 
+@pytest.mark.parametrize("name", ["vehicles", "lamps"])
+def test_one_part_alone_is_that_of_all(name: str, model: Model) -> None:
+    """To the bit by our own decoder, with its derivatives; whatever decoder it is."""
+    known = load_model(name) if name == "vehicles" else model
+    shape = NeuralShape.trained(known, "0")
+    points = 2 * torch.rand(400, 3, generator=torch.Generator().manual_seed(0)) - 1
+    latents = shape.latents.clone().requires_grad_()
+    one = known.decoded(latents, shape.poses).part(1, points)
+    all_of_them = known.part_distances(latents, shape.poses, points)[1]
+    assert torch.equal(one, all_of_them)
+    (mine,), (theirs,) = (torch.autograd.grad(d.sum(), latents) for d in (one, all_of_them))
+    torch.testing.assert_close(mine, theirs)
+
+
 def test_far_parts_are_left_out_and_near_ones_are_each_as_if_alone() -> None:
     """Every pair by itself: the network's value within reach of the room, the room's distance elsewhere."""
     made, (z, points, poses) = decoder(), placed()

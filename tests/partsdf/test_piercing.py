@@ -13,6 +13,7 @@ import trimesh
 
 from partwright.partsdf.editing import moved
 from partwright.partsdf.model import Model
+from partwright.partsdf.nearness import from_others
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.piercing import Tip, drawn_back, tips
 from partwright.partsdf.resampling import Sample, _mended, sound_samples
@@ -47,12 +48,17 @@ class Rod:
         }
 
 
+def _tips(rod: Any, meshes: dict[str, trimesh.Trimesh] | None = None) -> list[Tip]:
+    parts = rod.meshes() if meshes is None else meshes
+    return tips(rod, parts, from_others(rod, parts, parts))
+
+
 @pytest.mark.parametrize("beyond", [0.025, 0.05])
 def test_what_came_through_is_measured(beyond: float) -> None:
     """The end of a rod that stands out by so much on the other side of a thin plate; not the plate, which the
     rod does not divide, and not a rod that ends in it or goes through its middle."""
     rod: Any = Rod(-beyond)
-    (tip,) = tips(rod, rod.meshes())
+    (tip,) = _tips(rod)
     assert tip.part == "rod"
     area = 4 * RADIUS**2 + 8 * RADIUS * beyond
     assert tip.area == pytest.approx(area, rel=0.15)  # by whole triangles
@@ -61,17 +67,17 @@ def test_what_came_through_is_measured(beyond: float) -> None:
     assert tip.rest[:, 2].max() < -beyond - THIN + 1e-6
     for height in (THIN / 2, -LENGTH / 2):
         none: Any = Rod(height)
-        assert tips(none, none.meshes()) == []
+        assert _tips(none) == []
 
 
 def test_what_nobody_can_see_did_not_come_through() -> None:
     """The same end of the rod, within a closed shell."""
     rod: Any = Rod(-0.05)
     meshes = rod.meshes()
-    assert [tip.part for tip in tips(rod, meshes)] == ["rod"]
+    assert [tip.part for tip in _tips(rod, meshes)] == ["rod"]
     meshes["plate"] = trimesh.util.concatenate([meshes["plate"], trimesh.creation.box((0.6, 0.6, 0.3))])
-    assert "rod" not in [tip.part for tip in tips(rod, meshes)]
-    assert tips(rod, {}) == []
+    assert "rod" not in [tip.part for tip in _tips(rod, meshes)]
+    assert _tips(rod, {}) == []
 
 
 def test_a_ball_that_came_through_its_plate_is_drawn_back(
@@ -95,6 +101,10 @@ def test_a_ball_that_came_through_its_plate_is_drawn_back(
     assert _mended(sample, judge, ["ball"], keep_layout=False) is sample
     mended = _mended(sample, judge, [], keep_layout=False)
     assert mended.soundness.through == ()
+    # Where two other parts that lie oddly are the worst of it, nothing is drawn back for nothing.
+    odd = replace(found, offset=1.0, offset_between=("plate", "knob"))
+    other = Sample(broken, odd, 1)
+    assert _mended(other, judge, [], keep_layout=False) is other
     for mine, theirs in zip(
         (mended.shape.latents, *mended.shape.poses), (broken.latents, *broken.poses), strict=True
     ):

@@ -8,26 +8,30 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from partwright.atomic_io import replacing_files
+from partwright.cli.interrupts import INTERRUPTED, stopping
 from partwright.cli.parts_generate import CHANGE, sample_name
 from partwright.cli.progress import Work
 from partwright.cli.terminal import counted, say, warn
 from partwright.errors import SettingError
-from partwright.methods import check_count
+from partwright.methods import Cancellation, check_count
+from partwright.partsdf import pictures
 from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.from_photo import reconstruct_photo
 from partwright.partsdf.generator import load_generator
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
-from partwright.partsdf.pictures import picture
-from partwright.partsdf.resampling import Sample, sound_samples
+from partwright.partsdf.resampling import Sample, sound_samples_one_by_one
 from partwright.partsdf.soundness import layout_faults
 from partwright.partsdf.sources import found_in, open_source
 from partwright.render import Camera, sheet, write_png
 from partwright.shapes import PICTURE_SUFFIXES, SUFFIXES
 
 _PANEL, _COLUMNS = 240, 4  # pixels
+_CELLS = 144  # along the unit frame of a picture, at most: of finer ones no more is seen in so few pixels
 _STALE = re.compile(r"sample_\d+\.json")
 
 
@@ -37,26 +41,29 @@ def run(arguments: argparse.Namespace) -> int:
     keep = _names(arguments.keep, model)
     generator = load_generator(model)
     change = (CHANGE if arguments.change is None else arguments.change) if arguments.like else 0.0
-    with Work("reading") as work:
+    camera, cancel = Camera(up=model.up), Cancellation()
+    made: list[Sample] = []
+    nearest: list[tuple[str, float]] = []
+    panels: list[np.ndarray] = []
+    with Work("reading") as work, stopping(cancel.request):
         source = _kept(arguments, model)
         odd = layout_faults(source) if arguments.poses and source is not None else []
         warn([f"in {arguments.poses} {fault}; so they do in all samples" for fault in odd])
         work.stage("making")
-        made = sound_samples(
+        for one in sound_samples_one_by_one(
             generator, arguments.count, arguments.seed, source, keep,
-            keep_layout=arguments.poses is not None, change=change, tries=arguments.tries, told=work.show,
-        )  # fmt: skip
-        samples = [one.shape for one in made]
-        work.stage("comparing")
-        nearest = [nearest_training_shape(one) for one in samples]
-        work.stage("drawing")
-        camera, pictures = Camera(up=model.up), []
-        for i, one in enumerate(samples):
-            pictures.append(picture(one, None, _PANEL, camera))
-            work.show((i + 1) / len(samples))
+            keep_layout=arguments.poses is not None, change=change, tries=arguments.tries,
+        ):  # fmt: skip
+            # Each with all that is told of it, so that what is done may be kept.
+            nearest.append(nearest_training_shape(one.shape))
+            panels.append(_picture(one.shape, camera))
+            made.append(one)
+            work.show(len(made) / arguments.count)
+            if cancel.requested:
+                break
         captions = [f"{i}: {100 * far:.1f} from {name}" for i, (name, far) in enumerate(nearest)]
         if arguments.like and source is not None:
-            pictures.insert(0, picture(source, None, _PANEL, camera))
+            panels.insert(0, _picture(source, camera))
             captions.insert(0, "like this")
         about = {
             "model": {"name": model.name, "hash": model.hash},
@@ -66,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
             "like": {"shape": arguments.like, "change": change} if arguments.like else None,
             "samples": [
                 {
-                    "file": sample_name(i, len(samples)),
+                    "file": sample_name(i, arguments.count),
                     "parts": one.shape.names(),
                     "nearest": name,
                     "difference": far,
@@ -77,21 +84,29 @@ def run(arguments: argparse.Namespace) -> int:
             ],
         }
         with replacing_files(arguments.output, _STALE) as folder:
-            for i, one in enumerate(samples):
-                to_assembly(one, up=model.up, source=f"{model.name}, seed {arguments.seed}, sample {i}").save(
-                    folder / sample_name(i, len(samples))
+            for i, one in enumerate(made):
+                source_text = f"{model.name}, seed {arguments.seed}, sample {i}"
+                to_assembly(one.shape, up=model.up, source=source_text).save(
+                    folder / sample_name(i, arguments.count)
                 )
-            write_png(folder / "samples.png", sheet(pictures, captions, min(_COLUMNS, len(pictures))))
+            write_png(folder / "samples.png", sheet(panels, captions, min(_COLUMNS, len(panels))))
             (folder / "samples.json").write_text(json.dumps(about, indent=1))
     warn(_broken(made))
     again = sum(one.tries > 1 for one in made)
     least = min(far for _, far in nearest)
     say(
-        f"{counted(len(samples), 'shape')} of {model.name}'s family: {arguments.output}; the least new "
+        f"{counted(len(made), 'shape')} of {model.name}'s family: {arguments.output}; the least new "
         f"differs by {100 * least:.2f} hundredths of a unit length from one that was trained on"
         + (f"; {again} of them made anew, as parts came apart" if again else "")
     )
+    if len(made) < arguments.count:
+        warn([f"interrupted: {counted(len(made), 'sample')} of {arguments.count} written"])
+        return INTERRUPTED
     return 0
+
+
+def _picture(shape: NeuralShape, camera: Camera) -> np.ndarray:
+    return pictures.picture(shape, pictures.picture_resolution(shape, most=_CELLS), _PANEL, camera)
 
 
 def _broken(made: Sequence[Sample]) -> list[str]:
