@@ -18,12 +18,18 @@ from partwright.assembly import Assembly
 from partwright.export import export
 from tests.browsers import PATIENCE
 
+# Once at rest, a picture is drawn four times and smoothed: seconds of a processor, after every change.
+UNSMOOTHED = """() => {
+    Object.defineProperty(partwright.viewport.renderer, "passes", { get: () => 1 });
+}"""
+
 
 class Page:
     """A page of the studio, and the errors that it met."""
 
-    def __init__(self, page: Any) -> None:
+    def __init__(self, page: Any, smooth: bool) -> None:
         self.page = page
+        self.smooth = smooth
         self.errors: list[str] = []
         self.requests: list[str] = []
         page.on("pageerror", lambda error: self.errors.append(str(error)))
@@ -32,6 +38,8 @@ class Page:
     def open(self, url: str) -> Page:
         self.page.goto(url)
         self.wait("() => !!window.partwright && (partwright.viewport.renderer?.ready ?? false)")
+        if not self.smooth:
+            self.ask(UNSMOOTHED)
         return self
 
     def ask(self, script: str, argument: Any = None) -> Any:
@@ -67,12 +75,12 @@ class Page:
 def new_page(browser: Any) -> Iterator[Callable[..., Page]]:
     contexts = []
 
-    def make(width: int = 900, height: int = 400, **options: Any) -> Page:
+    def make(width: int = 900, height: int = 400, smooth: bool = False, **options: Any) -> Page:
         # A quarter as many pixels each way: a processor draws them here, and the page is as large.
         few = {"device_scale_factor": 0.25, **options}
         context = browser.new_context(viewport={"width": width, "height": height}, **few)
         contexts.append(context)
-        return Page(context.new_page())
+        return Page(context.new_page(), smooth)
 
     yield make
     for context in contexts:

@@ -183,10 +183,11 @@ def test_what_is_no_image_is_no_harm(shared: Callable[..., Page]) -> None:
 
 
 def test_a_lost_context_comes_back_with_all_that_it_showed(shared: Callable[..., Page]) -> None:
-    page = shared(mapped(MUG), width=800, height=400)
+    page = shared(mapped(MUG), width=800, height=400, smooth=True)
     page.wait("() => partwright.viewport.maps.maps?.count === 3")
     page.page.locator(".row[data-name=handle]").click()
     page.settle()
+    assert page.ask("() => partwright.viewport.renderer.complete") == 4  # pictures that it is smoothed of
     look = """() => {
         const { renderer } = partwright.viewport, { gl } = renderer;
         renderer.redraw(); renderer.draw();
