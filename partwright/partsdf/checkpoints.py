@@ -59,6 +59,9 @@ def save_checkpoint(
     write_bytes(path, save(kept, {"partwright": json.dumps(about)}))
 
 
+_OF_LENGTH = {"training.epochs", "training.warmup"}  # what `--steps` of `parts family` tells
+
+
 def load_checkpoint(
     path: Path,
     config: Config,
@@ -119,6 +122,13 @@ def _check_settings(path: Path, before: dict[str, object], now: dict[str, object
             training[name] = None
     if before != now:
         changed = sorted(_differences(before, now, ""))
+        if "training.epochs" in changed and not set(changed) - _OF_LENGTH:
+            old, new = (settings["training"]["epochs"] for settings in (before, now))  # type: ignore[index]
+            raise SettingError(
+                f"{path}: is of a training of {old} epochs, and {new} are asked for; one of another length "
+                "is a training of its own, as its rates are laid out over its length: take as many steps or "
+                "epochs as before, or write elsewhere with -o"
+            )
         raise SettingError(
             f"{path}: was trained with other settings ({', '.join(changed)}); take those, or write "
             "elsewhere with -o"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 
-from partwright.cli.commands.companions import how, train_beside
+from partwright.cli.commands.companions import Steps, how, train_beside
 from partwright.cli.progress import Count
 from partwright.datasets.prepared import PreparedFamily
 from partwright.methods import Cancellation
@@ -21,10 +21,13 @@ def run(arguments: argparse.Namespace) -> int:
     last: list[EncoderStep | ImageStep] = []
 
     def train(model: Model, count: Count, cancel: Cancellation) -> Encoder | ImageEncoder:
+        steps = Steps(count)
+
         def told(step: EncoderStep | ImageStep) -> None:
             last[:] = [step]
-            count.show(step.number, step.of, f"latents {step.latents:.3f}  poses {step.poses:.3f}")
+            steps.show(step.number, step.of, f"latents {step.latents:.3f}  poses {step.poses:.3f}")
 
+        steps.begin()
         family, width = PreparedFamily(arguments.family), arguments.width
         if arguments.sees == "points":
             settings = EncoderSettings(width=width)
@@ -32,6 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         def drawn(done: int, of: int) -> None:
             count.show(done, of, "views drawn")
+            steps.begin()
 
         workers = (os.cpu_count() or 1) if arguments.workers is None else arguments.workers
         return train_image_encoder(
