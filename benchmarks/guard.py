@@ -5,7 +5,7 @@
 
 Quality is the IoU and the number of parts: the same bytes on one machine, nearly so on others, hence the
 margins. Speed is the fit's CPU time over that of a fixed computation with NumPy, which runs between the fits:
-what makes the machine slower makes both slower. The cheapest of a few turns counts.
+what makes the machine slower makes both slower. What was slow is measured again; the cheapest turn counts.
 """
 
 from __future__ import annotations
