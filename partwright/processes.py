@@ -1,16 +1,20 @@
 """Orders that processes of their own carry out: begun anew, and deaf to Ctrl-C, which who began them hears.
+They end with it, however it ends.
 
 A script that has orders carried out so, by more than one process, needs `if __name__ == "__main__":`.
 """
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
+import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process, resource_tracker
 from typing import Any, TypeVar
 
 from partwright.errors import SettingError
@@ -35,6 +39,7 @@ def carried_out(
     if workers <= 1:
         yield from map(work, orders)
         return
+    _begin_tracker()
     with ProcessPoolExecutor(workers, get_context("spawn"), _remember, (work,)) as pool:
         try:
             with _deaf():  # while they begin: they are as deaf as the thread that begins them
@@ -48,7 +53,32 @@ def carried_out(
             pool.shutdown(cancel_futures=True)
 
 
+def _begin_tracker() -> None:
+    """multiprocessing's process that clears away what others leave, told not to warn of it: to end at once is
+    how Ctrl-C ends a command."""
+    quiet = "ignore:resource_tracker:UserWarning"
+    sys.warnoptions.append(quiet)  # it begins with these
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions.remove(quiet)
+
+
+def end_with_parent() -> None:
+    """From now on this process, which another one began, ends with it, in the middle of its work if need be:
+    who hears Ctrl-C ends at once and cannot ask."""
+    parent = parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True, name="parent").start()
+
+
 def _remember(work: Callable[[Any], Any]) -> None:
+    end_with_parent()
     _work[:] = [work]
 
 

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
+import time
 from contextlib import closing
 from functools import partial
+from pathlib import Path
 
+import psutil
 import pytest
 
 from partwright.errors import SettingError
@@ -56,6 +61,39 @@ def test_what_an_order_raises_there_is_raised_here() -> None:
     assert next(made) == 0
     with pytest.raises(SettingError, match=r"^1 is refused$"):
         next(made)
+
+
+LEFT = """
+import os, time
+from partwright.processes import carried_out
+
+def told(order):
+    if order < 2:
+        return os.getpid()
+    time.sleep(60)
+
+if __name__ == "__main__":
+    made = carried_out(told, range(6), 2)
+    print(next(made), next(made), flush=True)
+    os._exit(0)
+"""
+
+
+def test_they_end_with_who_began_them(tmp_path: Path) -> None:
+    """Who hears Ctrl-C ends at once, and tells nobody; orders may take minutes."""
+    (tmp_path / "left.py").write_text(LEFT)
+    begun = subprocess.run(
+        [sys.executable, tmp_path / "left.py"], capture_output=True, text=True, check=True, timeout=50
+    )
+    assert begun.stderr == ""
+    # It came back at all: what they write to was closed, so none of them has it open any more.
+    for process in begun.stdout.split():
+        for _ in range(100):
+            if not psutil.pid_exists(int(process)) or psutil.Process(int(process)).status() == "zombie":
+                break
+            time.sleep(0.1)
+        else:
+            raise AssertionError(f"{process} goes on")
 
 
 def test_a_process_that_is_ended_is_told() -> None:

@@ -41,6 +41,7 @@ from partwright.datasets.prepared import (
 )
 from partwright.datasets.primitives import PrimitiveFit, fit_primitives
 from partwright.errors import FamilyError, OutputError, PartwrightError, SettingError
+from partwright.processes import end_with_parent
 from partwright.shapes.units import canonical_up
 
 VALIDATION, TEST = 0.2, 0.2  # shares of the shapes; the rest trains (PartSDF, B.4)
@@ -245,7 +246,7 @@ def _run(jobs: Sequence[_Job], workers: int) -> Iterator[tuple[_Job, str]]:
     if min(workers, len(jobs)) == 1:
         yield from ((job, _prepare_shape(job)) for job in jobs)
         return
-    with ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn")) as pool:
+    with ProcessPoolExecutor(min(workers, len(jobs)), get_context("spawn"), end_with_parent) as pool:
         waiting = {pool.submit(_prepare_shape, job): job for job in jobs}
         try:
             for done in as_completed(waiting):
