@@ -17,13 +17,13 @@ from partwright.cli.progress import Work
 from partwright.cli.terminal import counted, say, warn
 from partwright.errors import SettingError
 from partwright.methods import Cancellation, check_count
-from partwright.partsdf import pictures
 from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.from_photo import reconstruct_photo
 from partwright.partsdf.generator import load_generator
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
+from partwright.partsdf.pictures import picture
 from partwright.partsdf.resampling import Sample, sound_samples_one_by_one
 from partwright.partsdf.soundness import layout_faults
 from partwright.partsdf.sources import found_in, open_source
@@ -31,7 +31,6 @@ from partwright.render import Camera, sheet, write_png
 from partwright.shapes import PICTURE_SUFFIXES, SUFFIXES
 
 _PANEL, _COLUMNS = 240, 4  # pixels
-_CELLS = 144  # along the unit frame of a picture, at most: of finer ones no more is seen in so few pixels
 _STALE = re.compile(r"sample_\d+\.json")
 
 
@@ -56,14 +55,14 @@ def run(arguments: argparse.Namespace) -> int:
         ):  # fmt: skip
             # Each with all that is told of it, so that what is done may be kept.
             nearest.append(nearest_training_shape(one.shape))
-            panels.append(_picture(one.shape, camera))
+            panels.append(picture(one.shape, None, _PANEL, camera))
             made.append(one)
             work.show(len(made) / arguments.count)
             if cancel.requested:
                 break
         captions = [f"{i}: {100 * far:.1f} from {name}" for i, (name, far) in enumerate(nearest)]
         if arguments.like and source is not None:
-            panels.insert(0, _picture(source, camera))
+            panels.insert(0, picture(source, None, _PANEL, camera))
             captions.insert(0, "like this")
         about = {
             "model": {"name": model.name, "hash": model.hash},
@@ -103,10 +102,6 @@ def run(arguments: argparse.Namespace) -> int:
         warn([f"interrupted: {counted(len(made), 'sample')} of {arguments.count} written"])
         return INTERRUPTED
     return 0
-
-
-def _picture(shape: NeuralShape, camera: Camera) -> np.ndarray:
-    return pictures.picture(shape, pictures.picture_resolution(shape, most=_CELLS), _PANEL, camera)
 
 
 def _broken(made: Sequence[Sample]) -> list[str]:
