@@ -15,6 +15,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process, resource_tracker
+from multiprocessing.util import Finalize
 from typing import Any, TypeVar
 
 from partwright.errors import SettingError
@@ -80,6 +81,9 @@ def end_with_parent() -> None:
 def _remember(work: Callable[[Any], Any]) -> None:
     end_with_parent()
     _work[:] = [work]
+    Finalize(
+        None, _work.clear, exitpriority=0
+    )  # what compiled code made is to be gone before that is unloaded
 
 
 def _remembered(order: Any) -> Any:

@@ -11,7 +11,9 @@ from partwright.robots import CollideOptions, collide, side_by_side
 from tests.robots.robots import urdf
 
 
-def test_shapes_are_the_same_by_several_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shapes_are_the_same_by_several_processes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     path, options = urdf(tmp_path), CollideOptions(kinds=("hull",))
     here = collide(path, options)
 
@@ -30,3 +32,4 @@ def test_shapes_are_the_same_by_several_processes(tmp_path: Path, monkeypatch: p
             assert one.name == other.name
             assert np.array_equal(one.mesh.vertices, other.mesh.vertices)
             assert np.array_equal(one.mesh.faces, other.mesh.faces)
+    assert capfd.readouterr().err == ""  # as of solids that a process leaves at its end
