@@ -26,6 +26,16 @@ Made = TypeVar("Made")
 _work: list[Callable[[Any], Any]] = []  # of a process
 
 
+def one_a_processor(workers: int | None) -> int:
+    """How many workers are meant: as many as are given, or None for as many as there are processors.
+
+    Raises SettingError for none.
+    """
+    if workers is not None and workers < 1:
+        raise SettingError(f"workers: expected a whole number of at least 1, got {workers}")
+    return workers or os.cpu_count() or 1
+
+
 def carried_out(
     work: Callable[[Order], Made], orders: Sequence[Order], workers: int, at_once: int = 1
 ) -> Generator[Made, None, None]:
@@ -55,8 +65,10 @@ def carried_out(
 
 
 def _begin_tracker() -> None:
-    """multiprocessing's process that clears away what others leave, told not to warn of it: to end at once is
-    how Ctrl-C ends a command."""
+    """multiprocessing's process that clears away what others leave, where there is one, told not to warn of
+    it: to end at once is how Ctrl-C ends a command."""
+    if os.name != "posix":
+        return
     quiet = "ignore:resource_tracker:UserWarning"
     sys.warnoptions.append(quiet)  # it begins with these
     try:
@@ -81,9 +93,8 @@ def end_with_parent() -> None:
 def _remember(work: Callable[[Any], Any]) -> None:
     end_with_parent()
     _work[:] = [work]
-    Finalize(
-        None, _work.clear, exitpriority=0
-    )  # what compiled code made is to be gone before that is unloaded
+    # What compiled code made is to go before that does.
+    Finalize(None, _work.clear, exitpriority=0)
 
 
 def _remembered(order: Any) -> Any:

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,7 @@ import psutil
 import pytest
 
 from partwright.errors import SettingError
-from partwright.processes import carried_out
+from partwright.processes import carried_out, one_a_processor
 
 
 def _scaled(factor: int, order: int) -> tuple[int, int]:
@@ -48,6 +47,13 @@ def test_orders_come_back_as_they_stand() -> None:
     assert {process for _, process in carried_out(partial(_scaled, 3), range(4), 2, at_once=4)} == {
         os.getpid()
     }
+
+
+def test_one_a_processor_is_meant_where_none_are_given() -> None:
+    assert one_a_processor(None) == os.cpu_count()
+    assert one_a_processor(3) == 3
+    with pytest.raises(SettingError, match="workers: expected a whole number of at least 1, got 0"):
+        one_a_processor(0)
 
 
 def test_they_are_deaf_to_ctrl_c_and_end_when_they_are_no_longer_asked() -> None:
@@ -87,13 +93,8 @@ def test_they_end_with_who_began_them(tmp_path: Path) -> None:
     )
     assert begun.stderr == ""
     # It came back at all: what they write to was closed, so none of them has it open any more.
-    for process in begun.stdout.split():
-        for _ in range(100):
-            if not psutil.pid_exists(int(process)) or psutil.Process(int(process)).status() == "zombie":
-                break
-            time.sleep(0.1)
-        else:
-            raise AssertionError(f"{process} goes on")
+    gone = [psutil.Process(int(one)) for one in begun.stdout.split() if psutil.pid_exists(int(one))]
+    assert not psutil.wait_procs(gone, timeout=10)[1]
 
 
 def test_a_process_that_is_ended_is_told() -> None:

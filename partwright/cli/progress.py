@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from partwright.cli.terminal import counted, note, printable
+from partwright.durations import duration
 
 _QUIET = 1.0  # seconds between plain lines of one stage
 _PATIENT = 10.0  # the same, where they tell nothing but the time
@@ -98,14 +99,21 @@ class Count(_Shown):
 
     def __init__(self, name: str) -> None:
         super().__init__(name, "{task.completed:.0f}/{task.total:.0f}  {task.fields[detail]}", None)
+        self._begun = (time.monotonic(), 0, 0)  # when how many of how many were done
 
     def show(self, done: int, total: int, what: str) -> None:
         """`what` was just done, the `done`th of `total`."""
+        now = time.monotonic()
         if self._bar:
             self._bar.update(self._task, completed=done, total=total, detail=printable(what))
-        elif done == total or time.monotonic() - self._last_time > _QUIET:
-            note(f"{self._name}: {done}/{total}  {what}")
-            self._last_time = time.monotonic()
+            return
+        since, before, of = self._begun
+        if total != of or done < before:  # something else is counted now
+            self._begun = since, before, of = now, done, total
+        if done == total or now - self._last_time > _QUIET:
+            left = (now - since) / (done - before) * (total - done) if done > before else 0.0
+            note(f"{self._name}: {done}/{total}  {what}" + (f"  {duration(left)} left" if left else ""))
+            self._last_time = now
 
 
 class Work(_Shown):

@@ -7,7 +7,6 @@ was. Poses are agreed on when all shapes are there; the manifest is written last
 from __future__ import annotations
 
 import hashlib
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -41,7 +40,7 @@ from partwright.datasets.prepared import (
 )
 from partwright.datasets.primitives import PrimitiveFit, fit_primitives
 from partwright.errors import FamilyError, OutputError, PartwrightError, SettingError
-from partwright.processes import end_with_parent
+from partwright.processes import end_with_parent, one_a_processor
 from partwright.shapes.units import canonical_up
 
 VALIDATION, TEST = 0.2, 0.2  # shares of the shapes; the rest trains (PartSDF, B.4)
@@ -121,7 +120,7 @@ def prepare(
         raise FamilyError(f"{name}: no usable shape is called {', '.join(unknown)}; hold out others")
     _start(output)
     jobs = [_Job(s, names, samples, seed, output / SHAPES / f"{s.name}.safetensors") for s in sources]
-    for number, (job, reason) in enumerate(_run(jobs, workers or os.cpu_count() or 1), 1):
+    for number, (job, reason) in enumerate(_run(jobs, one_a_processor(workers)), 1):
         if reason:
             refused.append(Refused(job.source.name, reason))
         if progress is not None:

@@ -21,6 +21,7 @@ from partwright.partsdf.model import about_file
 
 FORMAT = "partwright-checkpoint"
 _MOMENTS = ("exp_avg", "exp_avg_sq")
+_OF_LENGTH = {"training.epochs", "training.warmup"}  # what `--steps` of `parts family` tells
 
 
 @dataclass
@@ -57,9 +58,6 @@ def save_checkpoint(
     }
     kept = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
     write_bytes(path, save(kept, {"partwright": json.dumps(about)}))
-
-
-_OF_LENGTH = {"training.epochs", "training.warmup"}  # what `--steps` of `parts family` tells
 
 
 def load_checkpoint(
@@ -123,6 +121,7 @@ def _check_settings(path: Path, before: dict[str, object], now: dict[str, object
     if before != now:
         changed = sorted(_differences(before, now, ""))
         if "training.epochs" in changed and not set(changed) - _OF_LENGTH:
+            # Dictionaries, as was asserted.
             old, new = (settings["training"]["epochs"] for settings in (before, now))  # type: ignore[index]
             raise SettingError(
                 f"{path}: is of a training of {old} epochs, and {new} are asked for; one of another length "

@@ -159,7 +159,7 @@ class Generator:
             latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents)
         elif change:
             near = self.layout_of(source.poses, source.present).expand_as(layout)
-            layout = self._within(denoised(self.layouts, layout, like=near, since=change))
+            layout = self._within(denoised(self.layouts, layout, like=near, since=change), like=near[0])
             form = self.vectors.of_latents(source.latents).expand_as(latents)
             latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents, like=form, since=change)
             source = None
@@ -177,9 +177,9 @@ class Generator:
         """(..., P, 13) of poses (..., P, ...) and presence (..., P)."""
         return tidy(torch.cat([self.vectors.of_poses(poses), 2.0 * present[..., None] - 1], dim=-1))
 
-    def _within(self, layout: Tensor, fixed: Tensor | None = None) -> Tensor:
+    def _within(self, layout: Tensor, fixed: Tensor | None = None, like: Tensor | None = None) -> Tensor:
         still = torch.zeros(layout.shape[1], dtype=torch.bool) if fixed is None else fixed
-        return within_range(self.model, self.vectors, layout, still)
+        return within_range(self.model, self.vectors, layout, still, like)
 
     def _check(self, source: NeuralShape | None, kept: Tensor, keep_layout: bool, change: float) -> None:
         name = self.model.name

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 from partwright.datasets.prepared import PreparedFamily
+from partwright.durations import duration
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.pictures import picture, target_picture
 from partwright.partsdf.training import EpochReport
@@ -44,10 +45,3 @@ class LivePicture:
 def _said(report: EpochReport) -> str:
     rest = f"about {duration(report.seconds_left)} left" if report.epoch < report.epochs else "done"
     return f"epoch {report.epoch} of {report.epochs}, error {report.part:.4f}, {rest}"
-
-
-def duration(seconds: float) -> str:
-    """`40 s`, `12 min`, `2.5 h`."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

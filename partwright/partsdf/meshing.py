@@ -2,10 +2,10 @@
 
 A cube that is far from all cuboids of parts is empty. One whose centre is farther from zero than `lipschitz`
 times its half diagonal holds no surface, so it is left out with the sign of its centre; the others are
-halved. After the first level a tenth of what the constant is above 1 is enough, as few places are that steep,
-and the surface grows: wherever a corner's sign is not the one that its neighbour was left out with, the
-neighbour is looked at, too. What that can miss is a steep piece of surface that lies apart from all others
-and is no larger than a cube. All parts are decoded in one pass, and each keeps what any of them needs.
+halved. The last level goes by half of what the constant is above 1, as few places are that steep, and grows:
+wherever a corner's sign is not the one that its neighbour was left out with, the neighbour is looked at, too.
+What that can miss is a steep piece of surface that lies apart from all others and is no larger than a cube.
+All parts are decoded in one pass, and each keeps what any of them needs.
 """
 
 from __future__ import annotations
@@ -35,9 +35,7 @@ FINEST = 2  # cells along a cube whose corners are evaluated
 MAX_RESOLUTION = 1024  # cells along the box
 _DEFAULT_RESOLUTION, _MAX_RESOLUTION_FOR_WALLS = 128, 256
 _BATCH = 1 << 14  # points between two reports of progress
-# Of what the constant is above 1, after the first level: to the vertex, new shapes of four families have the
-# same surfaces as by all of it, at half the points.
-_EXCESS = 0.1
+_LAST_EXCESS = 0.5  # of what the constant is above 1, at the last level
 
 
 _LATTICE = np.stack(np.meshgrid(*[np.arange(FINEST + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -227,7 +225,7 @@ class SparseLattice:
             if inside is None:
                 inside = np.zeros((len(values), *[len(axis)] * 3), dtype=bool)
             inside[:, cubes[:, 0], cubes[:, 1], cubes[:, 2]] = values < 0
-            lipschitz = self._lipschitz if size == COARSEST else 1 + _EXCESS * (self._lipschitz - 1)
+            lipschitz = self._lipschitz if size > FINEST else 1 + _LAST_EXCESS * (self._lipschitz - 1)
             near = (np.abs(values) <= lipschitz * size * self.cell * 3**0.5 / 2).any(axis=0)
             cubes = cubes[near]
             if size == FINEST:

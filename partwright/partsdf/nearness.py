@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,12 +19,10 @@ if TYPE_CHECKING:
 _FIRST = 64  # points of a cloud that say how near another one is at most
 
 
-def from_others(
-    shape: NeuralShape, parts: dict[str, trimesh.Trimesh], names: Collection[str]
-) -> dict[str, np.ndarray]:
-    """(V,) distances of the vertices of these parts' meshes (unit frame) from all other parts, by name;
+def from_others(shape: NeuralShape, parts: dict[str, trimesh.Trimesh]) -> dict[str, np.ndarray]:
+    """(V,) distances of the vertices of the parts' meshes (unit frame) from all other parts, by name;
     infinite where there is no other part. Asked for in one pass."""
-    numbers = [(number, name) for number, name in enumerate(shape.names()) if name in names and name in parts]
+    numbers = [(number, name) for number, name in enumerate(shape.names()) if name in parts]
     if not numbers:
         return {}
     clouds = [np.asarray(parts[name].vertices, np.float32) for _, name in numbers]

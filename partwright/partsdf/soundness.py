@@ -109,7 +109,7 @@ class Judge:
         gap, between = widest_gap(parts)
         allowed = GAP if gap <= GAP else max(GAP, self._own_gap)
         empty = tuple(name for name in shape.names() if name not in parts)
-        off = from_others(shape, parts, parts)
+        off = from_others(shape, parts)
         through = tuple(tip for tip in tips(shape, parts, off) if tip.share > THROUGH)
         if through:
             known = self._own_tips
@@ -130,7 +130,7 @@ class Judge:
         for row in rows:
             shape = NeuralShape.trained(self.model, names[row])
             parts = _meshes(shape)
-            found.append(_Trained(shape, parts, from_others(shape, parts, parts)))
+            found.append(_Trained(shape, parts, from_others(shape, parts)))
         return found
 
     @cached_property

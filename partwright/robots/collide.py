@@ -19,13 +19,13 @@ from partwright.errors import RobotError, SettingError
 from partwright.robots.containment import shape_solid, sticking_out
 from partwright.robots.enclosed_link import EnclosedLink
 from partwright.robots.keeping_apart import keep_apart
+from partwright.robots.link_processes import Order, shapes_of_all
 from partwright.robots.model import Link, RobotFile, Shape
 from partwright.robots.opening import open_robot
 from partwright.robots.overlaps import Pair, overlaps, too_near
 from partwright.robots.picture import picture
 from partwright.robots.report import LinkReport, report
 from partwright.robots.shaping import LIGHT, Wishes, numbered
-from partwright.robots.side_by_side import Order, made_side_by_side
 from partwright.robots.solids import Solids, Target, largest_deviation
 from partwright.robots.spheres import LinkSpheres, as_json, curobo, spheres_for
 from partwright.shapes.cleaning import counted
@@ -186,7 +186,7 @@ def collide(
         for link in links:
             if link.name in todo and (key := keys[link.name]) not in made:  # four legs alike are made once
                 orders.setdefault(key, Order(link, uses[link.name], link.name in seen, wishes[link.name]))
-        with closing(made_side_by_side(solids, [*orders.values()], workers)) as found:
+        with closing(shapes_of_all(solids, [*orders.values()], workers)) as found:
             for name, key in keys.items():
                 if key not in made:
                     made[key] = next(found)

@@ -103,8 +103,7 @@ def test_encoder_and_generator(
     assert main(["parts", "generate", "--model", str(file)]) == 2
     assert "lamps has no generator; make one with `parts train-generator`" in capsys.readouterr().err
     assert main(["parts", "train-encoder", str(file), str(lamps.folder), "--steps", "2"]) == 0
-    assert main(["parts", "train-generator", str(file), "--steps", "60"]) == 0
-    assert " s left" in capsys.readouterr().err
+    assert main(["parts", "train-generator", str(file), "--steps", "20"]) == 0
     assert sorted(p.name for p in tmp_path.glob("*.safetensors")) == [
         "lamps.encoder.safetensors",
         "lamps.generator.safetensors",

@@ -41,7 +41,7 @@ class Pane:
 
 
 def _off(pane: Any) -> dict[str, np.ndarray]:
-    return from_others(pane, pane.meshes(), pane.meshes())
+    return from_others(pane, pane.meshes())
 
 
 def test_what_lies_in_others_is_known_from_training_shapes() -> None:

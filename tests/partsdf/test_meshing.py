@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-import trimesh
 
 from partwright.meshing.cells import cell_polygons
 from partwright.meshing.tables import CORNERS
@@ -120,24 +119,13 @@ def test_far_from_all_cuboids_nothing_is_asked(model: Model, monkeypatch: pytest
     assert near.evaluations < 0.95 * everywhere.evaluations
 
 
-def test_a_tenth_of_the_steepness_finds_the_same_surfaces(
-    model: Model, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """To the vertex, of fewer points than by all that the constant asks for; parts alone are those parts."""
-
-    def known(mesh: trimesh.Trimesh) -> set[tuple[float, ...]]:
-        return set(map(tuple, np.round(mesh.vertices, 9).tolist()))
-
+def test_parts_alone_are_those_of_the_whole(model: Model) -> None:
     shape = NeuralShape.trained(model, "lamp1")
-    quick = mesh_shape(shape, 64)
-    alone = meshing.mesh_parts(shape, 64)
-    monkeypatch.setattr(meshing, "_EXCESS", 1.0)
-    slow = mesh_shape(shape, 64)
-    assert quick.evaluations < 0.9 * slow.evaluations
-    assert known(quick.whole) == known(slow.whole)
-    assert quick.parts.keys() == slow.parts.keys() == alone.keys()
-    for name, mesh in slow.parts.items():
-        assert known(quick.parts[name]) == known(alone[name]) == known(mesh)
+    found, alone = mesh_shape(shape, 64).parts, meshing.mesh_parts(shape, 64)
+    assert found.keys() == alone.keys()
+    for name, mesh in found.items():
+        assert np.array_equal(mesh.vertices, alone[name].vertices)
+        assert np.array_equal(mesh.faces, alone[name].faces)
 
 
 def test_progress_rises_to_one_and_can_end_the_work(model: Model) -> None:

@@ -37,6 +37,12 @@ def test_the_longest_bridge_is_that_of_all_pairs(seed: int) -> None:
     assert i > j
 
 
+def test_pieces_that_touch_in_a_point_are_at_no_distance() -> None:
+    """SciPy's tree has no edge for them, and takes another."""
+    points = [[[0.0, 0, 0], [1, 0, 0]], [[1, 0, 0], [2, 0, 0]], [[2.5, 0, 0], [3, 0, 0]]]
+    assert longest_bridge([np.array(cloud) for cloud in points]) == (0.5, 2, 1)
+
+
 def test_edges_and_pieces_are_those_of_trimesh() -> None:
     ball = trimesh.creation.icosphere(2)
     two = trimesh.util.concatenate([ball, ball.copy().apply_translation((3, 0, 0))])
@@ -51,11 +57,11 @@ def test_one_pass_tells_how_far_each_part_is_from_the_others(model: Model) -> No
     shape = NeuralShape.trained(model, "lamp0")
     rng = np.random.default_rng(0)
     parts = {name: trimesh.Trimesh(rng.uniform(-1, 1, (40, 3)), process=False) for name in shape.names()[1:]}
-    found = from_others(shape, parts, parts)
+    found = from_others(shape, parts)
     assert list(found) == list(parts)
     for number, name in enumerate(shape.names()):
         if name in parts:
             each = shape.part_distances(np.asarray(parts[name].vertices))
             expected = np.delete(each, number, axis=0).min(axis=0)
             np.testing.assert_allclose(found[name], expected, atol=1e-6)
-    assert from_others(shape, {}, {}) == {}
+    assert from_others(shape, {}) == {}

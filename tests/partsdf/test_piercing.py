@@ -50,7 +50,7 @@ class Rod:
 
 def _tips(rod: Any, meshes: dict[str, trimesh.Trimesh] | None = None) -> list[Tip]:
     parts = rod.meshes() if meshes is None else meshes
-    return tips(rod, parts, from_others(rod, parts, parts))
+    return tips(rod, parts, from_others(rod, parts))
 
 
 @pytest.mark.parametrize("beyond", [0.025, 0.05])

@@ -34,3 +34,8 @@ def test_what_lies_oddly_comes_back_and_all_else_stays(model: Model) -> None:
     plate = torch.tensor([True, False, False])
     assert torch.equal(within_range(model, vectors, layouts, plate)[0, 0], layouts[0, 0])
     assert torch.equal(within_range(model, vectors, layouts, ~free), layouts)
+    # Nor where those that lie oddly are kept, or do so in what these are like.
+    names = model.parts
+    both = torch.tensor([name in ("ball", "plate") for name in names])
+    assert torch.equal(within_range(model, vectors, layouts, both), layouts)
+    assert torch.equal(within_range(model, vectors, layouts, free, layouts[0]), layouts)

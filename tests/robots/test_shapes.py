@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from partwright.errors import SettingError
-from partwright.robots import CollideOptions, collide, side_by_side
+from partwright.robots import CollideOptions, collide, link_processes
 from partwright.robots.containment import outside_of, shape_solid
 from partwright.robots.model import Shape
 from partwright.robots.report import warnings
@@ -70,7 +70,7 @@ def test_links_of_the_same_mesh_have_the_same_shapes_which_are_made_once(
         made.append(name)
         return shapes_for(name, *rest)
 
-    monkeypatch.setattr(side_by_side, "shapes_for", counted)
+    monkeypatch.setattr(link_processes, "shapes_for", counted)
     path = urdf(tmp_path)
     legs = "".join(
         f"""<link name="{name}"><collision><geometry>
@@ -219,7 +219,7 @@ def test_a_link_is_held_to_the_tolerance_that_was_given(tmp_path: Path, monkeypa
         return shapes_for(name, target, wishes)
 
     monkeypatch.setattr(sys.modules["partwright.robots.collide"], "too_near", overlapping)
-    monkeypatch.setattr(side_by_side, "shapes_for", measured)
+    monkeypatch.setattr(link_processes, "shapes_for", measured)
     result = collide(urdf(tmp_path), CollideOptions(tolerance="10mm"))
     assert {link.tolerance for link in result.links} == {0.01}
     assert min(asked) == max(asked) / 2 < 0.005

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from partwright.cli.terminal import counted, note, say, warn
+from partwright.processes import one_a_processor
 from partwright.robots import Collided, CollideOptions, collide, save
 from partwright.robots.report import LinkReport, warnings
 from partwright.robots.spheres import LinkSpheres, sphere_warnings
@@ -25,7 +25,7 @@ def run(arguments: argparse.Namespace) -> int:
         spheres=arguments.spheres,
         kinds=tuple(filter(None, arguments.kinds.split(","))),
     )
-    workers = (os.cpu_count() or 1) if arguments.workers is None else arguments.workers
+    workers = one_a_processor(arguments.workers)
     result = collide(arguments.robot, options, arguments.packages, told=note, workers=workers)
     save(result, arguments.output)
     for line in (*_table(result.links), *_sphere_table(result.spheres)):

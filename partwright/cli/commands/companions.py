@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -14,7 +13,6 @@ from partwright.cli.progress import Count
 from partwright.cli.terminal import say, warn
 from partwright.methods import Cancellation
 from partwright.partsdf.companions import place_for
-from partwright.partsdf.live import duration
 from partwright.partsdf.model import Model, load_model
 
 
@@ -32,24 +30,6 @@ def how(arguments: argparse.Namespace) -> dict[str, Any]:
     """What `add_training` asks for, for the functions that train."""
     asked = {name: getattr(arguments, name) for name in ("steps", "seed", "device", "batch")}
     return {name: value for name, value in asked.items() if value is not None}
-
-
-class Steps:
-    """Counts steps of a training beside what they have come to, and says how long the others will take."""
-
-    def __init__(self, count: Count) -> None:
-        self._count = count
-        self._start = 0.0
-
-    def begin(self) -> None:
-        """From now on: what was done before, as drawing views, tells nothing of steps."""
-        self._start = time.monotonic()
-
-    def show(self, done: int, total: int, what: str) -> None:
-        if done < total:
-            left = (time.monotonic() - self._start) / done * (total - done)
-            what = f"{what}  {duration(left)} left"
-        self._count.show(done, total, what)
 
 
 def train_beside(

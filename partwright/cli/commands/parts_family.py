@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from partwright.cli.interrupts import INTERRUPTED, raising
 from partwright.cli.progress import Count
 from partwright.cli.terminal import counted, note, say, warn
-from partwright.partsdf.live import duration
+from partwright.durations import duration
 from partwright.partsdf.own_family import CHECK, PICTURE, Plan, learn_family
 from partwright.partsdf.training import EpochReport
 
@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
             with Count("preparing") as count, Count("learning") as epochs:
 
                 def told(report: EpochReport) -> None:
-                    what = f"error {report.part:.4f}  {duration(report.seconds_left)} left"
+                    what = f"error {report.part:.4f}"
                     epochs.show(report.epoch, report.epochs, what)
 
                 trained = learn_family(

@@ -6,6 +6,7 @@ import argparse
 import json
 import re
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -44,10 +45,11 @@ def run(arguments: argparse.Namespace) -> int:
     made: list[Sample] = []
     nearest: list[tuple[str, float]] = []
     panels: list[np.ndarray] = []
-    with Work("reading") as work, stopping(cancel.request):
+    with Work("reading") as work, ExitStack() as hearing:
         source = _kept(arguments, model)
         odd = layout_faults(source) if arguments.poses and source is not None else []
         warn([f"in {arguments.poses} {fault}; so they do in all samples" for fault in odd])
+        hearing.enter_context(stopping(cancel.request))
         work.stage("making")
         for one in sound_samples_one_by_one(
             generator, arguments.count, arguments.seed, source, keep,
@@ -67,6 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         about = {
             "model": {"name": model.name, "hash": model.hash},
             "seed": arguments.seed,
+            "asked": arguments.count,
             "kept": list(keep) or ("poses" if arguments.poses else []),
             "layout_faults": odd,
             "like": {"shape": arguments.like, "change": change} if arguments.like else None,
@@ -98,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
         f"differs by {100 * least:.2f} hundredths of a unit length from one that was trained on"
         + (f"; {again} of them made anew, as parts came apart" if again else "")
     )
-    if len(made) < arguments.count:
+    if cancel.requested:
         warn([f"interrupted: {counted(len(made), 'sample')} of {arguments.count} written"])
         return INTERRUPTED
     return 0

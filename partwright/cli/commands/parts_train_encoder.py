@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import os
 
-from partwright.cli.commands.companions import Steps, how, train_beside
+from partwright.cli.commands.companions import how, train_beside
 from partwright.cli.progress import Count
 from partwright.datasets.prepared import PreparedFamily
 from partwright.methods import Cancellation
@@ -15,19 +14,18 @@ from partwright.partsdf.encoder_training import EncoderStep, train_encoder
 from partwright.partsdf.image_encoder import ImageEncoder, ImageSettings
 from partwright.partsdf.image_encoder_training import ImageStep, train_image_encoder
 from partwright.partsdf.model import Model
+from partwright.processes import one_a_processor
 
 
 def run(arguments: argparse.Namespace) -> int:
     last: list[EncoderStep | ImageStep] = []
 
     def train(model: Model, count: Count, cancel: Cancellation) -> Encoder | ImageEncoder:
-        steps = Steps(count)
 
         def told(step: EncoderStep | ImageStep) -> None:
             last[:] = [step]
-            steps.show(step.number, step.of, f"latents {step.latents:.3f}  poses {step.poses:.3f}")
+            count.show(step.number, step.of, f"latents {step.latents:.3f}  poses {step.poses:.3f}")
 
-        steps.begin()
         family, width = PreparedFamily(arguments.family), arguments.width
         if arguments.sees == "points":
             settings = EncoderSettings(width=width)
@@ -35,9 +33,8 @@ def run(arguments: argparse.Namespace) -> int:
 
         def drawn(done: int, of: int) -> None:
             count.show(done, of, "views drawn")
-            steps.begin()
 
-        workers = (os.cpu_count() or 1) if arguments.workers is None else arguments.workers
+        workers = one_a_processor(arguments.workers)
         return train_image_encoder(
             model, family, settings=ImageSettings.of_width(width), views=arguments.views, workers=workers,
             drawn=drawn, told=told, cancel=cancel, **how(arguments),

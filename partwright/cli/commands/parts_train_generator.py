@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from partwright.cli.commands.companions import Steps, how, train_beside
+from partwright.cli.commands.companions import how, train_beside
 from partwright.cli.progress import Count
 from partwright.cli.terminal import counted
 from partwright.methods import Cancellation
@@ -15,12 +15,9 @@ from partwright.partsdf.model import Model
 
 def run(arguments: argparse.Namespace) -> int:
     def train(model: Model, count: Count, cancel: Cancellation) -> Generator:
-        steps = Steps(count)
-
         def told(step: GeneratorStep) -> None:
-            steps.show(step.number, step.of, f"poses {step.layouts:.3f}  latents {step.forms:.3f}")
+            count.show(step.number, step.of, f"poses {step.layouts:.3f}  latents {step.forms:.3f}")
 
-        steps.begin()
         return train_generator(model, told=told, cancel=cancel, **how(arguments))
 
     return train_beside(arguments, KIND, train, lambda model: f", of {counted(len(model.shapes), 'shape')}:")

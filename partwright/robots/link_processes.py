@@ -27,7 +27,7 @@ class Order:
     wishes: Wishes
 
 
-def made_side_by_side(
+def shapes_of_all(
     solids: Solids, orders: Sequence[Order], workers: int
 ) -> Generator[list[Shape], None, None]:
     """The shapes of each order, as they stand; the same by however many processes.
@@ -35,9 +35,11 @@ def made_side_by_side(
     Raises:
         RobotError: a mesh has none. SettingError: of `carried_out`.
     """
-    targets = [solids.target(order.link, order.uses, order.sheets).solid for order in orders]
-    work = sum(min(one.num_tri(), _COUNTED) for one in targets if Piece(one).extra > FLAWS * one.volume())
-    return carried_out(partial(_made, solids), orders, workers if work > _WORTH else 1)
+    if workers > 1:
+        targets = [solids.target(order.link, order.uses, order.sheets).solid for order in orders]
+        work = sum(min(one.num_tri(), _COUNTED) for one in targets if Piece(one).extra > FLAWS * one.volume())
+        workers = workers if work > _WORTH else 1
+    return carried_out(partial(_made, solids), orders, workers)
 
 
 def _made(solids: Solids, order: Order) -> list[Shape]:
