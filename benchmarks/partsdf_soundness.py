@@ -57,8 +57,8 @@ def sounding(arguments: argparse.Namespace) -> None:
         rows = np.unique(np.linspace(0, len(model.shapes) - 1, count).round().astype(int)).tolist()
         for label, make in (
             ("trained", lambda judge=judge, rows=rows: [trained(judge, i) for i in rows]),
-            ("new", lambda generator=generator: sound_samples(generator, count, arguments.seed, tries=1)),
-            ("anew", lambda generator=generator: sound_samples(generator, count, arguments.seed)),
+            ("new", lambda generator=generator: [*sound_samples(generator, count, arguments.seed, tries=1)]),
+            ("anew", lambda generator=generator: [*sound_samples(generator, count, arguments.seed)]),
         ):
             start = time.process_time()
             samples = make()

@@ -72,9 +72,8 @@ def reaches(trained: Iterable[Mapping[str, np.ndarray]]) -> dict[str, Reach]:
     vertices of its parts' meshes are from the other parts."""
     found: dict[str, list[float]] = {}
     for off in trained:
-        for name, far in off.items():
-            if np.isfinite(far).all():  # there is another part
-                found.setdefault(name, []).append(float(np.quantile(far, _MOST)))
+        for name, far in off.items() if len(off) > 1 else ():
+            found.setdefault(name, []).append(float(np.quantile(far, _MOST)))
     return {
         name: Reach(float(np.median(far)) + _SLACK, max(far) + _SLACK)
         for name, far in found.items()
@@ -89,8 +88,8 @@ def insets(
     vertices of each are from the other parts."""
     rng = np.random.default_rng(0)
     found = []
-    for name, far in off.items():
-        if name not in known or len(off) < 2:
+    for name, far in off.items() if len(off) > 1 else ():
+        if name not in known:
             continue
         points = rng.permutation(np.asarray(parts[name].vertices, np.float32))[:_PLACES]
         share = float((far > known[name].most).mean())

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from partwright.partsdf.neural import NeuralShape
@@ -40,12 +38,6 @@ def edges_of(mesh: trimesh.Trimesh) -> np.ndarray:
     keys = np.sort(ends @ np.array([len(mesh.vertices), 1]))  # several times as fast as what trimesh does
     keys = keys[np.diff(keys, prepend=-1) > 0]
     return np.stack(np.divmod(keys, len(mesh.vertices)), axis=1)
-
-
-def components(count: int, edges: np.ndarray) -> np.ndarray:
-    """(count,) which connected piece each vertex belongs to, by edges (E, 2)."""
-    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def longest_bridge(clouds: Sequence[np.ndarray]) -> tuple[float, int, int]:

@@ -14,10 +14,10 @@ from torch import Tensor
 from partwright.assembly.similarity import Similarity
 from partwright.errors import SettingError
 from partwright.partsdf.cores import one_core_each
-from partwright.partsdf.decoder import Conditioned
+from partwright.partsdf.decoded import Decoded
 from partwright.partsdf.losses import aggregate
 from partwright.partsdf.model import Model
-from partwright.partsdf.poses import PoseTensors, local_points
+from partwright.partsdf.poses import PoseTensors
 
 _WALL_PLACES, _CUBOID_MARGIN = 1000, 1.05  # where walls are looked for, in and around a part's cuboid
 _WALL_QUANTILE = 0.95  # of the depths inside, which is half a wall
@@ -75,18 +75,18 @@ class NeuralShape:
         """(Q, N) float32 of the Q parts that are there, at points (N, 3) of the unit frame, in one pass."""
         size = CHUNK if self.model.asked == 1 else max(256, _CHUNK_OF_LAYERS // self.model.asked)
         chunks = torch.from_numpy(np.array(points, np.float32, order="C")).split(size)
-        conditioned = self._conditioned
+        decoded = self._decoded
 
         @torch.no_grad()
         def decode(chunk: Tensor) -> Tensor:
-            return conditioned(local_points(chunk, self.poses)[None])[0][self.present]
+            return decoded.parts(chunk)[self.present]
 
         return torch.cat(_side_by_side(decode, chunks), dim=1).numpy()
 
     @cached_property
-    def _conditioned(self) -> Conditioned:
+    def _decoded(self) -> Decoded:
         with torch.no_grad():
-            return self.model.condition(self.latents[None], self.poses.map(lambda t: t[None]))
+            return self.model.decoded(self.latents, self.poses)
 
     def walls(self) -> np.ndarray:
         """(Q,) about how thin each part that is there is, unit frame: twice a depth that few places inside

@@ -17,12 +17,13 @@ import numpy as np
 import torch
 
 from partwright.partsdf.cores import one_core_each
-from partwright.partsdf.nearness import components, edges_of
+from partwright.partsdf.nearness import edges_of
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.unknowns import FamilyUnknowns
 from partwright.render.raycast import Scene
+from partwright.shapes.topology import components
 
 if TYPE_CHECKING:
     import trimesh
@@ -84,7 +85,7 @@ def _tip(
     near = np.flatnonzero(distance[between].sum(axis=1) < 1.2 * np.linalg.norm(first - second, axis=1))
     along = (1 - _ALONG) * first[near] + _ALONG * second[near]
     cut = (outside(along.reshape(-1, 3)).reshape(len(_ALONG), -1) < 0).any(axis=0)
-    piece, own = (components(len(points), e) for e in (np.delete(between, near[cut], axis=0), edges))
+    piece, own = (components(len(points), *e.T) for e in (np.delete(between, near[cut], axis=0), edges))
     area = np.zeros(len(points))
     np.add.at(area, np.asarray(mesh.faces), mesh.area_faces[:, None] / 3)
     areas = np.bincount(piece, area)

@@ -39,27 +39,8 @@ def sound_samples(
     change: float = 0.0,
     tries: int = TRIES,
     told: ShareDone | None = None,
-) -> list[Sample]:
-    """All of `sound_samples_one_by_one`; told: the share of them that is done."""
-    made: list[Sample] = []
-    for one in sound_samples_one_by_one(generator, count, seed, source, keep, keep_layout, change, tries):
-        made.append(one)
-        if told is not None:
-            told(len(made) / count)
-    return made
-
-
-def sound_samples_one_by_one(
-    generator: Generator,
-    count: int,
-    seed: int = 0,
-    source: NeuralShape | None = None,
-    keep: Sequence[str] = (),
-    keep_layout: bool = False,
-    change: float = 0.0,
-    tries: int = TRIES,
 ) -> Iterator[Sample]:
-    """As `Generator.generate`, each made anew until it is sound, up to `tries` times in all.
+    """As `Generator.generate`, one by one, each made anew until it is sound, up to `tries` times in all.
 
     What is sound at once is what `generate` makes; 1 try takes all as they come. Parts that stand out of
     others are put back, and one that comes through another is drawn back, unless it is to stay. What is
@@ -97,6 +78,8 @@ def sound_samples_one_by_one(
             least = min(sample, new, key=lambda one: one.soundness.rank)
             sample = replace(least, tries=sample.tries + 1)
         yield sample
+        if told is not None:
+            told((number + 1) / count)
 
 
 def _mended(

@@ -17,11 +17,12 @@ import numpy as np
 from partwright.partsdf.insets import Inset, Reach, insets, reaches
 from partwright.partsdf.meshing import mesh_parts, resolution_for_wall
 from partwright.partsdf.model import Model
-from partwright.partsdf.nearness import components, edges_of, from_others, longest_bridge
+from partwright.partsdf.nearness import edges_of, from_others, longest_bridge
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.offsets import beyond_range
 from partwright.partsdf.piercing import Tip, tips
 from partwright.partsdf.pose_range import OFFSET
+from partwright.shapes.topology import area_vectors, components
 
 if TYPE_CHECKING:
     import trimesh
@@ -191,10 +192,10 @@ def _meshes(shape: NeuralShape) -> dict[str, trimesh.Trimesh]:
 
 def _pieces(mesh: trimesh.Trimesh) -> list[np.ndarray]:
     """Vertices (N, 3) of a mesh's connected pieces, without crumbs and the walls of cavities."""
-    piece = components(len(mesh.vertices), edges_of(mesh))
+    piece = components(len(mesh.vertices), *edges_of(mesh).T)
     owner = piece[mesh.faces[:, 0]]
     corners = mesh.triangles
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     area = np.bincount(owner, np.linalg.norm(normal, axis=1) / 2)
     volume = np.bincount(owner, np.einsum("fi,fi->f", corners[:, 0], normal))
     kept = (volume > 0) & (area >= _PIECE * area.sum())

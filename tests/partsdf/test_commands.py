@@ -360,7 +360,7 @@ def test_ctrl_c_keeps_the_samples_that_are_done(
 
     monkeypatch.setattr(commands + "load_generator", lambda model: None)
     monkeypatch.setattr(commands + "stopping", stopping)
-    monkeypatch.setattr(commands + "sound_samples_one_by_one", one_by_one)
+    monkeypatch.setattr(commands + "sound_samples", one_by_one)
     Path("made").mkdir()
     Path("made/sample_02.json").write_text("{}")
     line = ["parts", "generate", "--model", str(file), "-o", "made", "-n", "3", "--overwrite"]

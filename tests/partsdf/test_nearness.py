@@ -9,8 +9,9 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from partwright.partsdf.model import Model
-from partwright.partsdf.nearness import components, edges_of, from_others, longest_bridge
+from partwright.partsdf.nearness import edges_of, from_others, longest_bridge
 from partwright.partsdf.neural import NeuralShape
+from partwright.shapes.topology import components
 
 
 def by_all_pairs(clouds: list[np.ndarray]) -> tuple[float, int, int]:
@@ -48,7 +49,7 @@ def test_edges_and_pieces_are_those_of_trimesh() -> None:
     two = trimesh.util.concatenate([ball, ball.copy().apply_translation((3, 0, 0))])
     mine = set(map(tuple, edges_of(two).tolist()))
     assert mine == set(map(tuple, np.sort(two.edges_unique, axis=1).tolist()))
-    piece = components(len(two.vertices), edges_of(two))
+    piece = components(len(two.vertices), *edges_of(two).T)
     assert len(set(piece)) == two.body_count == 2
     assert len(set(piece[: len(ball.vertices)])) == 1
 

@@ -120,7 +120,7 @@ def test_what_is_broken_is_made_anew_and_the_least_broken_stays(
     heights = {Draw(1): 0.3, Draw(2): 0.3, Draw(2, 1): 0.15, Draw(2, 2): 0.4}
     generator = Scripted(model, heights)
     told: list[float] = []
-    made = sound_samples(generator, 3, tries=3, told=told.append)  # type: ignore[arg-type]
+    made = list(sound_samples(generator, 3, tries=3, told=told.append))  # type: ignore[arg-type]
     assert generator.asked == [*map(Draw, range(3)), Draw(1, 1), Draw(2, 1), Draw(2, 2)]
     assert generator.changes == [0.0, 0.6, 0.6, 0.7]  # more of the first one goes with each try
     assert [one.tries for one in made] == [1, 2, 3]
@@ -130,10 +130,10 @@ def test_what_is_broken_is_made_anew_and_the_least_broken_stays(
     assert told == pytest.approx([1 / 3, 2 / 3, 1])
     never = {Draw(0, attempt): 0.3 for attempt in range(7)}
     generator = Scripted(model, never)
-    sound_samples(generator, 1, tries=7)  # type: ignore[arg-type]
+    list(sound_samples(generator, 1, tries=7))  # type: ignore[arg-type]
     assert generator.changes == [0.0, 0.6, 0.7, 0.8, 0.9, 0.0, 0.0]  # then nothing of it is left
     with pytest.raises(SettingError, match="tries: expected a whole number of at least 1"):
-        sound_samples(generator, 3, tries=0)  # type: ignore[arg-type]
+        list(sound_samples(generator, 3, tries=0))  # type: ignore[arg-type]
 
 
 def test_what_a_given_layout_has_wrong_is_no_reason_for_another_try(

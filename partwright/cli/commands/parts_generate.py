@@ -25,7 +25,7 @@ from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
 from partwright.partsdf.pictures import picture
-from partwright.partsdf.resampling import Sample, sound_samples_one_by_one
+from partwright.partsdf.resampling import Sample, sound_samples
 from partwright.partsdf.soundness import layout_faults
 from partwright.partsdf.sources import found_in, open_source
 from partwright.render import Camera, sheet, write_png
@@ -51,15 +51,14 @@ def run(arguments: argparse.Namespace) -> int:
         warn([f"in {arguments.poses} {fault}; so they do in all samples" for fault in odd])
         hearing.enter_context(stopping(cancel.request))
         work.stage("making")
-        for one in sound_samples_one_by_one(
+        for one in sound_samples(
             generator, arguments.count, arguments.seed, source, keep,
-            keep_layout=arguments.poses is not None, change=change, tries=arguments.tries,
+            keep_layout=arguments.poses is not None, change=change, tries=arguments.tries, told=work.show,
         ):  # fmt: skip
             # Each with all that is told of it, so that what is done may be kept.
             nearest.append(nearest_training_shape(one.shape))
             panels.append(picture(one.shape, None, _PANEL, camera))
             made.append(one)
-            work.show(len(made) / arguments.count)
             if cancel.requested:
                 break
         captions = [f"{i}: {100 * far:.1f} from {name}" for i, (name, far) in enumerate(nearest)]
