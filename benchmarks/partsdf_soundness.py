@@ -22,7 +22,7 @@ from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.resampling import TRIES, Sample, sound_samples
-from partwright.partsdf.soundness import GAP, OFFSET, THROUGH, Judge, largest_offset
+from partwright.partsdf.soundness import GAP, OFFSET, THIN, THROUGH, Judge, largest_offset
 
 _FOLDS = 8
 _RESOLUTION = 96
@@ -37,8 +37,9 @@ def sounding(arguments: argparse.Namespace) -> None:
         f"{count} shapes a row. Apart: a piece of a part is more than {GAP} (of 1.8) from all others, or "
         f"more than in training shapes; odd: two parts lie by more than {OFFSET} beyond the range of the "
         f"training shapes to each other (for trained ones: of those of the other {_FOLDS - 1} eighths); "
-        f"empty: a part has no surface; through: more than {100 * THROUGH:.1f} % of a part's surface came "
-        "out of another part's far side, beyond the most in a few training shapes; out: more than "
+        f"empty: a part has no surface; thin: a part's wall is less than {THIN} times the thinnest in "
+        f"training shapes; through: more than {100 * THROUGH:.1f} % of a part's surface came out of "
+        "another part's far side, beyond the most in a few training shapes; out: more than "
         f"{100 * STANDS_OUT:.0f} % of the surface of a part that lies in others, as a window, is farther "
         "from them than in those. Anew: parts that came through are drawn back, what stands out is put "
         f"back, and each shape is made up to {TRIES} times. MMD-CD and COV-CD against "
@@ -46,9 +47,9 @@ def sounding(arguments: argparse.Namespace) -> None:
         f"After the coverage: its standard deviation over {_DRAWS} draws of three quarters of either set. "
         "Seconds of the processor a shape, to make and to judge.", "",
         command_line(), "",
-        "| family | shapes | broken % | apart | odd | empty | through | out | tries "
+        "| family | shapes | broken % | apart | odd | empty | thin | through | out | tries "
         "| MMD-CD x1e4 | COV-CD % | s |",
-        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]  # fmt: skip
     for name in arguments.names.split(","):
         model = load_model(name)
@@ -79,6 +80,7 @@ def cells(samples: Sequence[Sample], held: list[np.ndarray]) -> str:
         [one.gap > one.allowed for one in judged],
         [one.offset > OFFSET for one in judged],
         [bool(one.empty) for one in judged],
+        [one.thickness < THIN for one in judged],
         [bool(one.through) for one in judged],
         [bool(one.standing_out) for one in judged],
     )

@@ -88,6 +88,7 @@ class NeuralShape:
         with torch.no_grad():
             return self.model.decoded(self.latents, self.poses)
 
+    @cached_property
     def walls(self) -> np.ndarray:
         """(Q,) about how thin each part that is there is, unit frame: twice a depth that few places inside
         exceed, and so at most about twice the depth at which training clamps; where this is much more than
@@ -101,7 +102,7 @@ class NeuralShape:
     @cached_property
     def thinnest(self) -> float:
         """The least of `walls`; infinite where there is none."""
-        return float(self.walls().min(initial=np.inf))
+        return float(self.walls.min(initial=np.inf))
 
     def wall(self, name: str) -> float:
         """About how thin one part is, as in `walls`."""

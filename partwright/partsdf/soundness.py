@@ -1,13 +1,15 @@
 """Whether a new shape hangs together as those of its family do: what an eye would call broken, measured.
 
-Five things are looked for: a part that is said to be there and has no surface; a piece of a part that is
+Six things are looked for: a part that is said to be there and has no surface; a piece of a part that is
 apart from all others; two parts that lie to each other as in no training shape, as a leg that ends above its
-seat; a part that comes through another, as a blade through the wall of its tube; and one that stands out of
-those that it lies in, as a window above a roof.
+seat; a part that is thinner than in any training shape, as the wall of a tube that is a sieve if looked at
+closely; a part that comes through another, as a blade through the wall of its tube; and one that stands out
+of those that it lies in, as a window above a roof.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -34,6 +36,8 @@ THROUGH = 0.005  # of a part's surface, beyond what comes through in training sh
 _SEEN = 0.02  # of a part's surface, that an eye sees come through
 _COARSE, _FINE = 64, 112  # cells along the unit frame, by the thinnest wall
 _JUDGES = 8  # training shapes whose own gaps are looked at
+THIN = 0.8  # of the thinnest that a part is in training shapes: what is less has holes, or none can see it
+_WALLS = 64  # training shapes whose parts' walls are looked at
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,8 @@ class Soundness:
     narrowest, and the parts on its sides. allowed: a gap that is none for this family. offset: how far beyond
     the training shapes' range two parts lie to each other, and these two. Unit lengths. through: what
     of parts came through others, more than in training shapes, the least area first. insets: parts that lie
-    in others, and by how much they stand out of them."""
+    in others, and by how much they stand out of them. thickness: the least wall of a part, as a share of the
+    thinnest that it has in training shapes, and of which part."""
 
     empty: tuple[str, ...]
     gap: float
@@ -52,6 +57,8 @@ class Soundness:
     offset_between: tuple[str, ...]
     through: tuple[Tip, ...] = ()
     insets: tuple[Inset, ...] = ()
+    thickness: float = np.inf
+    thinnest: str = ""
 
     @property
     def standing_out(self) -> tuple[str, ...]:
@@ -70,6 +77,8 @@ class Soundness:
         said = [f"{name} has no surface" for name in self.empty]
         if self.gap > self.allowed:
             said.append(f"{' and '.join(dict.fromkeys(self.gap_between))} are {self.gap:.2f} apart")
+        if self.thickness < THIN:
+            said.append(f"{self.thinnest} is {self.thickness:.2f} times as thick as the thinnest in training")
         return said + _of_layout(self.offset, self.offset_between)
 
     def of_forms(self, given: Soundness) -> Soundness:
@@ -81,7 +90,8 @@ class Soundness:
         """By how much the worst of it exceeds what is allowed, 1 where it just does."""
         out = [one.share for one in self.insets if one.stands_out]
         seen = sum(tip.share for tip in self.through) + sum(out) + (1.0 if self.through or out else 0.0)
-        return 2.0 * len(self.empty) + max(self.gap / self.allowed, self.offset / OFFSET, seen)
+        worst = max(self.gap / self.allowed, self.offset / OFFSET, THIN / self.thickness, seen)
+        return 2.0 * len(self.empty) + worst
 
     @property
     def rank(self) -> tuple[bool, float]:
@@ -116,7 +126,25 @@ class Judge:
             known = self._own_tips
             through = tuple(tip for tip in through if tip.share > THROUGH + known.get(tip.part, 0.0))
         lying = insets(parts, self._reaches, off)
-        return Soundness(empty, gap, between, allowed, *largest_offset(shape), through, lying)
+        thickness, thinnest = self._thickness(shape)
+        offset = largest_offset(shape)
+        return Soundness(empty, gap, between, allowed, *offset, through, lying, thickness, thinnest)
+
+    def _thickness(self, shape: NeuralShape) -> tuple[float, str]:
+        """The least share that a part's wall is of the thinnest one in training shapes, and of which part."""
+        walls = zip(shape.names(), shape.walls, strict=True)
+        shares = [(wall / self._thinnest[name], name) for name, wall in walls if name in self._thinnest]
+        return min(shares, default=(np.inf, ""))
+
+    @cached_property
+    def _thinnest(self) -> dict[str, float]:
+        """By part, its thinnest wall in some training shapes."""
+        least: dict[str, float] = {}
+        for name in _spread(self.model.shapes, _WALLS):
+            shape = NeuralShape.trained(self.model, name)
+            for part, wall in zip(shape.names(), shape.walls, strict=True):
+                least[part] = min(least.get(part, np.inf), float(wall))
+        return {part: wall for part, wall in least.items() if wall < np.inf}
 
     @cached_property
     def _reaches(self) -> dict[str, Reach]:
@@ -125,11 +153,9 @@ class Judge:
     @cached_property
     def _trained(self) -> list[_Trained]:
         """A few training shapes."""
-        names = self.model.shapes
-        rows = np.unique(np.linspace(0, len(names) - 1, _JUDGES).round().astype(int)).tolist()
         found = []
-        for row in rows:
-            shape = NeuralShape.trained(self.model, names[row])
+        for name in _spread(self.model.shapes, _JUDGES):
+            shape = NeuralShape.trained(self.model, name)
             parts = _meshes(shape)
             found.append(_Trained(shape, parts, from_others(shape, parts)))
         return found
@@ -147,6 +173,12 @@ class Judge:
             for tip in tips(*one):
                 most[tip.part] = max(most.get(tip.part, 0.0), tip.share)
         return most
+
+
+def _spread(names: Sequence[str], count: int) -> list[str]:
+    """At most so many of them, evenly from the first to the last."""
+    rows = np.unique(np.linspace(0, len(names) - 1, count).round().astype(int))
+    return [names[row] for row in rows]
 
 
 def widest_gap(parts: dict[str, trimesh.Trimesh]) -> tuple[float, tuple[str, ...]]:

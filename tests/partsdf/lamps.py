@@ -11,6 +11,7 @@ import trimesh
 from partwright.datasets.poses import Poses, average_poses
 from partwright.datasets.prepared import PreparedFamily, PreparedShape, write_family
 from partwright.partsdf.config import Config, DecoderSettings, LossSettings, TrainingSettings
+from partwright.partsdf.neural import NeuralShape
 from partwright.shapes import UnitFrame
 
 PARTS = ("plate", "ball", "knob")
@@ -62,6 +63,14 @@ def distances(points: np.ndarray, centres: np.ndarray, half: np.ndarray, *radii:
     plate = np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(axis=1), 0)
     balls = [np.linalg.norm(points - c, axis=1) - r for c, r in zip(centres[1:], radii, strict=True)]
     return np.stack([plate, *balls], axis=1)
+
+
+def exact_distances(shape: NeuralShape, points: np.ndarray) -> np.ndarray:
+    """What a decoder without error would answer: (Q, N) of a lamp's parts, whose poses are not turned."""
+    poses = shape.poses.numpy()
+    half, ball, knob = poses.scale
+    each = distances(points, poses.translation, half, ball[0], knob[0])
+    return each.T[shape.present.numpy()]
 
 
 def write_lamps(folder: Path, count: int = 26, samples: int = 4000) -> PreparedFamily:

@@ -24,7 +24,7 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.shapes import UnitFrame
 from tests.counting import points_asked
-from tests.partsdf.lamps import distances
+from tests.partsdf.lamps import exact_distances
 
 FRAME = UnitFrame((10.0, 20.0, 30.0), 0.5)
 POINTS = np.random.default_rng(1).uniform(-0.9, 0.9, (300, 3)).astype(np.float32)
@@ -254,19 +254,11 @@ def test_a_field_alone_is_as_its_model_knows_it(model: Model, assembly: pw.Assem
     np.testing.assert_allclose(twice(2 * local), 2 * alone(local), atol=1e-5)
 
 
-def analytic(shape: NeuralShape, points: np.ndarray) -> np.ndarray:
-    """What a decoder without error would answer: (Q, N) of a lamp's parts, whose poses are not turned."""
-    poses = shape.poses.numpy()
-    half, ball, knob = poses.scale
-    each = distances(points, poses.translation, half, ball[0], knob[0])
-    return each.T[shape.present.numpy()]
-
-
 def test_walls_are_as_thin_as_the_parts_are(lamp: NeuralShape, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of exact distances: the sampled depth that one in twenty places inside exceeds is known."""
-    monkeypatch.setattr(NeuralShape, "part_distances", analytic)
+    monkeypatch.setattr(NeuralShape, "part_distances", exact_distances)
     half, ball, knob = lamp.poses.scale.numpy()
-    plate, *balls = lamp.walls()
+    plate, *balls = dataclasses.replace(lamp).walls
     assert plate == pytest.approx(2 * half.min(), rel=0.1)
     assert balls == pytest.approx([2 * (1 - 0.05 ** (1 / 3)) * r for r in (ball[0], knob[0])], rel=0.06)
     fields = [part.field for part in to_assembly(lamp, FRAME).parts]
@@ -290,7 +282,7 @@ def test_a_wall_with_a_flange_is_as_thin_as_the_wall(
         return np.tile(np.minimum(wall, flange), (3, 1))
 
     monkeypatch.setattr(NeuralShape, "part_distances", flanged)
-    assert lamp.walls()[0] == pytest.approx(2 * thin, rel=0.35)
+    assert dataclasses.replace(lamp).walls[0] == pytest.approx(2 * thin, rel=0.35)
 
 
 def test_a_part_that_is_nowhere_has_no_wall_and_no_surface(
@@ -298,7 +290,7 @@ def test_a_part_that_is_nowhere_has_no_wall_and_no_surface(
 ) -> None:
     part = to_assembly(lamp, FRAME).parts[0]
     monkeypatch.setattr(NeuralShape, "part_distances", lambda shape, points: np.ones((3, len(points))))
-    assert np.isinf(lamp.walls()).all()
+    assert np.isinf(dataclasses.replace(lamp).walls).all()
     with pytest.raises(NoSurfaceError, match=r"part plate of .* has no surface"):
         mesh_part(part)
 

@@ -21,12 +21,14 @@ from partwright.partsdf.resampling import sound_samples
 from partwright.partsdf.soundness import (
     GAP,
     OFFSET,
+    THIN,
     Judge,
     Soundness,
     largest_offset,
     layout_faults,
     widest_gap,
 )
+from tests.partsdf.lamps import exact_distances
 
 
 def box(size: float, x: float) -> trimesh.Trimesh:
@@ -80,6 +82,26 @@ def test_a_lamp_in_two_is_told(model: Model, monkeypatch: pytest.MonkeyPatch) ->
     gone = Soundness(("ball",), 0.0, (), GAP, 0.0, ())
     assert gone.faults() == ["ball has no surface"]
     assert gone.badness > 1
+
+
+def test_a_part_thinner_than_in_any_training_shape_is_told(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("partwright.partsdf.soundness._JUDGES", 2)
+    monkeypatch.setattr(NeuralShape, "part_distances", exact_distances)
+    judge = Judge(model)
+    least = float(model.poses.scale[:, 1].min())
+    known = NeuralShape.trained(model, model.shapes[int(model.poses.scale[:, 1, 0].argmin())])
+    assert judge(known).thickness == pytest.approx(1, abs=1e-5)
+    assert judge(known).faults() == []
+    for share in (0.9, 0.5):
+        scale = known.poses.scale.clone()
+        scale[1] = share * least
+        said = judge(replace(known, poses=known.poses._replace(scale=scale)))
+        assert (said.thickness, said.thinnest) == (pytest.approx(share, rel=0.01), "ball")
+        told = f"ball is {said.thickness:.2f} times as thick as the thinnest in training"
+        assert (told in said.breaks()) == (share < THIN)
+        assert (said.badness > 1) >= (share < THIN)
 
 
 class Scripted:
