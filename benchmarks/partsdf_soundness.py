@@ -41,15 +41,16 @@ def sounding(arguments: argparse.Namespace) -> None:
         f"training shapes; through: more than {100 * THROUGH:.1f} % of a part's surface came out of "
         "another part's far side, beyond the most in a few training shapes; out: more than "
         f"{100 * STANDS_OUT:.0f} % of the surface of a part that lies in others, as a window, is farther "
-        "from them than in those. Anew: parts that came through are drawn back, what stands out is put "
+        "from them than in those; covered: less of a part shows than half of the least in those. Anew: parts "
+        "that came through are drawn back, what stands out or is covered is put "
         f"back, and each shape is made up to {TRIES} times. MMD-CD and COV-CD against "
         f"{count} held-out shapes, made with another seed, {POINTS} points each, meshes of {_RESOLUTION}^3. "
         f"After the coverage: its standard deviation over {_DRAWS} draws of three quarters of either set. "
         "Seconds of the processor a shape, to make and to judge.", "",
         command_line(), "",
-        "| family | shapes | broken % | apart | odd | empty | thin | through | out | tries "
+        "| family | shapes | broken % | apart | odd | empty | thin | through | out | covered | tries "
         "| MMD-CD x1e4 | COV-CD % | s |",
-        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]  # fmt: skip
     for name in arguments.names.split(","):
         model = load_model(name)
@@ -83,6 +84,7 @@ def cells(samples: Sequence[Sample], held: list[np.ndarray]) -> str:
         [one.thickness < THIN for one in judged],
         [bool(one.through) for one in judged],
         [bool(one.standing_out) for one in judged],
+        [bool(one.covered) for one in judged],
     )
     shares = " | ".join(f"{100 * np.mean(one):.0f}" for one in broken)
     tries = np.mean([one.tries for one in samples])

@@ -17,7 +17,7 @@ from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.decoded import Decoded
 from partwright.partsdf.losses import aggregate
 from partwright.partsdf.model import Model
-from partwright.partsdf.poses import PoseTensors
+from partwright.partsdf.poses import PoseTensors, local_points
 
 _WALL_PLACES, _CUBOID_MARGIN = 1000, 1.05  # where walls are looked for, in and around a part's cuboid
 _WALL_QUANTILE = 0.95  # of the depths inside, which is half a wall
@@ -115,6 +115,11 @@ class NeuralShape:
         pose = self.poses.map(lambda t: t[self.model.index(name)]).numpy()
         turned = Similarity(1.0, tuple(pose.rotation.tolist()), tuple(pose.translation.tolist()))
         return turned(within * pose.scale).astype(np.float32)
+
+    def in_box(self, name: str, points: np.ndarray) -> np.ndarray:
+        """(N, 3) of points (N, 3) of the unit frame, in a part's cuboid, whose sides are at -1 and 1."""
+        own = self.poses.map(lambda t: t[self.model.index(name)][None])
+        return local_points(torch.from_numpy(np.array(points, np.float32)), own)[0].numpy()
 
     def whole(self, distances: np.ndarray) -> np.ndarray:
         """(N,) distance of the whole shape, of its parts' (Q, N)."""

@@ -1,5 +1,5 @@
 """New shapes that hang together: what a generator makes, and makes anew where parts came apart; those that
-came through others are drawn back, and those that stand out of others put back."""
+came through others are drawn back, and those that stand out of others or are covered by them put back."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ def sound_samples(
     """As `Generator.generate`, one by one, each made anew until it is sound, up to `tries` times in all.
 
     What is sound at once is what `generate` makes; 1 try takes all as they come. Parts that stand out of
-    others are put back, and one that comes through another is drawn back, unless it is to stay. What is
-    broken else is made anew: new noise takes over more of it with each try, then all. Replaced by anything,
-    shapes that often come apart, as benches, would be rare. What a layout that is kept has wrong itself is no
-    reason for another try: all would have it.
+    others or are covered by them are put back, and one that comes through another is drawn back, unless it is
+    to stay. What is broken else is made anew: new noise takes over more of it with each try, then all.
+    Replaced by anything, shapes that often come apart, as benches, would be rare. What a layout that is kept
+    has wrong itself is no reason for another try: all would have it.
 
     Raises:
         SettingError: no try is allowed; else as `Generator.generate`.
@@ -85,8 +85,9 @@ def sound_samples(
 def _mended(
     sample: Sample, judge: Callable[[NeuralShape], Soundness], keep: Sequence[str], keep_layout: bool
 ) -> Sample:
-    """The sample with parts that stand out of others put back, all together, and those that came through
-    others drawn back, one by one; one for which that does not help stays, and the others have their turn."""
+    """The sample with parts that stand out of others or are covered put back, all together, and those that
+    came through others drawn back, one by one; one for which that does not help stays, and the others have
+    their turn."""
     kept = set(keep)
 
     def better(shape: NeuralShape) -> Sample | None:
@@ -97,7 +98,7 @@ def _mended(
         return new if new.soundness.rank < sample.soundness.rank else None
 
     for _ in range(_PUT_BACK):
-        if not set(sample.soundness.standing_out) - kept:
+        if not set(sample.soundness.standing_out + sample.soundness.covered) - kept:
             break
         new = better(put_back(sample.shape, sample.soundness.insets, kept, move_pose=not keep_layout))
         if new is None:

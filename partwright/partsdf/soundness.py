@@ -1,10 +1,10 @@
 """Whether a new shape hangs together as those of its family do: what an eye would call broken, measured.
 
-Six things are looked for: a part that is said to be there and has no surface; a piece of a part that is
+Seven things are looked for: a part that is said to be there and has no surface; a piece of a part that is
 apart from all others; two parts that lie to each other as in no training shape, as a leg that ends above its
 seat; a part that is thinner than in any training shape, as the wall of a tube that is a sieve if looked at
-closely; a part that comes through another, as a blade through the wall of its tube; and one that stands out
-of those that it lies in, as a window above a roof.
+closely; a part that comes through another, as a blade through the wall of its tube; one that stands out of
+those that it lies in, as a window above a roof; and one that others cover.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class Soundness:
     """empty: parts without a surface. gap: the widest that is left when all pieces of parts are joined by the
     narrowest, and the parts on its sides. allowed: a gap that is none for this family. offset: how far beyond
     the training shapes' range two parts lie to each other, and these two. Unit lengths. through: what
-    of parts came through others, more than in training shapes, the least area first. insets: parts that lie
-    in others, and by how much they stand out of them. thickness: the least wall of a part, as a share of the
+    of parts came through others, more than in training shapes, the least area first. insets: how all
+    parts lie in others. thickness: the least wall of a part, as a share of the
     thinnest that it has in training shapes, and of which part."""
 
     empty: tuple[str, ...]
@@ -65,11 +65,17 @@ class Soundness:
         """Parts that lie in others, but for more than is seen."""
         return tuple(one.part for one in self.insets if one.stands_out)
 
+    @property
+    def covered(self) -> tuple[str, ...]:
+        """Parts that others cover more than in any training shape."""
+        return tuple(one.part for one in self.insets if one.covered)
+
     def faults(self) -> list[str]:
         """What is broken or seen to come through, a few words each; nothing where it is sound."""
         seen = [tip.part for tip in self.through if tip.share > _SEEN]
         through = [f"{part} comes through another part" for part in seen[:1]]
-        return self.breaks() + through + [f"{part} stands out of the others" for part in self.standing_out]
+        out = [f"{part} stands out of the others" for part in self.standing_out]
+        return self.breaks() + through + out + [f"{part} is covered by others" for part in self.covered]
 
     def breaks(self) -> list[str]:
         """What is apart or missing, a few words each: worth another try. What comes through is not, as that
@@ -88,8 +94,8 @@ class Soundness:
     @property
     def badness(self) -> float:
         """By how much the worst of it exceeds what is allowed, 1 where it just does."""
-        out = [one.share for one in self.insets if one.stands_out]
-        seen = sum(tip.share for tip in self.through) + sum(out) + (1.0 if self.through or out else 0.0)
+        amiss = [one.amiss for one in self.insets if one.amiss]
+        seen = sum(tip.share for tip in self.through) + sum(amiss) + (1.0 if self.through or amiss else 0.0)
         worst = max(self.gap / self.allowed, self.offset / OFFSET, THIN / self.thickness, seen)
         return 2.0 * len(self.empty) + worst
 
@@ -125,7 +131,7 @@ class Judge:
         if through:
             known = self._own_tips
             through = tuple(tip for tip in through if tip.share > THROUGH + known.get(tip.part, 0.0))
-        lying = insets(parts, self._reaches, off)
+        lying = insets(shape, parts, self._reaches, off)
         thickness, thinnest = self._thickness(shape)
         offset = largest_offset(shape)
         return Soundness(empty, gap, between, allowed, *offset, through, lying, thickness, thinnest)
@@ -148,7 +154,7 @@ class Judge:
 
     @cached_property
     def _reaches(self) -> dict[str, Reach]:
-        return reaches(one.off for one in self._trained)
+        return reaches(self._trained)
 
     @cached_property
     def _trained(self) -> list[_Trained]:

@@ -1,4 +1,4 @@
-"""Parts that lie in others are told where they stand out of these, and put back."""
+"""Parts that lie in others are told where they stand out of these or are covered, and put back."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import torch
 import trimesh
 
 from partwright.partsdf.generator import Draw, load_generator
-from partwright.partsdf.insets import insets, put_back, reaches
+from partwright.partsdf.insets import Inset, Reach, insets, put_back, reaches
+from partwright.partsdf.meshing import mesh_parts
 from partwright.partsdf.model import load_model
 from partwright.partsdf.nearness import from_others
 from partwright.partsdf.resampling import Sample, _mended
@@ -31,6 +32,14 @@ class Pane:
         blocks = [(np.abs(points - c) - h).max(axis=1) for c, h in boxes]
         return np.stack([*blocks, np.linalg.norm(points - (2, 0, 0), axis=1) - 0.3])
 
+    def in_box(self, name: str, points: np.ndarray) -> np.ndarray:
+        centre, half = {
+            "block": ((0, 0, -0.5), (0.5, 0.5, 0.5)),
+            "pane": ((0, 0, self.height), (0.2, 0.2, 0.01)),
+            "ball": ((2, 0, 0), (0.3, 0.3, 0.3)),
+        }[name]
+        return np.asarray((points - centre) / np.array(half))
+
     def meshes(self) -> dict[str, trimesh.Trimesh]:
         pane = trimesh.creation.box((0.4, 0.4, 0.02)).subdivide_to_size(0.02)
         return {
@@ -40,24 +49,44 @@ class Pane:
         }
 
 
-def _off(pane: Any) -> dict[str, np.ndarray]:
-    return from_others(pane, pane.meshes())
+def _known(*heights: float) -> dict[str, Reach]:
+    panes: list[Any] = [Pane(height) for height in heights]
+    return reaches((pane, pane.meshes(), from_others(pane, pane.meshes())) for pane in panes)
+
+
+def _pane(height: float, known: dict[str, Reach]) -> Inset:
+    pane: Any = Pane(height)
+    found = insets(pane, pane.meshes(), known, from_others(pane, pane.meshes()))
+    return next(one for one in found if one.part == "pane")
 
 
 def test_what_lies_in_others_is_known_from_training_shapes() -> None:
     """A pane that reaches one to three hundredths above its block, two usually; neither the block nor the
     ball lies in anything."""
-    panes: list[Any] = [Pane(height) for height in (0.0, 0.01, 0.02)]
-    known = reaches([_off(one) for one in panes])
-    assert list(known) == ["pane"]
-    assert known["pane"] == pytest.approx((0.025, 0.035), abs=1e-6)
-    (found,) = insets(panes[0].meshes(), known, _off(panes[0]))
-    assert (found.part, found.share, found.stands_out) == ("pane", 0.0, False)
+    known = _known(0.0, 0.01, 0.02)
+    usual, most, *_ = known["pane"]
+    assert (usual, most) == pytest.approx((0.025, 0.035), abs=1e-6)
+    assert known["block"].most == known["ball"].most == np.inf
+    found = _pane(0.0, known)
+    assert (found.share, found.stands_out, found.covered, found.lies_in) == (0.0, False, False, True)
     assert found.limit == known["pane"].most
-    above: Any = Pane(0.1)
-    (found,) = insets(above.meshes(), known, _off(above))
+    found = _pane(0.1, known)
     assert (found.share, found.stands_out, found.limit) == (1.0, True, known["pane"].usual)
     assert found.points.shape == (300, 3)
+
+
+def test_what_is_covered_is_told_and_where_it_should_show() -> None:
+    """Of a pane that is half in its block all shows but the lowest of three layers of cells."""
+    known = _known(0.0, 0.0)
+    shown = known["pane"].shown
+    mesh = Pane().meshes()["pane"]
+    assert shown == pytest.approx((mesh.vertices[:, 2] > -0.003).mean())
+    found = _pane(-0.005, known)  # the upper face is still out of it
+    assert (found.covered, found.amiss) == (False, 0.0)
+    assert not found.shows.any()
+    found = _pane(-0.05, known)
+    assert (found.covered, found.stands_out, found.shown, found.amiss) == (True, False, 0.0, 1.0)
+    np.testing.assert_array_equal(found.shows, found.points[:, 2] > -0.05 - 0.01 / 3)
 
 
 @pytest.fixture(scope="module")
@@ -66,14 +95,23 @@ def judge() -> Judge:
 
 
 @pytest.mark.heavy
-@pytest.mark.parametrize(("number", "part"), [(3, "windows_right"), (5, "lights_front")])
-def test_what_stands_out_of_new_vehicles_is_put_back(number: int, part: str, judge: Judge) -> None:
-    """Windows that reach above the roof, and lights before the nose; with them goes what came through. What
-    lies in nothing, as the body, stays to the bit."""
+@pytest.mark.parametrize(
+    ("number", "seed", "fault"),
+    [
+        (3, 0, "windows_right stands out of the others"),
+        (5, 0, "lights_front stands out of the others"),
+        (5, 3, "windscreen is covered by others"),
+    ],
+)
+def test_what_stands_out_or_is_covered_of_new_vehicles_is_put_back(
+    number: int, seed: int, fault: str, judge: Judge
+) -> None:
+    """Windows that reach above the roof, lights before the nose, a windscreen below the roof; with them goes
+    what came through. What lies in nothing, as the body, stays to the bit."""
     model = judge.model
-    (made,) = load_generator(model).generate([Draw(number)], 0)
+    (made,) = load_generator(model).generate([Draw(number)], seed)
     before = judge(made)
-    assert f"{part} stands out of the others" in before.faults()
+    assert fault in before.faults()
     after = _mended(Sample(made, before, 1), judge, [], keep_layout=False)
     assert after.soundness.faults() == []
     rest = [model.index(name) for name in ("body", "wheel_front_left", "mirror_left")]
@@ -81,6 +119,16 @@ def test_what_stands_out_of_new_vehicles_is_put_back(number: int, part: str, jud
         (after.shape.latents, *after.shape.poses), (made.latents, *made.poses), strict=True
     ):
         assert torch.equal(mine[rest], theirs[rest])
+
+
+def test_what_is_covered_comes_to_show(judge: Judge) -> None:
+    """A windscreen of which the body covers all but a fiftieth."""
+    (made,) = load_generator(judge.model).generate([Draw(5)], 3)
+    told = judge(made)
+    assert told.covered == ("windscreen",)
+    assert next(one.shown for one in told.insets if one.part == "windscreen") < 0.02
+    moved = put_back(made, told.insets)
+    assert (from_others(moved, mesh_parts(moved, 64))["windscreen"] > -0.003).mean() > 0.2
 
 
 def test_parts_that_are_kept_and_poses_that_are_held_stay(
