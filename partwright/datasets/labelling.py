@@ -16,6 +16,7 @@ from partwright.shapes.source import Piece, Source
 
 NEAR_SIGMA = (0.005**0.5, 0.0005**0.5)  # unit lengths: the paper's variances 0.005 and 0.0005
 NEAR_SHARE = 0.95  # of the samples; the rest is uniform in [-1, 1]^3
+_LOOSE = 0.01  # unit lengths beyond the whole, of a part that is not in it
 _APART = 0.05  # unit lengths that the whole's surface may lie off its parts
 
 
@@ -37,7 +38,7 @@ def label_surface(parted: PartedShape, parts: Sequence[str]) -> LabelledShape:
     So parts may be open, and what lies hidden where they overlap has no say (PartSDF, section 3.3).
 
     Raises what `load_shape` raises, and FamilyError for a part that is not among `parts`, one that lies
-    wholly inside the others, or a whole that reaches far beyond its parts.
+    wholly inside the others or bounds nothing, or a whole that reaches far beyond its parts.
     """
     strange = [name for name in parted.parts if name not in parts]
     if strange:
@@ -53,12 +54,9 @@ def label_surface(parted: PartedShape, parts: Sequence[str]) -> LabelledShape:
             f"{parted.name}: the whole's surface lies up to {distance.max():.2f} of 1.8 off all parts; give "
             "every part, in the same place and units as the whole"
         )
-    hidden = [parts[number] for number in numbers if not (label == number).any()]
-    if hidden:
-        raise FamilyError(
-            f"{parted.name}: {', '.join(hidden)} lies wholly inside the other parts, so none of the surface "
-            "is its own; move it out or leave it out"
-        )
+    for number, piece in numbers.items():
+        if not (label == number).any():
+            raise FamilyError(f"{parted.name}: {parts[number]} {_why_hidden(shape, piece)}")
     vertices = {number: shape.frame.to_unit(_used(piece)) for number, piece in numbers.items()}
     return LabelledShape(shape, label, vertices)
 
@@ -92,9 +90,24 @@ def _nearest_part(shape: Shape, parts: dict[int, Piece]) -> tuple[NDArray[np.int
     faces = np.concatenate([p.faces + o for p, o in zip(pieces, offsets, strict=True)])
     owner = np.repeat(np.array(list(parts), dtype=np.int8), [len(p.faces) for p in pieces])
     source = MeshDistance(vertices, faces, faces, closed=False)
-    middle = shape.frame.to_unit(shape.vertices[shape.faces].mean(axis=1))
+    middle = shape.frame.to_unit(_middles(shape))
     triangle, distance = source.nearest(middle)
     return owner[triangle], distance
+
+
+def _why_hidden(shape: Shape, piece: Piece) -> str:
+    """Of a part that none of the whole's surface is nearest to."""
+    outside, _ = shape.unit_nearest(shape.frame.to_unit(_middles(piece)).astype(np.float32))
+    if outside.max() > _LOOSE:  # what bounds nothing is no part of the repaired whole
+        return "is an open surface that bounds nothing, as a sheet does; close it or give it a thickness"
+    return (
+        "lies wholly inside the other parts, so none of the surface is its own; move it out or leave it out"
+    )
+
+
+def _middles(mesh: Piece | Shape) -> NDArray[np.float64]:
+    """(F, 3) of the faces."""
+    return np.asarray(mesh.vertices[mesh.faces].mean(axis=1))
 
 
 def _used(piece: Piece) -> NDArray[np.float64]:

@@ -297,7 +297,7 @@ def test_a_missing_part_has_the_average_pose(tmp_path: Path) -> None:
 
 
 def test_unusable_shapes_are_left_out_by_name(tmp_path: Path) -> None:
-    source = folders_of_parts(tmp_path / "in", 7)
+    source = folders_of_parts(tmp_path / "in", 8)
     nan = parts_of(1)["head"]
     nan.vertices[0] = np.nan
     nan.export(source / "thing_1" / "head.ply")
@@ -310,17 +310,20 @@ def test_unusable_shapes_are_left_out_by_name(tmp_path: Path) -> None:
     whole.export(source / "thing_6" / "_whole.ply")
     parts_of(1.2)["foot"].export(source / "labelled.ply")
     (source / "labelled.ply.labels.json").write_text(json.dumps(["foot"] * 11))
+    sheet = [[-1, 0, 2], [1, 0, 2], [1, 0, 3], [-1, 0, 3]]
+    trimesh.Trimesh(sheet, [[0, 1, 2], [0, 2, 3]]).export(source / "thing_7" / "head.ply")
     folders_of_parts(tmp_path / "in" / "more", 1)
-    (source / "more" / "thing_0").rename(source / "thing_7")
+    (source / "more" / "thing_0").rename(source / "thing_8")
     made = prepare(source, tmp_path / "out", samples=SAMPLES, parts=("foot", "head"), workers=1)
     reasons = {shape.name: shape.reason for shape in made.refused}
-    assert [entry.name for entry in made.family.shapes] == ["thing_0", "thing_7"]
+    assert [entry.name for entry in made.family.shapes] == ["thing_0", "thing_8"]
     assert "part 'head' has NaN" in reasons["thing_1"]
     assert "no faces" in reasons["thing_2"] or "surface" in reasons["thing_2"]
     assert "head.ply: cannot be read" in reasons["thing_3"]
     assert "head lies wholly inside the other parts" in reasons["thing_4"]
     assert "has hat, which the family has not" in reasons["thing_5"]
     assert "off all parts" in reasons["thing_6"]
+    assert "head is an open surface that bounds nothing" in reasons["thing_7"]
     assert "11 labels for the 12 faces" in reasons["labelled"]
 
 
