@@ -89,8 +89,8 @@ class Inset:
 
     @property
     def limit(self) -> float:
-        """To be kept to when parts are put back: one that stands out is to lie as is usual."""
-        return self.reach.usual if self.stands_out else self.reach.most
+        """To be kept to when parts are put back: one that stands out or is covered is to lie as is usual."""
+        return self.reach.usual if self.stands_out or self.covered else self.reach.most
 
 
 def reaches(
