@@ -13,14 +13,17 @@ RADIUS, PITCH, LENGTH = 0.4, 0.12, 1.2
 INNER = RADIUS - 0.6134 * PITCH
 
 
-def threaded(pitch: float = PITCH, around: int = 60, along: int = 16, ends: float = 1.0) -> Manifold:
+def threaded(
+    pitch: float = PITCH, around: int = 60, along: int = 16, ends: float = 1.0, starts: int = 1
+) -> Manifold:
     """A rod with the ISO profile: crests an eighth of the pitch wide, roots a quarter.
 
+    starts: ridges that wind beside one another, each as steep as the pitch says.
     ends: of the depth, that there is at the ends, where it runs out over two turns.
     """
     rows = round(LENGTH / abs(pitch) * along)
     turns, heights = np.arange(around) / around, np.linspace(-LENGTH / 2, LENGTH / 2, rows + 1)
-    phase = np.mod(heights[:, None] / pitch - turns, 1.0)
+    phase = np.mod(starts * (heights[:, None] / pitch - turns), 1.0)
     share = np.clip((np.abs(2 * phase - 1) - 1 / 8) / (5 / 8), 0.0, 1.0)
     near = np.clip((LENGTH / 2 - np.abs(heights[:, None])) / (2 * abs(pitch)), 0.0, 1.0)
     radius = RADIUS - share * (ends + (1 - ends) * near) * (RADIUS - INNER)

@@ -115,6 +115,48 @@ def test_a_tapped_hole_becomes_as_narrow_as_its_crests() -> None:
     assert plain.genus() == 1
 
 
+@pytest.mark.parametrize("starts", [2, 3])
+def test_ridges_that_wind_beside_one_another_are_one_thread(starts: int) -> None:
+    plain, (thread,) = without_threads(turned_askew(threaded(starts * PITCH, starts=starts)))
+    assert thread.pitch == pytest.approx(starts * PITCH, rel=5e-3)
+    assert plain.volume() == pytest.approx(math.pi * RADIUS**2 * LENGTH, rel=0.02)  # of crests in chords
+
+
+def wavy_neck(winds: int, around: int, rows: int, askew: float) -> Manifold:
+    """Of a bottle: as many waves wind around it, or rings where it is 0.
+
+    askew: of a chord, by which the corners of each row are turned on from those of the row below."""
+    k, j = (index.ravel() for index in np.meshgrid(np.arange(rows + 1), np.arange(around), indexing="ij"))
+    turns, heights = (j + askew * k) / around, LENGTH * (k / rows - 0.5)
+    radius = RADIUS - 0.025 + 0.025 * np.cos(2 * np.pi * (heights / (2 * PITCH) - winds * turns))
+    angle = 2 * np.pi * turns
+    wall = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), heights])
+    low, right = np.arange(rows * around), (j[: rows * around] + 1) % around + k[: rows * around] * around
+    rim, end = np.arange(around), rows * around
+    after = np.roll(rim, -1)
+    caps = [
+        (after, rim, np.full(around, len(wall))),
+        (end + rim, end + after, np.full(around, len(wall) + 1)),
+    ]
+    sides = [(low, right, low + around), (right, right + around, low + around)]
+    corners = np.concatenate([wall, [(0, 0, -LENGTH / 2), (0, 0, LENGTH / 2)]])
+    return closed(corners, np.concatenate([np.column_stack(one) for one in [*sides, *caps]]))
+
+
+@pytest.mark.parametrize(("around", "rows", "askew"), [(16, 30, 0.25), (16, 40, 0.25), (24, 40, 0.25)])
+def test_rings_are_no_thread_though_their_chords_lean(around: int, rows: int, askew: float) -> None:
+    """A bottle's neck had threads of a pitch that nothing on it had."""
+    neck = wavy_neck(0, around, rows, askew)
+    plain, found = without_threads(neck)
+    assert found == []
+    assert plain.volume() == neck.volume()
+
+
+def test_the_same_waves_are_a_thread_where_they_wind() -> None:
+    (thread,) = without_threads(wavy_neck(1, 48, 60, 0.25))[1]
+    assert thread.pitch == pytest.approx(2 * PITCH, rel=0.02)
+
+
 def test_what_is_beside_a_thread_stays() -> None:
     head = Manifold.cylinder(0.4, 0.7, 0.7, 6).translate((0, 0, 0.5))
     shank = Manifold.cylinder(0.5, RADIUS, RADIUS, 60).translate((0, 0, -1.0))

@@ -32,6 +32,7 @@ _ONLY = 30.0  # times as far off all other motions are, squared
 _KEPT, _RADIAL = 0.1, 0.95  # of a face: cosine to the velocity, and to the way out, at most
 _UNEVEN, _PITCHES = 0.06, 241  # of the pitch, that is tried around it, in so many steps
 _COHERENT = 0.5  # of the flanks' area, that agrees on where a turn lies, at least
+_STARTS = 6  # ridges that wind beside one another, at most
 _TURNS = 1.3  # that a patch goes around, at least
 _DEPTH = (0.02, 0.35)  # of the outer radius
 _CLIMB = (0.7, 30.0)  # depths that a thread climbs in a turn
@@ -114,7 +115,9 @@ def _candidates(mesh: trimesh.Trimesh, smooth: float) -> list[Thread]:
             continue
         for flanks in _apart(whole, mesh, leaning):
             thread = _measured(whole, screw, mesh, corners, flanks)
-            if _is_like_a_thread(thread) and not any(_is_same(thread, other) for other in found):
+            if thread is None or not _is_like_a_thread(thread):
+                continue
+            if not any(_is_same(thread, other) for other in found):
                 found.append(thread)
     return found
 
@@ -141,13 +144,14 @@ def _apart(thread: Thread, mesh: trimesh.Trimesh, flanks: np.ndarray) -> list[np
 
 def _measured(
     whole: Thread, screw: Screw, mesh: trimesh.Trimesh, corners: np.ndarray, flanks: np.ndarray
-) -> Thread:
-    """The thread of these flanks, with the radii of the patch's corners (N, 3) that lie between its ends."""
+) -> Thread | None:
+    """The thread of these flanks, with the radii of the patch's corners (N, 3) that lie between its ends;
+    None where they do not wind."""
     own = mesh.vertices[np.unique(mesh.faces[flanks])]
     heights, along = ((points - whole.axis) @ whole.direction for points in (own, corners))
     beside = corners[(along >= heights.min() - _OVERLAP) & (along <= heights.max() + _OVERLAP)]
     thread = _between_ends(_screw(mesh, flanks) or screw, beside if len(beside) else own)
-    return _with_even_turns(_as_long_as(thread, own), mesh, flanks)
+    return _winding(_as_long_as(thread, own), mesh, flanks)
 
 
 def _between_ends(screw: Screw, corners: np.ndarray) -> Thread:
@@ -185,22 +189,27 @@ def _as_long_as(thread: Thread, corners: np.ndarray) -> Thread:
     return dataclasses.replace(thread, axis=middle, length=high - low)
 
 
-def _with_even_turns(thread: Thread, mesh: trimesh.Trimesh, flanks: np.ndarray) -> Thread:
+def _winding(thread: Thread, mesh: trimesh.Trimesh, flanks: np.ndarray) -> Thread | None:
     """With the pitch at which each turn lies on the one before: normals of chords tell it to a few
-    hundredths, the places of many turns much better. As it is where there is more than one start."""
+    hundredths, the places of many turns much better. None where flanks do not lie the further along, the
+    further around they are, as those of rings do not: coarse chords of rings lean as a helix would."""
     off = mesh.triangles_center[flanks] - thread.axis
-    along = off @ thread.direction
     frame = thread.frame
     angle = np.arctan2(off @ frame[:, 1], off @ frame[:, 0])
+    turns = 2 * math.pi * (off @ thread.direction) / thread.pitch
     upwards = mesh.face_normals[flanks] @ thread.direction > 0
     weights = mesh.area_faces[flanks]
-    best, pitch = _COHERENT * float(weights.sum()), thread.pitch
-    for share in np.linspace(1 - _UNEVEN, 1 + _UNEVEN, _PITCHES).tolist():
-        waves = weights * np.exp(1j * (2 * math.pi * along / (share * thread.pitch) - angle))
-        coherent = float(abs(waves[upwards].sum()) + abs(waves[~upwards].sum()))
-        if coherent > best:
-            best, pitch = coherent, share * thread.pitch
-    return dataclasses.replace(thread, pitch=pitch)
+
+    def coherent(starts: int, share: float) -> float:
+        waves = weights * np.exp(1j * starts * (turns / share - angle))
+        return float(abs(waves[upwards].sum()) + abs(waves[~upwards].sum()))
+
+    shares = np.linspace(1 - _UNEVEN, 1 + _UNEVEN, _PITCHES).tolist()
+    for starts in range(1, _STARTS + 1):
+        most, share = max((coherent(starts, share), share) for share in shares)
+        if most > _COHERENT * float(weights.sum()):
+            return dataclasses.replace(thread, pitch=share * thread.pitch)
+    return None
 
 
 def _screw(mesh: trimesh.Trimesh, faces: np.ndarray) -> Screw | None:
