@@ -30,14 +30,13 @@ from partwright.export.brep_rims import shallower
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
 from partwright.export.brep_swept_profile import swept_profile
-from partwright.export.brep_topology import faces_of
+from partwright.export.brep_topology import faces_of, volume_and_area
 from partwright.fields import Field, SuperFrustum, Swept
 from partwright.meshing import mesh_part
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
 
-_INTEGRATED = 1e-6  # relative error of volumes; without it B-splines are integrated to 1 %
 _SHORTEST = 1e-5  # of the longest side: shorter edges are left out
 _STRAIGHT = 1e-4  # radians: an arc of this half angle is none
 # What is built may be off by this share of volume and longest side; the mesh that it is held against lacks a
@@ -159,16 +158,6 @@ def _off(built_field: SuperFrustum, field: SuperFrustum) -> tuple[float, float] 
         return None
     exact = built_field == field and _analytic(field)
     return (0.0, 0.0) if exact else (area * deviation / bulk, deviation)
-
-
-def volume_and_area(shape: TopoDS_Shape) -> tuple[float, float]:
-    from OCP.BRepGProp import BRepGProp
-    from OCP.GProp import GProp_GProps
-
-    volume, area = GProp_GProps(), GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, volume, _INTEGRATED)
-    BRepGProp.SurfaceProperties_s(shape, area)
-    return float(volume.Mass()), float(area.Mass())
 
 
 def _analytic(f: SuperFrustum) -> bool:

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.errors import NoSurfaceError
-from partwright.export.brep import volume_and_area
 from partwright.export.brep_errors import opencascade_errors
-from partwright.export.brep_topology import faces_of
+from partwright.export.brep_topology import faces_of, volume_and_area
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape

@@ -10,8 +10,8 @@ import dataclasses
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
+from partwright.export.brep_rim_cuts import with_cut_rims
 from partwright.export.brep_topology import edges_of
 from partwright.fields import Extrusion, Swept
 from partwright.fields.extrusion import RIMS
@@ -28,11 +28,21 @@ SHALLOW = "its fillets and chamfers are a thousandth less deep: OpenCASCADE buil
 
 
 def with_rims(field: Extrusion, solid: TopoDS_Shape, bottom: TopoDS_Shape, top: TopoDS_Shape) -> TopoDS_Shape:
-    """The solid with its rims. bottom, top: its faces at the ends.
+    """The solid with its rims, cut where no CAD program makes them. bottom, top: its faces at the ends.
 
     Raises:
         NoSurfaceError: OpenCASCADE cannot build them.
     """
+    made = by_itself(field, solid, bottom, top)
+    return with_cut_rims(field, solid) if made is None else made
+
+
+def by_itself(
+    field: Extrusion, solid: TopoDS_Shape, bottom: TopoDS_Shape, top: TopoDS_Shape
+) -> TopoDS_Shape | None:
+    """`with_rims` as OpenCASCADE's own fillets and chamfers have it; None where these fail."""
+    from OCP.BRepCheck import BRepCheck_Analyzer
+
     ends = [(rim, face) for rim, face in zip(field.rims, (bottom, top), strict=True) if rim.depth]
     for share in _SHARES:
         try:
@@ -41,8 +51,9 @@ def with_rims(field: Extrusion, solid: TopoDS_Shape, bottom: TopoDS_Shape, top: 
                 result = _with_rim(result, face, rim, share)
         except opencascade_errors():
             continue
-        return result
-    raise NoSurfaceError(f"OpenCASCADE cannot build the rims of an {field.kind} {field.profile}")
+        if BRepCheck_Analyzer(result).IsValid():
+            return result
+    return None
 
 
 def shallower(field: Swept) -> Iterator[tuple[Extrusion, float]]:

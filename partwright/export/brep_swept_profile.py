@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
-from partwright.export.brep_rims import with_rims
+from partwright.export.brep_rims import by_itself, with_rims
 from partwright.export.brep_swept import sewn
 from partwright.export.brep_topology import solids_of
 from partwright.fields import Extrusion, Profile, Revolution, Swept
@@ -40,16 +40,24 @@ def swept_profile(field: Swept) -> TopoDS_Shape:
         raise NoSurfaceError(f"OpenCASCADE cannot build an {field.kind} {field.profile}") from error
 
 
+def has_common_rims(field: Extrusion) -> bool:
+    """Whether OpenCASCADE's own fillets and chamfers make its rims, as CAD programs that build on it do."""
+    return by_itself(field, *_upright(field)) is not None
+
+
 def _extruded(field: Extrusion) -> TopoDS_Shape:
+    solid, bottom, top = _upright(field)
+    return _oriented(with_rims(field, solid, bottom, top)) if field.has_rims else solid
+
+
+def _upright(field: Extrusion) -> tuple[TopoDS_Shape, TopoDS_Shape, TopoDS_Shape]:
+    """The solid without its rims, and its faces at the bottom and the top."""
     from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
     from OCP.gp import gp_Vec
 
     base = _face(field.profile, _level(-field.height / 2))
     prism = BRepPrimAPI_MakePrism(base, gp_Vec(0, 0, field.height))
-    solid = _oriented(prism.Shape())
-    return (
-        _oriented(with_rims(field, solid, prism.FirstShape(), prism.LastShape())) if field.has_rims else solid
-    )
+    return _oriented(prism.Shape()), prism.FirstShape(), prism.LastShape()
 
 
 def _revolved(field: Revolution) -> TopoDS_Shape:

@@ -10,6 +10,8 @@ from partwright.shapes.step import parts_of
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Edge, TopoDS_Face, TopoDS_Shape, TopoDS_Solid
 
+_INTEGRATED = 1e-6  # relative error of volumes; without it B-splines are integrated to 1 %
+
 
 def faces_of(shape: TopoDS_Shape) -> Iterator[TopoDS_Face]:
     from OCP.TopAbs import TopAbs_ShapeEnum
@@ -45,3 +47,13 @@ def side_by_side(shapes: Sequence[TopoDS_Shape]) -> TopoDS_Shape:
     for shape in shapes:
         builder.Add(compound, shape)
     return compound
+
+
+def volume_and_area(shape: TopoDS_Shape) -> tuple[float, float]:
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    volume, area = GProp_GProps(), GProp_GProps()
+    BRepGProp.VolumeProperties_s(shape, volume, _INTEGRATED)
+    BRepGProp.SurfaceProperties_s(shape, area)
+    return float(volume.Mass()), float(area.Mass())

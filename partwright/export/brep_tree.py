@@ -14,12 +14,12 @@ from partwright.approximation.closed_quadrics import Ball
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import NoSurfaceError
-from partwright.export.brep import solid_of, volume_and_area
+from partwright.export.brep import solid_of
 from partwright.export.brep_booleans import Repairs, operated, operated_on_moved
 from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
-from partwright.export.brep_topology import side_by_side, solids_of
+from partwright.export.brep_topology import side_by_side, solids_of, volume_and_area
 from partwright.fields import Sphere
 from partwright.meshing import has_exact_mesh, mesh_csg
 from partwright.meshing.sampled_volume import sampled_volume

@@ -82,6 +82,7 @@ _RESERVED = (
 )
 _TRIANGLES = 800  # for a quadric, at most: OpenCASCADE takes minutes for thousands of faces
 _TIGHT = 0.99999  # of a rim's depth, where nothing else would be left between rims
+_REACHED = 0.999  # of the way to where a side vanishes, that rims go
 _NEARLY = 0.01  # of a frame's width
 _GRID = """\
 def grid(counts, spacing):
@@ -147,9 +148,15 @@ def _facets(tree: Assembly) -> dict[str, tuple[Manifold, float]]:
 
 
 def _kept(part: Part) -> Approximation | None:
-    """A quadric without end as it is, and what can be lofted."""
-    if part.field.quadric() is not None and not np.isfinite(part.field.bounds()).all():
-        return Approximation(part.field, part, 0.0, 0.0)
+    """A quadric without end as it is, what can be lofted, and rims no deeper than all sides of the profile
+    reach: OpenCASCADE makes few others by itself."""
+    field = part.field
+    if field.quadric() is not None and not np.isfinite(field.bounds()).all():
+        return Approximation(field, part, 0.0, 0.0)
+    if isinstance(field, Extrusion) and field.has_rims and field.collapses:
+        most = _REACHED * field.collapses[0]
+        less = {name: min(getattr(field, name), most) for name in RIMS}
+        return compared(part, dataclasses.replace(field, **less))
     return _lofted(part)
 
 

@@ -26,10 +26,11 @@ from partwright.approximation.solid_tree import solid_tree
 from partwright.assembly import Assembly, Node
 from partwright.atomic_io import replacing
 from partwright.errors import NoSurfaceError, OutputError
-from partwright.export.brep import built, volume_and_area
+from partwright.export.brep import built
 from partwright.export.brep_facets import FacetsWarning, faceted
 from partwright.export.brep_rims import SHALLOW
-from partwright.export.brep_topology import faces_of
+from partwright.export.brep_swept_profile import has_common_rims
+from partwright.export.brep_topology import faces_of, volume_and_area
 from partwright.export.brep_tree import Compromises, combined, volume_off
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
@@ -188,7 +189,10 @@ def _with_note(change: Change, assembly: Assembly, made: Assembly) -> Change:
 
 
 def _is_mitred(field: Field) -> bool:
-    return isinstance(field, Extrusion) and field.has_rims and field.rounds_inner_corners
+    """Whether OpenCASCADE makes its rims by itself, another way than the field has them."""
+    if not isinstance(field, Extrusion) or not field.has_rims:
+        return False
+    return field.rounds_inner_corners and has_common_rims(field)
 
 
 def _document(products: list[tuple[str, TopoDS_Shape]]) -> TDocStd_Document:

@@ -13,6 +13,7 @@ from partwright.errors import ParameterError
 from partwright.fields.base import LARGEST, checked, normalise, number
 from partwright.fields.operations import library
 from partwright.fields.profile import Profile
+from partwright.fields.profile_collapses import Stage, section, stages
 from partwright.fields.profile_distance import profile_distance, profile_gradients
 from partwright.fields.profile_offset import Wall, offset
 from partwright.fields.rims import Rim
@@ -35,7 +36,8 @@ class Extrusion(Swept):
 
     bottom_fillet, top_fillet: radius by which the edges of that end are rounded, those of holes as well.
     bottom_chamfer, top_chamfer: lengths by which they are cut off at 45 degrees instead. Rims need upright
-    walls, and sides that reach the end; a corner of the profile may be exactly as round as the fillet.
+    walls, and what lies so deep within the profile in one piece; sides that vanish on the way there, corners
+    less round than the rim is deep, end on it, and what is beside them meets in a mitre.
 
     Without taper and rims the distance is exact. With them it is wherever the nearest point lies on a wall
     that the nearest side of the profile makes, and beyond the edges between such walls, outside of corners
@@ -78,7 +80,7 @@ class Extrusion(Swept):
         total = sum(rim.depth for rim in self.rims)
         if total > self.height * (1 + 1e-9):
             raise ParameterError(f"{self.kind}: rims take {total:.6g} of a height of {self.height:.6g}")
-        _ = self.within(max(rim.depth for rim in self.rims))
+        _ = self.within(self.deepest)
 
     @property
     def has_rims(self) -> bool:
@@ -95,18 +97,35 @@ class Extrusion(Swept):
         """Whether the profile has corners that turn inwards: leaning walls and rims run in an arc about them.
 
         CAD programs let them meet there in a mitre."""
-        depth = max(rim.depth for rim in self.rims)
-        walls = self.walls if self.taper else self.within(depth)[1]
+        walls = self.walls if self.taper else self.within(self.deepest)[1]
         return any(wall.below is None for loop in walls for wall in loop)
+
+    @property
+    def deepest(self) -> float:
+        """How deep its rims go."""
+        return max(rim.depth for rim in self.rims)
+
+    @property
+    def collapses(self) -> list[float]:
+        """Depths along its rims right before and right after sides of the profile vanish."""
+        depths: list[float] = []
+        for stage in self._stages[1:]:
+            if not depths or stage.depth > depths[-1]:
+                depths += [stage.depth, stage.depth * (1 + 3 * _VANISHING)]
+        return depths
+
+    @cached_property
+    def _stages(self) -> list[Stage]:
+        return stages(self.profile, self.deepest * (1 - _VANISHING))
 
     def within(self, depth: float) -> tuple[Profile, list[list[Wall]]]:
         """The section that lies so deep, at most as deep as a rim goes, within the profile, and how its sides
-        grow out of the profile's."""
+        grow out of the profile's: those that have vanished end in a point."""
         if depth <= 0:
             return self.profile, []
         known: dict[float, tuple[Profile, list[list[Wall]]]] = self.__dict__.setdefault("_sections", {})
         if depth not in known:
-            known[depth] = offset(self.profile, depth * (1 - _VANISHING), curved=True)
+            known[depth] = section(self.profile, self._stages, depth * (1 - _VANISHING))
         return known[depth]
 
     @cached_property

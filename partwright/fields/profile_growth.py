@@ -65,8 +65,9 @@ def _grown_loop(sides: tuple[Side, ...], depths: list[float], tilted: bool) -> L
 
 
 def _corner(before: Side, after: Side, deep: float, deeper: float) -> Point:
-    if abs(turn_between(before, after)) > _NEARLY_SMOOTH:
-        return parallels_cross(before, after, deep, deeper)
+    turn = turn_between(before, after)
+    if abs(turn) > _NEARLY_SMOOTH:
+        return parallels_cross(before, after, deep, deeper, turn)
     x, y = before.direction(at_end=True) + after.direction()
     inwards = np.array([-y, x]) / math.hypot(x, y)
     px, py = (np.array(after.start) + (deep + deeper) / 2 * inwards).tolist()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +12,10 @@ import numpy as np
 from partwright.errors import ParameterError
 from partwright.fields.profile import Corner, Profile, Side
 
-_NEWTON, _CONVERGED = 50, 1e-11
-_ROUNDED = 1e-14  # of coordinates
 _SMOOTH = 1e-6  # radians: sides that turn by less run on smoothly
+
+
+Point = tuple[float, float]
 
 
 class Wall(NamedTuple):
@@ -26,6 +29,43 @@ class Wall(NamedTuple):
     above: Side
 
 
+class Mover(NamedTuple):
+    """What moves inwards of a loop: a side, or an arc that grows about a corner that turns inwards.
+
+    start: where it begins on the profile. below: the side, None of such an arc. side: that whose parallel it
+    runs along, of such an arc one of radius 0.
+    """
+
+    start: tuple[float, float]
+    below: Side | None
+    side: Side
+
+
+class Front(NamedTuple):
+    """A loop on its way inwards. left: which of its movers are, in order. met: those that meet the one before
+    only since what lay between has vanished."""
+
+    movers: tuple[Mover, ...]
+    left: tuple[int, ...]
+    met: frozenset[int]
+
+    def pairs(self) -> Iterator[tuple[int, int]]:
+        """Of what is left, each with what comes after it."""
+        return zip(self.left, (*self.left[1:], self.left[0]), strict=True)
+
+
+def front_of(sides: Sequence[Side]) -> Front:
+    """A loop with all its sides."""
+    movers: list[Mover] = []
+    for before, side in zip((sides[-1], *sides), sides, strict=False):
+        bend = turn_between(before, side)
+        if bend < -_SMOOTH:
+            point = Side(side.start, side.start, math.tan(bend / 4), side.start, 0.0, bend)
+            movers.append(Mover(side.start, None, point))
+        movers.append(Mover(side.start, side, side))
+    return Front(tuple(movers), tuple(range(len(movers))), frozenset())
+
+
 def offset(profile: Profile, depth: float, curved: bool = False) -> tuple[Profile, list[list[Wall]]]:
     """The points at least `depth` > 0 inside of the profile, and how their boundary grows out of it.
 
@@ -37,45 +77,48 @@ def offset(profile: Profile, depth: float, curved: bool = False) -> tuple[Profil
         ParameterError: a side vanishes, parts of the outline meet, or without `curved` a corner turns
             outwards at an arc, whose parallel meets the other side's on no straight line.
     """
-    loops, walls = [], []
-    for sides in profile.sides:
-        corners: list[Corner] = []
-        grown: list[tuple[tuple[float, float], Side | None]] = []
-        count = len(sides)
-        begins = [_begin(sides[i - 1], sides[i], depth, curved) for i in range(count)]
-        for i, side in enumerate(sides):
-            arrive, leave = begins[i]
-            if arrive is not leave:
-                bend = turn_between(sides[i - 1], side)
-                corners.append((*arrive, math.tan(bend / 4)))
-                grown.append((side.start, None))
-            bulge = kept_bulge(side, leave, begins[(i + 1) % count][0], depth, curved)
-            corners.append((*leave, bulge))
-            grown.append((side.start, side))
-        loops.append(tuple(corners))
-        walls.append(grown)
+    return moved_in([front_of(sides) for sides in profile.sides], depth, curved)
+
+
+def moved_in(fronts: Sequence[Front], depth: float, curved: bool = True) -> tuple[Profile, list[list[Wall]]]:
+    """`offset` of what is left of loops; the walls of what is not end in a point, an arc of radius 0 where
+    they were arcs."""
+    loops: list[tuple[Corner, ...]] = []
+    for front in fronts:
+        begins = [meeting(front, *pair, depth, curved) for pair in front.pairs()]
+        starts = [begins[-1], *begins[:-1]]
+        sides = [front.movers[k].side for k in front.left]
+        bulges = [kept_bulge(*one, depth, curved) for one in zip(sides, starts, begins, strict=True)]
+        loops.append(tuple((*at, bulge) for at, bulge in zip(starts, bulges, strict=True)))
     try:
         inner = Profile.of_loops(loops)
     except ParameterError as error:
         raise _too_deep(depth) from error
-    made = [
-        [Wall(start, below, above) for (start, below), above in zip(grown, sides, strict=True)]
-        for grown, sides in zip(walls, inner.sides, strict=True)
-    ]
-    if any(
-        a.above.start != (c[0], c[1])
-        for w, loop in zip(made, loops, strict=True)
-        for a, c in zip(w, loop, strict=True)
-    ):
+    walls = [_walls(*pair) for pair in zip(fronts, inner.sides, strict=True)]
+    kept = [[side.start for side in sides] for sides in inner.sides]
+    if kept != [[(x, y) for x, y, _ in loop] for loop in loops]:
         raise _too_deep(depth)  # a loop has turned inside out
-    return inner, made
+    return inner, walls
+
+
+def _walls(front: Front, above: Sequence[Side]) -> list[Wall]:
+    """above: what is left, in order."""
+    own = dict(zip(front.left, above, strict=True))
+    made = []
+    for k, mover in enumerate(front.movers):
+        if k in own:
+            end = own[k]
+        else:
+            after = next((left for left in front.left if left > k), front.left[0])
+            x, y = own[after].start
+            arc = mover.side.centre is not None
+            end = Side((x, y), (x, y), 0.0, (x, y) if arc else None, 0.0, mover.side.sweep)
+        made.append(Wall(mover.start, mover.below, end))
+    return made
 
 
 def _too_deep(depth: float) -> ParameterError:
     return ParameterError(f"profile: not every side of it is left {depth:.6g} further inside")
-
-
-Point = tuple[float, float]
 
 
 def turn_between(before: Side, after: Side) -> float:
@@ -90,64 +133,92 @@ def turns_at_arcs(profile: Profile) -> bool:
     return any(turn_between(*pair) > _SMOOTH and (pair[0].centre or pair[1].centre) for pair in pairs)
 
 
-def _begin(before: Side, after: Side, depth: float, curved: bool) -> tuple[Point, Point]:
-    """Where the parallel of `before` ends and that of `after` begins: one and the same point, unless an arc
-    lies between."""
-    corner = np.array(after.start)
-    a, b = (np.array([-d[1], d[0]]) for d in (before.direction(at_end=True), after.direction()))
-    bend = turn_between(before, after)
-    if abs(bend) <= _SMOOTH:
+def meeting(front: Front, k: int, after: int, depth: float, curved: bool = True) -> Point:
+    """Where the parallels of two movers meet, the second of which comes after the first.
+
+    Raises:
+        ParameterError: they do not.
+    """
+    before, other = front.movers[k], front.movers[after]
+    if after in front.met:
+        return parallels_cross(before.side, other.side, depth, depth)
+    corner, ways = np.array(other.start), []
+    if before.below is not None:
+        ways.append(before.side.direction(at_end=True))
+    if other.below is not None:
+        ways.append(other.side.direction())
+    a, b = (np.array([-way[1], way[0]]) for way in (ways[0], ways[-1]))
+    arcs = before.side.centre is not None or other.side.centre is not None
+    if len(ways) < 2 or abs(turn_between(before.side, other.side)) <= _SMOOTH:
         x, y = (corner + depth * b).tolist()
-        return (point := (x, y)), point
-    if bend < 0:
-        (ax, ay), (bx, by) = (corner + depth * a).tolist(), (corner + depth * b).tolist()
-        return (ax, ay), (bx, by)
-    if curved and (before.centre is not None or after.centre is not None):
-        return (point := parallels_cross(before, after, depth, depth)), point
-    if before.centre is not None or after.centre is not None:
+    elif not arcs:
+        x, y = (corner + depth * (a + b) / (1 + a @ b)).tolist()
+    elif curved:
+        x, y = parallels_cross(before.side, other.side, depth, depth)
+    else:
         raise ParameterError(
-            f"profile: at ({after.start[0]:.6g}, {after.start[1]:.6g}) an arc meets a side at a corner, "
+            f"profile: at ({other.start[0]:.6g}, {other.start[1]:.6g}) an arc meets a side at a corner, "
             "which a taper cannot carry on; round the corner, or leave the taper 0"
         )
-    x, y = (corner + depth * (a + b) / (1 + a @ b)).tolist()
-    return (point := (x, y)), point
+    return x, y
 
 
-def parallels_cross(before: Side, after: Side, deep: float, deeper: float) -> Point:
-    """Where the parallels of two sides that meet at a corner meet, each so deep within: by Newton's method.
+def parallels_cross(before: Side, after: Side, deep: float, deeper: float, turn: float = 1.0) -> Point:
+    """Where the parallels of two sides meet, each so deep within, as if these went on: of two places that
+    where the way turns to the left, or to the right where `turn` is negative.
 
     Raises:
         ParameterError: they do not.
     """
     depth = max(abs(deep), abs(deeper))
-    at = np.array(after.start)
-    near = _CONVERGED * depth + _ROUNDED * (float(np.abs(at).max()) + before.radius + after.radius)
-    for _ in range(_NEWTON):
-        pairs = [_parallel(before, at, deep, True), _parallel(after, at, deeper, False)]
-        off = np.array([distance for distance, _ in pairs])
-        slopes = np.array([direction for _, direction in pairs])
-        if abs(np.linalg.det(slopes)) < _SMOOTH:
+    one, other = _Parallel.of(before, deep), _Parallel.of(after, deeper)
+    if one.centre is None and other.centre is None:
+        across = one.way[0] * other.way[1] - one.way[1] * other.way[0]
+        if across * turn <= _SMOOTH:
             raise _too_deep(depth)
-        step = np.linalg.solve(slopes, off)
-        at = at - step
-        if np.linalg.norm(step) <= near:
-            break
+        x, y = np.linalg.solve(np.array([one.inwards, other.inwards]), [one.level, other.level]).tolist()
+        return x, y
+    if one.centre is None or other.centre is None:
+        line, circle = (one, other) if one.centre is None else (other, one)
+        along, foot = line.way, circle.centre + (line.level - line.inwards @ circle.centre) * line.inwards
+        sign = circle.sign if one.centre is None else -circle.sign
     else:
+        apart = other.centre - one.centre
+        distance = float(np.linalg.norm(apart))
+        if distance <= _SMOOTH * depth:
+            raise _too_deep(depth)
+        ahead = apart / distance
+        share = (one.radius**2 - other.radius**2 + distance**2) / (2 * distance)
+        along, foot = np.array([-ahead[1], ahead[0]]), one.centre + share * ahead
+        circle, sign = one, one.sign * other.sign
+    room = circle.radius**2 - float(((foot - circle.centre) ** 2).sum())
+    if room < 0 or min(one.radius, other.radius) < 0:
         raise _too_deep(depth)
-    x, y = at.tolist()
+    x, y = (foot + math.copysign(math.sqrt(room), sign * turn) * along).tolist()
     return x, y
 
 
-def _parallel(side: Side, at: np.ndarray, depth: float, at_end: bool) -> tuple[float, np.ndarray]:
-    """How far (2,) lies within the parallel of a side, and the direction in which that grows."""
-    if side.centre is None:
-        x, y = side.direction(at_end=at_end)
-        inwards = np.array([-y, x])
-        return float((at - side.start) @ inwards) - depth, inwards
-    way = np.subtract(side.centre, at) * math.copysign(1.0, side.sweep)
-    reach = float(np.linalg.norm(way))
-    deep = (side.radius - reach) * math.copysign(1.0, side.sweep)
-    return deep - depth, way / max(reach, 1e-300)
+@dataclass(frozen=True)
+class _Parallel:
+    """A line, of what is at a level inwards, or a circle, in the direction of its sign."""
+
+    way: np.ndarray
+    level: float
+    centre: np.ndarray | None
+    radius: float
+    sign: float
+
+    @classmethod
+    def of(cls, side: Side, depth: float) -> _Parallel:
+        if side.centre is None:
+            way = side.direction()
+            return cls(way, float(np.array([-way[1], way[0]]) @ side.start) + depth, None, 0.0, 0.0)
+        sign = math.copysign(1.0, side.sweep)
+        return cls(np.zeros(2), 0.0, np.array(side.centre), side.radius - sign * depth, sign)
+
+    @property
+    def inwards(self) -> np.ndarray:
+        return np.array([-self.way[1], self.way[0]])
 
 
 def kept_bulge(side: Side, start: Point, end: Point, depth: float, curved: bool) -> float:

@@ -81,6 +81,12 @@ class Rim(NamedTuple):
         turns = [math.pi / 2 * k / count for k in range(count + 1)]
         return [(self.fillet * (1 - math.cos(t)), self.fillet * (1 - math.sin(t))) for t in turns]
 
+    def step_at(self, depth: float) -> tuple[float, float]:
+        """Its point so deep within the profile, as in `steps`."""
+        if self.chamfer:
+            return depth, self.chamfer - depth
+        return depth, self.fillet - math.sqrt(depth * (2 * self.fillet - depth))
+
     def around(self) -> list[tuple[float, float]]:
         """As `steps`, of the corners of a polygon around it, by tangents of a fillet."""
         if not self.fillet:

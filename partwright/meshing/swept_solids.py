@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -66,12 +66,13 @@ def _loops(field: Extrusion, tolerance: float) -> Iterator[list[Level]]:
         for line in field.profile.polylines(tolerance):
             yield [(line, -half, own := np.arange(len(line))), (line, half, own)]
         return
-    straight = not turns_at_arcs(field.profile)
-    down, up = (_steps(rim, tolerance, straight) for rim in field.rims)
-    deepest = max(depth for depth, _ in (*down, *up))
-    chords = _chords(field.within(deepest)[1], tolerance)
-    inner = {depth: list(_strips(field.within(depth)[1], chords)) for depth, _ in (*down, *up) if depth > 0}
-    for k, (below, above, index) in enumerate(inner[deepest]):
+    straight = not turns_at_arcs(field.profile) and not field.collapses
+    down, up = (_steps(rim, tolerance, straight, field.collapses) for rim in field.rims)
+    walls_at = {depth: field.within(depth)[1] for depth, _ in (*down, *up) if depth > 0}
+    cut = [_chords(walls, tolerance) for walls in walls_at.values()]
+    chords = [np.max(counts, axis=0).tolist() for counts in zip(*cut, strict=True)]
+    inner = {depth: list(_strips(walls, chords)) for depth, walls in walls_at.items()}
+    for k, (below, above, index) in enumerate(inner[max(inner)]):
         own = np.arange(len(above))
         levels: list[Level] = []
         walls = [(-half + down[0][1], below), (half - up[0][1], below)]
@@ -86,10 +87,14 @@ def _loops(field: Extrusion, tolerance: float) -> Iterator[list[Level]]:
         yield levels
 
 
-def _steps(rim: Rim, tolerance: float, straight: bool) -> list[tuple[float, float]]:
-    """straight: whether all edges across the rim are lines where the rim is a chamfer."""
+def _steps(
+    rim: Rim, tolerance: float, straight: bool, collapses: Sequence[float]
+) -> list[tuple[float, float]]:
+    """straight: whether all edges across the rim are lines where the rim is a chamfer. collapses: depths
+    around which sides vanish."""
     chamfer = 1 if straight else _CURVED
-    return rim.steps(arc_chords(rim.fillet, math.pi / 2, tolerance) if rim.fillet else chamfer)
+    steps = rim.steps(arc_chords(rim.fillet, math.pi / 2, tolerance) if rim.fillet else chamfer)
+    return sorted({*steps, *(rim.step_at(depth) for depth in collapses if depth < rim.depth)})
 
 
 def _strips(

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from partwright.approximation.sketches.candidates import candidates
-from partwright.approximation.sketches.rims import SHARP, Leaning, bottom_rim, rimmed_body, top_rim
+from partwright.approximation.sketches.rims import (
+    SHARP,
+    Leaning,
+    bottom_rim,
+    limited,
+    rimmed_body,
+    top_rim,
+)
 from partwright.fields import Box, Extrusion, Profile
 from partwright.fields.profile import circle
 from partwright.fields.rims import Rim
@@ -78,3 +85,25 @@ def test_a_chamfer_that_is_mitred_where_the_outline_goes_inwards() -> None:
     mesh = (lying + standing).to_mesh64()
     faces = Leaning.of(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
     assert top_rim(faces, outline, 0.2) == (0, pytest.approx(0.1, rel=1e-3))
+
+
+@pytest.mark.parametrize("rims", [{"top_fillet": 0.1}, {"top_chamfer": 0.1, "bottom_chamfer": 0.06}])
+def test_a_rim_may_be_deeper_than_corners_are_round(rims: dict[str, float]) -> None:
+    """An outline of such corners had no room for it, and stayed sharp."""
+    field = Extrusion(Profile.rectangle(1.2, 0.8, corner=0.05), 0.4, **rims)
+    found = [one.part.field for one in candidates(named_solid(field, 1e-3), [np.eye(3)], holes=True)]
+    near = [one for one in found if isinstance(one, Extrusion) and one.collapses]
+    for name, depth in rims.items():
+        assert depth == pytest.approx(
+            min((getattr(one, name) for one in near), key=lambda d: abs(d - depth)), rel=0.01
+        )
+
+
+def test_rims_that_are_a_little_too_deep_are_as_deep_as_there_is_room() -> None:
+    """Of a fillet as wide as a corner, and of two that meet half way up, the last digits decided."""
+    both = limited((Rim(0.2002, 0.0), Rim(0.2001, 0.0)), Profile.rectangle(1.2, 0.8, corner=0.3), 0.4)
+    assert sum(rim.depth for rim in both) == pytest.approx(0.4, rel=1e-12)
+    (bottom, top) = limited((Rim(0.201, 0.0), Rim(0.0, 0.1)), PLATE, 0.4)
+    assert bottom.fillet == pytest.approx(0.2, rel=1e-6)
+    assert top == (0.0, 0.1)
+    assert limited((Rim(0.25, 0.0), SHARP), PLATE, 0.4)[0].fillet == 0.25

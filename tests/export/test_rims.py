@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import runpy
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from partwright.assembly import Assembly, Part
 from partwright.atomic_io import report_path
-from partwright.export import export
+from partwright.errors import NoSurfaceError
+from partwright.export import brep_rims, brep_swept_profile, export
+from partwright.export.brep import solid_of
 from partwright.export.glsl import to_glsl
 from partwright.fields import Extrusion, Profile
 from partwright.fields.profile import circle
@@ -98,11 +101,59 @@ def test_mitres_about_inner_corners_are_told(tmp_path: Path) -> None:
         assert "corners" in change["note"]
 
 
-def test_rims_that_take_all_of_a_side_are_a_little_less_deep_and_say_so(tmp_path: Path) -> None:
-    """OpenCASCADE gets a dome as wide as its slot wrong, and facets stood for it."""
+SLOT = Extrusion(Profile.rectangle(20, 6, 3), 8, top_fillet=3, bottom_chamfer=1)
+BUMP = Profile([(0, 0), (20, 0), (20, 12), (11, 12, 1.0), (9, 12), (0, 12)])
+
+
+@pytest.mark.parametrize(
+    "field",
+    [
+        SLOT,
+        Extrusion(Profile.rectangle(20, 12, 1), 8, top_chamfer=2),
+        Extrusion(Profile([(0, 0), (20, 0), (20, 11.5), (19.5, 12), (0, 12)]), 8, top_fillet=2),
+        Extrusion(BUMP, 8, top_chamfer=2, bottom_chamfer=0.5),
+    ],
+    ids=["a dome as wide as its slot", "corners less round", "a corner cut off", "half a circle"],
+)
+def test_rims_along_which_sides_vanish_are_exact_in_step(field: Extrusion, tmp_path: Path) -> None:
+    """OpenCASCADE gets them wrong by itself: facets stood for them, or rims that were less deep."""
     bd = pytest.importorskip("build123d")
-    slot = Extrusion(Profile.rectangle(20, 6, 3), 8, top_fillet=3, bottom_chamfer=1)
-    whole = Assembly((Part(slot, name="slot"), Part(ROUND, (30, 0, 0), name="block")), unit="cm")
+    whole = Assembly((Part(field, name="body"),), unit="mm")
+    export(whole, tmp_path / "a.step")
+    assert not report_path(tmp_path / "a.step").exists()
+    read = bd.import_step(tmp_path / "a.step")
+    assert read.is_valid
+    assert read.volume == pytest.approx(mesh_assembly(whole, 512).volume, rel=2e-3)
+    assert len(read.faces()) < 30
+
+
+def test_build123d_has_them_as_deep_as_all_sides_reach_and_says_so(tmp_path: Path) -> None:
+    pytest.importorskip("build123d")
+    field = Extrusion(Profile.rectangle(20, 12, 1), 8, top_chamfer=2)
+    path = tmp_path / "a.build123d.py"
+    export(Assembly((Part(field, name="body"),), unit="mm"), path)
+    (change,) = json.loads(report_path(path).read_text())["approximated"]
+    assert change["parts"] == ["body"]
+    assert change["max_deviation"] == pytest.approx(0.5**0.5, rel=0.1)
+    made = runpy.run_path(str(path))["assembly"]
+    less = Extrusion(field.profile, 8, top_chamfer=1)
+    assert made.volume == pytest.approx(mesh_assembly(Assembly((Part(less),)), 256).volume, rel=5e-3)
+
+
+def test_rims_that_cannot_be_built_are_a_little_less_deep_and_say_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = brep_rims.with_rims
+
+    def failing(field: Extrusion, *faces: Any) -> Any:
+        if field.top_fillet == pytest.approx(30, rel=1e-6):  # mm
+            raise NoSurfaceError("OpenCASCADE cannot")
+        return real(field, *faces)
+
+    monkeypatch.setattr(brep_swept_profile, "with_rims", failing)
+    bd = pytest.importorskip("build123d")
+    solid_of.cache_clear()
+    whole = Assembly((Part(SLOT, name="slot"), Part(ROUND, (30, 0, 0), name="block")), unit="cm")
     export(whole, tmp_path / "a.step")
     (change,) = json.loads(report_path(tmp_path / "a.step").read_text())["approximated"]
     assert change["parts"] == ["slot"]

@@ -11,8 +11,8 @@ import pytest
 from partwright.assembly import Assembly, Part
 from partwright.errors import NoSurfaceError
 from partwright.export import brep_facets, export, step
-from partwright.export.brep import volume_and_area
 from partwright.export.brep_facets import FacetsWarning
+from partwright.export.brep_topology import volume_and_area
 from partwright.fields import Box, Cylinder
 from tests.export.step_faces import read_back
 from tests.export.trees import TURNED

@@ -170,7 +170,7 @@ def _rounded(
         bottoms = [(low, bottom_rim(view.leaning, profile, low)) for low in lows]
         tops = [(high, top_rim(view.leaning, profile, high)) for high in highs]
         for (low, under), (high, over) in product(bottoms, tops):
-            bottom, top = limited((under, over), profile)
+            bottom, top = limited((under, over), profile, high - low)
             further = (lows[0] - low, high - highs[0])
             if all(rim.depth >= _ALL_RIM * more for rim, more in zip((bottom, top), further, strict=True)):
                 rimmed = _with_rims(section, profile, view.frame, low, high, (bottom, top))

@@ -12,6 +12,7 @@ from manifold3d import CrossSection, JoinType, Manifold
 
 from partwright.approximation.sketches.rim_walls import depth_in_own_walls
 from partwright.fields.profile import Profile, Side
+from partwright.fields.profile_collapses import first_collapse
 from partwright.fields.profile_distance import profile_distance
 from partwright.fields.rims import Rim
 from partwright.shapes.topology import area_vectors
@@ -22,7 +23,6 @@ _LEAST = 6e-3  # unit lengths: smaller rims are sharp
 _MOST = 0.3
 _ALIKE = 0.02  # of its depth, by which vertices of one rim may differ
 _AT_45 = 0.025  # of the normal of a chamfer
-_CHAMFERED = 0.9  # of a rim's area, that is at 45 degrees
 _COVERED = 0.7  # of a rim's length, that has to be there
 _OFF = 2e-3  # unit lengths: how far a vertex may lie beyond a wall or an end
 _STEPS = 12
@@ -85,28 +85,44 @@ def _rim(faces: Leaning, near: np.ndarray, end: float, upwards: float, profile: 
     within, deep = nearest.min(axis=1) >= -_OFF, nearest.copy()
     deep[within] = depth_in_own_walls(profile, flat.reshape(-1, 3, 2)[within], facing_away[within])
     deep = np.where(np.isnan(deep), nearest, deep)
-    # Of a circle that touches both, through a point; of a chamfer's end points it is the chamfer.
-    depth = np.maximum(deep, 0) + off + np.sqrt(2 * np.maximum(deep, 0) * off)
-    depth[~within | (deep.min(axis=1) < -_OFF) | (deep.max(axis=1) > _MOST)] = np.inf
-    found = _most_common(depth.ravel(), np.repeat(area, 3))
-    alike = (np.abs(depth - found) < _ALIKE * found + _OFF / 4).all(axis=1) if np.isfinite(found) else own[:0]
-    if not _LEAST <= found < math.inf or not alike.any():
-        return SHARP
-    area, facing, depth, flat = area[alike], facing[alike], depth[alike], flat[np.repeat(alike, 3)]
-    total = float(area.sum())
-    tilted = np.abs(facing - math.sqrt(0.5)) < _AT_45
-    chamfer = float(area[tilted].sum()) > _CHAMFERED * total
-    width = found * (math.sqrt(2) if chamfer else math.pi / 2)
-    if total < _COVERED * lengths.sum() * width:
-        return SHARP
-    apart = [
-        np.abs(profile_distance(profile, flat, sides)).reshape(-1, 3).sum(axis=1) for sides in _loops(profile)
-    ]
-    there = np.bincount(np.argmin(apart, axis=0), area, minlength=len(lengths))
-    if (there < _COVERED * lengths * width).any():
-        return SHARP
-    exact = float(np.average(depth.ravel(), weights=np.repeat(area, 3)))
-    return Rim(0.0, exact) if chamfer else Rim(exact, 0.0)
+    known = within & (deep.min(axis=1) >= -_OFF) & (deep.max(axis=1) <= _MOST)
+    deep = np.maximum(deep, 0)
+    tilted = known & (np.abs(facing - math.sqrt(0.5)) < _AT_45)
+    # All along a chamfer both lengths add up to its own. A fillet is of the circle that touches wall and end.
+    chamfer, fillet = deep + off, deep + off + np.sqrt(2 * deep * off)
+    around = _Outline(profile, flat.reshape(-1, 3, 2), lengths)
+    found = around.depth(chamfer, tilted, area, math.sqrt(2))
+    if found:
+        return Rim(0.0, found)
+    return Rim(around.depth(fillet, known, area, math.pi / 2), 0.0)
+
+
+class _Outline(NamedTuple):
+    """A profile, the corners (F, 3, 2) of faces as seen from above, and the length of each of its loops."""
+
+    profile: Profile
+    flat: np.ndarray
+    lengths: np.ndarray
+
+    def depth(self, depths: np.ndarray, own: np.ndarray, area: np.ndarray, width: float) -> float:
+        """That on which most corners of faces agree, where these go around each loop; else 0.
+
+        depths: (F, 3) of a rim through each corner. own: (F,) faces that may be its. area: (F,). width: of a
+        rim that is 1 deep."""
+        common = _most_common(depths[own].ravel(), np.repeat(area[own], 3))
+        if not _LEAST <= common < math.inf:
+            return 0.0
+        own = own & (np.abs(depths - common) < _ALIKE * common + _OFF / 4).all(axis=1)
+        area, depths, flat = area[own], depths[own], self.flat[own].reshape(-1, 2)
+        least = _COVERED * common * width * self.lengths
+        if area.sum() < least.sum():
+            return 0.0
+        apart = [
+            np.abs(profile_distance(self.profile, flat, sides)).reshape(-1, 3).sum(axis=1)
+            for sides in _loops(self.profile)
+        ]
+        there = np.bincount(np.argmin(apart, axis=0), area, minlength=len(least))
+        return 0.0 if (there < least).any() else float(np.average(depths.ravel(), weights=np.repeat(area, 3)))
 
 
 def _loops(profile: Profile) -> Iterator[np.ndarray]:
@@ -132,14 +148,17 @@ def _perimeter(sides: Sequence[Side]) -> float:
     return sum(abs(s.sweep) * s.radius if s.centre else math.dist(s.start, s.end) for s in sides)
 
 
-def limited(rims: tuple[Rim, Rim], profile: Profile) -> tuple[Rim, Rim]:
-    """Fillets that are as wide as the narrowest corner where they are a little wider."""
-    arcs = [side.radius for loop in profile.sides for side in loop if side.sweep > 0]
-    least = min(arcs, default=math.inf)
+def limited(rims: tuple[Rim, Rim], profile: Profile, height: float) -> tuple[Rim, Rim]:
+    """Rims as deep as all sides of the profile reach where they are a little deeper, as at a corner of their
+    radius, and that meet half way up where they would go a little further."""
+    deepest = max(rim.depth for rim in rims)
+    least = first_collapse(profile, deepest) if deepest else math.inf
     bottom, top = (
         Rim(*(least if least < value < (1 + _ALIKE) * least else value for value in rim)) for rim in rims
     )
-    return bottom, top
+    total = bottom.depth + top.depth
+    share = height / total if height < total < (1 + _ALIKE) * height else 1.0
+    return Rim(*(share * value for value in bottom)), Rim(*(share * value for value in top))
 
 
 def rimmed_body(section: CrossSection, rims: tuple[Rim, Rim], height: float, outer: bool) -> Manifold:
