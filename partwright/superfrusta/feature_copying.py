@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from partwright.approximation.sketches.open_sides import with_open_sides
 from partwright.approximation.sketches.repeats import moves_between, planes_between, shifts_between
 from partwright.approximation.sketches.teeth import drawn_corners
 from partwright.assembly import Part, Similarity
+from partwright.assembly.motion import Motion
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Extrusion
 from partwright.meshing.csg import solid_of
@@ -34,12 +35,15 @@ from partwright.superfrusta.feature_symmetry import reflected, reflection
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
 
+Points = NDArray[np.float64]
+
 _COPY = 0.4  # of what the first gains, that a copy has to
 _AROUND = 5e-3  # unit lengths: from a part to points of the surface that are its own
 _EXACT = 1e-4  # unit lengths: moves whose means differ by less are as good
 _BY_CHANCE = 1.0  # roots of the number of samples, by which a copy may have fewer, and still be one
 _LEAST_COPY = 0.3
 _POINTS = 200
+_COMPOSED = 48  # turns after reflections, at most
 _DIGITS = 9  # of shifts that are told apart
 _APART = 8e-3  # unit lengths: shifts that differ by less lead to the same place
 _WAYS = 500  # that a part is tried at beyond where it is seen
@@ -97,15 +101,18 @@ def with_copies(
         inner, _ = chosen.bodies
         planes = [*search.mirrors, *(reflection(*plane) for plane in planes_between(inner, pieces))]
         flipped = image_of(part, Similarity())
-        flips = (as_move(part, flipped.transformed(plane)) for plane in planes)
-        moves = [*search.turns, *(move for move in flips if move is not None)]
+        across = [*planes, *_turned(search.mirrors, search.turns)]
+        images = ((plane, as_move(part, flipped.transformed(plane))) for plane in across)
+        flips = {move: Motion(plane, True) for plane, move in images if move is not None}
+        moves = [*search.turns, *flips]
         moves += moves_between(inner, pieces, search.frames, search.body)
         moves += shifts_between(chosen, others)
         moves += _shifts(part, search.turns, search.mirrors)
         found = ((move, part.transformed(move)) for move in moves)
         near = ((move, copy) for move, copy in found if within_box(few, *copy.bounds()).sum() > hits)
         may_pay = {move: (copy, hit) for move, copy in near if (hit := covers(copy, few)).sum() > hits}
-        kept = [move for move in _nearest_first(search, part, list(may_pay)) if joined(*may_pay[move])]
+        ordered = _nearest_first(search, part, list(may_pay), flips)
+        kept = [move for move in ordered if joined(*may_pay[move])]
         rest = few[left]
         ways = _lattice(part, kept) if len(rest) > hits else ()
         corners = ((move, part.transformed(move)) for move in ways)
@@ -113,10 +120,17 @@ def with_copies(
         kept += [move for move, copy in near if joined(copy, covers(copy, few))]
         part = replace(part, instances=tuple(kept))
         flipped = image_of(part, Similarity()) if kept else flipped
-        images = ((plane, flipped.transformed(plane)) for plane in planes)
-        image = next((plane for plane, one in images if is_image(one)), None)
+        wholes = ((plane, flipped.transformed(plane)) for plane in planes)
+        image = next((plane for plane, one in wholes if is_image(one)), None)
     objective = reached - tree.price - search.price(chosen.sides)
     return Step(chosen, added, part, covered, within, reached, objective, image)
+
+
+def _turned(mirrors: Sequence[Similarity], turns: Sequence[Similarity]) -> list[Similarity]:
+    """Reflections and then turns, where there are not very many: a corner of a block is across its middle
+    from another, where neither a turn nor a reflection alone leads."""
+    few = len(turns) * len(mirrors) <= _COMPOSED
+    return [turn @ mirror for turn in turns for mirror in mirrors] if few else []
 
 
 def _lattice(part: Part, moves: Sequence[Similarity]) -> list[Similarity]:
@@ -147,9 +161,13 @@ def _shifts(part: Part, turns: Sequence[Similarity], mirrors: Sequence[Similarit
     ]
 
 
-def _nearest_first(search: FeatureSearch, part: Part, moves: Sequence[Similarity]) -> list[Similarity]:
+def _nearest_first(
+    search: FeatureSearch, part: Part, moves: Sequence[Similarity], flips: Mapping[Similarity, Motion]
+) -> list[Similarity]:
     """Those first that take the surface around the part to the surface most exactly; symmetries of a whole
-    that is not quite symmetric, and middles of pieces with skins, are a little off."""
+    that is not quite symmetric, and middles of pieces with skins, are a little off. flips: the reflections
+    that some stand for, which may turn the part over for it and so take the surface elsewhere: of what is as
+    exact, what does not comes first."""
     if len(moves) < 2:
         return list(moves)
     surface = search.samples.surface
@@ -158,10 +176,11 @@ def _nearest_first(search: FeatureSearch, part: Part, moves: Sequence[Similarity
     if not len(points):
         return list(moves)
 
-    images = np.concatenate([move(points) for move in moves]).astype(np.float32)
-    away = np.minimum(search.samples.away(images, _AROUND), _AROUND).reshape(len(moves), -1)
-    off = np.round(away.mean(axis=1) / _EXACT)
-    return [moves[i] for i in np.argsort(off, kind="stable")]
+    motions = [motion for move in moves for motion in (move, flips.get(move, move))]
+    images = np.concatenate([motion(points) for motion in motions]).astype(np.float32)
+    away = np.minimum(search.samples.away(images, _AROUND), _AROUND).reshape(len(moves), 2, -1)
+    own, image = np.round(away.mean(axis=2) / _EXACT).T
+    return [moves[i] for i in np.lexsort([own, np.minimum(own, image)])]
 
 
 class StepBodies:

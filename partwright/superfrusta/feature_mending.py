@@ -78,6 +78,8 @@ def _with_best(
     """The tree and the candidate that takes the most of a piece, of those that cost hardly anything."""
     best: tuple[float, FeatureTree] | None = None
     for candidate in search.candidates_of(piece):
+        if added and candidate.beyond:
+            continue
         _, outer = candidate.bodies
         left = float((piece - outer).volume()) / float(piece.volume())
         if left > 0.5 or (best is not None and left >= best[0]):

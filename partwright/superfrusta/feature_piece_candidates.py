@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from manifold3d import Manifold
 from numpy.typing import NDArray
 
 from partwright.approximation.sketches.candidate import Candidate
-from partwright.approximation.sketches.candidates import candidates
+from partwright.approximation.sketches.candidates import candidates, silhouettes
 from partwright.approximation.sketches.directions import frames, long_axis
 
 Frames = Sequence[NDArray[np.float64]]
 
 _MOST = 150  # pieces that are looked at: a part of hundreds is no part that was drawn
 _OWN, _ASKEW = 2, 0.9995  # directions of a piece, and the cosine to others that a new one has at most
+_PLAIN = 4  # sides at most of what a piece is seen as from end to end
+_SAME = 0.9  # IoU of a piece and what it can be drawn as by itself
 _ALIKE = 0.6  # IoU of a piece and what is drawn along it where no face says so
 
 
 class PieceCandidates:
-    """Candidates of each piece, made once: along the frames (3, 3) of the whole, and along its own."""
+    """Candidates of each piece, made once: along the frames (3, 3) of the whole, and along its own. Where
+    none is the same body, also as it is seen along its own, from end to end: a corner of a block is cut off
+    so."""
 
     def __init__(self, whole: Frames) -> None:
         self._whole = whole
@@ -38,6 +43,9 @@ class PieceCandidates:
                 *candidates(piece, [*self._whole, *own], holes=True),
                 *(candidate for candidate in slanted if stands_for(candidate, piece)),
             ]
+            seen = [replace(one, beyond=True) for one in silhouettes(piece, own) if one.sides <= _PLAIN]
+            if seen and not any(stands_for(candidate, piece, _SAME) for candidate in found):
+                found = [*seen, *found]
             self._known[key] = [candidate for candidate in found if not candidate.usual]
         return self._known[key]
 
@@ -57,8 +65,8 @@ class PieceCandidates:
         return own, news([along] if along is not None else [])
 
 
-def stands_for(candidate: Candidate, piece: Manifold) -> bool:
-    """Whether a candidate is about the same body as the piece."""
+def stands_for(candidate: Candidate, piece: Manifold, alike: float = _ALIKE) -> bool:
+    """Whether a candidate is about the same body as the piece. alike: IoU that they have at least."""
     body = candidate.make(0.0)
     both = float((body ^ piece).volume())
-    return both > _ALIKE * (float(body.volume()) + float(piece.volume()) - both)
+    return both > alike * (float(body.volume()) + float(piece.volume()) - both)

@@ -36,7 +36,7 @@ from partwright.superfrusta.feature_mending import mended
 from partwright.superfrusta.feature_own_bodies import is_own_body
 from partwright.superfrusta.feature_piece_candidates import PieceCandidates, stands_for
 from partwright.superfrusta.feature_recasting import recast
-from partwright.superfrusta.feature_steps import FeatureTree, covers, within_box
+from partwright.superfrusta.feature_steps import FeatureTree, Step, covers, within_box
 from partwright.superfrusta.feature_symmetry import symmetries
 from partwright.superfrusta.samples import FitSamples
 
@@ -245,7 +245,8 @@ class FeatureSearch:
 
         def look_at(pool: Sequence[Candidate], added: bool) -> None:
             if added:
-                pool = [c for c in pool if not self._lines_a_hole(c) and (not only_own or self._is_own(c))]
+                pool = [c for c in pool if not (c.beyond or self._lines_a_hole(c))]
+                pool = [c for c in pool if self._is_own(c)] if only_own else pool
             pool = [c for c in pool if c.key != banned]
             pools[added] += pool
             gains = self.gains(tree, pool, added).tolist() if pool else ()
@@ -280,9 +281,7 @@ class FeatureSearch:
         paying = [step for step in steps if step.objective > tree.objective]
         least = max((step.objective for step in paying), default=0.0) - self.tie
         good = [step for step in paying if step.objective >= least]
-        plain = min(
-            good, key=lambda step: (step.chosen.sides, isinstance(step.part.field, Swept)), default=None
-        )
+        plain = min(good, key=_plainness, default=None)
         return joined_by(self, tree, plain) if plain is not None else None
 
     def _alike(self, chosen: Candidate, pieces: Sequence[Manifold]) -> int:
@@ -379,6 +378,11 @@ class FeatureSearch:
         """(2,) of what covers such samples (N,) and the shape: weights of both together, and of either."""
         sums = covered.astype(np.float64) @ self._in_and_out
         return sums[:2], self._whole + sums[2:]
+
+
+def _plainness(step: Step) -> tuple[int, bool, bool]:
+    """The less, the plainer; of what is as plain, what takes all of a piece leaves no chip."""
+    return step.chosen.sides, not step.chosen.beyond, isinstance(step.part.field, Swept)
 
 
 def _weights(samples: FitSamples) -> NDArray[np.float64]:

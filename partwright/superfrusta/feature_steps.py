@@ -14,10 +14,12 @@ from partwright.approximation.sketches.ends import with_open_ends
 from partwright.assembly import Part, Similarity
 from partwright.assembly.motion import Motion
 from partwright.assembly.similarity import rotation_matrix
-from partwright.fields import Extrusion
+from partwright.fields import Extrusion, Field
+from partwright.fields.profile import is_same_loop
 from partwright.meshing.csg import solid_of
 
 _CHORD = 1e-3  # unit lengths: how far chords of a fold may be off
+_SAME = 1e-5  # of a profile's size: corners that differ by less are the same
 
 
 @dataclass(frozen=True)
@@ -135,16 +137,21 @@ def with_open_ends_everywhere(feature: Feature, distance: Callable[[np.ndarray],
 def as_move(part: Part, image: Part) -> Similarity | None:
     """The rigid move that makes of a part its mirror image (as of `image_of`), of a box, say, if there is
     one."""
-    turn = Similarity()
-    if (
-        isinstance(part.field, Extrusion)
-        and not part.field.taper
-        and part.field.rims[0] == part.field.rims[1]
-    ):
+    turn, own = Similarity(), part.field
+    if image.field != own and not _have_one_outline(own, image.field):
+        if not isinstance(own, Extrusion) or own.taper or own.rims[0] != own.rims[1]:
+            return None
         turn = Similarity(rotation=(0.0, 1.0, 0.0, 0.0))  # upside down it is its own mirror image
-    elif image.field != part.field:
-        return None
     return image.pose @ turn @ part.pose.inverse()
+
+
+def _have_one_outline(own: Field, image: Field) -> bool:
+    """Whether an extrusion is as its mirror image without being turned over, so that its ends stay where they
+    are: one of them may be open."""
+    if not isinstance(own, Extrusion) or not isinstance(image, Extrusion) or own.profile.holes:
+        return False
+    one, other = (np.array(field.profile.outline) for field in (own, image))
+    return is_same_loop(one, other, _SAME * own.profile.size, _SAME)
 
 
 def covers(part: Part, points: NDArray[np.float32]) -> NDArray[np.bool_]:

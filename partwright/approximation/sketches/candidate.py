@@ -25,6 +25,7 @@ class Candidate:
     that is drawn (`drawn_corners`). volume, rims: tell candidates apart. cuts: parts that are cut from it and
     belong to it, holes with sharp edges in a body with round ones; only a tree's first part may have such.
     usual: whether it is turned from what most half sections have in common, and not all, nor any.
+    beyond: whether it goes further than what it is a candidate of: it can be cut where that lies open.
     """
 
     part: Part
@@ -34,6 +35,7 @@ class Candidate:
     rims: tuple[Rim, ...] = ()
     cuts: tuple[Part, ...] = ()
     usual: bool = False
+    beyond: bool = False
 
     @cached_property
     def bodies(self) -> tuple[Manifold, Manifold]:
