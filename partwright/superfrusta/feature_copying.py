@@ -111,7 +111,7 @@ def with_copies(
         found = ((move, part.transformed(move)) for move in moves)
         near = ((move, copy) for move, copy in found if within_box(few, *copy.bounds()).sum() > hits)
         may_pay = {move: (copy, hit) for move, copy in near if (hit := covers(copy, few)).sum() > hits}
-        ordered = _nearest_first(search, part, list(may_pay), flips)
+        ordered = _nearest_first(search, part, list(may_pay), flips if chosen.beyond else {})
         kept = [move for move in ordered if joined(*may_pay[move])]
         rest = few[left]
         ways = _lattice(part, kept) if len(rest) > hits else ()
@@ -166,8 +166,8 @@ def _nearest_first(
 ) -> list[Similarity]:
     """Those first that take the surface around the part to the surface most exactly; symmetries of a whole
     that is not quite symmetric, and middles of pieces with skins, are a little off. flips: the reflections
-    that some stand for, which may turn the part over for it and so take the surface elsewhere: of what is as
-    exact, what does not comes first."""
+    that some stand for, which may turn the part over for it: the surface is at one end alone of what is cut
+    beyond the shape."""
     if len(moves) < 2:
         return list(moves)
     surface = search.samples.surface
