@@ -12,7 +12,7 @@ DEMO_SHAPE := examples/shapes/watering_can.ply
 
 LOWEST_TESTS := tests/shapes tests/assembly tests/meshing tests/render tests/cli
 
-.PHONY: setup demo test test-heavy test-lowest lint types docs page release bench benchmarks guard clean
+.PHONY: setup demo test test-heavy test-commands test-lowest lint types docs page release bench benchmarks guard clean
 setup: $(INSTALLED)
 
 $(BIN)/python:
@@ -43,9 +43,14 @@ test: setup
 	$(PYTEST)
 
 # The tests that are marked heavy: whole fits and trainings, and sweeps of all cases, that repeat in the large what
-# quick tests say. Takes some minutes, so it is not in .ci/run: before a release, and after a change to what they try.
-test-heavy: setup
+# quick tests say, and the commands of the documentation. Takes some minutes, so it is not in .ci/run: before a release,
+# and after a change to what they try.
+test-heavy: setup test-commands
 	$(PYTEST) -m heavy
+
+# Every command of the documentation's pages; those of the README are in .ci/run.
+test-commands: setup
+	$(BIN)/python .ci/readme_commands docs/*.md
 
 # The lowest versions that pyproject.toml declares. Takes some minutes, so it is not in .ci/run: before a
 # release, and when a dependency is used in a new way.
