@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import os
+import queue
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
 from partwright.assembly import Assembly
+from partwright.cli.main import parser
 from partwright.export import export
 from tests.browsers import PATIENCE
 
@@ -46,12 +49,14 @@ class Page:
         return self.page.evaluate(script, argument)
 
     def wait(self, script: str, argument: Any = None) -> None:
-        """Until the script gives true. The page allows no code from strings, so this asks from outside."""
-        end = time.monotonic() + PATIENCE
+        """Until the script gives true. The page allows no code from strings, so this asks from outside, ever
+        more seldom: three processes take part in an answer."""
+        begun = time.monotonic()
         while not self.page.evaluate(script, argument):
             assert not self.errors, self.errors
-            assert time.monotonic() < end, f"the page never said yes to {script}"
-            time.sleep(0.02)
+            waited = time.monotonic() - begun
+            assert waited < PATIENCE, f"the page never said yes to {script}"
+            time.sleep(min(0.02 + waited / 10, 0.25))
 
     def settle(self) -> None:
         self.wait("() => partwright.viewport.renderer.settled")
@@ -106,7 +111,59 @@ def free_port() -> int:
 
 
 class Server:
-    """`partwright studio` as a process of its own."""
+    """`partwright studio` in a thread of this process, which has all imports; it ends as by Ctrl-C."""
+
+    running: ClassVar[dict[threading.Thread, Any]] = {}
+    """uvicorn's server in each thread."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.options = parser().parse_args(["studio", *arguments, f"--port={free_port()}"])
+        self.start()
+
+    def start(self) -> None:
+        from partwright.studio.server import serve
+
+        address: queue.Queue[str] = queue.Queue()
+        files, told = (
+            (self.options.file, self.options.shape),
+            {"port": self.options.port, "ready": address.put},
+        )
+        self.thread = threading.Thread(target=serve, args=files, kwargs=told, daemon=True)
+        self.thread.start()
+        self.url = address.get(timeout=PATIENCE)
+
+    def stop(self) -> None:
+        self.running.pop(self.thread).should_exit = True
+        self.thread.join(PATIENCE)
+        assert not self.thread.is_alive()
+
+
+@pytest.fixture
+def serve(
+    tmp_path: Path, browser: object, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[..., Server]]:
+    import uvicorn
+
+    run, servers = uvicorn.Server.run, []
+
+    def known(server: uvicorn.Server, *arguments: Any, **options: Any) -> None:
+        Server.running[threading.current_thread()] = server
+        run(server, *arguments, **options)
+
+    def make(*arguments: str) -> Server:
+        servers.append(Server(*arguments))
+        return servers[-1]
+
+    monkeypatch.setattr(uvicorn.Server, "run", known)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+    yield make
+    for server in servers:
+        server.stop()
+
+
+class ServerProcess:
+    """`partwright studio` as a process of its own, which can be killed."""
 
     def __init__(self, folder: Path, *arguments: str) -> None:
         self.folder = folder
@@ -137,11 +194,11 @@ class Server:
 
 
 @pytest.fixture
-def serve(tmp_path: Path, browser: object) -> Iterator[Callable[..., Server]]:
+def serve_apart(tmp_path: Path, browser: object) -> Iterator[Callable[..., ServerProcess]]:
     servers = []
 
-    def make(*arguments: str) -> Server:
-        servers.append(Server(tmp_path, *arguments))
+    def make(*arguments: str) -> ServerProcess:
+        servers.append(ServerProcess(tmp_path, *arguments))
         return servers[-1]
 
     yield make

@@ -11,7 +11,7 @@ from partwright.assembly import Assembly, Part, load_assembly
 from partwright.assembly.files import from_text
 from partwright.fields import Box, Cylinder
 from partwright.meshing import mesh_assembly
-from tests.studio.conftest import Page, Server
+from tests.studio.conftest import Page, Server, ServerProcess
 
 pytest.importorskip("uvicorn", reason="the studio's server needs uvicorn")
 
@@ -21,12 +21,12 @@ TABLE = Assembly(
 
 
 def test_refit_edits_and_a_server_that_is_killed(
-    tmp_path: Path, serve: Callable[..., Server], new_page: Callable[..., Page]
+    tmp_path: Path, serve_apart: Callable[..., ServerProcess], new_page: Callable[..., Page]
 ) -> None:
     mesh_assembly(TABLE, 48).export(tmp_path / "table.stl")
     wrong = TABLE.replace_part("foot", Part(Cylinder(5, 44), (4, 0, 0)))
     wrong.save(tmp_path / "table.json")
-    server = serve("table.json", "--shape=table.stl")
+    server = serve_apart("table.json", "--shape=table.stl")
     page = new_page().open(server.url)
     page.wait("() => live.state?.input === 'table.stl'")
 

@@ -144,7 +144,7 @@ def test_the_slider_goes_from_few_parts_to_many(
     page.page.keyboard.press("Control+z")
     assert from_text(page.assembly()) == best
     assert int(slider.input_value()) == len(best) - 1
-    server.kill()
+    server.stop()
     server.start()
     page.open(server.url)
     page.wait("() => live.link.revision > 0 && !!document.querySelector('.curve output')?.textContent")

@@ -12,7 +12,7 @@ from partwright.assembly import Assembly, Part
 from partwright.assembly.files import from_text
 from partwright.fields import Box, Cylinder
 from partwright.meshing import mesh_assembly
-from tests.studio.conftest import Page, Server
+from tests.studio.conftest import Page, Server, ServerProcess
 
 pytest.importorskip("uvicorn", reason="the studio's server needs uvicorn")
 
@@ -22,13 +22,18 @@ TABLE = Assembly(
 
 
 @pytest.fixture
-def server(tmp_path: Path, serve: Callable[..., Server]) -> Server:
+def files(tmp_path: Path) -> tuple[str, str]:
     mesh_assembly(TABLE, 48).export(tmp_path / "table.stl")
     TABLE.save(tmp_path / "table.json")
-    return serve("table.json", "--shape=table.stl")
+    return "table.json", "--shape=table.stl"
 
 
-def opened(page: Page, server: Server) -> Page:
+@pytest.fixture
+def server(files: tuple[str, str], serve: Callable[..., Server]) -> Server:
+    return serve(*files)
+
+
+def opened(page: Page, server: Server | ServerProcess) -> Page:
     page.open(server.url)
     page.wait("() => live.state?.input === 'table.stl' && partwright.viewport.renderer.hasInput")
     return page
@@ -84,7 +89,7 @@ def test_with_the_server_gone_the_page_says_what_it_cannot_do(
     server: Server, new_page: Callable[..., Page]
 ) -> None:
     page = opened(new_page(1000, 600), server)
-    server.kill()
+    server.stop()
     page.page.locator(".banner").wait_for()
     page.page.locator(".row[data-name=foot]").click()
     page.page.get_by_role("button", name="Refit selected").click()
@@ -103,8 +108,9 @@ def test_with_the_server_gone_the_page_says_what_it_cannot_do(
 
 
 def test_two_tabs_see_each_other_and_neither_loses_an_edit(
-    server: Server, new_page: Callable[..., Page]
+    files: tuple[str, str], serve_apart: Callable[..., ServerProcess], new_page: Callable[..., Page]
 ) -> None:
+    server = serve_apart(*files)
     one, two = (opened(new_page(900, 500), server) for _ in range(2))
     move(one, "foot", "x3")
     two.wait("(t) => partwright.text() === t", one.assembly())
