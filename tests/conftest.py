@@ -17,9 +17,9 @@ from tests.browsers import browser
 __all__ = ["browser"]
 
 # A busy machine is no defect: how long an example takes is measured by benchmarks, not by tests.
-# The same examples each time, so that a change is judged by what it changes; others are drawn by
-# `--hypothesis-profile=search`.
-settings.register_profile("patient", deadline=None, derandomize=True)
+# The same examples each time, so that a change is judged by what it changes; others, and twice
+# as many, are drawn by `--hypothesis-profile=search`.
+settings.register_profile("patient", deadline=None, derandomize=True, max_examples=50)
 settings.register_profile("search", deadline=None)
 settings.load_profile("patient")
 
@@ -40,6 +40,7 @@ def pytest_collection() -> Generator[None, object, object]:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(20_000, 20, 20)  # results are arrays, without cycles
         gc.enable()
 
 

@@ -15,7 +15,7 @@ BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 
 @pytest.mark.parametrize(
-    ("files", "commands"), [(40, 4), pytest.param(40, 20, marks=pytest.mark.heavy)], ids=["few", "sixty"]
+    ("files", "commands"), [(16, 2), pytest.param(40, 20, marks=pytest.mark.heavy)], ids=["few", "sixty"]
 )
 def test_cases_end_well(files: int, commands: int, tmp_path: Path) -> None:
     table = tmp_path / "fuzz.md"

@@ -29,10 +29,10 @@ def test_the_assemblies_are_those_of_single_fits(tmp_path: Path) -> None:
     file, cut = tmp_path / "box.stl", tmp_path / "cut.stl"
     SHAPES[0].export(file)
     cut.write_bytes(file.read_bytes()[:300])
-    shapes = [pw.load_shape(mesh) for mesh in SHAPES[1:]]
+    shapes = [pw.load_shape(SHAPES[2])]
     seen: set[int] = set()
     together = fit_many([cut, file, *shapes], 2, progress=lambda i, _: seen.add(i), quality="draft")
-    assert seen == {1, 2, 3}
+    assert seen == {1, 2}
     assert isinstance(together[0], UnreadableFileError)
     for shape, result in zip([pw.load_shape(file), *shapes], together[1:], strict=True):
         assert isinstance(result, Result)

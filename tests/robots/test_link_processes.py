@@ -14,7 +14,13 @@ from partwright.robots.containment import shape_solid
 from tests.robots.robots import urdf
 
 
-@pytest.mark.parametrize("options", [CollideOptions(), CollideOptions(enclose=True, max_parts=3)])
+@pytest.mark.parametrize(
+    "options",
+    [
+        CollideOptions(),
+        pytest.param(CollideOptions(enclose=True, max_parts=3), marks=pytest.mark.heavy),
+    ],
+)
 def test_shapes_are_the_same_by_several_processes(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

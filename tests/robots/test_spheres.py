@@ -85,7 +85,7 @@ def dumbbell() -> trimesh.Trimesh:
 
 
 @pytest.mark.usefixtures("few_cells")
-@pytest.mark.parametrize("enclose", [False, True])
+@pytest.mark.parametrize("enclose", [False, pytest.param(True, marks=pytest.mark.heavy)])
 def test_more_spheres_err_less_and_few_are_warned_of(
     tmp_path: Path, enclose: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
