@@ -28,8 +28,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The studio's tests first: they take longest and wait much, and files are begun in this order."""
-    items.sort(key=lambda item: not item.nodeid.startswith("tests/studio/"))
+    """The studio's tests first: they take longest and wait much, and files are begun in this order.
+
+    Short files last, so that no process waits long for another.
+    """
+    place = {"studio": 0, "fields": 2}
+    items.sort(key=lambda item: place.get(item.path.parent.name, 1))
 
 
 @pytest.hookimpl(wrapper=True)

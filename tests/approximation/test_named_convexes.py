@@ -78,7 +78,10 @@ def apart(one: Assembly, other: Assembly) -> float:
 TURNED = Similarity(1.0, (0.8, 0.3, -0.4, 0.33166247903554), (3, -1, 2))
 
 
-@pytest.mark.parametrize("move", [Similarity(), TURNED], ids=["plain", "turned"])
+@pytest.mark.parametrize(
+    "move",
+    [pytest.param(Similarity(), marks=pytest.mark.heavy, id="plain"), pytest.param(TURNED, id="turned")],
+)
 @pytest.mark.parametrize("name", CONVEXES)
 def test_a_convex_is_what_it_is(name: str, move: Similarity) -> None:
     quadrics, kind, volume = CONVEXES[name]

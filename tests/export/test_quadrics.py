@@ -24,6 +24,7 @@ from tests.export.step_faces import read_back
 from tests.export.test_openscad import rendered
 
 TURN = Similarity(1.0, (0.9, 0.1, -0.3, 0.2), (4.0, -1.0, 2.0))
+SADDLE = Quadric((1, -1, 0, 0, 0, 1, 0))
 # name -> the quadric and the face that STEP gives it
 CURVED = {
     "sphere": (Quadric.sphere(0.6, (0.3, 0.2, 0.1)), "Sphere"),
@@ -131,9 +132,14 @@ def test_what_step_cannot_hold_and_what_does_not_end_is_said(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    "quadric", [CURVED["paraboloid"][0], Quadric((1, -1, 0, 0, 0, 1, 0))], ids=["paraboloid", "saddle"]
+    ("quadric", "hole"),
+    [
+        pytest.param(CURVED["paraboloid"][0], False, id="paraboloid"),
+        pytest.param(CURVED["paraboloid"][0], True, marks=pytest.mark.heavy, id="hole of a paraboloid"),
+        pytest.param(SADDLE, False, marks=pytest.mark.heavy, id="saddle"),
+        pytest.param(SADDLE, True, id="hole of a saddle"),
+    ],
 )
-@pytest.mark.parametrize("hole", [False, True])
 def test_build123d_has_flat_facets_of_quadrics_that_no_solid_is_like(
     tmp_path: Path, quadric: Quadric, hole: bool
 ) -> None:

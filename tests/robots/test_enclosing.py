@@ -76,7 +76,7 @@ def test_an_outer_hull_contains_with_few_faces() -> None:
     assert exact.num_vert() == 8
 
 
-@pytest.mark.parametrize("enclose", [False, True])
+@pytest.mark.parametrize("enclose", [pytest.param(False, marks=pytest.mark.heavy), True])
 def test_hulls_are_closed_and_convex_in_files_of_single_precision(tmp_path: Path, enclose: bool) -> None:
     path = urdf(tmp_path / "in")
     ball = trimesh.creation.icosphere(2, 0.02)
