@@ -165,7 +165,7 @@ def test_a_large_repair_is_told(method: BoxMethod, block: Path, tmp_path: Path, 
 def test_a_solid_that_is_seen_in_an_open_surface_is_told(
     method: BoxMethod, tmp_path: Path, capsys: Any
 ) -> None:
-    blinds(0.022, pitch=0.04).export(tmp_path / "blinds.stl")
+    blinds(0.022, pitch=0.08).export(tmp_path / "blinds.stl")
     assert main(["fit", str(tmp_path / "blinds.stl"), "-o", str(tmp_path / "out")]) == 0
     error = capsys.readouterr().err
     assert "warning: the surface is open in many places, and the solid that is seen in it" in error
