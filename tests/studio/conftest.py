@@ -49,14 +49,12 @@ class Page:
         return self.page.evaluate(script, argument)
 
     def wait(self, script: str, argument: Any = None) -> None:
-        """Until the script gives true. The page allows no code from strings, so this asks from outside, ever
-        more seldom: three processes take part in an answer."""
-        begun = time.monotonic()
+        """Until the script gives true. The page allows no code from strings, so this asks from outside."""
+        end = time.monotonic() + PATIENCE
         while not self.page.evaluate(script, argument):
             assert not self.errors, self.errors
-            waited = time.monotonic() - begun
-            assert waited < PATIENCE, f"the page never said yes to {script}"
-            time.sleep(min(0.02 + waited / 10, 0.25))
+            assert time.monotonic() < end, f"the page never said yes to {script}"
+            time.sleep(0.02)
 
     def settle(self) -> None:
         self.wait("() => partwright.viewport.renderer.settled")
