@@ -122,14 +122,17 @@ def test_two_tabs_see_each_other_and_neither_loses_an_edit(
     two.ask("() => void (live.link.sent = 1)")
     move(two, "top", "z4")
     move(one, "foot", "y5")
-    first = one.assembly()
     two.wait("() => partwright.store.undoLabel === 'Edits of this page' && !live.link.waiting.length")
     last = two.assembly()
     assert from_text(last)["top"].translation == (0, 0, 24)
     one.wait("(t) => partwright.text() === t", last)
+    # The first one's is a step of its own, below the second's.
     one.page.keyboard.press("Control+z")
+    one.wait("(t) => partwright.text() !== t", last)
+    first = one.assembly()
     two.wait("(t) => partwright.text() === t", first)
     assert from_text(first)["foot"].translation == (0, 5, 0)
+    assert from_text(first)["top"] == TABLE["top"]
     assert not one.errors + two.errors
 
 
