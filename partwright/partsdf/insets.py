@@ -59,8 +59,7 @@ class Reach(NamedTuple):
 @dataclass(frozen=True)
 class Inset:
     """A part among others. reach: of training shapes; of its mesh's vertices, share: farther than any, shown:
-    not in other parts; points (K, 3): of its surface, unit frame; shows (K,): those that should, of one that
-    is covered."""
+    not in other parts; points (K, 3): of its surface, unit frame; shows (K,): where it usually does."""
 
     part: str
     reach: Reach
@@ -131,8 +130,7 @@ def insets(
         reach = known[name]
         points = rng.permutation(np.asarray(parts[name].vertices, np.float32))[:_PLACES]
         share, shown = float((far > reach.most).mean()), float((far > _SHOWS).mean())
-        shows = reach.cells[_cells(shape, name, points)] & (shown < COVERED * reach.shown)
-        found.append(Inset(name, reach, share, shown, points, shows))
+        found.append(Inset(name, reach, share, shown, points, reach.cells[_cells(shape, name, points)]))
     return tuple(found)
 
 
@@ -160,7 +158,7 @@ def put_back(
     numbers = torch.tensor([model.index(one.part) for one in moving])
     owner = torch.repeat_interleave(numbers, torch.tensor(counts))
     limit = torch.repeat_interleave(torch.tensor([one.limit for one in moving]), torch.tensor(counts))
-    shows = torch.from_numpy(np.concatenate([one.shows for one in moving]))
+    shows = torch.from_numpy(np.concatenate([one.shows & one.covered for one in moving]))
     surface = _Carried(shape, owner, torch.from_numpy(np.concatenate([one.points for one in moving])))
     row = torch.zeros(len(shape.present), 1, dtype=torch.bool)
     row[numbers] = True

@@ -161,7 +161,7 @@ def test_distances_do_not_depend_on_the_number_of_cores(model: Model) -> None:
 def test_pictures_are_finer_for_thin_walls(
     model: Model, monkeypatch: pytest.MonkeyPatch, wall: float, cells: int
 ) -> None:
-    monkeypatch.setattr(NeuralShape, "walls", lambda shape: np.array([1.0, wall]))
+    monkeypatch.setattr(NeuralShape, "walls", np.array([1.0, wall]))
     shape = NeuralShape.trained(model, "lamp1")
     assert picture_resolution(shape) == cells
     assert picture_resolution(shape, shape, most=160) == min(cells, 160)  # of a film
