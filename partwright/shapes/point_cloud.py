@@ -1,7 +1,8 @@
 """Points to a surface: a signed distance around them, and its zero level as a mesh.
 
 Near the points the distance is that to the planes of the nearest ones (implicit moving least squares, Kolluri
-2005); away from them the winding number tells the sign, and closes what the points leave open.
+2005), on thin walls to the nearer of both sides; away from them the winding number tells the sign, and closes
+what the points leave open.
 """
 
 from __future__ import annotations
@@ -30,7 +31,11 @@ _NEIGHBOURS = 12  # points that span a normal's plane
 _PLANES = 8  # points whose planes make up the distance
 _WIDTH = 0.7  # of the spacing: how far a point's plane counts
 _REACH = 1.5  # of the spacing: beyond, the planes say nothing
-_OPPOSED = -0.3  # cosine under which a point belongs to the other side of a wall
+_OPPOSED = -0.3  # cosine under which a point does not belong to the nearest one's side
+_BEHIND = -0.7  # cosine under which a point belongs to the other side of a wall
+_LEAST_BEHIND = 0.05  # of the nearest point's weight: fewer points say nothing of the other side
+_THIN = 1.5  # spacings that a thin wall has at most
+_MANY_THIN = 0.1  # of the points on thin walls, from which on cells are half as wide
 _CLOSE = 2.0  # of the spacing: a point this near to a surface bears it out
 _MARGIN = 4  # cells around the points
 _FLAT = 1e-6
@@ -39,11 +44,15 @@ _LEAST_CONFIDENCE = 0.5
 
 @dataclass(frozen=True)
 class _Elements:
-    """Oriented surface elements in the unit frame: points (N, 3), outward unit normals (N, 3), areas (N,)."""
+    """Oriented surface elements in the unit frame: points (N, 3), outward unit normals (N, 3), areas (N,).
+
+    walled: the normals were given, and walls are thin. Estimated ones often face the wrong way there.
+    """
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
     area: NDArray[np.float64]
+    walled: bool
 
     @property
     def spacing(self) -> float:
@@ -125,16 +134,21 @@ def _elements(
         raise FlatShapeError(f"{name}: all points lie in one plane, so there is no inside to fit")
     distance, neighbours = cKDTree(points).query(points, _NEIGHBOURS, workers=-1)
     # The disc to the last neighbour holds the other neighbours, the point itself and half of the last one.
-    area = np.pi * distance[:, -1] ** 2 / (_NEIGHBOURS - 0.5)
-    spacing = float(np.sqrt(area.mean()))
+    disc = np.pi * distance[:, -1] ** 2
     if normals is None:
+        area = disc / (_NEIGHBOURS - 0.5)
         lines = normal_lines(points, neighbours)
-        normals = orient_normals(points, lines, neighbours, spacing)
+        normals = orient_normals(points, lines, neighbours, float(np.sqrt(area.mean())))
         notes.append("their normals were estimated from their neighbours and the empty space around")
-    elif ((points - points.mean(axis=0)) * normals).sum(axis=1) @ area < 0:
+        return _Elements(points, normals, area, walled=False)
+    facing = (normals[neighbours] * normals[:, None]).sum(axis=2)
+    area = disc / ((facing > _OPPOSED).sum(axis=1) - 0.5)  # the other side of a wall has a disc of its own
+    if ((points - points.mean(axis=0)) * normals).sum(axis=1) @ area < 0:
         normals = -normals
         notes.append("their normals faced inwards and were turned")
-    return _Elements(points, normals, area)
+    depth = ((points[:, None] - points[neighbours]) * normals[:, None]).sum(axis=2)
+    thin = (facing < _BEHIND) & (depth > 0) & (depth < _THIN * np.sqrt(area.mean()))
+    return _Elements(points, normals, area, walled=bool(thin.any(axis=1).mean() > _MANY_THIN))
 
 
 def _surface(elements: _Elements) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -142,7 +156,7 @@ def _surface(elements: _Elements) -> tuple[NDArray[np.float64], NDArray[np.int64
     indicator = Indicator(
         elements.points, elements.normals * elements.area[:, None], max(elements.spacing, LONGEST_SIDE / 128)
     )
-    cell = max(elements.spacing, _FINEST)
+    cell = max(elements.spacing / (2 if elements.walled else 1), _FINEST)
     lower, upper = elements.points.min(axis=0), elements.points.max(axis=0)
     sides = np.ceil((upper - lower) / cell).astype(int) + 2 * _MARGIN
     origin = (lower + upper) / 2 - cell * (sides - 1) / 2
@@ -151,7 +165,7 @@ def _surface(elements: _Elements) -> tuple[NDArray[np.float64], NDArray[np.int64
     distance, known = _plane_distance(elements, origin + cell * near)
     field[tuple(near[known].T)] = distance[known]
     vertices, faces = contour(field, origin, cell)
-    return vertices, _without_crumbs(vertices, faces, (2 * cell) ** 3)
+    return vertices, _without_crumbs(vertices, faces, (2 * max(elements.spacing, _FINEST)) ** 3)
 
 
 def _borne_out(elements: _Elements, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float:
@@ -187,15 +201,24 @@ def _cells_near(
 def _plane_distance(
     elements: _Elements, places: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Signed distance (M,) at places (M, 3) by the nearest elements' planes, and where they reach."""
+    """Signed distance (M,) at places (M, 3) by the nearest elements' planes, and where they reach.
+
+    Across a thin wall the nearest element may be one of the other side: the side that is nearer counts.
+    """
     from scipy.spatial import cKDTree
 
     apart, nearest = cKDTree(elements.points).query(places, _PLANES, workers=-1)
     normal = elements.normals[nearest]
     height = ((places[:, None] - elements.points[nearest]) * normal).sum(axis=2)
     weight = np.exp((apart[:, :1] ** 2 - apart**2) / (_WIDTH * elements.spacing) ** 2)
-    weight *= (normal * normal[:, :1]).sum(axis=2) > _OPPOSED
-    return (weight * height).sum(axis=1) / weight.sum(axis=1), apart[:, 0] < _REACH * elements.spacing
+    facing = (normal * normal[:, :1]).sum(axis=2)
+    beside, behind = weight * (facing > _OPPOSED), weight * (facing < _BEHIND)
+    distance = (beside * height).sum(axis=1) / beside.sum(axis=1)
+    if elements.walled:
+        borne = behind.sum(axis=1)
+        other = (behind * height).sum(axis=1) / np.maximum(borne, _LEAST_BEHIND)
+        distance = np.where((borne > _LEAST_BEHIND) & (np.abs(other) < np.abs(distance)), other, distance)
+    return distance, apart[:, 0] < _REACH * elements.spacing
 
 
 def _without_crumbs(

@@ -78,6 +78,18 @@ def test_sharp_edges_inner_corners_and_distances(with_normals):
     assert np.quantile(error, 0.99) < 0.025
 
 
+def test_thin_walls_keep_both_sides_where_normals_are_given():
+    """An open tray, its wall two thirds of a spacing thick, which the nearest point's plane alone loses."""
+    tray = trimesh.boolean.difference([box((2, 2, 1)), box((1.92, 1.92, 1), (0, 0, 0.04))])
+    true = load_shape(tray)
+    shape = load_shape(np.hstack(cloud(tray, 5000)))
+    assert np.sqrt(true.area / 5000) > 1.3 * 0.04
+    where = np.random.default_rng(0).uniform(-1, 1, (20_000, 3)) * [1.1, 1.1, 0.6]
+    inside, found = true.signed_distance(where) < 0, shape.signed_distance(where) < 0
+    assert (inside & found).sum() > 0.8 * (inside | found).sum()
+    assert shape.volume == pytest.approx(true.volume, rel=0.1)
+
+
 def test_normals_that_face_inwards_are_turned():
     points, normals = cloud(tee())
     shape = load_shape(np.hstack([points, -normals]))
