@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,20 @@ class OccupancySamples:
     def volume(self) -> float:
         """Weight of all that is inside."""
         return float(self.weight[self.inside].sum(dtype=np.float64))
+
+    def with_points(
+        self, places: Sequence[NDArray[np.float64]], shape: Shape, cost: float
+    ) -> OccupancySamples:
+        """These and the points (N, 3) of each place, which weigh `cost` together."""
+        points = np.concatenate(places).astype(np.float32)
+        weight = np.concatenate([np.full(len(p), max(1.0, np.rint(cost / len(p)))) for p in places])
+        return OccupancySamples(
+            np.concatenate([self.points, points]),
+            np.concatenate([self.inside, shape.unit_distance(points) < 0]),
+            np.concatenate([self.weight, weight.astype(np.float32)]),
+            self.near,
+            self.uniform,
+        )
 
 
 def draw_samples(shape: Shape, near: int, uniform: int, seed: int) -> OccupancySamples:

@@ -26,9 +26,11 @@ from partwright.capri.repeated_convexes import with_repeated_convexes
 from partwright.capri.samples import OccupancySamples
 from partwright.capri.selection import Problem
 from partwright.capri.settings import Settings
+from partwright.capri.strays import strays
 from partwright.errors import MissingDependencyError, SettingError
 from partwright.methods import Checkpoint, Outcome, Progress, Run, timed
 from partwright.shapes import Shape
+from partwright.shapes.frame import LONGEST_SIDE
 
 _MAX_CONVEXES = 64  # convexes: the paper's c (section 4.1)
 _PRICE_FACTOR = 1.5  # factor between the prices that are tried for a budget or a target
@@ -36,6 +38,12 @@ _PRICE_STEPS = 16  # prices that are tried at most
 _OFFERED_PRICE = 0.3  # times the prices, at which convexes are found that may pay as one with copies
 _MAX_OFFERED = 24  # of these: more of a pattern are where the motions between them lead on
 _SEARCHED = 0.9  # of the expected work, where copies are sought after the search
+_STAGES = {"select": (0.1, 0.4), "recreate": (0.4, 0.9), "mend": (0.9, 1.0)}  # of the expected work
+_FAR_OFF = 0.03 * LONGEST_SIDE  # from which on a place is mended
+_MENDINGS = 3  # times that the tree is asked again for places that are far off
+_MOST_PLACES = 10
+_MENDED_PRICE = 1.5  # times the prices of a convex and a primitive: what such a place costs
+_MENDING_TRIES = 8  # each time, convexes are taken out and replaced so many times
 
 
 @dataclass
@@ -91,7 +99,7 @@ class TreeSearch:
         """The tree: by search, by the paper's schedule, or by this from that."""
         s = self.settings
         if s.schedule == "search" or self.origin == "seeds":
-            self.outcome = self.search()
+            self.outcome = self.search(shape)
         if s.schedule == "paper":
             with self.timed("fine-tune"):
                 seeds = self.tree() if self.placed else None
@@ -159,7 +167,7 @@ class TreeSearch:
             self.pause,
         )
 
-    def search(self) -> Outcome:
+    def search(self, shape: Shape) -> Outcome:
         """Starts that forgive false positives more or less, the best ruined and recreated; then demands."""
         s = self.settings
         problem = self.problem()
@@ -176,7 +184,36 @@ class TreeSearch:
             for i in range(s.tries):
                 layers = selection.ruin_and_recreate(problem, self.best, _MAX_CONVEXES)
                 self.keep_cheaper(problem, layers, "recreate", i + 1, s.tries)
+        with self.timed("mend"):
+            self.mend(shape)
         return self.meet_demands()
+
+    def mend(self, shape: Shape) -> None:
+        """Asks again for a tree where it is far off, with samples of these places beside the others; the tree
+        that is the least far off stays."""
+        s = self.settings
+        cost = _MENDED_PRICE * (s.price + s.convex_price) * self.samples.volume
+        kept, least = self.best, np.inf
+        try:
+            for round_ in range(_MENDINGS + 1):
+                places = strays(self.bounded_tree(), shape, _FAR_OFF, self.run.seed)[:_MOST_PLACES]
+                off = max((place.off for place in places), default=0.0)
+                if off < least:
+                    kept, least = self.best, off
+                if not places or round_ == _MENDINGS:
+                    break
+                self.samples = self.samples.with_points([place.points for place in places], shape, cost)
+                self.outside = (rows.values(self.pool.rows, self.samples.points) > 0).astype(np.float32)
+                problem = self.problem()
+                self.best = selection.polish(problem, self.best or [], _MAX_CONVEXES)
+                if not any(self.best):
+                    break
+                for i in range(_MENDING_TRIES):
+                    layers = selection.ruin_and_recreate(problem, self.best, _MAX_CONVEXES)
+                    done = round_ * _MENDING_TRIES + i + 1
+                    self.keep_cheaper(problem, layers, "mend", done, _MENDINGS * _MENDING_TRIES)
+        finally:
+            self.best = kept
 
     def meet_demands(self) -> Outcome:
         """Dearer, until the budget is met; cheaper or dearer, until the target is only just met."""
@@ -222,7 +259,8 @@ class TreeSearch:
         if tree and self.best:
             parts, iou = tree.primitives, self.iou(problem.occupancy(self.best))
         self.history.append({"stage": stage, "round": round_, "parts": parts, "iou": iou})
-        done = 0.1 + 0.3 * round_ / rounds if stage == "select" else 0.4 + 0.6 * round_ / rounds
+        begin, end = _STAGES[stage]
+        done = begin + (end - begin) * round_ / rounds
         done *= 0.3 if self.settings.schedule == "paper" else 1.0
         best = partial(self.assembled, tree) if tree and self.assembled else None
         self.run.told(Progress(stage, round_, rounds, parts, iou, self.fraction(done), best))

@@ -260,8 +260,10 @@ def test_holes_that_are_too_small_to_pay_one_by_one_are_drilled_at_once() -> Non
 
 
 def test_holes_that_are_too_small_to_pay_one_by_one_are_not_drilled_so(monkeypatch) -> None:
-    """Without being offered all at once, which is what drills them."""
+    """Without being offered all at once, which is what drills them, and without mending, which drills singly
+    those whose walls are far from the faces."""
     monkeypatch.setattr(tree_search, "_MAX_OFFERED", 0)
+    monkeypatch.setattr(tree_search, "_MENDINGS", 0)
     alone = quick(load_shape(perforated_plate()), surface=12_000, near=12_000, uniform=6000)
     assert solid(alone.assembly).euler_number > 2 - 2 * 30
 
