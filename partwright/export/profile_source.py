@@ -34,7 +34,8 @@ function side_points(a, b, bulge) = bulge == 0 ? [a] :
 
 SCAD_RIMS = """\
 // The outline extruded, with the edges at its ends rounded or cut off: [fillet, chamfer] of the bottom and
-// of the top. In slices, of an outline that is convex within their hull.
+// of the top. In slices, of an outline that is convex within their hull; each of the others goes on a little
+// into the wider one before it, as what only touches would be a body of its own.
 module extrude_with_rims(height, bottom, top, convex) {
     if (convex) hull() rim_slices(height, bottom, top, true) children();
     else {
@@ -52,8 +53,9 @@ module rim_slices(height, bottom, top, thin) {
                 from = rim_point(rim, i / max(steps, 1)),
                 to = rim_point(rim, (i + 1) / max(steps, 1)),
                 depth = thin ? from[0] : rim_point(rim, (i + 0.5) / steps)[0],
-                thick = thin ? min(height / 10000, height / 2 - from[1]) : from[1] - to[1],
-                low = end[0] < 0 ? (thin ? from[1] : to[1]) : height - from[1] - (thin ? thick : 0)
+                lap = height / 10000,
+                thick = thin ? min(lap, height / 2 - from[1]) : from[1] - to[1] + lap,
+                low = end[0] < 0 ? (thin ? from[1] : to[1]) : height - from[1] - (thin ? thick : lap)
             )
             if (thick > 0)
                 translate([0, 0, low - height / 2]) linear_extrude(thick) offset(r = -depth) children();

@@ -84,6 +84,14 @@ def test_openscad_stacks_slices(tmp_path: Path) -> None:
     assert np.abs(two.distance(mesh.vertices)).max() < 0.25
 
 
+def test_openscads_slices_are_one_body(tmp_path: Path) -> None:
+    """Heights whose sums round, so that slices which only touch came apart in it."""
+    ring = Profile(circle(12.3), (circle(7.5),))
+    whole = Assembly((Part(Extrusion(ring, 5.75, top_chamfer=0.5), name="ring").translated((0, 0, -0.125)),))
+    export(whole, tmp_path / "a.scad", facets=96)
+    assert rendered(tmp_path / "a.scad").body_count == 1
+
+
 def test_the_shader_rounds_rims() -> None:
     whole = assembly()
     lower, upper = whole.bounds()
