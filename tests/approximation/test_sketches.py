@@ -228,3 +228,12 @@ def test_letters_in_a_wall_are_no_corners_of_its_outline() -> None:
     assert any(
         np.allclose(np.ptp(one.part.bounds(), axis=0), (1.6, 0.4, 0.5)) and one.sides == 4 for one in found
     )
+
+
+def test_a_port_at_the_height_of_a_pockets_middle_is_none_of_its_outline() -> None:
+    """Of what is too much, pocket and port together: seen from above the port's middle makes it wider."""
+    pocket = Manifold.cube((100, 60, 20), center=True)
+    port = Manifold.cylinder(12, 6, circular_segments=48, center=True).rotate((90, 0, 0))
+    found = candidates((pocket + port.translate((0, 33, 0))).scale((0.018,) * 3), [np.eye(3)], holes=True)
+    boxes = [one.part.field.size for one in found if isinstance(one.part.field, Box)]
+    assert any(size == pytest.approx((1.8, 1.08, 0.36), abs=1e-3) for size in boxes)

@@ -106,7 +106,8 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
 
 def _regions(view: View, low: float, high: float) -> Iterator[Region]:
     """Of a slab: those in its middle, and others elsewhere in it that hold these, where a hole across it has
-    cut the middle; where letters that are engraved in its walls have, all of it as it is seen."""
+    cut the middle, or plainer ones within these, where what goes across has widened it; where letters that
+    are engraved in its walls have cut it, all of it as it is seen."""
     middle = view.regions((low + high) / 2)[:MOST_REGIONS]
     found = [region for region in middle if region.area >= _LEAST_SHARE * middle[0].area]
     for share in ELSEWHERE:
@@ -116,10 +117,23 @@ def _regions(view: View, low: float, high: float) -> Iterator[Region]:
                 found.append(region)
     yield from found
     largest = max(found, key=lambda region: region.area, default=None)
-    if largest is not None and _corners(largest) > _ENGRAVED:
+    if largest is None:
+        return
+    yield from _narrower(view, low, high, largest)
+    if _corners(largest) > _ENGRAVED:
         for region in view.shadow(low, high)[:1]:
             if 0 < _corners(region) < _PLAINER * _corners(largest) and goes_on(largest, [region]):
                 yield region
+
+
+def _narrower(view: View, low: float, high: float, middle: Region) -> Iterator[Region]:
+    """The region near both ends of a slab that lies within that of its middle and is plainer, if there is
+    such."""
+    below, above = (view.regions(low + share * (high - low))[:1] for share in ELSEWHERE)
+    for region in below:
+        is_less = region.area < (1 - SAME_AREA) * middle.area and _corners(region) < _corners(middle)
+        if is_less and goes_on(region, above) and goes_on(region, [middle]):
+            yield region
 
 
 def _corners(region: Region) -> int:
