@@ -38,6 +38,7 @@ from partwright.superfrusta.feature_piece_candidates import PieceCandidates, sta
 from partwright.superfrusta.feature_recasting import recast
 from partwright.superfrusta.feature_steps import FeatureTree, Step, covers, within_box
 from partwright.superfrusta.feature_symmetry import symmetries
+from partwright.superfrusta.feature_weights import feature_weights
 from partwright.superfrusta.samples import FitSamples
 
 _FREE_SIDES = 4
@@ -88,7 +89,7 @@ class FeatureSearch:
         self.frames = frames(vertices, faces)
         self.volume = float(self.body.volume())
         self.points = samples.points[::_EVERY]
-        self.weights = _weights(samples)[::_EVERY]
+        self.weights = feature_weights(shape, samples)[::_EVERY]
         self.inside = samples.inside[::_EVERY]
         inside = self.inside[:, None]
         self._in_and_out = np.hstack([self.weights * inside, self.weights * ~inside])
@@ -383,11 +384,3 @@ class FeatureSearch:
 def _plainness(step: Step) -> tuple[int, bool, bool]:
     """The less, the plainer; of what is as plain, what takes all of a piece leaves no chip."""
     return step.chosen.sides, not step.chosen.beyond, isinstance(step.part.field, Swept)
-
-
-def _weights(samples: FitSamples) -> NDArray[np.float64]:
-    """(N, 2): of the samples near the surface, and of the others."""
-    weights = np.zeros((len(samples.points), 2))
-    weights[: samples.near, 0] = samples.weight[: samples.near]
-    weights[samples.near :, 1] = samples.weight[samples.near :]
-    return weights
