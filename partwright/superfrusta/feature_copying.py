@@ -42,6 +42,7 @@ _AROUND = 5e-3  # unit lengths: from a part to points of the surface that are it
 _EXACT = 1e-4  # unit lengths: moves whose means differ by less are as good
 _BY_CHANCE = 1.0  # roots of the number of samples, by which a copy may have fewer, and still be one
 _LEAST_COPY = 0.3
+_FEW = 20  # samples, of which chance has too many or too few
 _POINTS = 200
 _COMPOSED = 48  # turns after reflections, at most
 _DIGITS = 9  # of shifts that are told apart
@@ -61,32 +62,51 @@ def with_copies(
 ) -> Step:
     """The candidate with copies where the whole's symmetries, pieces that are alike or other candidates have
     it again."""
-    within = search.mask(chosen) > 0
-    covered = tree.covered | within if added else tree.covered & ~within
-    reached = search.score_of(covered)
+    within, opened = search.mask(chosen) > 0, search.opened(chosen)
+    if chosen.cuts:
+        covered = tree.behind(within)
+    else:
+        covered = tree.covered | within if added else tree.covered & ~within
     wrong = search.inside & ~tree.covered if added else ~search.inside & tree.covered
     count_of_hits = float(within[wrong].sum())
     share = max(_COPY - _BY_CHANCE / math.sqrt(max(count_of_hits, 1.0)), _LEAST_COPY)
-    least = share * (reached - tree.score)
-    few, hits = search.points[wrong & ~within], share * count_of_hits
+    # Of what is small those samples tell that lie near the surface: they are many more there.
+    kinds = slice(1 if (search.weights[within & wrong, 1] > 0).sum() < _FEW else 2)
+
+    def rated(covered: NDArray[np.bool_]) -> float:
+        return float(search.shares_of(covered)[kinds].mean())
+
+    reached = rated(covered)
+    least = share * (reached - rated(tree.covered))
+    is_small = count_of_hits < _FEW
+    few, hits = search.points[wrong & ~within], 0.0 if is_small else share * count_of_hits
     left = np.ones(len(few), bool)
+
+    def taken(part: Part) -> float:
+        """What volume a part takes of what is missed, or too much."""
+        return float((solid_of(part, _CHORD) ^ (tree.missed if added else tree.excess)).volume())
+
+    least_taken = share * taken(chosen.part) if is_small else 0.0
 
     def is_new(hit: NDArray[np.bool_]) -> bool:
         """Whether no other is there. hit: those of `few` within."""
         return float((hit & left).sum()) > hits
 
-    def gained(mask: NDArray[np.bool_], hit: NDArray[np.bool_], count: int) -> bool:
-        """Whether that many further copies gain enough, which they then do. mask: samples within."""
+    def gained(whole: Part, mask: NDArray[np.bool_], hit: NDArray[np.bool_]) -> bool:
+        """Whether further copies gain enough, which they then do: of what is small, by volume, and lose
+        nothing. mask: samples within."""
         nonlocal covered, reached, within, left
         more = covered | mask if added else covered & ~mask
-        better = search.score_of(more)
-        if better - reached < least * count:
+        better, count = rated(more), len(whole.copies)
+        if better - reached < (0.0 if is_small else least * count):
+            return False
+        if is_small and taken(whole) < least_taken * count:
             return False
         covered, reached, within, left = more, better, within | mask, left & ~hit
         return True
 
     def joined(copy: Part, hit: NDArray[np.bool_]) -> bool:
-        return is_new(hit) and gained(covers(copy, search.points), hit, 1)
+        return is_new(hit) and gained(copy, covers(copy, search.points), hit)
 
     def is_image(whole: Part) -> bool:
         """Whether a mirror image with its copies joined, which most of it may not have been before."""
@@ -94,7 +114,7 @@ def with_copies(
         if not is_new(hit):
             return False
         mask = covers(whole, search.points)
-        return bool((mask & within).sum() < _SHARED * mask.sum()) and gained(mask, hit, len(whole.copies))
+        return bool((mask & within).sum() < _SHARED * mask.sum()) and gained(whole, mask, hit)
 
     part, image = chosen.part, None
     if not chosen.cuts:  # of which there is but one
@@ -122,8 +142,9 @@ def with_copies(
         flipped = image_of(part, Similarity()) if kept else flipped
         wholes = ((plane, flipped.transformed(plane)) for plane in planes)
         image = next((plane for plane, one in wholes if is_image(one)), None)
-    objective = reached - tree.price - search.price(chosen.sides)
-    return Step(chosen, added, part, covered, within, reached, objective, image)
+    score = search.score_of(covered)
+    objective = score - tree.price - search.price(chosen.sides)
+    return Step(chosen, added, part, covered, within, opened, score, objective, image)
 
 
 def _turned(mirrors: Sequence[Similarity], turns: Sequence[Similarity]) -> list[Similarity]:
@@ -215,15 +236,23 @@ class StepBodies:
 
 
 def joined_by(search: FeatureSearch, tree: FeatureTree, step: Step) -> FeatureTree:
-    """The tree and a candidate with its copies."""
+    """The tree and a candidate with its copies; one that comes with cuts before all else, of which these
+    then take nothing."""
+    return replayed(search, [step, *tree.steps]) if step.chosen.cuts else _followed_by(search, tree, step)
+
+
+def _followed_by(search: FeatureSearch, tree: FeatureTree, step: Step) -> FeatureTree:
     part, outer, own = search.step_bodies(step)
     if step.added:
         missed, excess = tree.missed - outer, tree.excess + own
+        if (tree.covered & step.opened).any():
+            gone = sum((solid_of(cut, _CHORD) for cut in step.chosen.cuts), Manifold())
+            missed, excess = missed + (gone ^ search.body), excess - gone
     else:
         missed, excess = tree.missed + own, tree.excess - outer
     sides = step.chosen.sides - (_hole_corners(step.part) - _hole_corners(part))
     feature = Feature(step.added, part, step.within, sides, step.image)
-    cuts = (Feature(False, cut, step.within, 0) for cut in step.chosen.cuts)
+    cuts = (Feature(False, cut, step.opened, 0) for cut in step.chosen.cuts)
     price = tree.price + search.price(sides)
     features, steps = [*tree.features, feature, *cuts], (*tree.steps, step)
     return FeatureTree(features, step.covered, missed, excess, step.score, price, steps)
@@ -238,10 +267,12 @@ def replayed(search: FeatureSearch, steps: Sequence[Step]) -> FeatureTree:
     """The tree of steps, whatever they followed before."""
     result = search.empty
     for step in steps:
-        covered = result.covered | step.within if step.added else result.covered & ~step.within
+        covered = step.after(result.covered)
         score = search.score_of(covered)
         objective = score - result.price - search.price(step.chosen.sides)
-        result = joined_by(search, result, replace(step, covered=covered, score=score, objective=objective))
+        result = _followed_by(
+            search, result, replace(step, covered=covered, score=score, objective=objective)
+        )
     return result
 
 

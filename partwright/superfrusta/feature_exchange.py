@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.superfrusta.feature_copying import replayed
-from partwright.superfrusta.feature_steps import FeatureTree, Step, fold
+from partwright.superfrusta.feature_steps import FeatureTree, Step
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
@@ -54,7 +54,8 @@ def _with_other(search: FeatureSearch, steps: Sequence[Step], k: int, own: Seque
     left = FeatureTree(covered=_fold(search, [*before, *after]))
     taken = np.logical_or.reduce([np.zeros(len(search.inside), bool), *(step.within for step in after)])
     chosen = pool[int(search.gains(left, pool, True, ~taken).argmax())]
-    other = replace(steps[k], chosen=chosen, part=chosen.part, within=search.mask(chosen) > 0)
+    within, opened = search.mask(chosen) > 0, search.opened(chosen)
+    other = replace(steps[k], chosen=chosen, part=chosen.part, within=within, opened=opened)
     return [*before, other, *after]
 
 
@@ -76,4 +77,4 @@ def _objective(search: FeatureSearch, steps: Sequence[Step]) -> float:
 
 
 def _fold(search: FeatureSearch, steps: Sequence[Step]) -> NDArray[np.bool_]:
-    return fold(((step.added, step.within) for step in steps), len(search.inside))
+    return FeatureTree(steps=tuple(steps)).behind(np.zeros(len(search.inside), bool))

@@ -98,6 +98,7 @@ class FeatureSearch:
         self.turns, self.mirrors = symmetries(self.body, directions, samples.surface, samples.away)
         self.candidates_of = PieceCandidates(self.frames)
         self.mask = AskedOnce(self._mask)
+        self.opened = AskedOnce(self._opened)
         self._is_own = AskedOnce(partial(is_own_body, self))
         self._lines_a_hole = AskedOnce(lambda candidate: lines_a_hole(candidate.part, samples.measure))
         self._bores_of = AskedOnce(bores_of)
@@ -337,10 +338,12 @@ class FeatureSearch:
 
     def _mask(self, candidate: Candidate) -> NDArray[np.float32]:
         """(N,) 1 at the samples within."""
-        within = covers(candidate.part, self.points)
-        for cut in candidate.cuts:
-            within &= ~covers(cut, self.points)
-        return within.astype(np.float32)
+        return (covers(candidate.part, self.points) & ~self.opened(candidate)).astype(np.float32)
+
+    def _opened(self, candidate: Candidate) -> NDArray[np.bool_]:
+        """(N,) the samples that the cuts of a candidate take away."""
+        none = np.zeros(len(self.points), bool)
+        return np.logical_or.reduce([none, *(covers(cut, self.points) for cut in candidate.cuts)])
 
     def gains(
         self,
@@ -363,7 +366,12 @@ class FeatureSearch:
             ratio = (both + change[:, :2]) / np.maximum(either + change[:, 2:], 1e-9)
             scores.append(ratio.mean(axis=1))
         price = np.array([self.price(c.sides) for c in pool])
-        return np.concatenate(scores) - tree.score - price
+        gained = np.concatenate(scores) - tree.score - price
+        for k, candidate in enumerate(pool if tree.steps else ()):
+            if candidate.cuts:
+                behind = tree.behind(self.mask(candidate) > 0)
+                gained[k] = self.score_of(behind) - tree.score - price[k]
+        return gained
 
     def scored(self, tree: FeatureTree) -> FeatureTree:
         """The tree with its score and price."""
@@ -372,8 +380,12 @@ class FeatureSearch:
 
     def score_of(self, covered: NDArray[np.bool_]) -> float:
         """R of what covers such samples (N,)."""
+        return float(self.shares_of(covered).mean())
+
+    def shares_of(self, covered: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """(2,) what R is the mean of: the overlap at the samples near the surface, and at the others."""
         both, either = self._overlap(covered)
-        return float((both / np.maximum(either, 1e-9)).mean())
+        return both / np.maximum(either, 1e-9)
 
     def _overlap(self, covered: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(2,) of what covers such samples (N,) and the shape: weights of both together, and of either."""

@@ -47,7 +47,8 @@ class Feature:
 class Step:
     """A candidate with its copies.
 
-    covered: (N,) the samples within the tree with them; within: those within them. score: R of that tree.
+    covered: (N,) the samples within the tree with them; within: those within them; opened: those that cuts
+    which the candidate comes with take away, also from what was there before. score: R of that tree.
     image: as of a feature.
     """
 
@@ -56,9 +57,14 @@ class Step:
     part: Part
     covered: NDArray[np.bool_]
     within: NDArray[np.bool_]
+    opened: NDArray[np.bool_]
     score: float
     objective: float
     image: Similarity | None = None
+
+    def after(self, covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(N,) the samples covered when the step follows what covers such."""
+        return covered & ~self.opened | self.within if self.added else covered & ~self.within
 
 
 @dataclass
@@ -78,6 +84,12 @@ class FeatureTree:
     price: float = 0.0
     steps: tuple[Step, ...] = ()
     off: float = 0.0
+
+    def behind(self, first: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(N,) the samples covered where all steps follow what covers such (N,)."""
+        for step in self.steps:
+            first = step.after(first)
+        return first
 
     def at(self, points: NDArray[np.float32]) -> NDArray[np.bool_]:
         """(N,) whether points (N, 3) lie within the fold."""

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import tracemalloc
 
 import numpy as np
 import pytest
 
-from partwright.assembly import Part, Similarity
-from partwright.fields import Cylinder
+import partwright as pw
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.fields import Box, Cylinder, Extrusion, Profile
+from partwright.meshing import mesh_assembly
+from partwright.methods import Run
 from partwright.superfrusta.feature_copying import _lattice
+from partwright.superfrusta.feature_search import FeatureSearch
+from partwright.superfrusta.samples import FitSamples
+from partwright.superfrusta.solids import Settings
 
 HOLE = Part(Cylinder(0.02, 0.1), (0.1, 0.2, 0.3))
 
@@ -54,3 +61,23 @@ def test_many_copies_take_little_memory() -> None:
         tracemalloc.stop()
     assert len(ways) == 500
     assert np.abs(ways - grid[gone]).max(axis=1).min() < 1e-6
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_corners_cut_off_a_sheet_are_one_cut_however_few_samples_each_has(seed: int) -> None:
+    """A hat channel with its four corners cut off: two to eight samples each, in one of them by chance three
+    that stand for much volume. It was a cut in one corner, or a plate with gutters milled from it."""
+    low, high = [(-30, 0), (-12, 0), (-12, 14), (12, 14), (12, 0), (30, 0)], [(30, 1), (13, 1), (13, 15)]
+    hat = Profile.polygon([*low, *high, *((-x, y) for x, y in high[::-1])])
+    upright, slanted = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0), (math.cos(math.pi / 8), 0.0, 0.0)
+    moves = tuple(
+        Similarity(translation=(x, y, 0.0)) for x, y in ((-60.0, 0.0), (0.0, -40.0), (-60.0, -40.0))
+    )
+    corners = Part(Box((8, 8, 6)), (30, 20, 0), (*slanted, math.sin(math.pi / 8)), instances=moves)
+    drawn = Assembly((Part(Extrusion(hat, 40), (0, 0, 0), upright), corners), "difference")
+    shape, settings = pw.load_shape(mesh_assembly(drawn), unit="mm"), Settings.for_quality("draft")
+    samples = FitSamples.of(shape, settings, Run(seed=seed))
+    tree = FeatureSearch(shape, samples, settings.alpha).run()
+    assert tree is not None
+    assert [(f.added, len(f.part.copies)) for f in tree.features] == [(True, 1), (False, 4)]
+    assert len(tree.features[0].part.field.profile.corners) == 12

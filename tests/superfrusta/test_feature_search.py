@@ -12,7 +12,7 @@ import partwright as pw
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.fields import Box
+from partwright.fields import Box, Cylinder, Extrusion, Profile
 from partwright.meshing import mesh_assembly
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import FeatureTree
@@ -69,6 +69,30 @@ def test_bodies_of_a_step_are_made_once(search: FeatureSearch, block: FeatureTre
     assert again[2] is within
     other = search.step_bodies(replace(step, part=replace(step.part, instances=(Similarity(),))))
     assert other[1] is not around
+
+
+def test_a_solid_that_comes_with_holes_takes_nothing_of_what_is_there() -> None:
+    """A plate with round edges around a boss, whose sharp hole is as wide as that: its place is before it."""
+    settings = Settings.for_quality("draft")
+    square = Profile.rectangle(32, 32, corner=2)
+    plate = Part(Extrusion(square, 3, bottom_chamfer=0.5, top_chamfer=0.5), (0, 0, -1.5))
+    boss, bore = Part(Cylinder(12, 6)), Part(Cylinder(7.5, 8))
+    whole = Assembly((Assembly((plate, boss)), bore), "difference")
+    shape = pw.load_shape(mesh_assembly(whole), unit="mm")
+    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+    own = candidates(search.body, search.frames, holes=True)
+    ring = next(one for one in own if one.part.field.kind == "tube")
+    tree = search.extended(search.empty, ring, True)
+    rest = max(tree.missed.decompose(), key=lambda piece: piece.volume())
+    drilled = [one for one in search.candidates_of(rest) if one.cuts]
+    assert drilled
+    gains = search.gains(tree, drilled, True)
+    for candidate, gain in zip(drilled, gains, strict=True):
+        both = search.extended(tree, candidate, True)
+        assert both.score == search.score_of(both.at(search.points))
+        assert both.objective - tree.objective == pytest.approx(gain, abs=1e-6)
+    assert gains.max() > 0.3
+    assert both.covered[tree.covered & search.inside].all()
 
 
 def test_a_tree_may_be_the_further_behind_the_fewer_steps_it_has(block: FeatureTree) -> None:

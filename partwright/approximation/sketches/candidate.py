@@ -23,7 +23,7 @@ class Candidate:
 
     make: the body, further out by a length where its walls are not the mesh's own. sides: of its profile, as
     that is drawn (`drawn_corners`). volume, rims: tell candidates apart. cuts: parts that are cut from it and
-    belong to it, holes with sharp edges in a body with round ones; only a tree's first part may have such.
+    belong to it, holes with sharp edges in a body with round ones; all else of a tree comes after them.
     usual: whether it is turned from what most half sections have in common, and not all, nor any.
     beyond: whether it goes further than what it is a candidate of: it can be cut where that lies open.
     """
