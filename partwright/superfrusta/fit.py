@@ -19,6 +19,7 @@ from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.several_growths import SeveralGrowths
+from partwright.superfrusta.sharp_edges import sharp_edge_warnings
 from partwright.superfrusta.starting import starting_rows
 from partwright.superfrusta.symmetric_fit import RepeatedPart
 
@@ -103,7 +104,11 @@ def _of_features(
     seconds: dict[str, float],
     history: list[dict[str, float | str]],
 ) -> Fitted:
-    return Fitted(whole, outcome, seconds, history, warnings=freeform_warnings(shape, whole))
+    told = freeform_warnings(shape, whole)
+    if outcome != "interrupted":
+        with timed(seconds, "edges"):
+            told += sharp_edge_warnings(shape, whole)
+    return Fitted(whole, outcome, seconds, history, warnings=told)
 
 
 def _mended(
