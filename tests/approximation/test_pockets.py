@@ -84,6 +84,20 @@ def test_a_floor_in_the_middle_leaves_pockets_above_and_below_of_every_copy() ->
     assert ((made.distance(points) < 0) == (whole.distance(points) < 0)).all()
 
 
+def test_pockets_that_are_alike_are_copies_of_one() -> None:
+    """Two slots and a notch in a plate, closed by a floor: a pattern, and another pocket."""
+    slot = Profile([(0.05, -0.1, 0), (0.05, 0.1, 1), (-0.05, 0.1, 0), (-0.05, -0.1, 1)])
+    holes = [slot.moved((x, 0.0)).outline for x in (-0.4, 0.0)]
+    holes.append(Profile.polygon([(0.3, -0.1), (0.5, -0.1), (0.4, 0.1)]).outline)
+    wall = Part(Extrusion(Profile(Profile.rectangle(1.2, 0.8).outline, holes), 0.4))
+    floor = Part(Box((1.2, 0.8, 0.1)), (0, 0, -0.15))
+    ((body, pockets, _),) = as_pockets(wall, floor)
+    assert sorted(len(pocket.copies) for pocket in pockets) == [1, 2]
+    points = np.random.default_rng(0).uniform(-0.7, 0.7, (5000, 3))
+    made = Assembly((body, *pockets), "difference").distance(points) < 0
+    assert (made == (Assembly((wall, floor)).distance(points) < 0)).mean() > 0.999
+
+
 def test_a_wall_is_seen_though_a_hole_cuts_the_middle() -> None:
     wall = named_solid(WALL, 1e-3) - named_solid(Cylinder(0.1, 2), 1e-3).rotate((90, 0, 0))
     areas = [one.volume for one in candidates(wall, [np.eye(3)], holes=False)]

@@ -24,8 +24,9 @@ Pocketed = tuple[Part, tuple[Part, ...], tuple[Part, ...]]
 
 
 def as_pockets(wall: Part, floor: Part) -> Iterator[Pocketed]:
-    """The wall without the holes that the floor closes, the pockets that are left of these, and the floor's
-    own holes; nothing where the floor closes none, or reaches beyond the wall.
+    """The wall without the holes that the floor closes, the pockets that are left of these, those that are
+    alike as copies of one, and the floor's own holes; nothing where the floor closes none, or reaches beyond
+    the wall.
 
     A floor that ends where the wall does leaves one pocket. Another may have more than itself on either side,
     so it gives several possibilities; what of it is beyond the wall's ends is left out. Of walls that are
@@ -85,7 +86,8 @@ def _pocketed(wall: Part, floor: Part) -> Iterator[Pocketed]:
     body = extruded(Profile(field.profile.outline, rest), (-half, half))
     holes = hole_parts(dataclasses.replace(floor, field=lid)) if lid.profile.holes else ()
     for left in choices:
-        pockets = tuple(extruded(Profile(loop), ends) for loop in closed for ends in left)
+        walls = (extruded(Profile(field.profile.outline, tuple(closed)), ends) for ends in left)
+        pockets = tuple(pocket for one in walls for pocket in hole_parts(one))
         yield dataclasses.replace(body, name=wall.name), pockets, holes
 
 
