@@ -20,6 +20,7 @@ from partwright.superfrusta.feature_freeform import far_off, with_freeform
 from partwright.superfrusta.feature_outlines import with_plain_outlines
 from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_pruning import pruned
+from partwright.superfrusta.feature_rings import with_shared_bores
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
 from partwright.superfrusta.feature_teeth import with_teeth_apart
@@ -77,7 +78,8 @@ class FeaturedFit:
             return None, False
         if settings.min_iou is None:
             points = self._samples.points
-            toothed = with_teeth_apart(search, with_pockets(tree, points))
+            tree = with_pockets(with_shared_bores(tree, points), points)
+            toothed = with_teeth_apart(search, tree)
             return with_plain_outlines(search, with_whole_boxes(toothed, points)), False
         for count in range(1, len(tree.features) + 1):
             shorter = tree.first(count)
