@@ -14,7 +14,7 @@ import numpy as np
 
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.group_copies import GroupCopy
-from partwright.superfrusta.feature_steps import Feature, image_of
+from partwright.superfrusta.feature_steps import Feature, as_move, image_of
 from partwright.superfrusta.flat_tree import joined_by_cuts, nested
 
 _MOST = 150  # copies that are looked at
@@ -95,7 +95,7 @@ def _groups(features: Sequence[Feature], leaves: list[_Leaf]) -> list[_Group]:
 def _copy(first: Sequence[_Leaf], other: Sequence[_Leaf]) -> GroupCopy | None:
     """How the other body is made of the first; None where no move and no mirror does."""
     for mirror in (None, "x"):
-        images = [leaf.part if mirror is None else image_of(leaf.part, Similarity()) for leaf in first]
+        images = [leaf.part if mirror is None else _image(leaf.part) for leaf in first]
         for move in _moves(first, images, other):
             left = list(other)
             for leaf, image in zip(first, images, strict=True):
@@ -107,6 +107,13 @@ def _copy(first: Sequence[_Leaf], other: Sequence[_Leaf]) -> GroupCopy | None:
             else:
                 return GroupCopy(move, mirror)
     return None
+
+
+def _image(part: Part) -> Part:
+    """The part mirrored in the plane x = 0: turned over where that is the same, as its copies are."""
+    image = image_of(part, Similarity())
+    move = as_move(part, image)
+    return image if move is None else part.transformed(move)
 
 
 def _moves(first: Sequence[_Leaf], images: Sequence[Part], other: Sequence[_Leaf]) -> Iterator[Similarity]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,25 @@ def test_feet_with_blind_holes_are_one_group_that_is_there_four_times(tmp_path: 
     assert result.surface.volume == pytest.approx(
         80 * 60 * 6 + 4 * (16 * 12 * 18 - np.pi * 2.5**2 * 10), rel=2e-3
     )
+
+
+def test_a_group_of_parts_that_were_turned_over_is_a_mirror_image() -> None:
+    """A flange and its other side are one extrusion, turned over; with a corner cut off at one end, no move
+    leads from one to the other."""
+    angle = Profile.polygon([(0.3, 0), (0.7, 0), (0.7, 0.05), (0.35, 0.05), (0.35, 0.4), (0.3, 0.4)])
+    flange = Part(Extrusion(angle, 0.3), (0, 0, 0.2))
+    upright = (np.sqrt(0.5), np.sqrt(0.5), 0, 0)
+    corner = Part(Extrusion(Profile.polygon([(0.6, 0.4), (0.8, 0.2), (0.8, 0.4)]), 0.2), (0, 0, 0), upright)
+    moves = [as_move(part, image_of(part, Similarity())) for part in (flange, corner)]
+    both = [replace(part, instances=(move,)) for part, move in zip((flange, corner), moves, strict=True)]
+    made = grouped([Feature(added, part, NONE, 4) for added, part in zip((True, False), both, strict=True)])
+    (found,) = repeats(made)
+    assert len(found.images) == 1
+    assert len(parts_once(made)) == 2
+    points = np.random.default_rng(0).uniform(-0.9, 0.9, (2000, 3))
+    left, right = (made.distance(points * sign) for sign in ([1, 1, 1], [-1, 1, 1]))
+    np.testing.assert_allclose(left, right, atol=1e-6)
+    assert (left < 0).any()
 
 
 def test_a_left_and_a_right_block_are_a_group_and_its_mirror_image() -> None:
