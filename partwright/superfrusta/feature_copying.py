@@ -70,14 +70,8 @@ def with_copies(
     wrong = search.inside & ~tree.covered if added else ~search.inside & tree.covered
     count_of_hits = float(within[wrong].sum())
     share = max(_COPY - _BY_CHANCE / math.sqrt(max(count_of_hits, 1.0)), _LEAST_COPY)
-    # Of what is small those samples tell that lie near the surface: they are many more there.
-    kinds = slice(1 if (search.weights[within & wrong, 1] > 0).sum() < _FEW else 2)
-
-    def rated(covered: NDArray[np.bool_]) -> float:
-        return float(search.shares_of(covered)[kinds].mean())
-
-    reached = rated(covered)
-    least = share * (reached - rated(tree.covered))
+    reached = search.score_of(covered)
+    least = share * (reached - tree.score)
     is_small = count_of_hits < _FEW
     few, hits = search.points[wrong & ~within], 0.0 if is_small else share * count_of_hits
     left = np.ones(len(few), bool)
@@ -97,7 +91,7 @@ def with_copies(
         nothing. mask: samples within."""
         nonlocal covered, reached, within, left
         more = covered | mask if added else covered & ~mask
-        better, count = rated(more), len(whole.copies)
+        better, count = search.score_of(more), len(whole.copies)
         if better - reached < (0.0 if is_small else least * count):
             return False
         if is_small and taken(whole) < least_taken * count:
@@ -142,9 +136,8 @@ def with_copies(
         flipped = image_of(part, Similarity()) if kept else flipped
         wholes = ((plane, flipped.transformed(plane)) for plane in planes)
         image = next((plane for plane, one in wholes if is_image(one)), None)
-    score = search.score_of(covered)
-    objective = score - tree.price - search.price(chosen.sides)
-    return Step(chosen, added, part, covered, within, opened, score, objective, image)
+    objective = reached - tree.price - search.price(chosen.sides)
+    return Step(chosen, added, part, covered, within, opened, reached, objective, image)
 
 
 def _turned(mirrors: Sequence[Similarity], turns: Sequence[Similarity]) -> list[Similarity]:

@@ -380,12 +380,8 @@ class FeatureSearch:
 
     def score_of(self, covered: NDArray[np.bool_]) -> float:
         """R of what covers such samples (N,)."""
-        return float(self.shares_of(covered).mean())
-
-    def shares_of(self, covered: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """(2,) what R is the mean of: the overlap at the samples near the surface, and at the others."""
         both, either = self._overlap(covered)
-        return both / np.maximum(either, 1e-9)
+        return float((both / np.maximum(either, 1e-9)).mean())
 
     def _overlap(self, covered: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(2,) of what covers such samples (N,) and the shape: weights of both together, and of either."""

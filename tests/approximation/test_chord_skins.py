@@ -40,14 +40,28 @@ def test_skins_lie_outside_round_walls_and_within_the_walls_of_holes() -> None:
         assert not held(body, ring(radius, (-3.0, -0.05))).any()
 
 
-def test_half_a_turn_at_either_end_of_an_arc_belongs_to_it() -> None:
-    """A rounded corner in three chords: the first and the last turn off the walls by half as much."""
-    angle = np.radians([0, 30, 60, 90])
+def corner(chords: int) -> tuple[Manifold, np.ndarray]:
+    """A plate with one corner of that many chords, and points half way up over the middle of each."""
+    angle = np.linspace(0, math.pi / 2, chords + 1)
     arc = np.column_stack([8 + 2 * np.cos(angle), 8 + 2 * np.sin(angle)])
     body = Manifold.extrude(CrossSection([[[-10, -10], [10, -10], *arc.tolist(), [-10, 10]]]), 4)
-    middle, way = np.radians([15, 45, 75]), 2 - 0.5 * (2 - 2 * math.cos(math.radians(15)))
-    points = np.column_stack([8 + way * np.cos(middle), 8 + way * np.sin(middle), np.full(3, 2.0)])
-    assert held(body, points).all()
+    middle = (angle[1:] + angle[:-1]) / 2
+    reach = 2 * (1 + math.cos(math.pi / 4 / chords)) / 2
+    points = [8 + reach * np.cos(middle), 8 + reach * np.sin(middle), np.full(chords, 2.0)]
+    return body, np.column_stack(points)
+
+
+def test_half_a_turn_at_either_end_of_an_arc_belongs_to_it() -> None:
+    """The first and the last chord of a rounded corner turn off the walls by half as much."""
+    assert held(*corner(4)).all()
+
+
+def test_three_sides_are_no_arc() -> None:
+    """Any that turn alike lie on a circle."""
+    assert not held(*corner(3)).any()
+    roof = [[-10, 0], [10, 0], [10, 3], [4, 6], [-4, 6], [-10, 3]]
+    body = Manifold.extrude(CrossSection([roof]), 4)
+    assert not held(body, np.array([[0.0, 6.2, 2.0], [7.1, 4.65, 2.0]])).any()
 
 
 @pytest.mark.parametrize("chords", [4, 6, 8])

@@ -2,8 +2,9 @@
 
 A part that was drawn round is off its own coarse mesh by the height of the arcs over their chords. What
 follows the chords instead would explain more of such a mesh and be no part that was drawn, so neither is to
-be told by what lies in between. Facets are chords under the same conditions as sides of an outline
-(`outlines`): they turn by at most 37 degrees from one to the next, alike on both sides, from three on.
+be told by what lies in between. Facets are chords under the conditions of sides of an outline (`outlines`):
+they turn by at most 37 degrees from one to the next, alike on both sides; but from four on, as
+three sides that turn alike lie on a circle in any case.
 """
 
 from __future__ import annotations
@@ -49,8 +50,8 @@ class ChordSkins:
             first, last = sides.opposite(left)
             made._set(way, sides, first, last)
             if way == 0:
+                made._leave_out_single(sides)
                 made._set_ends(sides, vertices, faces)
-                made._leave_out_bevels(sides)
             along = np.full((count, 3), np.nan)
             along[sides.facet[first]] = sides.into[first]
             cosine = np.einsum("ni,ni->n", along[sides.facet[left]], sides.into[left])
@@ -84,7 +85,7 @@ class ChordSkins:
     def _set_ends(self, sides: _Sides, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
         """Facets that have a strip on one side alone: the last chords of an arc, to their farthest corner."""
         known, beside = self.turn[:, 0] != 0, sides.beside
-        width = np.einsum("ni,ni->n", self.end[:, 0] - self.start[:, 0], self.into[:, 0])
+        width = self._width
         at_end = np.flatnonzero(~known[sides.facet] & (self.turn[beside, 0] * sides.turn > 0))
         facet, chosen = np.unique(sides.facet[at_end], return_index=True)
         row = np.full(len(known), -1)
@@ -103,12 +104,21 @@ class ChordSkins:
         )
         self.end[facet, 0], self.back[facet, 0] = sides.place[one] + reach[facet, None] * into, -into
 
-    def _leave_out_bevels(self, sides: _Sides) -> None:
-        """A facet that turns alike on both sides, but to walls that are no chords."""
-        known = self.turn[:, 0] != 0
-        chained = np.zeros(len(known), bool)
-        chained[sides.facet[known[sides.facet] & known[sides.beside]]] = True
+    def _leave_out_single(self, sides: _Sides) -> None:
+        """Facets that turn alike on both sides, but to none that does so too and is about as wide: of bevels,
+        and of three sides that lie on a circle as any such do."""
+        width = self._width
+        one, two = width[sides.facet], width[sides.beside]
+        even = (np.minimum(one, two) > 0) & (np.maximum(one, two) < _EVEN * np.minimum(one, two))
+        chained = np.zeros(len(width), bool)
+        chained[sides.facet[even]] = True
         self.turn[~chained, 0] = 0.0
+
+    @property
+    def _width(self) -> NDArray[np.float64]:
+        """(K,) of the first strip of each facet, 0 where there is none."""
+        across = np.einsum("ni,ni->n", self.end[:, 0] - self.start[:, 0], self.into[:, 0])
+        return np.where(self.turn[:, 0] != 0, across, 0.0)
 
 
 @dataclass(frozen=True)
