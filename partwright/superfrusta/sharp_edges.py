@@ -24,10 +24,11 @@ from partwright.shapes.topology import EdgeTable, area_vectors, components
 from partwright.superfrusta.feature_assembly import in_unit_frame
 
 _LEAST, _MOST = 3e-3, 0.1  # unit lengths, that a strip is off in its middle
-_LEANS = np.cos(np.radians([75.0, 15.0]))  # between a strip and the wall that is nearest
+_OWN = 1e-3  # unit lengths, that what belongs to one is off at least
+_LEANS = np.cos(np.radians([80.0, 10.0]))  # between a strip and the wall that is nearest
 _LONG = 6.0  # times as long as it is off
 _CHAMFER, _FILLET = 0.5, 1 - math.sqrt(0.5)  # of their size, that they are off in the middle
-_OPEN, _CLOSED = 0.5, 0.7  # of what the middle is off, and of a strip's outline, which has to be nearer
+_OPEN, _CLOSED = 0.3, 0.7  # of what the middle is off, and of a strip's outline, which has to be nearer
 _ON = 0.2  # of what the middle is off, that a chamfer's outline may be
 _MIDDLE, _BEYOND = 0.7, 2.5  # of what the middle is off: what counts as that, and how near an edge is to it
 _SHARP, _SPACING = 0.77, 2e-3  # cosine between faces at a sharp edge, and unit lengths between its points
@@ -106,7 +107,7 @@ class _Seen:
         signed, nearest = surface.signed_nearest(points.reshape(-1, 3))
         off, walls = signed.reshape(points.shape[:2]), _units(area_vectors(own[0][own[1]]))[nearest]
         cosine = np.einsum("fki,fi->fk", walls.reshape(points.shape), _units(normal))
-        leans = (cosine > _LEANS[0]) & (cosine < _LEANS[1]) & (np.abs(off) > _LEAST)
+        leans = (cosine > _LEANS[0]) & (cosine < _LEANS[1]) & (np.abs(off) > _OWN)
         deep = np.where(leans, off, 0.0)
         farthest = np.arange(len(faces)), np.abs(deep).argmax(axis=1)
         edges, beside = EdgeTable(faces).pairs
@@ -122,7 +123,7 @@ class _Seen:
         depth, area = np.zeros(int(self.label.max(initial=-1)) + 1), np.bincount(self.label, self.area)
         np.maximum.at(depth, self.label, np.abs(self.deep).max(axis=1))
         long = _length(area, depth) > _LONG * depth
-        return np.flatnonzero((depth > 0) & (depth < _MOST) & long).tolist()
+        return np.flatnonzero((depth > _LEAST) & (depth < _MOST) & long).tolist()
 
     def strip(self, index: int) -> _Strip | None:
         """What was left off there; None where it is another fault: beside no sharp edge, or open at its
