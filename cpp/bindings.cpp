@@ -147,10 +147,11 @@ NB_MODULE(_kernel, m) {
     {
       nb::gil_scoped_release release;
       const auto parts = parts_of(rows);
-      const Samples samples = samples_of(points, distance, weight, background);
+      SampleBlocks samples(samples_of(points, distance, weight, background), false);
+      samples.sharpen(beta);
       PartDistances distances(parts.size(), samples);
-      measure(parts, samples, beta, threads, distances);
-      system = normal_equations(parts, flags(live), samples, beta, {overlap, blending}, threads, distances);
+      measure(parts, samples, threads, distances);
+      system = normal_equations(parts, flags(live), samples, {overlap, blending}, threads, distances);
     }
     std::copy(system.gradient.begin(), system.gradient.end(), gradient.data());
     for (const auto& [pair, block] : system.blocks)
@@ -168,9 +169,10 @@ NB_MODULE(_kernel, m) {
                    float overlap, float blending, int threads) {
     nb::gil_scoped_release release;
     const auto parts = parts_of(rows);
-    const Samples samples = samples_of(points, distance, weight, background);
+    SampleBlocks samples(samples_of(points, distance, weight, background), false);
+    samples.sharpen(beta);
     PartDistances distances(parts.size(), samples);
-    return loss(parts, std::vector<char>(parts.size(), 1), samples, beta, {overlap, blending}, threads, distances);
+    return loss(parts, std::vector<char>(parts.size(), 1), samples, {overlap, blending}, threads, distances);
   }, "rows"_a, "points"_a, "distance"_a, "weight"_a, "background"_a, "beta"_a, "overlap"_a, "blending"_a,
      "threads"_a,
      "Half the sum of squared residuals.");

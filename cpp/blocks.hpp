@@ -65,7 +65,7 @@ struct Workspace {
   std::vector<float> g, weight, share, blend, occ;
   std::vector<size_t> folded;
   Block block;
-  alignas(64) float field[BLOCK], total[BLOCK], carried[BLOCK], assembled[BLOCK], weights[BLOCK];
+  alignas(64) float field[BLOCK], total[BLOCK], carried[BLOCK], assembled[BLOCK];
 };
 
 // Fold of the parts that count over one block, from the distances g (M, BLOCK) of all, keeping each one's fold

@@ -6,19 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "blocks.hpp"
+#include "sample_blocks.hpp"
 
 namespace partwright {
-
-// What a fit compares with: at each point the shape's signed distance, a weight, and (optionally) the field of
-// parts that stay as they are, which joins the fold first.
-struct Samples {
-  const float* points;
-  const float* distance;
-  const float* weight;
-  const float* background;  // null when there is none
-  int64_t count;
-};
 
 // Weights of the residuals that accompany the reconstruction (eq. 7): overlap and smooth-union consistency. Both
 // look at the parts that are added, for eq. 8 knows no others.
@@ -40,8 +30,8 @@ struct NormalEquations {
 // at this sharpness, it has none: most parts are far from most blocks.
 class PartDistances {
  public:
-  PartDistances(size_t parts, const Samples& samples);
-  const Ball& ball(int64_t b) const { return balls_[size_t(b)]; }
+  PartDistances(size_t parts, const SampleBlocks& samples)
+      : parts_(parts), values_(size_t(samples.blocks()) * parts * BLOCK), felt_(size_t(samples.blocks()) * parts) {}
   float* block(int64_t b) { return values_.data() + size_t(b) * parts_ * BLOCK; }
   const float* block(int64_t b) const { return values_.data() + size_t(b) * parts_ * BLOCK; }
   char& felt(int64_t b, size_t part) { return felt_[size_t(b) * parts_ + part]; }
@@ -52,18 +42,17 @@ class PartDistances {
   size_t parts_;
   std::vector<float> values_;
   std::vector<char> felt_;
-  std::vector<Ball> balls_;
 };
 
-// Brings the distances of all parts up to date, for calls at the sharpness `beta`.
-void measure(const std::vector<Part>& parts, const Samples& samples, float beta, int threads, PartDistances& distances);
+// Brings the distances of all parts up to date, for calls at the samples' sharpness.
+void measure(const std::vector<Part>& parts, const SampleBlocks& samples, int threads, PartDistances& distances);
 
 // `live[i]` says whether part i moves; blocks and gradients of the others are not formed.
-NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples,
-                                 float beta, Penalties penalties, int threads, const PartDistances& distances);
+NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const SampleBlocks& samples,
+                                 Penalties penalties, int threads, const PartDistances& distances);
 
 // Brings the distances of live parts up to date on the way.
-double loss(const std::vector<Part>& parts, const std::vector<char>& live, const Samples& samples, float beta,
+double loss(const std::vector<Part>& parts, const std::vector<char>& live, const SampleBlocks& samples,
             Penalties penalties, int threads, PartDistances& distances);
 
 }  // namespace partwright

@@ -2,131 +2,11 @@
 
 #include <cmath>
 
-#include "compact_samples.hpp"
+#include "damped_step.hpp"
 #include "parallel.hpp"
 
 namespace partwright {
 namespace {
-
-using Square = std::array<double, DERIVATIVES * DERIVATIVES>;
-using Vector = std::array<double, DERIVATIVES>;
-
-// Lower Cholesky factor in place; false when not positive definite.
-bool factor(Square& a) {
-  for (int i = 0; i < DERIVATIVES; ++i)
-    for (int j = 0; j <= i; ++j) {
-      double sum = a[i * DERIVATIVES + j];
-      for (int k = 0; k < j; ++k) sum -= a[i * DERIVATIVES + k] * a[j * DERIVATIVES + k];
-      if (i == j && !(sum > 0)) return false;
-      a[i * DERIVATIVES + j] = i == j ? std::sqrt(sum) : sum / a[j * DERIVATIVES + j];
-    }
-  return true;
-}
-
-void solve(const Square& l, const double* b, double* x) {
-  for (int i = 0; i < DERIVATIVES; ++i) {
-    double sum = b[i];
-    for (int k = 0; k < i; ++k) sum -= l[i * DERIVATIVES + k] * x[k];
-    x[i] = sum / l[i * DERIVATIVES + i];
-  }
-  for (int i = DERIVATIVES - 1; i >= 0; --i) {
-    double sum = x[i];
-    for (int k = i + 1; k < DERIVATIVES; ++k) sum -= l[k * DERIVATIVES + i] * x[k];
-    x[i] = sum / l[i * DERIVATIVES + i];
-  }
-}
-
-// Diagonal damping that keeps parameters without influence in place.
-constexpr double FLOOR = 1e-3;
-
-// The damped Gauss-Newton step by conjugate gradients. Parts couple only where they touch, so each part's own
-// block is nearly all there is: with the blocks' factors as preconditioner a few products with the sparse matrix
-// do, where a dense factorisation would cost the cube of the number of parts.
-class DampedStep {
- public:
-  DampedStep(const NormalEquations& system, const std::vector<char>& moving) : system_(system), moving_(moving) {}
-
-  // Entries of `step` that do not move are 0. False when a block is not positive definite.
-  bool operator()(double damping, std::vector<double>& step) {
-    const size_t n = moving_.size();
-    factors_.assign(n / DERIVATIVES, identity());
-    damping_.assign(n, 0.0);
-    for (const auto& [pair, block] : system_.blocks) {
-      if (pair.first != pair.second) continue;
-      const size_t base = size_t(pair.first) * DERIVATIVES;
-      Square& own = factors_[size_t(pair.first)];
-      for (int r = 0; r < DERIVATIVES; ++r)
-        for (int c = 0; c < DERIVATIVES; ++c)
-          if (moving_[base + r] && moving_[base + c]) own[r * DERIVATIVES + c] = block[r * DERIVATIVES + c];
-      for (int r = 0; r < DERIVATIVES; ++r) {
-        if (!moving_[base + r]) continue;
-        damping_[base + r] = damping * (block[r * DERIVATIVES + r] + FLOOR) + 1e-9;
-        own[r * DERIVATIVES + r] += damping_[base + r];
-      }
-      if (!factor(own)) return false;
-    }
-    step.assign(n, 0.0);
-    std::vector<double> residual(n), z(n), p(n), q(n);
-    for (size_t i = 0; i < n; ++i) residual[i] = moving_[i] ? -system_.gradient[i] : 0.0;
-    precondition(residual, z);
-    p = z;
-    double rz = dot(residual, z);
-    const double enough = rz * 1e-6;
-    for (int iteration = 0; iteration < 60 && rz > enough && rz > 0; ++iteration) {
-      multiply(p, q);
-      const double alpha = rz / dot(p, q);
-      for (size_t i = 0; i < n; ++i) {
-        step[i] += alpha * p[i];
-        residual[i] -= alpha * q[i];
-      }
-      precondition(residual, z);
-      const double next = dot(residual, z);
-      for (size_t i = 0; i < n; ++i) p[i] = z[i] + next / rz * p[i];
-      rz = next;
-    }
-    return true;
-  }
-
- private:
-  static Square identity() {
-    Square a{};
-    for (int i = 0; i < DERIVATIVES; ++i) a[i * DERIVATIVES + i] = 1;
-    return a;
-  }
-
-  static double dot(const std::vector<double>& a, const std::vector<double>& b) {
-    double sum = 0;
-    for (size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
-    return sum;
-  }
-
-  void precondition(const std::vector<double>& r, std::vector<double>& z) const {
-    for (size_t i = 0; i < factors_.size(); ++i) solve(factors_[i], &r[i * DERIVATIVES], &z[i * DERIVATIVES]);
-    for (size_t i = 0; i < z.size(); ++i) z[i] = moving_[i] ? z[i] : 0.0;
-  }
-
-  void multiply(const std::vector<double>& x, std::vector<double>& y) const {
-    for (size_t i = 0; i < y.size(); ++i) y[i] = damping_[i] * x[i];
-    for (const auto& [pair, block] : system_.blocks) {
-      const double *xi = &x[size_t(pair.first) * DERIVATIVES], *xj = &x[size_t(pair.second) * DERIVATIVES];
-      double *yi = &y[size_t(pair.first) * DERIVATIVES], *yj = &y[size_t(pair.second) * DERIVATIVES];
-      const bool twice = pair.first != pair.second;
-      for (int r = 0; r < DERIVATIVES; ++r) {
-        double sum = 0;
-        for (int c = 0; c < DERIVATIVES; ++c) sum += block[r * DERIVATIVES + c] * xj[c];
-        yi[r] += sum;
-        if (twice)
-          for (int c = 0; c < DERIVATIVES; ++c) yj[c] += block[r * DERIVATIVES + c] * xi[r];
-      }
-    }
-    for (size_t i = 0; i < y.size(); ++i) y[i] = moving_[i] ? y[i] : 0.0;
-  }
-
-  const NormalEquations& system_;
-  const std::vector<char>& moving_;
-  std::vector<Square> factors_;
-  std::vector<double> damping_;
-};
 
 float& shape_entry(float* row, int derivative) { return row[SX + derivative - D_SX]; }
 
@@ -175,7 +55,7 @@ void tie(NormalEquations& system, const std::vector<char>& tied) {
 }
 
 Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied,
-                  const Samples& samples, const std::vector<Stage>& stages, Penalties penalties, const Limits& limits,
+                  SampleBlocks samples, const std::vector<Stage>& stages, Penalties penalties, const Limits& limits,
                   int threads) {
   const int parts = int(rows.size() / COLUMNS);
   std::vector<char> live(size_t(parts), 0);
@@ -187,9 +67,10 @@ Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const 
   PartDistances distances(size_t(parts), samples), tried(distances);
   for (const Stage& stage : stages) {
     double damping = 1e-2;
-    measure(prepared(out.rows), samples, stage.beta, threads, distances);
+    samples.sharpen(stage.beta);
+    measure(prepared(out.rows), samples, threads, distances);
     tried = distances;
-    NormalEquations system = normal_equations(prepared(out.rows), live, samples, stage.beta, penalties, threads, distances);
+    NormalEquations system = normal_equations(prepared(out.rows), live, samples, penalties, threads, distances);
     tie(system, tied);
     for (int iteration = 0; iteration < stage.iterations; ++iteration) {
       // A variable at its bound that wants to leave the box takes no part in the step.
@@ -209,7 +90,7 @@ Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const 
           std::vector<float> candidate = out.rows;
           for (int i = 0; i < parts; ++i)
             if (live[size_t(i)]) move(&candidate[size_t(i) * COLUMNS], &step[size_t(i) * DERIVATIVES], &moving[size_t(i) * DERIVATIVES], limits, tied[size_t(i)]);
-          const double now = loss(prepared(candidate), live, samples, stage.beta, penalties, threads, tried);
+          const double now = loss(prepared(candidate), live, samples, penalties, threads, tried);
           if (now < system.loss) {
             gain = (system.loss - now) / system.loss;
             out.rows = std::move(candidate);
@@ -225,7 +106,7 @@ Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const 
         system.loss *= 1 - gain;
         break;
       }
-      system = normal_equations(prepared(out.rows), live, samples, stage.beta, penalties, threads, distances);
+      system = normal_equations(prepared(out.rows), live, samples, penalties, threads, distances);
       tie(system, tied);
     }
     out.loss = system.loss;
@@ -238,11 +119,8 @@ Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const 
 Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied,
                             const Samples& samples, const std::vector<Stage>& stages, Penalties penalties,
                             const Limits& limits, int threads) {
-  if (rows.size() > COLUMNS) {
-    const CompactSamples compact(samples);
-    return minimised(std::move(rows), free, tied, compact.samples(), stages, penalties, limits, threads);
-  }
-  return minimised(std::move(rows), free, tied, samples, stages, penalties, limits, threads);
+  SampleBlocks blocks(samples, rows.size() > COLUMNS);
+  return minimised(std::move(rows), free, tied, std::move(blocks), stages, penalties, limits, threads);
 }
 
 std::vector<Outcome> fit_starts(const std::vector<float>& starts, const std::vector<int64_t>& first,

@@ -17,22 +17,26 @@ inline int thread_count(int requested) {
   return hardware;
 }
 
-// Calls work(item) for every item, each on one thread, in no particular order.
-template <typename Work>
-void parallel_for(int64_t items, int threads, Work work) {
+// Calls work(item, state) for every item, each on one thread, in no particular order. Each thread makes a state of
+// its own, once.
+template <typename Make, typename Work>
+void parallel_for(int64_t items, int threads, Make make, Work work) {
   threads = int(std::min<int64_t>(thread_count(threads), items));
-  if (threads <= 1) {
-    for (int64_t i = 0; i < items; ++i) work(i);
-    return;
-  }
   std::atomic<int64_t> next{0};
   auto run = [&] {
-    for (int64_t i = next++; i < items; i = next++) work(i);
+    auto state = make();
+    for (int64_t i = next++; i < items; i = next++) work(i, state);
   };
   std::vector<std::thread> pool;
   for (int i = 1; i < threads; ++i) pool.emplace_back(run);
   run();
   for (auto& thread : pool) thread.join();
+}
+
+// The same for work without a state.
+template <typename Work>
+void parallel_for(int64_t items, int threads, Work work) {
+  parallel_for(items, threads, [] { return 0; }, [&](int64_t i, int) { work(i); });
 }
 
 }  // namespace partwright

@@ -1,7 +1,8 @@
-#include "compact_samples.hpp"
+#include "sample_blocks.hpp"
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 namespace partwright {
@@ -35,22 +36,33 @@ void split(Place* places, int64_t count) {
 
 }  // namespace
 
-CompactSamples::CompactSamples(const Samples& given) {
+SampleBlocks::SampleBlocks(const Samples& given, bool compact)
+    : blocks_(size_t((given.count + BLOCK - 1) / BLOCK)), count_(given.count), background_(given.background) {
   std::vector<Place> places(static_cast<size_t>(given.count));
   for (int64_t i = 0; i < given.count; ++i)
     places[size_t(i)] = {{given.points[3 * i], given.points[3 * i + 1], given.points[3 * i + 2]}, i};
-  split(places.data(), given.count);
-  for (const Place& place : places) {
-    points_.insert(points_.end(), place.at.begin(), place.at.end());
-    distance_.push_back(given.distance[place.index]);
-    weight_.push_back(given.weight[place.index]);
-    if (given.background) background_.push_back(given.background[place.index]);
+  if (compact) split(places.data(), given.count);
+  for (size_t b = 0; b < blocks_.size(); ++b) {
+    SampleBlock& block = blocks_[b];
+    const Place* mine = &places[b * BLOCK];
+    const int n = int(std::min<int64_t>(BLOCK, given.count - int64_t(b) * BLOCK));
+    for (int i = 0; i < BLOCK; ++i) {
+      const Place& place = mine[i < n ? i : 0];
+      block.at.x[i] = place.at[0];
+      block.at.y[i] = place.at[1];
+      block.at.z[i] = place.at[2];
+      block.distance[i] = given.distance[place.index];
+      block.root[i] = i < n ? std::sqrt(given.weight[place.index]) : 0.f;
+      block.background[i] = given.background ? given.background[place.index] : 0.f;
+    }
+    block.heaviest = *std::max_element(block.root, block.root + BLOCK);
+    block.ball = around(block.at);
   }
 }
 
-Samples CompactSamples::samples() const {
-  return {points_.data(), distance_.data(), weight_.data(), background_.empty() ? nullptr : background_.data(),
-          int64_t(distance_.size())};
+void SampleBlocks::sharpen(float beta) {
+  beta_ = beta;
+  for (SampleBlock& block : blocks_) occupancy(block.distance, beta, block.target);
 }
 
 }  // namespace partwright
