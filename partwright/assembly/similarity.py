@@ -5,18 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from partwright.assembly.checks import Quaternion, Vector, number, unit_quaternion, vector
 from partwright.errors import ParameterError
+from partwright.rows import lengths, sums
+
+_N = TypeVar("_N", float, NDArray[np.float64])
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 NO_ROTATION: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
-def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """The rotation `b` followed by `a`."""
+def quaternion_product(a: tuple[_N, _N, _N, _N], b: tuple[_N, _N, _N, _N]) -> tuple[_N, _N, _N, _N]:
+    """The rotation `b` followed by `a`; components may be arrays, of many rotations."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
     return (
@@ -134,20 +139,24 @@ def rigid_moves(value: Sequence[Similarity], name: str) -> tuple[Similarity, ...
     return tuple(move if move.scale == 1.0 else replace(move, scale=1.0) for move in moves)
 
 
+def quaternions(rotations: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4) of rotations (..., 3, 3), by way of the largest component (Shepperd 1978)."""
+    diagonal = np.diagonal(rotations, axis1=-2, axis2=-1)
+    trace = sums(diagonal)[..., None]
+    turned = np.swapaxes(rotations, -1, -2)
+    symmetric = rotations + turned
+    twist = (turned - rotations)[..., (1, 2, 0), (2, 0, 1)]
+    ways = np.empty((*rotations.shape[:-2], 4, 4))
+    ways[..., 0, 0] = 1.0 + trace[..., 0]
+    ways[..., 0, 1:] = ways[..., 1:, 0] = twist
+    ways[..., 1:, 1:] = symmetric
+    places = np.arange(1, 4)
+    ways[..., places, places] = 1.0 + 2.0 * diagonal - trace
+    largest = np.concatenate([trace, diagonal], axis=-1).argmax(axis=-1)
+    found = np.take_along_axis(ways, largest[..., None, None], axis=-2)[..., 0, :]
+    return np.asarray(found / lengths(found)[..., None])
+
+
 def _quaternion(rotation: np.ndarray) -> Quaternion:
-    """Unit quaternion of a (3, 3) rotation, by way of its largest component (Shepperd 1978)."""
-    r = rotation
-    squares = np.array([r.trace(), r[0, 0], r[1, 1], r[2, 2]])
-    symmetric = r + r.T
-    twist = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    largest = int(squares.argmax())
-    if largest == 0:
-        q = np.array([1.0 + r.trace(), *twist])
-    else:
-        i = largest - 1
-        q = np.empty(4)
-        q[0] = twist[i]
-        q[1:] = symmetric[i]
-        q[1 + i] = 1.0 + 2.0 * r[i, i] - r.trace()
-    w, x, y, z = (q / np.linalg.norm(q)).tolist()
+    w, x, y, z = quaternions(rotation).tolist()
     return w, x, y, z

@@ -158,9 +158,9 @@ def _grown(samples: FitSamples, wanted: list[Region], rows: Rows, settings: Sett
     return _select(samples, candidates, rows, settings.price / _PRICE_DIVISOR, most)
 
 
-def _view(samples: FitSamples, region: Region) -> View:
-    voxels = samples.grid_points[np.flatnonzero(region.voxels)]
-    low, high = voxels.min(axis=0), voxels.max(axis=0)
+def _view(samples: FitSamples, region: Region, points: NDArray[np.float32]) -> View:
+    """points: (n, 3) the region's voxels."""
+    low, high = points.min(axis=0), points.max(axis=0)
     margin = max(0.06, region.margin * float((high - low).max()))
     index = samples.within(low - margin, high + margin)
     if len(index) > _MOST_SAMPLES:
@@ -196,10 +196,11 @@ def finalists(
     All starts are screened briefly on few samples, and the best go on. `overlap` is the price of running into
     the other parts. Growth asks none: a new part that may not cross what is there gets stuck in its region.
     """
-    views = [_view(samples, region) for region in wanted]
     # Regions of the same voxels, which differ in what they count around them, start alike.
     of_voxels = {id(region.voxels): region for region in wanted}
-    starting = {key: _guesses(samples, region, settings) for key, region in of_voxels.items()}
+    points = {key: samples.grid_points[np.flatnonzero(one.voxels)] for key, one in of_voxels.items()}
+    views = [_view(samples, region, points[id(region.voxels)]) for region in wanted]
+    starting = {key: _guesses(samples, one, points[key], settings) for key, one in of_voxels.items()}
     guesses = [starting[id(region.voxels)] for region in wanted]
     owner = np.repeat(np.arange(len(wanted)), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))
@@ -223,8 +224,8 @@ def finalists(
     return fitted, owner[kept], losses
 
 
-def _guesses(samples: FitSamples, region: Region, settings: Settings) -> Rows:
-    points, spacing = samples.grid_points[np.flatnonzero(region.voxels)], samples.grid.spacing
+def _guesses(samples: FitSamples, region: Region, points: NDArray[np.float32], settings: Settings) -> Rows:
+    spacing = samples.grid.spacing
     if settings.family == "solid":
         return solid_starts.starts(points, spacing, region.sign, region.frames)
     rows = with_locked_values(
@@ -280,15 +281,16 @@ def _select(samples: FitSamples, candidates: Rows, rows: Rows, price: float, mos
     What is added may join before the parts that are subtracted, or after them.
     """
     occupied = samples.covered_by(candidates, samples.points)
-    added, cuts = candidates[:, Column.SIGN] > 0, rows[rows[:, Column.SIGN] < 0]
+    added, cuts = candidates[:, Column.SIGN, None] > 0, rows[rows[:, Column.SIGN] < 0]
     carved = samples.covered_by(cuts, samples.points).any(axis=0) if len(cuts) else None
     covered = samples.field(rows) < 0
     chosen: list[tuple[bool, int]] = []
     current = float(occupancy_score(samples, covered))
     while len(chosen) < most:
-        ways = {False: np.where(added[:, None], covered | occupied, covered & ~occupied)}
+        more = covered | occupied
+        ways = {False: more if added.all() else np.where(added, more, covered > occupied)}
         if carved is not None:
-            ways[True] = np.where(added[:, None], covered | (occupied & ~carved), covered)
+            ways[True] = np.where(added, covered | (occupied > carved), covered)
         scores = {under: occupancy_score(samples, way) for under, way in ways.items()}
         under = max(scores, key=lambda u: (float(scores[u].max()), u))
         best = int(scores[under].argmax())
@@ -296,7 +298,7 @@ def _select(samples: FitSamples, candidates: Rows, rows: Rows, price: float, mos
             break
         chosen.append((under, best))
         covered, current = ways[under][best], float(scores[under][best])
-        if carved is not None and not added[best]:
+        if carved is not None and not added[best, 0]:
             carved = carved | occupied[best]
     first, last = ([i for u, i in chosen if u is under] for under in (True, False))
     return Grown(candidates[first], candidates[last])

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from partwright.fields.columns import ROTATION, SIZE, TRANSLATION, WIDTH, Column
+from partwright.rows import crosses
 from partwright.superfrusta.refining import START_BLEND
 from partwright.superfrusta.samples import Rows
 
@@ -33,13 +34,12 @@ def starts(points: NDArray[np.float32], spacing: float, frames: NDArray[np.float
     _, axes = np.linalg.eigh(local.T @ local / len(local) + 1e-8 * np.eye(3))
     principal = [along(axes, axis) for axis in range(3)]
     given = Rotation.from_quat(frames, scalar_first=True).as_matrix() if len(frames) else []
-    straight = [*principal, *(along(np.eye(3), axis) for axis in range(3)), *given]
-    quarters = Rotation.from_euler("z", 90 * np.arange(4)[:, None], degrees=True).as_matrix()
+    straight = [*principal, *_WORLD, *given]
 
     # frame, roundness, bulge, onion of each start
     guesses = [(frame, roundness, 0.0, 0.0) for frame in straight for roundness in (_BOXY, _ROUND)]
     guesses += [(frame, _ROUND, 0.0, 0.75) for frame in principal]
-    guesses += [(principal[2] @ quarters[turn], 0.8, bulge, 0.0) for turn, bulge in _BENT]
+    guesses += [(principal[2] @ _QUARTERS[turn], 0.8, bulge, 0.0) for turn, bulge in _BENT]
 
     turned = np.stack([frame for frame, *_ in guesses])
     low, high = extents(local, turned)
@@ -78,4 +78,8 @@ def extents(
 def along(basis: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
     """A right-handed frame whose z is the given column of the basis."""
     x, z = basis[:, (axis + 1) % 3], basis[:, axis]
-    return np.stack([x, np.cross(z, x), z], axis=1)
+    return np.stack([x, crosses(z, x), z], axis=1)
+
+
+_WORLD = [along(np.eye(3), axis) for axis in range(3)]
+_QUARTERS = Rotation.from_euler("z", 90 * np.arange(4)[:, None], degrees=True).as_matrix()

@@ -18,7 +18,7 @@ from partwright.fields.columns import ROTATION, Column
 from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.repeat_candidates import Occupancies, Repeat, without_twins
 from partwright.superfrusta.samples import FitSamples, Rows
-from partwright.superfrusta.symmetric_fit import image
+from partwright.superfrusta.symmetric_fit import images
 from partwright.superfrusta.symmetry import Isometry, image_error, refined, shifted
 
 Floats = NDArray[np.float64]
@@ -136,8 +136,8 @@ class _Forms:
         ways = [Isometry(turn, self.middles[other] - turn @ self.middles[base]) for turn in turns]
         samples, there = self.samples, self.rows[[other]]
         points = samples.points[samples.parts_of(there, samples.points)[0] < _NEAR]
-        images = np.stack([image(self.rows[base], way) for way in ways])
-        covered = samples.covered_by(np.concatenate([there, images]), points)
+        laid = images(self.rows[[base]], ways)[:, 0]
+        covered = samples.covered_by(np.concatenate([there, laid]), points)
         both, either = (covered[1:] & covered[0]).sum(axis=1), (covered[1:] | covered[0]).sum(axis=1)
         iou = both / np.maximum(either, 1)
         best, least = None, self.tolerance

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from os import cpu_count
 
@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from partwright.fields.columns import ROTATION, Column
 from partwright.fields.kernel import Target
 from partwright.superfrusta.deviations import Deviations, deviations
-from partwright.superfrusta.growing import Region, carve, finalists, fit_regions, grow
+from partwright.superfrusta.growing import Grown, Region, carve, finalists, fit_regions, grow
 from partwright.superfrusta.merging import Merger, carried_out, mergers, owners
 from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.pruning import cheapest_removal, neighbours
@@ -69,6 +69,7 @@ class Mending:
     settings: Settings
     locked: int = 0
     told: Callable[[Rows], None] | None = None
+    _of_whole: dict[bytes, Grown] = field(default_factory=dict)
 
     def __call__(self, rows: Rows) -> Rows:
         """Rows (M, 17) after at most `settings.mends` tries, without parts that no longer pay."""
@@ -256,7 +257,7 @@ class Mending:
                 begun = np.insert(still, [self.locked] * len(grown.first), True)
                 yield grown.joined(others, self.locked), np.append(begun, _all(grown.last))
         if self.settings.carving and off.distance[worst] > 0:
-            carved = carve(samples, rows, self.settings, self.settings.regions)
+            carved = self.carved(rows)
             if len(carved):
                 yield with_new(carved.last)
             for one in self.holes(rows, off, worst):
@@ -269,6 +270,14 @@ class Mending:
             yield with_new(np.concatenate(found))
         if np.count_nonzero(mine) > _LEAST_HALVED:
             yield instead(*(self.fitted(half, others, rows[part], cut) for half in _halves(samples, mine)))
+
+    def carved(self, rows: Rows) -> Grown:
+        """What could be subtracted anywhere: the same for every part that is tried in vain."""
+        key = rows.tobytes()
+        if key not in self._of_whole:
+            self._of_whole.clear()
+            self._of_whole[key] = carve(self.samples, rows, self.settings, self.settings.regions)
+        return self._of_whole[key]
 
     def holes(self, rows: Rows, off: Deviations, worst: int) -> Rows:
         """Parts (M, 17) to subtract about a point that is covered, by samples of that place alone: a hole may

@@ -82,10 +82,11 @@ def mergers(
     without, _ = removal_scores(samples, rows)
     touching = _touching_pairs(samples, rows)
     owner = owners(samples, rows)
+    owning = np.isin(np.arange(len(rows)), owner)
 
     def suited(pair: tuple[int, int]) -> bool:
         alike = rows[pair[0], Column.SIGN] == rows[pair[1], Column.SIGN]
-        return bool(alike and pair[0] >= locked and np.isin(owner, pair).any())
+        return bool(alike and pair[0] >= locked and owning[list(pair)].any())
 
     every = list(filter(suited, combinations(range(len(rows)), 2) if apart else touching))
     cheap = sorted(every, key=lambda pair: (-max(without[list(pair)]), pair))[:_FITTED]
@@ -96,9 +97,9 @@ def mergers(
         return []
     regions = [
         Region(
-            np.isin(owner, pair),
+            voxels := (owner == pair[0]) | (owner == pair[1]),
             np.delete(rows, pair, axis=0),
-            _depth(samples, owner, pair),
+            _depth(samples, voxels),
             margin=0.2,
             elsewhere=0.15,
             frames=rows[list(pair), ROTATION],
@@ -170,8 +171,8 @@ def _nearest(
     return nearest
 
 
-def _depth(samples: FitSamples, owner: NDArray[np.int64], pair: tuple[int, int]) -> float:
-    depths = np.abs(samples.grid.values.ravel()[np.isin(owner, pair)])
+def _depth(samples: FitSamples, voxels: NDArray[np.bool_]) -> float:
+    depths = np.abs(samples.grid.values.ravel()[voxels])
     return float(depths.max()) if len(depths) else samples.grid.spacing
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from partwright.fields.columns import Column
 from partwright.superfrusta.samples import FitSamples, Rows
-from partwright.superfrusta.symmetric_fit import image
+from partwright.superfrusta.symmetric_fit import images
 from partwright.superfrusta.symmetry import Isometry
 
 _EVERY = 6  # samples that matching looks at
@@ -78,19 +78,16 @@ class Occupancies:
 
     def candidates(self, group: Sequence[Isometry], bases: Iterable[int], locked: int) -> Iterator[Repeat]:
         """Repeats under the isometries of a group, of each of the bases by itself and with others."""
-        images = np.stack([self.samples.covered_by(_images(self.rows, one), self.points) for one in group])
-        meeting = _meeting(self.rows, self.parts, images)
+        rows = images(self.rows, group)
+        there = np.stack([self.samples.covered_by(of_one, self.points) for of_one in rows])
+        meeting = _meeting(self.rows, self.parts, there)
         for base in bases:
             for one in (
-                _of_part(self.rows, self.parts, images[:, base], group, base, locked),
+                _of_part(self.rows, self.parts, there[:, base], group, base, locked),
                 _of_group(self.points, self.parts, meeting, group, base, locked),
             ):
                 if one is not None:
                     yield one
-
-
-def _images(rows: Rows, isometry: Isometry) -> Rows:
-    return np.stack([image(row, isometry) for row in rows])
 
 
 def _of_part(

@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from partwright.assembly import Similarity
+from partwright.assembly.similarity import quaternion_product, quaternions
 from partwright.fields import kernel
 from partwright.fields.columns import (
     POSE,
@@ -25,6 +27,7 @@ from partwright.fields.columns import (
 )
 from partwright.fields.superfrustum import tightest_bulge
 from partwright.least_squares import Damping, minimise
+from partwright.rows import lengths
 from partwright.superfrusta.limits import LIMITS
 from partwright.superfrusta.refining import Stages, freedom, penalties, sharpened, ties
 from partwright.superfrusta.samples import FitSamples, Rows
@@ -50,7 +53,7 @@ class RepeatedPart:
     @property
     def rows(self) -> Rows:
         """(1 + copies, 17), the leaf itself first."""
-        return np.stack([self.row, *(image(self.row, isometry) for isometry in self.isometries)])
+        return np.concatenate([self.row[None], images(self.row[None], self.isometries)[:, 0]])
 
     @property
     def moves(self) -> tuple[Similarity, ...]:
@@ -72,10 +75,26 @@ def rigid(row: NDArray[np.float32], isometry: Isometry) -> Similarity:
     return Similarity.from_matrix(matrix)
 
 
-def image(row: NDArray[np.float32], isometry: Isometry) -> NDArray[np.float32]:
-    """The row (17,) of a part's image."""
-    placed = rigid(row, isometry) @ _pose(row)
-    return np.array([*placed.translation, *placed.rotation, *row[Column.SX :]], dtype=np.float32)
+def images(rows: Rows, isometries: Sequence[Isometry]) -> Rows:
+    """Rows (K, M, 17) of the images of parts (M, 17) under isometries: each `rigid` move, all at once."""
+    found = np.repeat(rows[None].astype(np.float32), len(isometries), axis=0)
+    if not len(isometries):
+        return found
+    linear = np.stack([one.linear for one in isometries])[:, None]
+    shift = np.stack([one.shift for one in isometries])[:, None]
+    flips = np.stack([_FLIP if one.improper else np.eye(3) for one in isometries])[:, None]
+    place = rows[:, TRANSLATION].astype(np.float64)
+    pose = rows[:, ROTATION].astype(np.float64)
+    pose /= lengths(pose)[:, None]
+    turns = Rotation.from_quat(pose, scalar_first=True).as_matrix()
+    moves = quaternions(linear @ turns @ flips @ turns.transpose(0, 2, 1))
+    found[..., TRANSLATION] = (linear @ place[..., None])[..., 0] + shift
+    found[..., ROTATION] = np.stack(quaternion_product(_components(moves), _components(pose)), axis=-1)
+    return found
+
+
+def _components(quaternions: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    return quaternions[..., 0], quaternions[..., 1], quaternions[..., 2], quaternions[..., 3]
 
 
 def expanded(leaves: Sequence[RepeatedPart]) -> Rows:

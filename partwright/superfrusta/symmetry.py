@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -48,7 +49,7 @@ class Isometry:
     def inverse(self) -> Isometry:
         return Isometry(self.linear.T, -self.linear.T @ self.shift)
 
-    @property
+    @cached_property
     def improper(self) -> bool:
         return bool(np.linalg.det(self.linear) < 0)
 
@@ -205,37 +206,41 @@ def refined(
     grid: DistanceGrid,
     isometry: Isometry,
     points: Floats,
-    nudged: Callable[[Isometry, Floats], Isometry],
+    moved: Callable[[Isometry, Isometry], Isometry],
     enough: float = _EXACT,
 ) -> Isometry:
     """An isometry that brings the images of points (N, 3) closer to the surface, by Gauss-Newton.
 
-    nudged: it after a small rigid motion, given as a twist (6,). enough: mean distance that needs no more.
+    moved: it after a small rigid motion. enough: mean distance that needs no more.
     """
     for _ in range(_STEPS):
         residual = _sampled(grid, isometry(points))
         if np.abs(residual).mean() < enough:
             break
-        ways = [nudged(isometry, _WIDTH * unit) for unit in np.eye(6)]
-        jacobian = np.stack([(_sampled(grid, way(points)) - residual) / _WIDTH for way in ways], axis=1)
+        nudged = np.concatenate([moved(isometry, nudge)(points) for nudge in _NUDGES])
+        jacobian = (_sampled(grid, nudged).reshape(len(_NUDGES), -1) - residual).T / _WIDTH
         step = np.linalg.lstsq(jacobian, -residual, rcond=0.05)[0]
-        better = nudged(isometry, np.clip(step, -0.1, 0.1))
+        better = moved(isometry, _motion(np.clip(step, -0.1, 0.1)))
         if np.abs(_sampled(grid, better(points))).mean() >= np.abs(residual).mean():
             break
         isometry = better
     return isometry
 
 
-def conjugated(isometry: Isometry, twist: Floats) -> Isometry:
+def conjugated(isometry: Isometry, motion: Isometry) -> Isometry:
     """E T E^-1 under a rigid motion E. That keeps what T is: a mirror stays one, a rotation keeps its
     angle."""
-    motion = Isometry(_turn(twist[:3]), twist[3:])
     return motion @ isometry @ motion.inverse()
 
 
-def shifted(isometry: Isometry, twist: Floats) -> Isometry:
+def shifted(isometry: Isometry, motion: Isometry) -> Isometry:
     """E T under a rigid motion E."""
-    return Isometry(_turn(twist[:3]), twist[3:]) @ isometry
+    return motion @ isometry
+
+
+def _motion(twist: Floats) -> Isometry:
+    """The rigid motion of a twist (6,): a rotation vector and a shift."""
+    return Isometry(_turn(twist[:3]), twist[3:])
 
 
 def _turn(vector: Floats) -> Floats:
@@ -253,3 +258,6 @@ def _fixed_point(isometry: Isometry, near: Floats | None = None) -> Floats:
     start = np.zeros(3) if near is None else near
     missing = isometry.shift - (start - isometry.linear @ start)
     return np.asarray(start + np.linalg.pinv(np.eye(3) - isometry.linear, rcond=1e-6) @ missing)
+
+
+_NUDGES = [_motion(_WIDTH * unit) for unit in np.eye(6)]

@@ -50,7 +50,8 @@ def test_two_blocks_grow_two_parts(pair: FitSamples, exact: np.ndarray) -> None:
 @pytest.mark.parametrize("smooth", [True, False])
 def test_starts_blend_unless_unions_are_plain(pair: FitSamples, smooth: bool) -> None:
     region = Region(pair.grid.values.ravel() < 0, NONE, 0.1, 0.2, 0.15)
-    blends = _guesses(pair, region, Settings.for_quality("draft", smooth=smooth))[:, Column.BLEND]
+    points = pair.grid_points[region.voxels]
+    blends = _guesses(pair, region, points, Settings.for_quality("draft", smooth=smooth))[:, Column.BLEND]
     assert (blends > 0).all() if smooth else (blends == 0).all()
 
 

@@ -14,14 +14,15 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.parts_from_rows import parts_from_rows
 from partwright.assembly.rows import rows
 from partwright.fields import SuperFrustum, kernel
-from partwright.fields.columns import Column
+from partwright.fields.columns import ROTATION as ROTATION_OF
+from partwright.fields.columns import TRANSLATION, Column
 from partwright.methods import FitRequest
 from partwright.shapes import load_shape
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.repeated_parts import repeat
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, image, refit, rigid
+from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, images, refit, rigid
 from partwright.superfrusta.symmetry import Isometry, Symmetry, groups, mirror, rotation, symmetries
 from tests.assembly.strategies import ROTATION, SUPERFRUSTA, VECTOR
 from tests.superfrusta.meshes import box, table, union
@@ -57,10 +58,22 @@ def test_the_image_of_a_part_has_the_moved_field(field, translation, turn, isome
     row = rows([Part(field, translation, turn)])[0].astype(np.float32)
     there = isometry(POINTS).astype(np.float32)
     expected = kernel.evaluate(row[None], POINTS)
-    assert np.allclose(kernel.evaluate(image(row, isometry)[None], there), expected, atol=2e-5)
+    assert np.allclose(kernel.evaluate(images(row[None], [isometry])[0], there), expected, atol=2e-5)
     move = rigid(row, isometry)
     copy = parts_from_rows(row[None])[0].transformed(move)
     assert np.allclose(copy.distance(there), expected, atol=2e-5)
+
+
+@given(st.lists(st.tuples(SUPERFRUSTA, VECTOR, ROTATION), min_size=1, max_size=4))
+def test_images_at_once_are_those_of_each_move_alone(parts) -> None:
+    some = rows([Part(*part) for part in parts]).astype(np.float32)
+    found = images(some, ISOMETRIES)
+    for isometry, there in zip(ISOMETRIES, found, strict=True):
+        for row, one in zip(some, there, strict=True):
+            placed = rigid(row, isometry) @ Similarity(1.0, tuple(row[ROTATION_OF]), tuple(row[TRANSLATION]))
+            assert one[TRANSLATION] == pytest.approx(placed.translation, abs=1e-6)
+            assert one[ROTATION_OF] == pytest.approx(placed.rotation, abs=1e-6)
+            assert one[Column.SX :].tolist() == row[Column.SX :].tolist()
 
 
 def test_symmetries_know_their_axis_and_centre() -> None:
