@@ -30,12 +30,18 @@ PW_CLONES void block_sums(const uint8_t* __restrict occupied, const uint8_t* __r
   constexpr int LANES = 16;
   float in[LANES] = {}, any[LANES] = {};
   int i = 0;
-  for (; i + LANES <= n; i += LANES)
+  for (; i + LANES <= n; i += LANES) {
+    // A product and no choice, which would be a branch.
+    int shared[LANES], some[LANES];
     for (int lane = 0; lane < LANES; ++lane) {
-      const float w = weight[i + lane];
-      in[lane] += occupied[i + lane] & inside[i + lane] ? w : 0.f;
-      any[lane] += occupied[i + lane] | inside[i + lane] ? w : 0.f;
+      shared[lane] = occupied[i + lane] & inside[i + lane];
+      some[lane] = occupied[i + lane] | inside[i + lane];
     }
+    for (int lane = 0; lane < LANES; ++lane) {
+      in[lane] += weight[i + lane] * float(shared[lane]);
+      any[lane] += weight[i + lane] * float(some[lane]);
+    }
+  }
   for (; i < n; ++i) {
     in[0] += occupied[i] & inside[i] ? weight[i] : 0.f;
     any[0] += occupied[i] | inside[i] ? weight[i] : 0.f;

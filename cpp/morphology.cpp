@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "blocks.hpp"
+
 namespace partwright {
 namespace {
 
@@ -15,10 +17,21 @@ struct Box {
   int lower[3], upper[3];  // upper is one past the end
 };
 
+// The least of so many values, lane by lane and then of the lanes; no more than 0.
+PW_CLONES float least(const float* v, size_t count) {
+  constexpr size_t LANES = 16;
+  float lanes[LANES] = {};
+  size_t i = 0;
+  for (; i + LANES <= count; i += LANES)
+    for (size_t lane = 0; lane < LANES; ++lane) lanes[lane] = std::min(lanes[lane], v[i + lane]);
+  for (; i < count; ++i) lanes[0] = std::min(lanes[0], v[i]);
+  return *std::min_element(lanes, lanes + LANES);
+}
+
 // Voxels from deepest to shallowest, by a counting sort of their depth.
 std::vector<uint32_t> by_depth(const std::vector<float>& field) {
   constexpr int BINS = 4096;
-  const float deepest = *std::min_element(field.begin(), field.end());
+  const float deepest = least(field.data(), field.size());
   std::vector<uint32_t> order;
   if (deepest >= 0) return order;
   const float scale = (BINS - 1) / -deepest;
@@ -158,6 +171,7 @@ std::vector<float> decompose(std::vector<float> field, const Grid& grid, const P
     const std::vector<uint32_t> order = by_depth(field);
     if (double(order.size()) < peeling.least_voxels) break;
     const float deepest = -field[order[0]];
+    if (deepest < peeling.least_depth) break;
 
     // Eq. 5: sink the threshold until a connected core holds the wanted share of the volume. Where no core ever
     // does (crumbs), take the largest component.
@@ -182,7 +196,6 @@ std::vector<float> decompose(std::vector<float> field, const Grid& grid, const P
     }
     core = components.root(core);
     if (!found) depth = 0;
-    if (deepest < peeling.least_depth) break;
 
     // Dilate the core back by the depth it was eroded by. Half a voxel more makes up for the distance being
     // measured between voxel centres.
