@@ -119,6 +119,12 @@ inline float tightest_bulge(float width, float height) {
   return std::asin(std::min(1.f, height / std::max(width, 1e-6f))) / HALF_PI;
 }
 
+// The sum of two numbers that are not negative, and a number less another: of products, which are rounded first and not
+// fused with the sum, as another use of each forbids. Values are then the same to the bit whether or not a compiler
+// takes least and greatest numbers as one instruction (values.cpp).
+PW_INLINE float sum_of(float a, float b) { return std::max(std::max(a + b, a), b); }
+PW_INLINE float less(float a, float b) { return std::min(a - b, std::max(b, 1e30f)); }
+
 PW_INLINE float clamp01(float v) { return std::min(std::max(v, 0.f), 1.f); }
 
 // atan(t)/t as a polynomial in t^2 on [0, 1]; relative error 1.5e-8, so small angles keep their digits.
@@ -156,7 +162,7 @@ PW_INLINE float cross_section(const Part& p, float x, float y) {
   const float dx = std::fabs(x) - p.half_x + p.round_radius;
   const float dy = std::fabs(y) - p.half_y + p.round_radius;
   const float ox = std::max(dx, 0.f), oy = std::max(dy, 0.f);
-  return std::min(std::max(dx, dy), 0.f) + std::sqrt(ox * ox + oy * oy) - p.round_radius;
+  return std::min(std::max(dx, dy), 0.f) + std::sqrt(sum_of(ox * ox, oy * oy)) - p.round_radius;
 }
 
 // Signed distance to the profile quad in the (q, z) plane; a closed hole has no inner edge.
@@ -169,13 +175,13 @@ PW_INLINE float profile(const Part& p, float q, float z) {
   const float bq = q - std::min(std::max(q, bottom_in), 0.f);
   float d2 = std::min(tq * tq + up * up, bq * bq + down * down);
   const float so = clamp01((q * p.e + down * height) * p.outer_inverse);
-  const float oq = q - so * p.e, oz = down - so * height;
+  const float oq = less(q, so * p.e), oz = less(down, so * height);
   d2 = std::min(d2, oq * oq + oz * oz);
   bool inside = (std::fabs(z) < p.h) & (q * height < p.e * down);
   if (HOLLOW) {
     const float rq = q - p.inner_bottom;
     const float si = clamp01((rq * p.inner_run + down * height) * p.inner_inverse);
-    const float iq = rq - si * p.inner_run, iz = down - si * height;
+    const float iq = less(rq, si * p.inner_run), iz = less(down, si * height);
     d2 = std::min(d2, iq * iq + iz * iz);
     inside = inside & (rq * height > p.inner_run * down);
   }
