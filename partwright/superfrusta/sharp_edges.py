@@ -25,6 +25,7 @@ from partwright.superfrusta.feature_assembly import in_unit_frame
 
 _LEAST, _MOST = 3e-3, 0.1  # unit lengths, that a strip is off in its middle
 _OWN = 1e-3  # unit lengths, that what belongs to one is off at least
+_GOOD = 0.95  # of the rest of the surface, that is off by less: else strips are effects of other faults
 _LEANS = np.cos(np.radians([80.0, 10.0]))  # between a strip and the wall that is nearest
 _LONG = 6.0  # times as long as it is off
 _CHAMFER, _FILLET = 0.5, 1 - math.sqrt(0.5)  # of their size, that they are off in the middle
@@ -75,6 +76,8 @@ def _sentence(shape: Shape, strips: list[_Strip]) -> str:
 
 def _strips(shape: Shape, whole: Assembly) -> list[_Strip]:
     seen = _Seen.of(shape, whole)
+    if seen.good < _GOOD:
+        return []
     return [strip for index in seen.long_and_narrow() if (strip := seen.strip(index)) is not None]
 
 
@@ -84,7 +87,8 @@ class _Seen:
 
     middle (F, 3), area (F,); deep (F, P): how far points of each that lean on the nearest wall are off it,
     positive outside, else 0; cosine (F,) between both at the farthest; beyond (F, P): how far its points are
-    from the nearest sharp edge. label (F,): which lean the same way side by side; around: their outlines.
+    from the nearest sharp edge. good: the share of the rest's area that is hardly off. label (F,): which lean
+    the same way side by side; around: their outlines.
     """
 
     middle: NDArray[np.float64]
@@ -92,6 +96,7 @@ class _Seen:
     deep: NDArray[np.floating]
     cosine: NDArray[np.float64]
     beyond: NDArray[np.float64]
+    good: float
     label: NDArray[np.int64]
     around: _Around
 
@@ -116,7 +121,9 @@ class _Seen:
         around = _Around.of(vertices, edges, label[beside], np.abs(surface.signed(vertices)))
         beyond = _from_edges(*own, points.reshape(-1, 3)).reshape(off.shape)
         area = np.linalg.norm(normal, axis=1) / 2
-        return cls(middle, area, deep, cosine[farthest], beyond, label, around)
+        rest = np.where((deep == 0).all(axis=1), area, 0.0)
+        good = float(rest[np.abs(off[:, 0]) < _LEAST].sum() / max(rest.sum(), 1e-300))
+        return cls(middle, area, deep, cosine[farthest], beyond, good, label, around)
 
     def long_and_narrow(self) -> list[int]:
         """Labels of those that are much longer than they are off."""

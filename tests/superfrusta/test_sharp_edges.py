@@ -70,3 +70,13 @@ def test_walls_that_are_off_and_facets_are_no_rims() -> None:
     coarse -= Manifold.cylinder(30, 8, circular_segments=6, center=True)
     ring = Assembly((Part(Cylinder(20, 20)), Part(Cylinder(8 * math.cos(math.pi / 12), 30))), "difference")
     assert told(coarse, *(ring,)) == ()
+
+
+def test_where_much_else_is_off_nothing_is_told() -> None:
+    """The strips of a poor fit are mostly faults of another kind."""
+    body = Part(Extrusion(PLATE, 20, top_chamfer=2.0))
+    bored = Assembly((body, Part(Cylinder(12, 30))), "difference")
+    assert told(bored, Part(Box((60, 40, 20)))) == ()
+    assert (
+        len(told(bored, *(Assembly((Part(Box((60, 40, 20))), Part(Cylinder(12, 30))), "difference"),))) == 1
+    )
