@@ -2,6 +2,8 @@
 
 #include <cstring>
 
+#include "superfrustum_derivatives.hpp"
+
 namespace partwright {
 namespace {
 
