@@ -31,6 +31,11 @@ def lengths(rows: Floats) -> Floats:
     return np.asarray(np.sqrt(sums(rows * rows)))
 
 
+def units(rows: Floats) -> Floats:
+    """(..., D) rows of length 1 along rows (..., D); what has no length stays 0."""
+    return rows / np.maximum(lengths(rows), np.finfo(rows.dtype).tiny)[..., None]
+
+
 def crosses(one: Floats, other: Floats) -> Floats:
     """(..., 3) cross products of rows (..., 3): `np.cross(one, other)`."""
     a, b, c = one[..., 0], one[..., 1], one[..., 2]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from partwright.rows import crosses, dots, lengths, sums
+from partwright.rows import crosses, dots, lengths, sums, units
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -20,6 +20,17 @@ def test_the_bits_are_those_of_numpy(shape: tuple[int, ...], dtype: type) -> Non
         np.testing.assert_array_equal(found, want)
     if shape[-1] == 3:
         np.testing.assert_array_equal(crosses(one, other), np.cross(one, other))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_units_have_length_one_however_short_rows_are(dtype: type) -> None:
+    rows = np.random.default_rng(2).normal(size=(100, 3)).astype(dtype) * dtype(1e-15)
+    rows[7] = 0
+    found = units(rows)
+    assert found.dtype == dtype
+    assert (found[7] == 0).all()
+    np.testing.assert_allclose(np.delete(np.linalg.norm(found, axis=1), 7), 1, atol=1e-6)
+    assert (dots(found, rows) >= 0).all()
 
 
 def test_one_row_goes_with_many() -> None:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from partwright.capri.csg_tree import CsgTree
 from partwright.meshing import mesh_assembly
 from partwright.shapes import Shape
-from partwright.shapes.sampling import sample_triangles
-from partwright.shapes.topology import area_vectors
+from partwright.shapes.sampling import sample_with_normals
 
 _POINTS = 20_000  # on each of both surfaces
 _BESIDE = 0.003  # unit frame: how far from a surface the sides of its points are told
@@ -39,8 +38,10 @@ def strays(tree: CsgTree, shape: Shape, limit: float, seed: int) -> list[Place]:
     mesh = mesh_assembly(tree.assembly())
     if not len(mesh.faces):
         return []
-    ours, our_normal = _surface(np.asarray(mesh.vertices), np.asarray(mesh.faces), seed)
-    theirs, their_normal = _surface(shape.frame.to_unit(shape.vertices), shape.faces, seed)
+    ours, our_normal = sample_with_normals(np.asarray(mesh.vertices), np.asarray(mesh.faces), _POINTS, seed)
+    theirs, their_normal = sample_with_normals(
+        shape.frame.to_unit(shape.vertices), shape.faces, _POINTS, seed
+    )
     above = shape.unit_distance(ours)
     missed = cKDTree(ours).query(theirs, workers=-1)[0]
     far, lost = above > limit, missed > limit
@@ -54,15 +55,6 @@ def strays(tree: CsgTree, shape: Shape, limit: float, seed: int) -> list[Place]:
     off = np.concatenate([above[far], missed[lost], missed[lost]])
     wrong = tree.occupancy(points) != (shape.unit_distance(points) < 0) if len(points) else np.zeros(0, bool)
     return _places(points[wrong], off[wrong])
-
-
-def _surface(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], seed: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points (N, 3) of a mesh by area, and the outward normals (N, 3) of their triangles."""
-    points, face = sample_triangles(vertices, faces, _POINTS, seed)
-    normal = area_vectors(vertices[faces[face]])
-    return points, normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
 
 
 def _places(points: NDArray[np.float64], off: NDArray[np.float64]) -> list[Place]:

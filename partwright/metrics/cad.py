@@ -14,8 +14,7 @@ from partwright.metrics.complexity import convexes, primitives
 from partwright.metrics.edge_chamfer import edge_chamfer
 from partwright.metrics.light_field import light_field_distance
 from partwright.metrics.normal_consistency import normal_consistency
-from partwright.shapes.sampling import sample_triangles
-from partwright.shapes.topology import area_vectors
+from partwright.shapes.sampling import sample_with_normals
 
 if TYPE_CHECKING:
     import trimesh
@@ -86,7 +85,4 @@ def cad_scores(
 
 def _sample(mesh: trimesh.Trimesh, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (N, 3) of the surface and its unit normals (N, 3) there."""
-    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    points, face = sample_triangles(vertices, faces, count, seed)
-    normal = area_vectors(vertices[faces[face]])
-    return points, normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    return sample_with_normals(np.asarray(mesh.vertices), np.asarray(mesh.faces), count, seed)

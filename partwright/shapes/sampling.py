@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.shapes.topology import doubled_areas
+from partwright.rows import units
+from partwright.shapes.topology import area_vectors, doubled_areas
 
 NEAR_SIGMA = (0.02, 0.005)  # unit lengths; half of the near samples each
 _ENLARGED = 0.05  # unit lengths that the box of the uniform samples reaches beyond the bounding box
@@ -57,6 +58,15 @@ def sample_triangles(
     root, second = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
     a, b, c = vertices[faces[face]].transpose(1, 0, 2)
     return (1 - root) * a + root * ((1 - second) * b + second * c), face
+
+
+def sample_with_normals(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], count: int, seed: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """`count` points (N, 3) spread evenly over the area, and the outward unit normals (N, 3) of their
+    triangles."""
+    points, face = sample_triangles(vertices, faces, count, seed)
+    return points, units(area_vectors(vertices[faces[face]]))
 
 
 def near_surface(surface: NDArray[np.float32], sigma: Sequence[float], seed: int) -> NDArray[np.float32]:

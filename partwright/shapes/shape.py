@@ -29,6 +29,7 @@ from partwright.shapes.sampling import (
     morton_order,
     near_surface,
     sample_triangles,
+    sample_with_normals,
     uniform_box,
 )
 from partwright.shapes.source import Piece, Source
@@ -256,11 +257,7 @@ class Shape:
         return self._surface.vertices.min(axis=0), self._surface.vertices.max(axis=0)
 
     def _sample_surface(self, count: int, seed: int) -> SurfaceSamples:
-        vertices, faces = self._surface.vertices, self._surface.faces
-        points, face = sample_triangles(vertices, faces, count, seed)
-        corners = vertices[faces[face]]
-        normal = area_vectors(corners)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        points, normal = sample_with_normals(*self.unit_mesh, count, seed)
 
         def curvature() -> NDArray[np.float32]:
             return _read_only(self._cached(("curvature",), self._curvature)(points).astype(np.float32))

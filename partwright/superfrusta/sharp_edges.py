@@ -19,6 +19,7 @@ from partwright.meshing import has_exact_mesh
 from partwright.meshing.csg import solid_of
 from partwright.meshing.manifolds import surface_of
 from partwright.metrics.deviation import place_in
+from partwright.rows import units
 from partwright.shapes import MeshDistance, Shape
 from partwright.shapes.topology import EdgeTable, area_vectors, components
 from partwright.superfrusta.feature_assembly import in_unit_frame
@@ -110,8 +111,8 @@ class _Seen:
         own = surface_of(solid_of(in_unit_frame(shape, whole), _CHORD))
         surface = MeshDistance(*own, own[1], True)
         signed, nearest = surface.signed_nearest(points.reshape(-1, 3))
-        off, walls = signed.reshape(points.shape[:2]), _units(area_vectors(own[0][own[1]]))[nearest]
-        cosine = np.einsum("fki,fi->fk", walls.reshape(points.shape), _units(normal))
+        off, walls = signed.reshape(points.shape[:2]), units(area_vectors(own[0][own[1]]))[nearest]
+        cosine = np.einsum("fki,fi->fk", walls.reshape(points.shape), units(normal))
         leans = (cosine > _LEANS[0]) & (cosine < _LEANS[1]) & (np.abs(off) > _OWN)
         deep = np.where(leans, off, 0.0)
         farthest = np.arange(len(faces)), np.abs(deep).argmax(axis=1)
@@ -159,7 +160,7 @@ def _from_edges(
 ) -> NDArray[np.float64]:
     """How far (N,) points (N, 3) are from the nearest sharp edge of a surface."""
     edges, beside = EdgeTable(faces).pairs
-    normal = _units(area_vectors(vertices[faces]))
+    normal = units(area_vectors(vertices[faces]))
     cosine = np.einsum("ni,ni->n", normal[beside[:, 0]], normal[beside[:, 1]])
     start, end = vertices[edges[np.abs(cosine) < _SHARP]].transpose(1, 0, 2)
     if not len(start):
@@ -197,7 +198,3 @@ class _Around:
         """Of the length around a set, what is not further off."""
         own = self.label == index
         return float(self.length[own & (self.off < near)].sum() / max(self.length[own].sum(), 1e-300))
-
-
-def _units(ways: NDArray[np.float64]) -> NDArray[np.float64]:
-    return ways / np.maximum(np.linalg.norm(ways, axis=-1, keepdims=True), 1e-300)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.errors import NoColoursError
-from partwright.rows import crosses, dots, lengths, sums
+from partwright.rows import crosses, dots, sums, units
 from partwright.shapes.corner_normals import corner_normals
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.loading import READ_BY_TRIMESH, load_scene
@@ -122,13 +122,13 @@ class Colours:
 
     def normals_on_faces(self, face: NDArray[np.int64], weights: Floats) -> Floats:
         """Unit normals (N, 3) on faces (N,) at barycentric weights (N, 3), with what normal maps say."""
-        result = _unit(np.einsum("nc,ncd->nd", weights, self.normals[face].astype(np.float64)))
+        result = units(np.einsum("nc,ncd->nd", weights, self.normals[face].astype(np.float64)))
         uv = np.einsum("nc,ncd->nd", weights, self.relief_uv[face].astype(np.float64))
         for i, image in enumerate(self.reliefs):
             mine = np.flatnonzero(self.relief[face] == i)
             bent = image.at(uv[mine])
             across, up = self._tangents(face[mine], result[mine])
-            result[mine] = _unit(bent[:, :1] * across + bent[:, 1:2] * up + bent[:, 2:] * result[mine])
+            result[mine] = units(bent[:, :1] * across + bent[:, 1:2] * up + bent[:, 2:] * result[mine])
         return result
 
     def _tangents(self, face: NDArray[np.int64], normals: Floats) -> tuple[Floats, Floats]:
@@ -137,7 +137,7 @@ class Colours:
         (e, f), (g, h) = ((one[:, 1] - one[:, 0], one[:, 2] - one[:, 0]) for one in (corners, uv))
         turned = np.where(g[:, 0] * h[:, 1] - h[:, 0] * g[:, 1] < 0, -1.0, 1.0)[:, None]
         across = turned * (h[:, 1:] * e - g[:, 1:] * f)
-        across = _unit(across - dots(across, normals)[:, None] * normals)
+        across = units(across - dots(across, normals)[:, None] * normals)
         return across, turned * crosses(normals, across)
 
 
@@ -288,11 +288,7 @@ def _normals(mesh: Any, matrix: Floats) -> Floats:
         places, number = np.unique(vertices, axis=0, return_inverse=True)  # files part them at seams
         corners = corner_normals(places, number.reshape(-1)[faces]).astype(np.float64)
     turn = np.linalg.pinv(matrix[:3, :3]).T
-    return _unit((corners @ turn.T).reshape(-1, 3)).reshape(-1, 3, 3)
-
-
-def _unit(vectors: Floats) -> Floats:
-    return vectors / np.maximum(lengths(vectors)[..., None], 1e-20)
+    return units((corners @ turn.T).reshape(-1, 3)).reshape(-1, 3, 3)
 
 
 def _texel(index: Floats, count: int, wrap: str) -> NDArray[np.int64]:

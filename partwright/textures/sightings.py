@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
-from partwright.rows import dots, lengths
+from partwright.rows import dots, lengths, units
 from partwright.shapes.sampling import sample_triangles
 from partwright.textures.colours import Colours, barycentric
 from partwright.textures.cut_outs import all_three, first_shown
@@ -60,7 +60,7 @@ def sightings(assembly: Assembly, colours: Colours, size: int, seed: int, views:
     here, there = Scene(vertices, faces), Scene(colours.vertices, colours.faces)
 
     def at(points: Floats, own: _Place, its: _Place, weight: float, held: bool = False) -> Sightings:
-        smooth = _unit(np.einsum("nc,ncd->nd", own[1], here.corner_normals[own[0]].astype(np.float64)))
+        smooth = units(np.einsum("nc,ncd->nd", own[1], here.corner_normals[own[0]].astype(np.float64)))
         # A side that faces inwards counts as its other one does.
         turned = dots(here.face_normals[own[0]], there.face_normals[its[0]])[:, None]
         normals = np.where(turned < 0, -1.0, 1.0) * colours.normals_on_faces(*its)
@@ -97,7 +97,3 @@ def _camera(i: int, count: int, start: float) -> Camera:
 
     azimuth = start + i * math.pi * (3 - math.sqrt(5))
     return Camera(math.degrees(azimuth), math.degrees(math.asin(1 - (2 * i + 1) / count)))
-
-
-def _unit(vectors: Floats) -> Floats:
-    return vectors / np.maximum(lengths(vectors)[:, None], 1e-20)

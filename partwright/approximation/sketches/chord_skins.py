@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.rows import units
 from partwright.shapes.topology import EdgeTable, area_vectors, components
 
 _FLAT, _LEAST, _MOST = (math.radians(angle) for angle in (0.1, 1.0, 37.0))
@@ -139,9 +140,9 @@ class _Sides:
     @classmethod
     def of(cls, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Sides:
         edge, beside = EdgeTable(faces).pairs
-        normal = _units(area_vectors(vertices[faces]))
+        normal = units(area_vectors(vertices[faces]))
         along = vertices[edge[:, 1]] - vertices[edge[:, 0]]
-        length, along = np.linalg.norm(along, axis=1), _units(along)
+        length, along = np.linalg.norm(along, axis=1), units(along)
         left, right = (normal[beside[:, k]] for k in (0, 1))
         sine = np.einsum("ni,ni->n", np.cross(left, right), along)
         turn = np.arctan2(sine, np.einsum("ni,ni->n", left, right))
@@ -173,7 +174,3 @@ class _Sides:
         across = order_across[begin]
         good = cosine[across] < _OPPOSITE
         return order[begin][good], order[across][good]
-
-
-def _units(ways: NDArray[np.float64]) -> NDArray[np.float64]:
-    return ways / np.maximum(np.linalg.norm(ways, axis=-1, keepdims=True), 1e-300)
