@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,15 +33,14 @@ class OccupancySamples:
         return float(self.weight[self.inside].sum(dtype=np.float64))
 
     def with_points(
-        self, places: Sequence[NDArray[np.float64]], shape: Shape, cost: float
+        self, points: NDArray[np.float64], inside: NDArray[np.bool_], cost: float
     ) -> OccupancySamples:
-        """These and the points (N, 3) of each place, which weigh `cost` together."""
-        points = np.concatenate(places).astype(np.float32)
-        weight = np.concatenate([np.full(len(p), max(1.0, np.rint(cost / len(p)))) for p in places])
+        """These and points (N, 3) with their sides (N,), which weigh `cost` together."""
+        weight = np.full(len(points), max(1.0, np.rint(cost / len(points))), np.float32)
         return OccupancySamples(
-            np.concatenate([self.points, points]),
-            np.concatenate([self.inside, shape.unit_distance(points) < 0]),
-            np.concatenate([self.weight, weight.astype(np.float32)]),
+            np.concatenate([self.points, points.astype(np.float32)]),
+            np.concatenate([self.inside, inside]),
+            np.concatenate([self.weight, weight]),
             self.near,
             self.uniform,
         )

@@ -21,9 +21,11 @@ _REACH = 2.0  # times how far off the furthest point of a place is: what belongs
 
 @dataclass(frozen=True)
 class Place:
-    """Points (N, 3) of the unit frame that a tree has on the wrong side, and how far off it is there."""
+    """Points (N, 3) of the unit frame that a tree has on the wrong side, whether they are inside the shape
+    (N,), and how far off the tree is there."""
 
     points: NDArray[np.float64]
+    inside: NDArray[np.bool_]
     off: float
 
 
@@ -53,16 +55,19 @@ def strays(tree: CsgTree, shape: Shape, limit: float, seed: int) -> list[Place]:
         ]
     )
     off = np.concatenate([above[far], missed[lost], missed[lost]])
-    wrong = tree.occupancy(points) != (shape.unit_distance(points) < 0) if len(points) else np.zeros(0, bool)
-    return _places(points[wrong], off[wrong])
+    if not len(points):
+        return []
+    inside = shape.unit_distance(points) < 0
+    wrong = tree.occupancy(points) != inside
+    return _places(points[wrong], inside[wrong], off[wrong])
 
 
-def _places(points: NDArray[np.float64], off: NDArray[np.float64]) -> list[Place]:
+def _places(points: NDArray[np.float64], inside: NDArray[np.bool_], off: NDArray[np.float64]) -> list[Place]:
     """Points (N, 3) parted into places: the furthest off, and what is near to it, again and again."""
     places = []
     while len(points):
         first = int(np.argmax(off))
         near = np.linalg.norm(points - points[first], axis=1) <= _REACH * off[first]
-        places.append(Place(points[near], float(off[first])))
-        points, off = points[~near], off[~near]
+        places.append(Place(points[near], inside[near], float(off[first])))
+        points, inside, off = points[~near], inside[~near], off[~near]
     return places

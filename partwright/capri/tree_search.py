@@ -93,7 +93,11 @@ class TreeSearch:
             pool = CandidatePool.of(given, nested=s.nested, oriented=s.oriented)
             held = rows.expressible(pool.rows) | (s.schedule == "search")
             self.pool = CandidatePool(pool.rows[held], pool.complement[held])
-            self.outside = (rows.values(self.pool.rows, self.samples.points) > 0).astype(np.float32)
+            self.look_at_samples()
+
+    def look_at_samples(self) -> None:
+        """Which quadric leaves which sample out."""
+        self.outside = (rows.values(self.pool.rows, self.samples.points) > 0).astype(np.float32)
 
     def make(self, shape: Shape) -> None:
         """The tree: by search, by the paper's schedule, or by this from that."""
@@ -168,7 +172,8 @@ class TreeSearch:
         )
 
     def search(self, shape: Shape) -> Outcome:
-        """Starts that forgive false positives more or less, the best ruined and recreated; then demands."""
+        """Starts that forgive false positives more or less, the best ruined and recreated, and mended where
+        it is far off; then demands."""
         s = self.settings
         problem = self.problem()
         empty: selection.Layers = [[] for _ in range(2 if s.subtract else 1)]
@@ -202,8 +207,9 @@ class TreeSearch:
                     kept, least = self.best, off
                 if not places or round_ == _MENDINGS:
                     break
-                self.samples = self.samples.with_points([place.points for place in places], shape, cost)
-                self.outside = (rows.values(self.pool.rows, self.samples.points) > 0).astype(np.float32)
+                for place in places:
+                    self.samples = self.samples.with_points(place.points, place.inside, cost)
+                self.look_at_samples()
                 problem = self.problem()
                 self.best = selection.polish(problem, self.best or [], _MAX_CONVEXES)
                 if not any(self.best):

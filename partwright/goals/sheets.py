@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from partwright.rows import units
 from partwright.shapes.topology import area_vectors
 
 _SMOOTH = 0.97  # cosine between a vertex normal and the face normals around it
@@ -56,7 +57,7 @@ def sheets(vertices: np.ndarray, faces: np.ndarray) -> Sheets:
     mean = np.zeros_like(vertices)
     for k in range(3):
         np.add.at(mean, faces[:, k], cross)
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), np.finfo(float).tiny)
+    mean = units(mean)
     least = np.ones(len(vertices))
     around = (mean[faces] * unit[:, None]).sum(axis=2)
     large = area > 1e-4 * area.mean()  # slivers have no normal to speak of

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from partwright.render.camera import View
+from partwright.rows import units
 from partwright.shapes.corner_normals import corner_normals, face_normals
 
 _MISS = -1
@@ -98,7 +99,7 @@ def cast(scene: Scene, view: View, rays: np.ndarray) -> Hits:
     u, v = weights[pixel].T
     around = scene.corner_normals[face]
     normal = (1 - u - v)[:, None] * around[:, 0] + u[:, None] * around[:, 1] + v[:, None] * around[:, 2]
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
+    normal = units(normal)
     # An open or inverted surface shows its back: shade that like a front.
     away = np.einsum("nd,nd->n", scene.face_normals[face], rays) > 0
     normal[away] *= -1

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.rows import units
 from partwright.shapes.topology import EdgeTable, area_vectors
 
 _CELL = 0.04  # unit frame: the neighbourhood is about two cells wide
@@ -67,8 +68,7 @@ def _bent_edges(
     edge, beside = EdgeTable(faces).pairs
     left, right = beside.T
     corners = vertices[faces]
-    normal = area_vectors(corners)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    normal = units(area_vectors(corners))
     along = vertices[edge[:, 1]] - vertices[edge[:, 0]]
     length = np.linalg.norm(along, axis=1)
     direction = along / np.maximum(length, np.finfo(np.float64).tiny)[:, None]

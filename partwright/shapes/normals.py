@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.rows import units
 from partwright.shapes.topology import components
 
 _RADII = (1.4, 2.1, 3.0, 4.4)  # of the spacing: half thickness of the sheets that close the empty space
@@ -121,8 +122,7 @@ def _sides_by_neighbours(
     a, b = np.minimum(a, b)[a != b], np.maximum(a, b)[a != b]
     pair = np.unique(a * count + b)
     a, b = np.divmod(pair, count)
-    along = points[b] - points[a]
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    along = units(points[b] - points[a])
     climb = (normals[a] * along).sum(axis=1)
     agreement = ((normals[a] - 2 * climb[:, None] * along) * normals[b]).sum(axis=1)
     steep = np.maximum(np.abs(climb), np.abs((normals[b] * along).sum(axis=1)))

@@ -57,7 +57,7 @@ class _Elements:
     @property
     def spacing(self) -> float:
         """Side of the square that a point stands for."""
-        return float(np.sqrt(self.area.mean()))
+        return _spacing(self.area)
 
 
 def source_of_points(name: str, points: NDArray[Any], normals: NDArray[Any] | None = None) -> Source:
@@ -138,7 +138,7 @@ def _elements(
     if normals is None:
         area = disc / (_NEIGHBOURS - 0.5)
         lines = normal_lines(points, neighbours)
-        normals = orient_normals(points, lines, neighbours, float(np.sqrt(area.mean())))
+        normals = orient_normals(points, lines, neighbours, _spacing(area))
         notes.append("their normals were estimated from their neighbours and the empty space around")
         return _Elements(points, normals, area, walled=False)
     facing = (normals[neighbours] * normals[:, None]).sum(axis=2)
@@ -147,8 +147,12 @@ def _elements(
         normals = -normals
         notes.append("their normals faced inwards and were turned")
     depth = ((points[:, None] - points[neighbours]) * normals[:, None]).sum(axis=2)
-    thin = (facing < _BEHIND) & (depth > 0) & (depth < _THIN * np.sqrt(area.mean()))
+    thin = (facing < _BEHIND) & (depth > 0) & (depth < _THIN * _spacing(area))
     return _Elements(points, normals, area, walled=bool(thin.any(axis=1).mean() > _MANY_THIN))
+
+
+def _spacing(area: NDArray[np.float64]) -> float:
+    return float(np.sqrt(area.mean()))
 
 
 def _surface(elements: _Elements) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -212,9 +216,10 @@ def _plane_distance(
     height = ((places[:, None] - elements.points[nearest]) * normal).sum(axis=2)
     weight = np.exp((apart[:, :1] ** 2 - apart**2) / (_WIDTH * elements.spacing) ** 2)
     facing = (normal * normal[:, :1]).sum(axis=2)
-    beside, behind = weight * (facing > _OPPOSED), weight * (facing < _BEHIND)
+    beside = weight * (facing > _OPPOSED)
     distance = (beside * height).sum(axis=1) / beside.sum(axis=1)
     if elements.walled:
+        behind = weight * (facing < _BEHIND)
         borne = behind.sum(axis=1)
         other = (behind * height).sum(axis=1) / np.maximum(borne, _LEAST_BEHIND)
         distance = np.where((borne > _LEAST_BEHIND) & (np.abs(other) < np.abs(distance)), other, distance)

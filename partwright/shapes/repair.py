@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.errors import EmptyShapeError, FlatShapeError, OpenShellError
+from partwright.rows import units
 from partwright.shapes.boolean import unite
 from partwright.shapes.cleaning import drop_doubles, merge_vertices, weld_boundary
 from partwright.shapes.distance import MeshDistance
@@ -286,8 +287,7 @@ def _surface_of_sheets(
 def _facing(source: MeshDistance, corners: NDArray[np.float64]) -> NDArray[np.int64]:
     """+1 where a triangle (F, 3, 3) parts inside from outside and faces out, -1 where it faces in, 0 where it
     parts nothing: looked at in its middle and near its corners."""
-    normal = area_vectors(corners)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    normal = units(area_vectors(corners))
     facing = np.zeros(len(corners), dtype=np.int64)
     for weight in ((1 / 3, 1 / 3, 1 / 3), (0.9, 0.05, 0.05), (0.05, 0.9, 0.05), (0.05, 0.05, 0.9)):
         rest = np.flatnonzero(facing == 0)

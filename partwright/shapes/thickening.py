@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.rows import units
 from partwright.shapes.cleaning import counted
 from partwright.shapes.lids import lids_over, with_lids
 from partwright.shapes.orientation import split_bodies
@@ -129,8 +130,7 @@ def _outward(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray
     """(V, 3): from each vertex to where the planes of its faces (F, 3) meet after a step of one along their
     normals; where they are turned far from one another, not as far."""
     corners = vertices[faces]
-    normal = area_vectors(corners)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    normal = units(area_vectors(corners))
     ahead = np.roll(corners, -1, axis=1) - corners
     behind = np.roll(corners, 1, axis=1) - corners
     cross = np.linalg.norm(np.cross(ahead, behind), axis=2)
@@ -143,7 +143,7 @@ def _outward(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray
     weight = angle.ravel()
     each = np.repeat(normal, 3, axis=0)
     mean = np.stack([summed(weight * each[:, k]) for k in range(3)], axis=1)
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    mean = units(mean)
     cosine = summed(weight * (each * mean[at]).sum(axis=1)) / np.maximum(
         summed(weight), np.finfo(np.float64).tiny
     )

@@ -50,18 +50,21 @@ class _Strip:
     middle: NDArray[np.float64]
     length: float
 
+    def is_like(self, other: _Strip) -> bool:
+        return self.name == other.name and 1 / _ALIKE < self.size / other.size < _ALIKE
+
 
 def sharp_edge_warnings(shape: Shape, whole: Assembly) -> tuple[str, ...]:
     """A sentence for each size of what was left off, the longest first."""
     if not has_exact_mesh(whole):
         return ()
-    left = sorted(_strips(shape, whole), key=lambda strip: -strip.length)
     found: list[list[_Strip]] = []
-    while left:
-        first = left[0]
-        alike = [s for s in left if s.name == first.name and 1 / _ALIKE < s.size / first.size < _ALIKE]
-        left = [strip for strip in left if not any(strip is one for one in alike)]
-        found.append(alike)
+    for strip in sorted(_strips(shape, whole), key=lambda strip: -strip.length):
+        alike = next((group for group in found if strip.is_like(group[0])), None)
+        if alike is None:
+            found.append([strip])
+        else:
+            alike.append(strip)
     return tuple(_sentence(shape, alike) for alike in found[:_TOLD])
 
 

@@ -93,8 +93,8 @@ def images(rows: Rows, isometries: Sequence[Isometry]) -> Rows:
     return found
 
 
-def _components(quaternions: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    return quaternions[..., 0], quaternions[..., 1], quaternions[..., 2], quaternions[..., 3]
+def _components(rotations: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    return rotations[..., 0], rotations[..., 1], rotations[..., 2], rotations[..., 3]
 
 
 def expanded(leaves: Sequence[RepeatedPart]) -> Rows:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from partwright.assembly import Assembly, Part
 from partwright.errors import NoSurfaceError
 from partwright.methods import check_count
-from partwright.rows import crosses, dots, lengths, sums
+from partwright.rows import crosses, dots, sums, units
 from partwright.shapes.sampling import sample_triangles
 from partwright.textures.colours import Colours
 from partwright.textures.coordinates import directions, folded, frames, is_hollow, of_nearest_copy
@@ -155,7 +155,7 @@ class _Sums:
         flat = bent = total = 0.0
         for place, inner, values, weights in self.held:
             found, wanted = read(image, place, inner) / _SPAN - 1, values[:, 3:] / _SPAN - 1
-            found /= np.maximum(lengths(found)[:, None], 1e-20)
+            found = units(found)
             flat += float(weights @ sums((wanted - (0, 0, 1)) ** 2))
             bent += float(weights @ sums((wanted - found) ** 2))
             total += float(weights.sum())

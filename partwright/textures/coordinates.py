@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from partwright.assembly import Part
 from partwright.fields import Field, SuperFrustum
-from partwright.rows import crosses, dots, lengths, sums
+from partwright.rows import crosses, dots, lengths, sums, units
 
 Floats = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def frames(
     slope -= (slope @ normals[:, :, None]) * normals[:, None]
     across = crosses(slope[:, 1], normals)
     across *= np.where(dots(across, slope[:, 0]) < 0, -1.0, 1.0)[:, None]
-    across /= np.maximum(lengths(across)[:, None], 1e-300)
+    across = units(across)
     turned = dots(crosses(normals, across), slope[:, 1])
     return across, np.where(turned < 0, -1.0, 1.0)
 

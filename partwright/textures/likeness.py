@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
-from partwright.rows import crosses, dots, lengths
+from partwright.rows import crosses, dots, units
 from partwright.textures.colours import Colours
 from partwright.textures.coordinates import frames, of_nearest_copy
 from partwright.textures.cut_outs import all_three, first_shown
@@ -98,8 +98,7 @@ def map_normals(assembly: Assembly, points: Floats, smooth: Floats) -> Floats:
         across, turned = frames(part.field, own, away)
         up = turned[:, None] * crosses(away, across)
         x, y, z = (relief.at(part.field, own) / 127.5 - 1).T[:, :, None]
-        bent = x * across + y * up + z * away
-        bent /= np.maximum(lengths(bent)[:, None], 1e-20)
+        bent = units(x * across + y * up + z * away)
         result[mine] = np.stack([dots(bent, axis) for axis in axes_there], axis=1)
     return result
 
@@ -138,7 +137,7 @@ def likeness(
             want = picture(pixel, shaded(np.full((len(pixel), 3), 255.0), normals, view))
             white = np.full((len(own), 3), 255.0)
             smooth = np.einsum("nc,ncd->nd", shares, parts.corner_normals[mine].astype(np.float64))
-            smooth /= np.maximum(lengths(smooth)[:, None], 1e-20)
+            smooth = units(smooth)
             each = [picture(own, shaded(white, map_normals(one, places, smooth), view)) for one in assemblies]
         else:
             want = picture(pixel, colours.on_faces(face, weights))

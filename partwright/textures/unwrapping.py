@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.fields import Field
+from partwright.rows import units
 from partwright.textures.coordinates import directions, folded, frames
 from partwright.textures.maps import PartMap
 
@@ -57,8 +58,7 @@ def unwrapped(
     place[:, 0] = (place[:, 0] + kind[first, 3]) / texture.sides
     result = tm.Trimesh(values[corner[first], :3], back.reshape(-1, 3), process=False)
     if normals is not None:
-        smooth = values[corner[first], 7:]
-        smooth /= np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1e-20)
+        smooth = units(values[corner[first], 7:])
         across, turned = frames(field, values[corner[first], :3], smooth, kind[first, :3])
         result.vertex_attributes["NORMAL"] = smooth
         result.vertex_attributes["TANGENT"] = np.column_stack([across, turned])
