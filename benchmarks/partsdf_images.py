@@ -17,14 +17,15 @@ from partwright.datasets import family as made_family
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import EmptyShapeError
 from partwright.metrics.reconstruction import ReconstructionScores, mean_scores, reconstruction_scores
-from partwright.partsdf.from_photo import needed_encoder, warnings_of
+from partwright.partsdf.from_photo import needed_encoder
 from partwright.partsdf.image_encoder import ImageEncoder
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.photos import Looked, Photo, look_at
-from partwright.partsdf.standpoint import Standpoint, find_standpoint
+from partwright.partsdf.standpoint import Standpoint
 from partwright.partsdf.starts import nearest_trained
+from partwright.partsdf.strangers import standpoint_of, warnings_of
 from partwright.partsdf.targets import Target
 from partwright.render import Camera, render_mesh
 
@@ -80,7 +81,7 @@ def imaging(arguments: argparse.Namespace) -> None:
         seconds = (time.process_time() - start) / len(taken)
         off = [away(one, azimuth) for one, (_, azimuth, _) in zip(seen, taken, strict=True)]
         found = [(one and one.sight.shape, s) for one, (s, _, _) in zip(seen, taken, strict=True)]
-        ious, told = outlines(seen)
+        ious, told = outlines(encoder, seen)
         well = told[np.array(off) < SIDE]
         add(
             f"| seen, {label} | {scored(found)} | {np.median(off):.0f} | {100 * ious.mean():.0f} | "
@@ -91,7 +92,7 @@ def imaging(arguments: argparse.Namespace) -> None:
             other = PreparedFamily(family.folder.parent / name)
             some = [other.load(i) for i in other.split("test")[: arguments.shapes]]
             seen = [seen_in(encoder, photo) for _, _, photo in pictures(some, arguments.views, False)]
-            ious, told = outlines(seen)
+            ious, told = outlines(encoder, seen)
             add(f"| pictures of {name} | | | | | | {100 * ious.mean():.0f} | {100 * told.mean():.0f} | | |")
     write(f"images-{family.name}", lines)
 
@@ -117,7 +118,7 @@ def away(seen: Looked | None, azimuth: float) -> float:
     return abs((seen.sight.azimuth - azimuth + 180) % 360 - 180) if seen else 180.0
 
 
-def outlines(seen: list[Looked | None]) -> tuple[np.ndarray, np.ndarray]:
+def outlines(encoder: ImageEncoder, seen: list[Looked | None]) -> tuple[np.ndarray, np.ndarray]:
     """(N,) their IoUs, and whether each is told to be of no shape of the family."""
     ious, told = [], []
     for one in seen:
@@ -125,17 +126,15 @@ def outlines(seen: list[Looked | None]) -> tuple[np.ndarray, np.ndarray]:
             ious.append(0.0)
             told.append(True)
             continue
-        found = standpoint_of(one)
+        found = found_from(one)
         ious.append(found.iou)
-        told.append(bool(warnings_of("", one, found)))
+        told.append(bool(warnings_of(encoder, one, found)))
     return np.array(ious), np.array(told)
 
 
-def standpoint_of(one: Looked) -> Standpoint:
+def found_from(one: Looked) -> Standpoint:
     """Where what was seen is seen from, by a coarse mesh of it."""
-    sight, surface = one.sight, mesh_shape(one.sight.shape, OUTLINED, parts=False).whole
-    toward = sight.azimuth, sight.elevation, sight.shape.model.up
-    return find_standpoint(surface.vertices, surface.faces, one.silhouette, *toward)
+    return standpoint_of(one, mesh_shape(one.sight.shape, OUTLINED, parts=False).whole)
 
 
 def nearest(model: Model, shape: PreparedShape) -> NeuralShape:
@@ -206,9 +205,9 @@ def pictures_of_nothing(arguments: argparse.Namespace) -> None:
             if one is None:
                 refused += 1
                 continue
-            found = standpoint_of(one)
-            told += bool(warnings_of("", one, found))
-            plainly += bool(warnings_of("", replace(one, mirrored=1.0), found))
+            found = found_from(one)
+            told += bool(warnings_of(encoder, one, found))
+            plainly += bool(warnings_of(encoder, replace(one, mirrored=1.0), found))
         lines.append(f"| {label} | {len(photos)} | {refused} | {told} | {plainly} |")
         print(lines[-1], flush=True)
     write(f"images-of-nothing-{model.name}", lines)

@@ -22,17 +22,13 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.photos import Looked, Photo, look_at, read_photo
 from partwright.partsdf.pictures import picture
-from partwright.partsdf.standpoint import Standpoint, find_standpoint
+from partwright.partsdf.standpoint import Standpoint
+from partwright.partsdf.strangers import standpoint_of, warnings_of
 from partwright.render import Camera, render_mesh, sheet, write_png
 
 if TYPE_CHECKING:
     import trimesh
 
-# IoU of silhouettes at least, certainty of the side at least, oddness of the poses at most, doubt which parts
-# there are at most, IoU with what is seen in the mirror image at least. A hint: most pictures of the family
-# keep to them, few others do. Doubt tells most: of pictures of new chairs 48 of 60 are under it, of others 16
-# of 108.
-COVERED, CERTAIN, ODD, DOUBTFUL, MIRRORED = 0.5, 0.6, 1.2, 0.02, 0.8
 FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
 _PANEL = 320  # pixels
 _UNSEEN = 0.25  # of its light that is left of what is not the shape, in the preview
@@ -115,14 +111,7 @@ def reconstruct_seen(
     shape, seen = looked.sight.shape, time.perf_counter()
     meshed = mesh_shape(shape, resolution, parts=False)
     surface = meshed.whole
-    standpoint = find_standpoint(
-        surface.vertices,
-        surface.faces,
-        looked.silhouette,
-        looked.sight.azimuth,
-        looked.sight.elevation,
-        model.up,
-    )
+    standpoint = standpoint_of(looked, surface)
     camera = standpoint.camera
     report = {
         "method": "parts",
@@ -142,33 +131,10 @@ def reconstruct_seen(
         "mirrored_iou": round(looked.mirrored, 4),
         "resolution": meshed.resolution,
         "seconds": {"see": round(seen - start, 3), "mesh": round(time.perf_counter() - seen, 3)},
-        "warnings": warnings_of(model.name, looked, standpoint),
+        "warnings": warnings_of(encoder, looked, standpoint),
     }
     assembly = to_assembly(shape, up=model.up, source=name)
     return PhotoParts(shape, assembly, surface, looked, standpoint, report)
-
-
-def warnings_of(name: str, looked: Looked, standpoint: Standpoint) -> list[str]:
-    """One line where a picture may show no shape of the family that the model `name` knows, else none."""
-    said, sight = [], looked.sight
-    if looked.mirrored < MIRRORED:
-        said.append("something else is seen in its mirror image")
-    if standpoint.iou < COVERED:
-        said.append(
-            f"the outline of what was found covers but {100 * standpoint.iou:.0f} % of the silhouette"
-        )
-    if sight.certainty < CERTAIN:
-        said.append("it is not clear from which side it is seen")
-    if sight.doubt > DOUBTFUL:
-        said.append("it is not clear which parts there are")
-    if sight.oddness > ODD:
-        said.append("its parts are placed unlike those of the family")
-    if not said:
-        return []
-    return [
-        f"this may be no picture of a shape of the family that {name} knows: {', and '.join(said)}; look at "
-        "the picture of the parts, or cut the shape out of the picture"
-    ]
 
 
 def _enlarged(picture: np.ndarray) -> np.ndarray:

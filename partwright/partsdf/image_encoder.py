@@ -101,6 +101,22 @@ class ImageNetwork(PartQueries):
 
 
 @dataclass(frozen=True)
+class Limits:
+    """Beyond which a picture may show no shape of the family (`strangers`): the IoU of outlines and the
+    certainty of the side at least, the oddness of poses and the doubt which parts there are at most."""
+
+    covered: float
+    certain: float
+    odd: float
+    doubt: float
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if not (isinstance(value, float) and math.isfinite(value)):
+                raise SettingError(f"limit {name} is {value}; expected a finite number")
+
+
+@dataclass(frozen=True)
 class Sight:
     """What is seen in a picture: the shape in its family's frame, how likely each cell (SIDE / 2, SIDE / 2)
     of the picture is the shape, and where the camera stands, in degrees."""
@@ -126,6 +142,7 @@ class ImageEncoder:
     settings: ImageSettings
     network: ImageNetwork
     vectors: PartVectors
+    limits: Limits
 
     @torch.no_grad()
     def see(self, pictures: Tensor) -> list[Sight]:
@@ -150,7 +167,8 @@ class ImageEncoder:
 
     def save(self, path: str | Path) -> None:
         """Write it; raises OutputError."""
-        save_companion(path, KIND, self.model, asdict(self.settings), self.network.state_dict())
+        about = {**asdict(self.settings), "limits": asdict(self.limits)}
+        save_companion(path, KIND, self.model, about, self.network.state_dict())
 
 
 def load_image_encoder(model: Model, path: str | Path | None = None) -> ImageEncoder | None:
@@ -164,9 +182,11 @@ def load_image_encoder(model: Model, path: str | Path | None = None) -> ImageEnc
         return None
 
     def made(settings: dict[str, Any], tensors: dict[str, Tensor]) -> ImageEncoder:
+        if "limits" not in settings:
+            raise ValueError("it does not say what is usual in pictures, as older ones: train it again")
         known = ImageSettings(tuple(settings["channels"]), EncoderSettings(**settings["queries"]))
         vectors = PartVectors.of(model)
         network = with_weights(lambda: ImageNetwork(len(model.parts), vectors.width, known), tensors)
-        return ImageEncoder(model, known, network, vectors)
+        return ImageEncoder(model, known, network, vectors, Limits(**settings["limits"]))
 
     return load_companion(source, KIND, model, made)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -20,6 +20,7 @@ from partwright.partsdf.latent_metric import felt
 from partwright.partsdf.lighting import lit
 from partwright.partsdf.model import Model
 from partwright.partsdf.part_vectors import PartVectors
+from partwright.partsdf.strangers import SURE, usual_limits
 from partwright.partsdf.views import PartMeshes, Views, draw_views
 
 VIEWS = 16_000
@@ -101,7 +102,8 @@ def train_image_encoder(
         network.parameters(), terms, steps=steps, rate=rate, told=heard, every=_TOLD, cancel=cancel,
         steepest=_STEEPEST, after=lambda step: follow(kept, network, step, _AVERAGE),
     )  # fmt: skip
-    return ImageEncoder(model, settings, kept.cpu().eval(), vectors)
+    encoder = ImageEncoder(model, settings, kept.cpu().eval(), vectors, SURE)
+    return replace(encoder, limits=usual_limits(encoder, family))
 
 
 def picture_losses(

@@ -46,7 +46,7 @@ def lit(views: Views, rows: Tensor, generator: torch.Generator) -> tuple[Tensor,
     grain = _clouded(batch, generator)[:, :1]
     seen = seen * torch.where(chance(0.3), 0.7 + 0.6 * grain, torch.ones(()))
 
-    behind = _background(batch, generator)
+    behind = backgrounds(batch, generator)
     under = _larger(torch.roll(torch.nn.functional.avg_pool2d(silhouette[:, None], 12), 1, dims=2))
     behind = behind * (1 - uniform(batch, 1, 1, 1, high=0.7) * under * chance(0.6))
     picture = torch.where(silhouette[:, None] > 0, seen, behind).clamp(0, 1)
@@ -84,7 +84,7 @@ def _blurred(picture: Tensor, axis: int) -> Tensor:
     return torch.cat([picture.narrow(axis, 0, 1), inner, picture.narrow(axis, SIDE - 1, 1)], dim=axis)
 
 
-def _background(batch: int, generator: torch.Generator) -> Tensor:
+def backgrounds(batch: int, generator: torch.Generator) -> Tensor:
     """(B, 3, SIDE, SIDE): plain, light, from one colour to another, a wall over a floor, or clouds."""
 
     def colour() -> Tensor:

@@ -67,12 +67,12 @@ def find_standpoint(
     return best
 
 
-def outline(scene: Scene, camera: Camera) -> np.ndarray:
-    """(64, 64) bool: what a camera sees of a scene that just fills its picture."""
-    view = camera.fitted(scene.vertices, _CELLS, _CELLS)
-    rays = view.rays(_CELLS, _CELLS)
+def outline(scene: Scene, camera: Camera, cells: int = _CELLS) -> np.ndarray:
+    """(cells, cells) bool: what a camera sees of a scene, within its margin."""
+    view = camera.fitted(scene.vertices, cells, cells)
+    rays = view.rays(cells, cells)
     face, _, _ = scene.first_hit(np.broadcast_to(view.eye, rays.shape), rays)
-    return (face >= 0).reshape(_CELLS, _CELLS)
+    return (face >= 0).reshape(cells, cells)
 
 
 def boxed(silhouette: np.ndarray) -> np.ndarray:

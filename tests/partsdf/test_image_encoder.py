@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,17 +18,19 @@ from partwright.cli.main import main
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import EmptyShapeError, ModelError, SettingError, UnreadableFileError
 from partwright.methods import Cancellation
-from partwright.partsdf.companions import beside
+from partwright.partsdf.companions import beside, save_companion
 from partwright.partsdf.encoder import EncoderSettings, load_encoder
 from partwright.partsdf.from_photo import FILES, reconstruct_photo
 from partwright.partsdf.image_encoder import KIND, ImageEncoder, ImageSettings, load_image_encoder
 from partwright.partsdf.image_encoder_training import ImageStep, train_image_encoder
 from partwright.partsdf.latent_metric import felt
 from partwright.partsdf.lighting import lit
+from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model, file_of
 from partwright.partsdf.part_vectors import PartVectors
 from partwright.partsdf.photos import look_at, read_photo
 from partwright.partsdf.standpoint import boxed, find_standpoint, outline
+from partwright.partsdf.strangers import _pictures, standpoint_of, usual_limits
 from partwright.partsdf.views import SHADED, SIDE, PartMeshes, draw_views
 from partwright.render import Camera, render_mesh
 from partwright.render.raycast import Scene
@@ -272,6 +275,34 @@ def test_pictures_that_are_none_are_told(
         ModelError, match="lamps has no image encoder; make one with `parts train-encoder --from"
     ):
         reconstruct_photo(replace(model, hash="3" * 64), tmp_path / "cross.png")
+
+
+def test_what_is_usual_in_pictures_is_kept_with_it(
+    trained: Learnt, saved: Model, lamps: PreparedFamily, tmp_path: Path
+) -> None:
+    """Few pictures of shapes that it did not learn from lie beyond each limit."""
+    encoder = trained[0]
+    assert usual_limits(encoder, lamps) == encoder.limits  # the same each time
+    again = load_image_encoder(saved)
+    assert again is not None
+    assert again.limits == encoder.limits
+    signs = []
+    for photo in _pictures([lamps.load(name) for name in lamps.split("validation")], "z", 0):
+        with suppress(EmptyShapeError):
+            looked = look_at(encoder, photo)
+            found = standpoint_of(looked, mesh_shape(looked.sight.shape, 48, parts=False).whole)
+            assert found.iou > 0
+            signs.append((looked.sight.certainty, looked.sight.oddness))
+    certain, odd = np.transpose(signs)
+    assert encoder.limits.certain <= 0.9
+    assert (certain < encoder.limits.certain).sum() <= max(1, 0.15 * len(signs))
+    assert (odd > encoder.limits.odd).sum() <= max(1, 0.15 * len(signs))
+    old = tmp_path / "old.safetensors"
+    save_companion(old, KIND, saved, asdict(encoder.settings), encoder.network.state_dict())
+    with pytest.raises(ModelError, match="does not say what is usual in pictures, as older ones: train it"):
+        load_image_encoder(saved, old)
+    with pytest.raises(SettingError, match="limit doubt is nan; expected a finite number"):
+        replace(encoder.limits, doubt=float("nan"))
 
 
 def test_its_file_is_for_one_model_and_one_kind(trained: Learnt, saved: Model, lamps: PreparedFamily) -> None:

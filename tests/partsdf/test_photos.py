@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,12 +16,12 @@ from partwright.cli.main import main, parser
 from partwright.errors import EmptyShapeError, ModelError, SettingError, UnreadableFileError
 from partwright.partsdf.companions import load_companion, save_companion
 from partwright.partsdf.encoder import EncoderSettings
-from partwright.partsdf.from_photo import warnings_of
 from partwright.partsdf.generator import GeneratorSettings
-from partwright.partsdf.image_encoder import ImageSettings
+from partwright.partsdf.image_encoder import ImageSettings, Limits
 from partwright.partsdf.photos import _cut_out, look_at, read_photo
 from partwright.partsdf.settings import Settings
 from partwright.partsdf.standpoint import _HIGHEST, Standpoint, boxed, find_standpoint, outline
+from partwright.partsdf.strangers import MIRRORED, warnings_of
 from partwright.partsdf.views import SIDE
 from partwright.render import Camera
 from partwright.render.raycast import Scene
@@ -90,16 +89,39 @@ def test_what_is_not_seen_in_the_mirror_image_is_told(tmp_path: Path) -> None:
 
     photo = read_photo(two_colours(tmp_path / "photo.png", 64, 64))
     assert look_at(Seeing(), photo).mirrored == 1  # type: ignore[arg-type]
-    looked = look_at(Left(), photo)  # type: ignore[arg-type]
-    assert looked.mirrored == 0
-    sight = SimpleNamespace(certainty=1.0, oddness=0.0, doubt=0.0)
-    standing = Standpoint(Camera(0, 0), 1.0)
-    assert warnings_of("chairs", replace(looked, sight=sight, mirrored=1.0), standing) == []  # type: ignore[arg-type]
-    (line,) = warnings_of("chairs", replace(looked, sight=sight), standing)  # type: ignore[arg-type]
-    assert "something else is seen in its mirror image" in line
-    unsure = SimpleNamespace(certainty=1.0, oddness=0.0, doubt=0.3)
-    (line,) = warnings_of("chairs", replace(looked, sight=unsure, mirrored=1.0), standing)  # type: ignore[arg-type]
-    assert "not clear which parts there are" in line
+    assert look_at(Left(), photo).mirrored == 0  # type: ignore[arg-type]
+    assert told(mirrored=0.0) == "something else is seen in its mirror image"
+
+
+LIMITS = Limits(covered=0.8, certain=0.6, odd=1.2, doubt=0.1)
+
+
+def told(
+    iou: float = 0.8, certainty: float = 0.6, oddness: float = 1.2, doubt: float = 0.1,
+    mirrored: float = MIRRORED,
+) -> str:  # fmt: skip
+    """What is said of a picture whose signs are these, if anything: by default all are at their limits."""
+    encoder: Any = SimpleNamespace(limits=LIMITS, model=SimpleNamespace(name="lamps"))
+    sight = SimpleNamespace(certainty=certainty, oddness=oddness, doubt=doubt)
+    seen: Any = SimpleNamespace(sight=sight, mirrored=mirrored)
+    lines = warnings_of(encoder, seen, Standpoint(Camera(0, 0), iou))
+    if not lines:
+        return ""
+    (line,) = lines
+    start = "this may be no picture of a shape of the family that lamps knows: "
+    assert line.startswith(start)
+    return line[len(start) :].split("; ")[0]
+
+
+def test_what_is_beyond_the_family_s_limits_is_told() -> None:
+    assert told() == ""
+    assert told(iou=0.7) == (
+        "the outline of what was found agrees with the silhouette to 70 %, less than the 80 that are usual"
+    )
+    assert told(certainty=0.5) == "it is not clear from which side it is seen"
+    assert told(oddness=1.3, doubt=0.2) == (
+        "it is not clear which parts there are, and its parts are placed unlike those of the family"
+    )
 
 
 def test_damaged_pictures(tmp_path: Path) -> None:
