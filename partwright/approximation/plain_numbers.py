@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from partwright.assembly.instance_patterns import (
 )
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import ParameterError
-from partwright.fields import Field, Solid, Swept
+from partwright.fields import Box, Field, Revolution, Solid, Swept
 from partwright.fields.profile import Loop, Profile
 
 _ANGLES = ("taper", "angle")
@@ -103,27 +103,70 @@ def _plain_place(place: Vector, within: float) -> Vector:
 
 
 def _between_plain_ends(given: Part, part: Part, within: float) -> Part:
-    """Where its axis is one of the coordinates', between plain ends: parts that meet there go on meeting.
+    """Between plain ends where its axes are the coordinates', so that parts that meet there go on meeting:
+    along z, and a box without copies on all sides.
 
     given: the part before its numbers were made plain.
     """
-    if within <= 0 or "height" not in _names(part.field) or "height" not in _names(given.field):
+    if within <= 0:
         return part
-    axis = rotation_matrix(part.rotation)[:, 2]
-    k = int(np.abs(axis).argmax())
-    if abs(axis[k]) < 1 - _ALONG:
+    try:
+        for axis in (0, 1, 2) if isinstance(part.field, Box) and not part.instances else (2,):
+            part = _between(given, part, axis, within)
+    except ParameterError:
+        pass
+    return part
+
+
+def _between(given: Part, part: Part, axis: int, within: float) -> Part:
+    """With ends that are plain along one of its axes; what has none there, or lies askew, as it is."""
+    column = rotation_matrix(part.rotation)[:, axis]
+    k = int(np.abs(column).argmax())
+    moved = abs(given.translation[k] - part.translation[k])  # another copy may have become the first
+    if abs(column[k]) < 1 - _ALONG or moved > _MOVED * within:
         return part
-    height = float(given.field.height)  # type: ignore[attr-defined]
-    # One grid for all, so that what was at one level stays there.
-    digits = -math.floor(math.log10(within) + 0.1)
-    low, high = (round(given.translation[k] + end * height / 2, digits) for end in (-1, 1))
+    field: Any = part.field
+    if isinstance(field, Revolution):
+        return _at_plain_levels(given, part, k, float(column[k]), within)
+    length = _length(given.field, axis)
+    if length is None or _length(field, axis) is None:
+        return part
+    # Of ends at one level the same number comes, whatever else the parts are.
+    low, high = (plain(given.translation[k] + end * length / 2, within) for end in (-1, 1))
+    length = round(high - low, 12)
     place = list(part.translation)
     place[k] = round((low + high) / 2, 12) + 0.0
-    try:
-        field: Any = dataclasses.replace(part.field, height=round(high - low, 12))  # type: ignore[type-var]
-    except ParameterError:
-        return part
+    if isinstance(field, Box):
+        x, y, z = (length if a == axis else own for a, own in enumerate(field.size))
+        field = Box((x, y, z))
+    else:
+        field = dataclasses.replace(field, height=length)
     return dataclasses.replace(part, field=field, translation=(place[0], place[1], place[2]))
+
+
+def _length(field: Any, axis: int) -> float | None:
+    """From end to end along one of its own axes."""
+    if isinstance(field, Box):
+        return field.size[axis]
+    return float(field.height) if "height" in _names(field) and axis == 2 else None
+
+
+def _at_plain_levels(given: Part, part: Part, k: int, sign: float, within: float) -> Part:
+    """What is turned, with corners at plain levels along its axis, which is the coordinate `k`."""
+    own, place = cast(Revolution, given.field), part.translation[k]
+
+    def loop(before: Loop, now: Loop) -> Loop:
+        levels = (plain(given.translation[k] + sign * y, within) for _, y, _ in before)
+        return tuple(
+            (x, round(sign * (level - place), 12), b) for (x, _, b), level in zip(now, levels, strict=True)
+        )
+
+    before, now = own.profile, cast(Revolution, part.field).profile
+    holes = tuple(loop(*pair) for pair in zip(before.holes, now.holes, strict=True))
+    field = dataclasses.replace(
+        cast(Revolution, part.field), profile=Profile(loop(before.outline, now.outline), holes)
+    )
+    return dataclasses.replace(part, field=field)
 
 
 def _names(field: Any) -> set[str]:

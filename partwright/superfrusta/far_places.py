@@ -16,6 +16,7 @@ from partwright.approximation.sketches.bodies import bodies
 from partwright.meshing.manifolds import surface_of
 from partwright.metrics.deviation import buried
 from partwright.shapes import MeshDistance
+from partwright.shapes.topology import EdgeTable, signed_volumes
 from partwright.superfrusta.feature_mending import FAR
 
 Floats = NDArray[np.float64]
@@ -86,8 +87,11 @@ class Solid:
 
     @cached_property
     def count(self) -> int:
-        """Connected bodies, crumbs left out."""
-        return sum(1 for _ in bodies(self.body, _CRUMB * max(float(self.body.volume()), 0.0), 0.0))
+        """Connected bodies, crumbs left out; such as touch along an edge are one, as they are in a mesh."""
+        vertices, faces = surface_of(self.body)
+        same = np.unique(vertices, axis=0, return_inverse=True)[1].reshape(-1)[faces]
+        volume = signed_volumes(vertices, faces, EdgeTable(same).bodies)
+        return int((volume > _CRUMB * self.body.volume()).sum())
 
     def sign(self, points: Floats) -> Floats:
         return self.distance(points.astype(np.float32)).astype(np.float64)
@@ -120,7 +124,7 @@ def reach(shape: Solid, other: Solid, box: Floats, least: float = _REGION * FAR)
 def loose_places(shape: Solid, other: Solid) -> list[Place]:
     """Where pieces of the other body nearly touch its largest, if it has more of them than the shape."""
     pieces = sorted(bodies(other.body, _CRUMB * shape.body.volume(), 0.0), key=lambda piece: -piece[0])
-    if len(pieces) < 2 or len(pieces) <= shape.count:
+    if len(pieces) < 2 or other.count <= shape.count:
         return []
     found = []
     largest = pieces[0][1]

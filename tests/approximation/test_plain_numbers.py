@@ -115,6 +115,34 @@ def test_parts_that_meet_go_on_meeting() -> None:
     )
 
 
+def test_boxes_and_what_is_turned_meet_others_as_they_did() -> None:
+    """A block beside one, and a ring on it: numbers made plain one by one leave slits at x = 1, z = 0.5."""
+    one = with_plain_numbers(Part(Box((1.00008, 2, 1)), (0.49996, 0, 0)), 1e-4)
+    other = with_plain_numbers(Part(Box((0.33333, 2, 1)), (1.166665, 0, 0)), 1e-4)
+    ring = with_plain_numbers(
+        Part(
+            Revolution(Profile([(0.3, -0.13337), (0.6, -0.13337), (0.6, 0.2), (0.4, 0.3)])), (0, 0, 0.63337)
+        ),
+        1e-4,
+    )
+    assert one.bounds()[1][0] == other.bounds()[0][0] == 1.0
+    assert ring.bounds()[0][2] == one.bounds()[1][2] == 0.5
+    over = dataclasses.replace(ring, translation=(0, 0, 0.33332), rotation=(0.0, 1.0, 0.0, 0.0))
+    assert with_plain_numbers(over, 1e-4).bounds()[1][2] == pytest.approx(0.4667, abs=1e-12)
+
+
+def test_a_row_of_posts_stays_where_it_is() -> None:
+    """Whichever of them is named first, and though they stand in a row along their own axis."""
+    posts = Part(
+        Revolution(Profile([(0, -1), (2, -1), (1, 1), (0, 1)])),
+        (0, 0, 20.0003),
+        instances=tuple(Similarity(translation=(0, 0, z)) for z in (-10, -20, 10.0001)),
+    )
+    found = with_plain_numbers(posts, 1e-3)
+    assert {copy.translation for copy in found.copies} == {(0, 0, z) for z in (0, 10, 20, 30)}
+    assert np.allclose([found.bounds()], [posts.bounds()], atol=2e-3)
+
+
 def test_what_would_vanish_stays() -> None:
     thin = Part(Cylinder(1e-4, 5.0))
     assert with_plain_numbers(thin, 1e-3) == thin

@@ -120,6 +120,13 @@ def test_pieces_that_hardly_float_are_joined() -> None:
     assert len(tree.features) == 3
 
 
+def test_bodies_that_touch_along_an_edge_are_one() -> None:
+    one, other = (Manifold.cube((1.0, 1.0, 1.0)).translate((x, x, 0.0)) for x in (0.0, 1.0))
+    none = PLATE.distance
+    assert Solid(one + other, none).count == 1
+    assert Solid(one + other.translate((0.01, 0.0, 0.0)), none).count == 2
+
+
 def test_the_more_of_a_shape_floats_the_more_may_joining_it_cost(monkeypatch: pytest.MonkeyPatch) -> None:
     """The arm of a knob, 9 % of it, floated for good, as what joins it costs more of R than a place may."""
     monkeypatch.setattr(feature_freeform, "_LOSS", -0.02)  # what joins has to gain as much, and does not
