@@ -46,6 +46,22 @@ def test_a_plate_with_octagonal_pockets_is_drawn_once() -> None:
     assert result.scores.iou > 0.998
 
 
+def test_walls_with_a_draft_are_one_number() -> None:
+    """A tray from a mould: its outside narrower upwards, its inside as it is pulled off the core."""
+    block = Part(Extrusion(Profile.rectangle(90, 60, corner=10), 30, taper=2.0))
+    over = (0.0, 1.0, 0.0, 0.0)
+    pocket = Part(Extrusion(Profile.rectangle(78, 48, corner=6), 26, taper=1.0), (0, 0, 2), over)
+    result = fitted(Assembly((block, pocket), "difference"))
+    outside, inside = result.assembly.parts
+    for part, (size, taper, height) in ((outside, (90, 2.0, 30)), (inside, (78, 1.0, 26))):
+        assert isinstance(part.field, Extrusion)
+        assert part.field.taper == taper
+        assert part.field.profile.size == pytest.approx(size, abs=0.05)
+        assert part.field.height == pytest.approx(height, abs=0.06)
+    assert inside.name == "pocket"
+    assert result.scores.iou > 0.998
+
+
 def test_rounded_edges_are_numbers_of_the_body_that_has_them() -> None:
     """A plate with a fillet and holes, and on it a boss with a chamfer: two parts and a hole, no further."""
     plate = Part(Extrusion(Profile.rectangle(100, 60, corner=12), 12, top_fillet=3))

@@ -12,6 +12,7 @@ from manifold3d import CrossSection, JoinType, Manifold
 
 from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.candidate import Candidate, posed
+from partwright.approximation.sketches.drafts import drafted
 from partwright.approximation.sketches.holes import hole_parts
 from partwright.approximation.sketches.rims import SHARP, bottom_rim, limited, rimmed_body, top_rim
 from partwright.approximation.sketches.rods import (
@@ -23,7 +24,7 @@ from partwright.approximation.sketches.rods import (
     rod,
     round_at_ends,
 )
-from partwright.approximation.sketches.sections import FINE, Region, View, area_centre, profile_of
+from partwright.approximation.sketches.sections import FINE, Region, View, area_centre
 from partwright.approximation.sketches.teeth import drawn_corners
 from partwright.approximation.sketches.turned import turned
 from partwright.errors import ParameterError
@@ -78,6 +79,7 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
     done: set[tuple[int, int, int]] = set()
     for i in sorted(thick):
         by_itself = list(round_at_ends(view, *slabs[i]))
+        yield from drafted(view, slabs, i, holes)
         for region in _regions(view, *slabs[i]):
             first = last = i
             while first > 0 and goes_on(region, view.regions(middles[first - 1])):
@@ -140,15 +142,8 @@ def _corners(region: Region) -> int:
     return len(region.profile.corners) if region.profile is not None else 0
 
 
-def _outlines(region: Region, holes: bool) -> Iterator[tuple[CrossSection, Profile | None]]:
-    """The region, and also with its holes closed."""
-    yield region.section, region.profile
-    if holes and region.section.num_contour() > 1:
-        yield region.filled, profile_of(region.filled)
-
-
 def _extruded(view: View, region: Region, low: float, high: float, holes: bool) -> Iterator[Candidate]:
-    for section, profile in _outlines(region, holes):
+    for section, profile in region.outlines(holes):
         one = extrusion(section, profile, view.frame, low, high)
         if one is not None:
             yield one
@@ -178,7 +173,7 @@ def _rounded(
     """With the rims that the surface has there: at levels, or a slab further on, which then is all rim."""
     lows = [slabs[i][0] for i in (first, first - 1) if i >= 0]
     highs = [slabs[i][1] for i in (last, last + 1) if i < len(slabs)]
-    for section, profile in _outlines(region, holes):
+    for section, profile in region.outlines(holes):
         if profile is None:
             continue
         bottoms = [(low, bottom_rim(view.leaning, profile, low)) for low in lows]

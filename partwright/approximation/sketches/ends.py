@@ -9,10 +9,13 @@ import numpy as np
 
 from partwright.assembly import Part
 from partwright.assembly.similarity import rotation_matrix
+from partwright.errors import ParameterError
 from partwright.fields import Box, Cylinder, Extrusion, Field, Tube
 
 BEYOND = 0.03
 """Unit lengths: how far an open end goes on."""
+BARELY = 1e-3
+"""Unit lengths: the same of the wide end of leaning walls, which move with it, and by less than is seen."""
 STEPS = (0.004, 0.012, 0.02, BEYOND + 0.004)
 """Unit lengths beyond an end, where it has to be open."""
 _LONG = Box, Cylinder, Tube, Extrusion
@@ -26,10 +29,10 @@ def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.
 
     So no skin is left over a hole and no slit under a boss, whatever moves a little. distance: (N,) of the
     shape at points (N, 3), unit lengths like the part, negative inside. Only ends along
-    z of a box, a cylinder, a tube or an extrusion without taper; all copies have to agree.
+    z of a box, a cylinder, a tube or an extrusion; all copies have to agree.
     """
     field = part.field
-    if not isinstance(field, _LONG) or (isinstance(field, Extrusion) and field.taper):
+    if not isinstance(field, _LONG):
         return part
     low, high = field.bounds()
     flat = _interior(field, low, high)
@@ -50,12 +53,16 @@ def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.
                 return False
         return True
 
-    up, down = BEYOND * is_open(1.0), BEYOND * is_open(-1.0)
+    leans = isinstance(field, Extrusion) and field.taper > 0
+    up, down = BEYOND * is_open(1.0), (BARELY if leans else BEYOND) * is_open(-1.0)
     if not up and not down:
         return part
     axis = rotation_matrix(part.rotation)[:, 2]
     x, y, z = (np.array(part.translation) + axis * (up - down) / 2).tolist()
-    return dataclasses.replace(part, field=_longer(field, up + down), translation=(x, y, z))
+    try:
+        return dataclasses.replace(part, field=_longer(field, up + down), translation=(x, y, z))
+    except ParameterError:  # a leaning side would vanish
+        return part
 
 
 def _interior(field: Field, low: np.ndarray, high: np.ndarray) -> np.ndarray:

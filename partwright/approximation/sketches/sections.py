@@ -49,6 +49,16 @@ class Region:
     def profile(self) -> Profile | None:
         return profile_of(self.section)
 
+    def outlines(self, holes: bool) -> Iterator[tuple[CrossSection, Profile | None]]:
+        """The region, and also with its holes closed."""
+        yield self.section, self.profile
+        if holes and self.has_holes:
+            yield self.filled, profile_of(self.filled)
+
+    @property
+    def has_holes(self) -> bool:
+        return bool(self.section.num_contour() > 1)
+
     @cached_property
     def is_round(self) -> bool:
         """Whether its outline is a circle."""
