@@ -14,6 +14,7 @@ from partwright.shapes import Shape
 from partwright.superfrusta.feature_steps import FeatureTree
 from partwright.superfrusta.featured import SURE, FeaturedFit, freeform_warnings, wants_features
 from partwright.superfrusta.hole_search import HoleSearch
+from partwright.superfrusta.left_out import left_out, left_out_warnings
 from partwright.superfrusta.outcome import assembly_of
 from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import FitSamples
@@ -107,7 +108,8 @@ def _of_features(
     told = freeform_warnings(shape, whole)
     if outcome != "interrupted":
         with timed(seconds, "edges"):
-            told += sharp_edge_warnings(shape, whole)
+            details = left_out(shape, whole)
+            told += left_out_warnings(shape, details) + sharp_edge_warnings(shape, whole, details)
     return Fitted(whole, outcome, seconds, history, warnings=told)
 
 

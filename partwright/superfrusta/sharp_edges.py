@@ -7,6 +7,7 @@ what it was fitted by, along a narrow strip, the result has an edge with more, o
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +24,7 @@ from partwright.rows import units
 from partwright.shapes import MeshDistance, Shape
 from partwright.shapes.topology import EdgeTable, area_vectors, components
 from partwright.superfrusta.feature_assembly import in_unit_frame
+from partwright.superfrusta.left_out import Detail
 
 _LEAST, _MOST = 3e-3, 0.1  # unit lengths, that a strip is off in its middle
 _OWN = 1e-3  # unit lengths, that what belongs to one is off at least
@@ -54,12 +56,14 @@ class _Strip:
         return self.name == other.name and 1 / _ALIKE < self.size / other.size < _ALIKE
 
 
-def sharp_edge_warnings(shape: Shape, whole: Assembly) -> tuple[str, ...]:
-    """A sentence for each size of what was left off, the longest first."""
+def sharp_edge_warnings(shape: Shape, whole: Assembly, details: Sequence[Detail] = ()) -> tuple[str, ...]:
+    """A sentence for each size of what was left off, the longest first. details: that are told by themselves,
+    with their walls, which may lean."""
     if not has_exact_mesh(whole):
         return ()
+    strips = [one for one in _strips(shape, whole) if not any(d.is_beside(one.middle) for d in details)]
     found: list[list[_Strip]] = []
-    for strip in sorted(_strips(shape, whole), key=lambda strip: -strip.length):
+    for strip in sorted(strips, key=lambda strip: -strip.length):
         alike = next((group for group in found if strip.is_like(group[0])), None)
         if alike is None:
             found.append([strip])

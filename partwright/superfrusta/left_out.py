@@ -1,0 +1,108 @@
+"""Small detail that no feature has: letters that are engraved in a face or stand out of it, a shallow mark.
+
+It hardly shows in any score, yet who reads the features should know that it is not among them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.assembly import Assembly
+from partwright.meshing import has_exact_mesh
+from partwright.meshing.csg import solid_of
+from partwright.meshing.manifolds import surface_of
+from partwright.metrics.deviation import place_in
+from partwright.rows import units
+from partwright.shapes import MeshDistance, Shape
+from partwright.shapes.topology import EdgeTable, area_vectors, components
+from partwright.superfrusta.feature_assembly import in_unit_frame
+from partwright.superfrusta.feature_mending import FAR
+
+_LEAST = 3e-3  # unit lengths: what is less deep is no detail; what is deeper than `FAR` is told otherwise
+_SMALL, _CRUMB = 0.02, 2e-5  # of the surface's area, that what a detail covers is at most, and at least
+_ON = 1e-3  # unit lengths: what is as near to what was fitted lies on it
+_ALIKE = 0.95  # length of the mean of unit normals, and cosine, of what faces one way
+_AROUND = 0.8  # of its outline, along which the face that it is on goes on
+_CHORD = 1e-3  # unit lengths
+
+
+@dataclass(frozen=True)
+class Detail:
+    """A small place of a face that was fitted, which goes on around it. depth: unit lengths by which the
+    shape stands out there at most; negative where it is cut in. area: of the face, that it covers. box:
+    (2, 3)."""
+
+    depth: float
+    area: float
+    box: NDArray[np.float64]
+
+    def is_beside(self, point: NDArray[np.float64]) -> bool:
+        """Whether a point (3,) is one of its own."""
+        room = abs(self.depth)
+        return bool(((point > self.box[0] - room) & (point < self.box[1] + room)).all())
+
+
+def left_out_warnings(shape: Shape, found: Sequence[Detail]) -> tuple[str, ...]:
+    """One sentence for all; none where there is nothing."""
+    if not found:
+        return ()
+    depth = float(shape.frame.length_from_unit(max(abs(detail.depth) for detail in found)))
+    places = list(dict.fromkeys(place_in(shape, detail.box.mean(axis=0)) for detail in found))
+    ways = {True: "stands out", False: "is cut in"}
+    how = " or ".join(dict.fromkeys(ways[detail.depth > 0] for detail in found))
+    many = f" ({len(found)} places, as letters are)" if len(found) > 2 else ""
+    unit = f" {shape.unit}" if shape.unit else ""
+    return (
+        f"left out: small detail{many} that {how} by {depth:.2g}{unit} at the {places[0]}"
+        f"{' and elsewhere' if len(places) > 1 else ''}: no feature has it",
+    )
+
+
+def left_out(shape: Shape, whole: Assembly) -> list[Detail]:
+    """Of a shape beside what was fitted to it, the largest first."""
+    if not has_exact_mesh(whole):
+        return []
+    own = surface_of(solid_of(in_unit_frame(shape, whole), _CHORD))
+    return sorted(_details(*shape.unit_mesh, *own), key=lambda detail: -detail.area)
+
+
+def _details(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    own: NDArray[np.float64],
+    own_faces: NDArray[np.int64],
+) -> Iterator[Detail]:
+    corners = vertices[faces]
+    normal = area_vectors(corners) / 2
+    area = np.linalg.norm(normal, axis=1)
+    surface = MeshDistance(own, own_faces, own_faces, True)
+    at_middle, nearest = surface.signed_nearest(corners.mean(axis=1))
+    wall = units(area_vectors(own[own_faces]))[nearest]
+    off = np.column_stack([at_middle, surface.signed(vertices)[faces]])
+    off = np.take_along_axis(off, np.abs(off).argmax(axis=1)[:, None], axis=1)[:, 0]
+    is_off = np.abs(off) > _ON
+    edges, beside = EdgeTable(faces).pairs
+    length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    one, other = beside.T
+    together = is_off[one] & is_off[other] & (off[one] * off[other] > 0)
+    label = components(len(faces), one[together], other[together])
+    extent, whole = np.bincount(label, area), float(area.sum())
+    for k in np.unique(label[is_off]):
+        if extent[k] < _CRUMB * whole:
+            continue
+        mine = label == k
+        depth = float(off[mine][np.abs(off[mine]).argmax()])
+        up = np.average(wall[mine], axis=0, weights=area[mine])
+        covered = abs(float((normal[mine] @ up).sum()))
+        if not _LEAST < abs(depth) < FAR or np.linalg.norm(up) < _ALIKE or covered > _SMALL * whole:
+            continue
+        rim = mine[one] != mine[other]
+        outer = np.where(mine[one], other, one)[rim]
+        goes_on = ~is_off[outer] & (units(normal[outer]) @ units(up) > _ALIKE)
+        if length[rim][goes_on].sum() > _AROUND * length[rim].sum():
+            ends = corners[mine].min(axis=(0, 1)), corners[mine].max(axis=(0, 1))
+            yield Detail(depth, covered, np.stack(ends))
