@@ -21,12 +21,13 @@ from partwright.approximation.sketches.bodies import bodies
 from partwright.approximation.sketches.candidate import AskedOnce, Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames
+from partwright.approximation.sketches.drafts import leans
 from partwright.approximation.sketches.teeth import FEATURE
 from partwright.fields import Swept
 from partwright.meshing.manifolds import simplified
 from partwright.methods import Checkpoint
 from partwright.shapes import Shape
-from partwright.superfrusta.feature_bases import bases, is_nearly_whole, various
+from partwright.superfrusta.feature_bases import bases, is_nearly_whole, lacks_drafts, various
 from partwright.superfrusta.feature_blanks import BEHIND, PERFECT, cut_from_blanks, worth
 from partwright.superfrusta.feature_bores import bores, bores_of
 from partwright.superfrusta.feature_copying import StepBodies, joined_by, with_copies
@@ -119,10 +120,13 @@ class FeatureSearch:
         others = [candidate for candidate in own if not (candidate.cuts or candidate.usual)]
         for index in order:
             best = max(grown, key=lambda tree: tree.objective, default=None)
-            if best is not None and gains[index] < _RIVAL * gains[order[0]]:
-                break
-            if best is not None and self._is_done(best) and not is_nearly_whole(own[index]):
-                break
+            drawn_aside = best is not None and lacks_drafts(best, own)
+            is_rival = gains[index] >= _RIVAL * gains[order[0]] or (drawn_aside and leans(own[index].part))
+            done = best is not None and self._is_done(best) and not drawn_aside
+            if best is not None and (not is_rival or (done and not is_nearly_whole(own[index]))):
+                if not drawn_aside:
+                    break
+                continue
             tried.add(own[index].key)
             grown.append(self.grown(self.extended(empty, own[index], True), others, best))
             if best is None and not self._is_done(grown[0]):

@@ -62,6 +62,18 @@ def test_walls_with_a_draft_are_one_number() -> None:
     assert result.scores.iou > 0.998
 
 
+def test_a_block_with_a_draft_is_not_drawn_from_the_side() -> None:
+    """With its pocket in the section it explains more at first, and has its ends trimmed."""
+    plate = Part(Box((100, 62, 5)), (0, 0, -2.5))
+    block = Part(Extrusion(Profile.rectangle(66, 46, corner=5), 22, taper=4.0), (0, 0, 11))
+    over = (0.0, 1.0, 0.0, 0.0)
+    pocket = Part(Extrusion(Profile.rectangle(58, 38), 12, taper=3.0), (0, 0, 16), over)
+    result = fitted(Assembly((Assembly((plate, block)), pocket), "difference"))
+    tapers = sorted(f.taper for part in result.assembly.parts if isinstance(f := part.field, Extrusion))
+    assert (len(result.assembly.parts), tapers) == (3, [3.0, 4.0])
+    assert result.scores.iou > 0.999
+
+
 def test_rounded_edges_are_numbers_of_the_body_that_has_them() -> None:
     """A plate with a fillet and holes, and on it a boss with a chamfer: two parts and a hole, no further."""
     plate = Part(Extrusion(Profile.rectangle(100, 60, corner=12), 12, top_fillet=3))

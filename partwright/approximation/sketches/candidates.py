@@ -12,7 +12,7 @@ from manifold3d import CrossSection, JoinType, Manifold
 
 from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.candidate import Candidate, posed
-from partwright.approximation.sketches.drafts import drafted
+from partwright.approximation.sketches.drafts import drafted, slope_of
 from partwright.approximation.sketches.holes import hole_parts
 from partwright.approximation.sketches.rims import SHARP, bottom_rim, limited, rimmed_body, top_rim
 from partwright.approximation.sketches.rods import (
@@ -93,7 +93,7 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
                 key = (a, b, round(region.area * 1e5))
                 if key not in done:
                     done.add(key)
-                    yield from _extruded(view, region, slabs[a][0], slabs[b][1], holes)
+                    yield from _extruded(view, region, slabs[a][0], slabs[b][1], holes, slabs[i])
                     yield from _rounded(view, region, slabs, a, b, holes)
             if region.is_round or is_rod(region, *slabs[i]):
                 by_itself.append((region, (middles[i], middles[i])))
@@ -142,8 +142,18 @@ def _corners(region: Region) -> int:
     return len(region.profile.corners) if region.profile is not None else 0
 
 
-def _extruded(view: View, region: Region, low: float, high: float, holes: bool) -> Iterator[Candidate]:
+def _extruded(
+    view: View,
+    region: Region,
+    low: float,
+    high: float,
+    holes: bool,
+    slab: tuple[float, float] | None = None,
+) -> Iterator[Candidate]:
+    """slab: in which walls must not lean all alike, or they are no upright ones."""
     for section, profile in region.outlines(holes):
+        if slab is not None and slope_of(view, section, slab) is not None:
+            continue
         one = extrusion(section, profile, view.frame, low, high)
         if one is not None:
             yield one

@@ -16,10 +16,11 @@ from manifold3d import CrossSection, JoinType, Manifold
 from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.rods import MOST_REGIONS
-from partwright.approximation.sketches.sections import FINE, View, profile_of
+from partwright.approximation.sketches.sections import FINE, Region, View, profile_of
 from partwright.approximation.sketches.teeth import drawn_corners
 from partwright.assembly import Part
 from partwright.errors import ParameterError
+from partwright.fields import Extrusion
 from partwright.fields.profile import Profile
 from partwright.fields.profile_growth import grown_profile
 from partwright.meshing.csg import solid_of
@@ -29,6 +30,7 @@ _LEAST = 1.5e-3  # unit lengths: walls that lean by less in all are upright
 _STEEPEST = 15.0  # degrees
 _STEPS = 6  # of Newton's, for how far a section is within another
 _CORNERS = 0.45  # of that: corners that stay as round, or as sharp, are off by less, an upright wall by more
+_WALLS = 0.05  # of that, by which walls are off on average: those of a hole may lean otherwise
 _NEAR = 5e-4  # unit lengths, by which any wall may be off besides
 _ABOVE = 1e-3  # unit lengths from the wide end, where the profile is read
 _PLAIN = (1.0, 0.5, 0.25, 0.1, 0.05, 0.01)  # degrees, multiples of which are tried
@@ -42,9 +44,9 @@ def drafted(view: View, slabs: Sequence[tuple[float, float]], i: int, holes: boo
     middles = [(low + high) / 2 for low, high in slabs]
     for region in view.regions(middles[i])[:MOST_REGIONS]:
         for section in [region.section, *([region.filled] if holes and region.has_holes else [])]:
-            slope = _slope(view, section, slabs[i])
-            if slope is None or (region.is_round and section.num_contour() == 1):
-                continue  # a cone is turned
+            slope = slope_of(view, section, slabs[i])
+            if slope is None:
+                continue
             lean = _Lean(view, section, middles[i], slope)
             first = last = i
             while first > 0 and lean.at(middles[first - 1]) is not None:
@@ -55,6 +57,11 @@ def drafted(view: View, slabs: Sequence[tuple[float, float]], i: int, holes: boo
             one = lean.candidate(slabs[first][0], slabs[last][1]) if thickest == i else None
             if one is not None:
                 yield one
+
+
+def leans(part: Part) -> bool:
+    """Whether it has such walls."""
+    return isinstance(part.field, Extrusion) and part.field.taper > 0
 
 
 @dataclass(frozen=True)
@@ -103,8 +110,11 @@ class _Lean:
         return Candidate(own, make, drawn_corners(profile.loops) + 1, volume)
 
 
-def _slope(view: View, section: CrossSection, slab: tuple[float, float]) -> float | None:
-    """By how much all walls of a slab lean inwards a length up; None where they are upright or differ."""
+def slope_of(view: View, section: CrossSection, slab: tuple[float, float]) -> float | None:
+    """By how much all walls of a slab lean inwards a length up; None where they are upright or differ, and of
+    a cone, which is turned."""
+    if Region(section, section.area()).is_round and section.num_contour() == 1:
+        return None
     low, high = (slab[0] + share * (slab[1] - slab[0]) for share in _ENDS)
     below, above = (
         next((one for one in _alike(view, z, section) if not (one ^ section).is_empty()), None)
@@ -148,8 +158,11 @@ def _within(section: CrossSection, depth: float) -> CrossSection:
 
 def _are_same(one: CrossSection, other: CrossSection, depth: float) -> bool:
     """Whether no wall is off, corners being as they are where walls lean inwards by a depth."""
-    off = _CORNERS * abs(depth) + _NEAR
-    return all((a - _within(b, -off)).is_empty() for a, b in ((one, other), (other, one)))
+    at_corners = _CORNERS * abs(depth) + _NEAR
+    if not all((a - _within(b, -at_corners)).is_empty() for a, b in ((one, other), (other, one))):
+        return False
+    around = sum(_around(np.asarray(polygon)) for polygon in one.to_polygons())
+    return bool((one - other).area() + (other - one).area() < (_WALLS * abs(depth) + _NEAR / 2) * around)
 
 
 def _plain(degrees: float, height: float) -> float:
