@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,6 +30,7 @@ _FINE = 60_000  # triangles of a surface that is as fine
 _ONE = 0.07  # unit lengths between points of one place, at most
 _ON = 1e-6  # unit lengths: what is as near to a box's sides lies on them
 _CRUMB = 1e-5  # of the volume: a body that is smaller is rounding
+_VOID = 5e-7  # of the volume: a cavity that is smaller has no open space anywhere
 _WITHIN = 0.3  # of the points of a gap, that lie within the shape
 _GAP = 0.02  # unit lengths: what is as near to where a piece nearly touches the rest is filled, too
 
@@ -93,6 +94,15 @@ class Solid:
         volume = signed_volumes(vertices, faces, EdgeTable(same).bodies)
         return int((volume > _CRUMB * self.body.volume()).sum())
 
+    @cached_property
+    def cavities(self) -> list[Floats]:
+        """(N, 3) the corners of each."""
+        vertices, faces = surface_of(self.body)
+        label = EdgeTable(faces).bodies
+        volume = signed_volumes(vertices, faces, label)
+        found = np.flatnonzero(volume < -_VOID * self.body.volume())
+        return [vertices[np.unique(faces[label == k])] for k in found]
+
     def sign(self, points: Floats) -> Floats:
         return self.distance(points.astype(np.float32)).astype(np.float64)
 
@@ -112,7 +122,16 @@ def far_places(shape: Solid, other: Solid) -> list[Place]:
             if off[one].max() > NEARLY * FAR:
                 both = np.concatenate([points[one], feet[one]])
                 found.append(Place(both, side, float(off[one].max())))
-    return sorted(found, key=lambda place: -place.off)
+    return sorted([*found, *_voids(shape, other)], key=lambda place: -place.off)
+
+
+def _voids(shape: Solid, other: Solid) -> Iterator[Place]:
+    """Cavities deep in the shape, between parts that do not quite meet: too narrow for most of their points
+    to have open space beside them, but no less hollow for that."""
+    for corners in other.cavities:
+        off = float(shape.away(corners).max())
+        if off > NEARLY * FAR and (shape.sign(corners) < 0).all():
+            yield Place(corners, True, off)
 
 
 def reach(shape: Solid, other: Solid, box: Floats, least: float = _REGION * FAR) -> float:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
 
 _MOST = 4  # extrusions of one place
-_PLACES = 12
+_PLACES = 30
 _DEARER = 2.0  # times the price of a feature, that one costs: it says nothing of how it would be drawn
 _TOLERANCES = (0.9, 0.5)  # of `FAR`
 _EXACT = 0.1  # of `FAR`: what is as near to the shape is a feature
@@ -92,7 +92,7 @@ def with_freeform(
         if not places or left < 1:
             break
         start = _Mended(tree, other, [], places[0].off)
-        best = min(_tries(search, shape, start, places[0], left), key=lambda one: one.rank, default=None)
+        best = min(_tries(search, shape, start, places, left), key=lambda one: one.rank, default=None)
         if best is None:
             given_up.append(places[0])
         else:
@@ -110,9 +110,12 @@ def _solid(whole: Assembly) -> Solid:
     return Solid(solid_of(whole, _CHORD), whole.distance)
 
 
-def _tries(search: FeatureSearch, shape: Solid, start: _Mended, place: Place, most: int) -> Iterator[_Mended]:
-    """Ways to mend a place, each better than it is: by one feature that is as exact as others are, else by
-    what follows the shape, finer where no coarse one brings it near enough."""
+def _tries(
+    search: FeatureSearch, shape: Solid, start: _Mended, places: Sequence[Place], most: int
+) -> Iterator[_Mended]:
+    """Ways to mend the first of places, each better than it is: by one feature that is as exact as others
+    are, else by what follows the shape, finer where no coarse one brings it near enough."""
+    place, *others = places
     enough = False
     for tolerance, feature in ((_EXACT, True), *((one, False) for one in _TOLERANCES)):
         for frame in search.frames if not enough else ():
@@ -120,7 +123,7 @@ def _tries(search: FeatureSearch, shape: Solid, start: _Mended, place: Place, mo
             along = tolerance * FAR / 2 if feature else _AROUND
             local = _around(place, shape.body, frame, beside, along)
             parts = terraces(local, frame, tolerance * FAR, 1 if feature else most, place.points)
-            mended = _joined(search, shape, start, parts, place, not feature) if parts else None
+            mended = _joined(search, shape, start, parts, place, others, not feature) if parts else None
             if mended is not None and not (feature and mended.off >= NEARLY * FAR):
                 yield mended
                 enough = enough or mended.off < NEARLY * FAR
@@ -143,9 +146,11 @@ def _joined(
     start: _Mended,
     parts: list[Part],
     place: Place,
+    others: Sequence[Place],
     freeform: bool,
 ) -> _Mended | None:
-    """With parts added, or cut, where that makes a place better and leaves the body whole."""
+    """With parts added, or cut, where that makes a place better and leaves the body whole. others: places
+    that are as far off as they were."""
     tree, body = start.tree, start.solid.body
     features = [
         Feature(place.lacks, part, covers(part, search.points), 0, freeform=freeform) for part in parts
@@ -170,11 +175,23 @@ def _joined(
         return result
 
     solid = Solid(body, distance)
-    off = reach(shape, solid, place.box + np.array([[-_LOOKED], [_LOOKED]]))
+    off = _left(shape, solid, place, others)
     if off >= (NEARLY * FAR if place.gap else _BETTER * place.off):
         return None
     fewer = start.solid.count - solid.count
     return _Mended(tree, solid, parts, off) if fewer >= (1 if place.gap else 0) else None
+
+
+def _left(shape: Solid, solid: Solid, place: Place, others: Sequence[Place]) -> float:
+    """How far a place is off, or what is around it, if that is further off than the other places there."""
+    around = place.box + np.array([[-_LOOKED], [_LOOKED]])
+    off = reach(shape, solid, around)
+    known = (
+        other.off for other in others if (other.box[0] < around[1]).all() and (other.box[1] > around[0]).all()
+    )
+    if off > max(known, default=0.0) + _CHORD:
+        return off
+    return reach(shape, solid, place.box + np.array([[-_AROUND], [_AROUND]]))
 
 
 def _with_copies(
@@ -189,7 +206,8 @@ def _with_copies(
         if other is None:
             continue
         images = [part.transformed(move) for part, move in zip(first.parts, moves, strict=True)]
-        more = _joined(search, shape, best, images, other, first.tree.features[-1].freeform)
+        rest = [place for place in places[1:] if place is not other]
+        more = _joined(search, shape, best, images, other, rest, first.tree.features[-1].freeform)
         if more is not None and more.off < NEARLY * FAR:
             others.remove(other)
             kept.append(moves)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -118,6 +119,35 @@ def test_pieces_that_hardly_float_are_joined() -> None:
     tree, _, bodies = mended(Assembly((PLATE,)), *halves)
     assert bodies == 1
     assert len(tree.features) == 3
+
+
+def test_two_places_side_by_side_do_not_hide_one_another() -> None:
+    """Each is as far off as the other, so that neither is nearer where both are looked at."""
+    posts = [Part(Box((0.1, 0.1, 0.2)), (x, 0.0, 0.15)) for x in (-0.095, 0.095)]
+    lower = replace(PLATE, translation=(0.0, 0.0, -0.05))
+    drawn = [replace(post, translation=(post.translation[0], 0.0, 0.1)) for post in posts]
+    tree, off, _ = mended(Assembly((lower, *drawn)), lower)
+    assert off == tree.off == 0
+    tree, off, _ = mended(
+        Assembly((lower,)),
+        lower,
+        *(replace(post, translation=(post.translation[0], 0, 0.1)) for post in posts),
+    )
+    assert off == tree.off == 0
+
+
+def test_a_void_between_parts_is_filled() -> None:
+    """Too narrow for its corners to have open space beside them, and deep within the shape."""
+    block = Part(Box((1.8, 1.0, 0.8)))
+    void = Part(Box((0.008, 0.2, 0.2)))
+    whole = solid_of(Assembly((block, void), "difference"), 1e-3)
+    distance = Assembly((block, void), "difference").distance
+    shape = Solid(solid_of(block, 1e-3), block.distance)
+    (place,) = far_places(shape, Solid(whole, distance))
+    assert place.lacks
+    assert place.off == pytest.approx(0.3, abs=1e-3)
+    assert np.ptp(place.box, axis=0) == pytest.approx([0.008, 0.2, 0.2], abs=1e-6)
+    assert far_places(Solid(whole, distance), Solid(whole, distance)) == []
 
 
 def test_bodies_that_touch_along_an_edge_are_one() -> None:
