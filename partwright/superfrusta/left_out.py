@@ -5,12 +5,13 @@ It hardly shows in any score, yet who reads the features should know that it is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.approximation.part_roles import FREEFORM
 from partwright.assembly import Assembly
 from partwright.meshing import has_exact_mesh
 from partwright.meshing.csg import solid_of
@@ -27,6 +28,7 @@ _SMALL, _CRUMB = 0.02, 2e-5  # of the surface's area, that what a detail covers 
 _ON = 1e-3  # unit lengths: what is as near to what was fitted lies on it
 _ALIKE = 0.95  # length of the mean of unit normals, and cosine, of what faces one way
 _AROUND = 0.8  # of its outline, along which the face that it is on goes on
+_GOOD = 0.95  # of the rest of the surface, that is off by less than the least: else places are other faults
 _CHORD = 1e-3  # unit lengths
 
 
@@ -63,11 +65,18 @@ def left_out_warnings(shape: Shape, found: Sequence[Detail]) -> tuple[str, ...]:
 
 
 def left_out(shape: Shape, whole: Assembly) -> list[Detail]:
-    """Of a shape beside what was fitted to it, the largest first."""
+    """Of a shape beside what was fitted to it, the largest first; none where the fit is poor, and none of
+    what freeform steps leave."""
     if not has_exact_mesh(whole):
         return []
-    own = surface_of(solid_of(in_unit_frame(shape, whole), _CHORD))
-    return sorted(_details(*shape.unit_mesh, *own), key=lambda detail: -detail.area)
+    own = in_unit_frame(shape, whole)
+    steps = [part.bounds() for part in own.parts if part.name.startswith(FREEFORM)]
+    found = _details(*shape.unit_mesh, *surface_of(solid_of(own, _CHORD)))
+    return [
+        detail
+        for detail in found
+        if not any((detail.box[0] < high).all() and (detail.box[1] > low).all() for low, high in steps)
+    ]
 
 
 def _details(
@@ -75,7 +84,7 @@ def _details(
     faces: NDArray[np.int64],
     own: NDArray[np.float64],
     own_faces: NDArray[np.int64],
-) -> Iterator[Detail]:
+) -> list[Detail]:
     corners = vertices[faces]
     normal = area_vectors(corners) / 2
     area = np.linalg.norm(normal, axis=1)
@@ -91,6 +100,8 @@ def _details(
     together = is_off[one] & is_off[other] & (off[one] * off[other] > 0)
     label = components(len(faces), one[together], other[together])
     extent, whole = np.bincount(label, area), float(area.sum())
+    rest = np.ones(len(faces), bool)
+    found: list[Detail] = []
     for k in np.unique(label[is_off]):
         if extent[k] < _CRUMB * whole:
             continue
@@ -105,4 +116,7 @@ def _details(
         goes_on = ~is_off[outer] & (units(normal[outer]) @ units(up) > _ALIKE)
         if length[rim][goes_on].sum() > _AROUND * length[rim].sum():
             ends = corners[mine].min(axis=(0, 1)), corners[mine].max(axis=(0, 1))
-            yield Detail(depth, covered, np.stack(ends))
+            found.append(Detail(depth, covered, np.stack(ends)))
+            rest &= ~mine
+    good = area[rest & (np.abs(at_middle) < _LEAST)].sum() >= _GOOD * area[rest].sum()
+    return sorted(found, key=lambda detail: -detail.area) if good else []

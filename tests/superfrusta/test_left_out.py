@@ -53,6 +53,12 @@ def test_letters_have_one_line(drawn: Manifold, how: str) -> None:
     assert how in line
 
 
+def test_what_freeform_steps_leave_is_no_detail() -> None:
+    step = Part(Box((10, 10, 10)), (-20, 0, 0), name="freeform_1")
+    (line,) = told(PLATE - letters(1.0, 4.5), FOUND, step)
+    assert "3 places" in line
+
+
 def test_a_groove_along_an_edge_is_no_chamfer() -> None:
     """Both of its walls lean, beside an edge that is sharp as it was drawn."""
     groove = Manifold.cube((30, 1, 1), center=True).rotate((45, 0, 0)).translate((0, 19, 5))
