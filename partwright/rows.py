@@ -5,11 +5,12 @@ NumPy reduces an axis of three one row at a time; here whole columns are added i
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+Number = TypeVar("Number", bound=np.number[Any])
 Floats = NDArray[Any]  # of single or double precision, as is what comes of them
 
 
@@ -29,6 +30,13 @@ def dots(one: Floats, other: Floats) -> Floats:
 def lengths(rows: Floats) -> Floats:
     """(...,) Euclidean lengths of rows (..., D): `np.linalg.norm(rows, axis=-1)`."""
     return np.asarray(np.sqrt(sums(rows * rows)))
+
+
+def corners(rows: NDArray[Number]) -> tuple[NDArray[Number], NDArray[Number]]:
+    """Lowest and highest corner (D,) of the box around rows (N, D), N at least 1: `rows.min(axis=0)` and
+    `rows.max(axis=0)`."""
+    columns = np.ascontiguousarray(rows.T)
+    return columns.min(axis=1), columns.max(axis=1)
 
 
 def units(rows: Floats) -> Floats:

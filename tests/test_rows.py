@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from partwright.rows import crosses, dots, lengths, sums, units
+from partwright.rows import corners, crosses, dots, lengths, sums, units
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -20,6 +20,14 @@ def test_the_bits_are_those_of_numpy(shape: tuple[int, ...], dtype: type) -> Non
         np.testing.assert_array_equal(found, want)
     if shape[-1] == 3:
         np.testing.assert_array_equal(crosses(one, other), np.cross(one, other))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int64])
+def test_corners_are_the_ends_of_each_column(dtype: type) -> None:
+    rows = (100 * np.random.default_rng(3).normal(size=(400, 3))).astype(dtype)
+    for found, want in zip(corners(rows[::3]), (rows[::3].min(axis=0), rows[::3].max(axis=0)), strict=True):
+        assert found.dtype == want.dtype
+        np.testing.assert_array_equal(found, want)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import re
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -76,10 +77,15 @@ class Result:
 
         started = time.perf_counter()
         with finishing(), replacing_files(folder, CURVE_FILES) as staging:
-            self.assembly.save(staging / "assembly.json")
-            export(self.assembly, staging / "parts.glb")
-            write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
-            preview(self.shape, self.assembly, self.surface, staging / "preview.png", title=self.shape.name)
+            picture = staging / "preview.png"
+            with ThreadPoolExecutor(1) as beside:
+                drawn = beside.submit(
+                    preview, self.shape, self.assembly, self.surface, picture, title=self.shape.name
+                )
+                self.assembly.save(staging / "assembly.json")
+                export(self.assembly, staging / "parts.glb")
+                write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
+                drawn.result()
             if self.curve:
                 self._save_curve(staging)
             self._count_writing(time.perf_counter() - started)

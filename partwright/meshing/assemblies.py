@@ -107,12 +107,12 @@ def _marched(node: Assembly | Part, cell: float, sharp: bool) -> trimesh.Trimesh
     counts = int(np.ceil(longest / min(cell, thinnest / ACROSS)))
     local = node.transformed(frame)
     room = _ROOM + (upper - lower) * frame.scale / 2
-    mesh = mesh_field(local.distance, -room, room, counts, lipschitz=_lipschitz(node), sharp=sharp)
+    mesh = mesh_field(local.distance, -room, room, counts, lipschitz=lipschitz(node), sharp=sharp)
     finest, across = int(np.ceil(_FINEST * longest / cell)), _HOLED * 2 * room.max() / counts
     carved = counts < finest and len(thick) == len(node.parts) and _carved(node)
     if carved and has_thin_walls(local.distance, mesh.vertices, across):
         counts = finest
-        mesh = mesh_field(local.distance, -room, room, counts, lipschitz=_lipschitz(node), sharp=sharp)
+        mesh = mesh_field(local.distance, -room, room, counts, lipschitz=lipschitz(node), sharp=sharp)
     vertices, faces = without_small_components(mesh.vertices, mesh.faces, np.full(3, 2 * room.max() / counts))
     return trimesh.Trimesh(frame.inverse()(vertices), faces, process=False)
 
@@ -161,7 +161,7 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     return _repeated(mesh, part.instances)
 
 
-def _lipschitz(node: Assembly | Part) -> float:
+def lipschitz(node: Assembly | Part) -> float:
     """How fast the distance may change: learned parts know how steep they are."""
     return max(LIPSCHITZ, *(part.field.lipschitz for part in node.parts))
 

@@ -13,6 +13,7 @@ from partwright.meshing.blocks import BLOCK, Distance, Grid, evaluate, surface_b
 from partwright.meshing.features import sharpen
 from partwright.meshing.polygons import Polygons
 from partwright.meshing.tables import CORNERS, EDGE_AXIS, EDGES, loop_table
+from partwright.rows import corners
 
 if TYPE_CHECKING:
     import trimesh
@@ -127,8 +128,9 @@ def _crossed_cells(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 def _welded(lattice: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lattice edges (N,), given by their lower corner and axis, welded: one of each (V,), numbers (N,)."""
-    x, y, z = (lattice - lattice.min(axis=0)).T
-    ny, nz = np.ptp(lattice, axis=0)[1:] + 1
+    low, high = corners(lattice)
+    x, y, z = (lattice - low).T
+    _, ny, nz = high - low + 1
     key = ((x * ny + y) * nz + z) * 3 + axis
     _, representative, number = np.unique(key, return_index=True, return_inverse=True)
     return representative, number

@@ -11,6 +11,7 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.meshing.assemblies import mesh_assembly, mesh_part
+from partwright.rows import corners
 
 if TYPE_CHECKING:
     import trimesh
@@ -65,8 +66,9 @@ def mass_properties(solid: Assembly | Part | trimesh.Trimesh, resolution: int = 
     elif isinstance(solid, Part):
         solid = mesh_part(solid, resolution)
     vertices = np.asarray(solid.vertices, dtype=np.float64)
-    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    side = float(np.ptp(vertices, axis=0).max())
+    low, high = corners(vertices)
+    middle = (low + high) / 2
+    side = float((high - low).max())
     if not side > 0:
         raise NoSurfaceError("the mesh encloses no volume, so it has no mass")
     local = _moments((vertices - middle) / side, np.asarray(solid.faces))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from partwright.errors import SettingError
+from partwright.rows import corners
 from partwright.shapes.units import axis_vector
 
 # Up axis -> the side that azimuth 0 looks at.
@@ -103,10 +104,11 @@ class Camera:
 
         tangent = math.tan(math.radians(self.field_of_view) / 2)
         half = (tangent * width / height, tangent)
-        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        lowest, highest = corners(points)
+        middle = (lowest + highest) / 2
         x, y, z = ((points - middle) @ axis for axis in (right, up, back))
         # Not at the very tip of a needle that points at the viewer.
-        distance, shift = z.max() + _NEAREST * np.ptp(points, axis=0).max(), []
+        distance, shift = z.max() + _NEAREST * (highest - lowest).max(), []
         for offset, share in ((x, half[0]), (y, half[1])):
             slope = share * (1 - 2 * self.margin)
             high, low = (slope * z + offset).max(), (slope * z - offset).max()

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from partwright.render.camera import View
-from partwright.rows import units
+from partwright.rows import corners, units
 from partwright.shapes.corner_normals import corner_normals, face_normals
 
 _MISS = -1
@@ -23,7 +23,7 @@ class Scene:
 
         self.vertices = np.asarray(vertices, dtype=np.float64)
         self.faces = np.asarray(faces, dtype=np.int64)
-        self.lower, self.upper = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        self.lower, self.upper = corners(self.vertices)
         # Embree works in float32: bring the mesh to a size and place where that is enough.
         self._centre = (self.lower + self.upper) / 2
         self._scale = 2.0 / max(float((self.upper - self.lower).max()), np.finfo(float).tiny)

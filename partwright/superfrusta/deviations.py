@@ -152,7 +152,7 @@ def _of_voxels(
     mostly cut away.
     """
     points, distance = samples.lattice
-    field = samples.distance_of(rows, points)
+    field = samples.lattice_field(rows)
     beside = np.flatnonzero((field > 0) & (field < samples.grid.spacing) & (distance - field > _CLOSE))
     onto, arrived = _arrived(samples, rows, points[beside], field[beside])
     wrong = np.where(distance < 0, field, -field) > np.where(distance < -_DEEP, _SLIVER, _BESIDE / 2)

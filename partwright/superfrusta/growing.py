@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from partwright.fields import kernel
 from partwright.fields.columns import Column
+from partwright.rows import corners
 from partwright.superfrusta import solid_starts
 from partwright.superfrusta.families import locked_values, with_locked_values
 from partwright.superfrusta.initialisation import starts
@@ -154,19 +155,20 @@ def carve(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Gro
 def _grown(samples: FitSamples, wanted: list[Region], rows: Rows, settings: Settings, most: int) -> Grown:
     if not wanted or most <= 0:
         return Grown(NOTHING, NOTHING)
+    field = samples.field(rows)  # which all regions are fitted beside
     candidates = fit_regions(samples, wanted, settings)
-    return _select(samples, candidates, rows, settings.price / _PRICE_DIVISOR, most)
+    return _select(samples, candidates, rows, field < 0, settings.price / _PRICE_DIVISOR, most)
 
 
 def _view(samples: FitSamples, region: Region, points: NDArray[np.float32]) -> View:
     """points: (n, 3) the region's voxels."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = corners(points)
     margin = max(0.06, region.margin * float((high - low).max()))
     index = samples.within(low - margin, high + margin)
     if len(index) > _MOST_SAMPLES:
         index = index[np.linspace(0, len(index) - 1, _MOST_SAMPLES).astype(np.int64)]
     index = np.concatenate([index, samples.far_indices])
-    background = samples.distance_of(region.others, samples.points[index])
+    background = samples.field_at(region.others, index)
     weight = samples.weight[index].copy()
     wrong = (background < 0) != samples.inside[index]
     missed = samples.inside[index] if region.sign > 0 else ~samples.inside[index]
@@ -275,15 +277,17 @@ def _run(
     )
 
 
-def _select(samples: FitSamples, candidates: Rows, rows: Rows, price: float, most: int) -> Grown:
-    """Greedy choice: whichever candidate raises R most joins, until none pays its price.
+def _select(
+    samples: FitSamples, candidates: Rows, rows: Rows, covered: NDArray[np.bool_], price: float, most: int
+) -> Grown:
+    """Greedy choice beside rows that cover samples (N,): whichever candidate raises R most joins, until none
+    pays its price.
 
     What is added may join before the parts that are subtracted, or after them.
     """
     occupied = samples.covered_by(candidates, samples.points)
     added, cuts = candidates[:, Column.SIGN, None] > 0, rows[rows[:, Column.SIGN] < 0]
     carved = samples.covered_by(cuts, samples.points).any(axis=0) if len(cuts) else None
-    covered = samples.field(rows) < 0
     chosen: list[tuple[bool, int]] = []
     current = float(occupancy_score(samples, covered))
     while len(chosen) < most:

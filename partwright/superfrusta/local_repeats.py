@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,12 +76,14 @@ class _Forms:
         in the same steps for as long as it is."""
         ways = list(self.onto_others(base))
         kept: list[Isometry] = []
-        places = [self.middles[base], *self.middles[: self.locked]]
-        for one in (*ways, *(power for way in ways for power in self.powers(base, way))):
+        taken, there = [self.middles[base], *self.middles[: self.locked]], list[Floats]()
+        for one in chain(ways, chain.from_iterable(self.powers(base, way, there) for way in ways)):
             place = self.place(base, one)
-            if len(kept) < _MOST and np.linalg.norm(np.array(places) - place, axis=1).min() > _ONE_PLACE:
+            if _apart(place, [*taken, *there]) > _ONE_PLACE:
                 kept.append(one)
-                places.append(place)
+                there.append(place)
+            if len(kept) == _MOST:
+                break
         return tuple(kept)
 
     def nearly(self, base: int, isometries: Sequence[Isometry]) -> Iterator[tuple[Isometry]]:
@@ -90,16 +93,18 @@ class _Forms:
             if self.there(base, there):
                 yield (there,)
 
-    def powers(self, base: int, way: Isometry) -> Iterator[Isometry]:
+    def powers(self, base: int, way: Isometry, known: Sequence[Floats]) -> Iterator[Isometry]:
         """Of a move and of its inverse, for as long as each leads where what the part stands for is, and not
-        back to the part."""
+        back to the part; but for those to a place that is `known`, which all powers of a turn lead to again
+        and again."""
         for step in (way, way.inverse()):
             power = step
-            while np.linalg.norm(self.place(base, power) - self.middles[base]) > _ONE_PLACE:
-                there = self.refined(base, power, self.tolerance / 2)
-                if not self.there(base, there):
-                    break
-                yield there
+            while _apart(self.place(base, power), [self.middles[base]]) > _ONE_PLACE:
+                if _apart(self.place(base, power), known) > _ONE_PLACE / 2:
+                    there = self.refined(base, power, self.tolerance / 2)
+                    if not self.there(base, there):
+                        break
+                    yield there
                 power = step @ power
 
     def place(self, base: int, isometry: Isometry) -> Floats:
@@ -173,3 +178,8 @@ class _Forms:
     def extents(self) -> Floats:
         """(M, 3) along the parts' own axes, the shortest first."""
         return np.sort(np.ptp(np.einsum("mji,mkj->mki", self.frames, self.own), axis=1), axis=1)
+
+
+def _apart(place: Floats, others: Sequence[Floats]) -> float:
+    """How far a place (3,) is from the nearest of others."""
+    return min((float(np.linalg.norm(place - other)) for other in others), default=np.inf)

@@ -286,7 +286,7 @@ class Mending:
         near = np.linalg.norm(off.points - place, axis=1) < _ABOUT
         about = off.points[near & (off.distance > 0)]
         low, high = about.min(axis=0) - off.off[worst], about.max(axis=0) + off.off[worst]
-        return carve(self.samples.about(low, high), rows, self.settings, _HOLES).last
+        return carve(self.samples.about(low, high, rows), rows, self.settings, _HOLES).last
 
     def fitted(self, voxels: Mask, others: Rows, like: NDArray[np.float32], under: bool = False) -> Rows:
         """The best part (1, 17) for the voxels, beside the others and before those that are subtracted if it

@@ -28,9 +28,12 @@ def surface_points(rows: Rows) -> Floats:
     q, z = _profile(params)
     x, y = _outline(params, q)
     bent_x, bent_z = _bent(params, x, np.broadcast_to(z[:, :, None], x.shape))
-    local = np.stack([bent_x, y, bent_z], axis=-1).reshape(len(rows), -1, 3)
-    turn = Rotation.from_quat(params[:, ROTATION], scalar_first=True).as_matrix()
-    return np.asarray(np.einsum("mij,mkj->mki", turn, local) + params[:, None, TRANSLATION])
+    turn = Rotation.from_quat(params[:, ROTATION], scalar_first=True).as_matrix()[..., None, None]
+    points = np.empty((*x.shape, 3))
+    for i, offset in enumerate(params[:, TRANSLATION].T):  # by columns: rows of three are slow to loop over
+        turned = turn[:, i, 0] * bent_x + turn[:, i, 1] * y + turn[:, i, 2] * bent_z
+        points[..., i] = turned + offset[:, None, None]
+    return points.reshape(len(rows), -1, 3)
 
 
 def _profile(params: Floats) -> tuple[Floats, Floats]:

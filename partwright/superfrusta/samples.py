@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,6 +35,7 @@ _STRAY = 0.05  # unit lengths: what an assembly covers further than this from th
 _LOCAL_CELLS = 40  # of a local grid, along the longest side
 _LOCAL_ROOM = 0.15  # of that side: how much further than the place the grid goes
 _LOCAL_SAMPLES = 6000
+_EXACT_WITHIN = 1.6  # voxels from the surface: between voxels that are, all are exact
 _FAR = 0.1  # unit lengths from the shape
 _NOT_FAR = 0.3
 _FAR_COUNT = 400  # about so many samples stand for all that are far
@@ -71,6 +72,7 @@ class FitSamples:
     """(n, 3) points of the shape's surface that can be seen, as many to each unit of area."""
     growth: int = 0
     """Which of several growths they serve: each optimises on others of them."""
+    _last: dict[bytes, NDArray[np.float32]] = field(default_factory=dict, init=False, compare=False)
 
     @classmethod
     def of(
@@ -156,15 +158,22 @@ class FitSamples:
         known = _cell(self.points[np.abs(self.points).max(axis=1) > _HALF_SIDE]) - first
         return known[((known >= 0) & (known < counts)).all(axis=1)].T
 
-    def about(self, low: NDArray[np.floating], high: NDArray[np.floating]) -> FitSamples:
-        """These and more, with another grid, a little beyond the box between two corners (3,)."""
+    def about(
+        self, low: NDArray[np.floating], high: NDArray[np.floating], carved: Rows | None = None
+    ) -> FitSamples:
+        """These and more, with another grid, a little beyond the box between two corners (3,).
+
+        carved: the assembly from which something is to be subtracted there. The grid then holds what that
+        takes, and the shape's exact distance only where it is needed.
+        """
         room = _LOCAL_ROOM * float((high - low).max())
         low, high = low - room, high + room
         spacing = float((high - low).max()) / _LOCAL_CELLS
         counts = np.maximum(np.ceil((high - low) / spacing).astype(int), 4)
         origin = (low + high - spacing * (counts - 1)) / 2
         places = (origin + spacing * grid_indices(counts)).astype(np.float32)
-        grid = DistanceGrid(origin, spacing, self.measure(places).reshape(counts))
+        values = self.measure(places) if carved is None else self._where_covered(carved, places, spacing)
+        grid = DistanceGrid(origin, spacing, values.reshape(counts))
         drawn = np.random.default_rng(self.seed).uniform(low, high, (_LOCAL_SAMPLES, 3))
         local = drawn.astype(np.float32)
         return replace(
@@ -175,9 +184,28 @@ class FitSamples:
             grid=grid,
         )
 
+    def _where_covered(self, rows: Rows, places: NDArray[np.float32], spacing: float) -> NDArray[np.float32]:
+        """Signed distance (n,) of the shape at places (n, 3), as far as it says what rows cover too much.
+
+        That is max(F, -S), within a voxel of it (growing._pieces). What is read off the whole grid is enough
+        where it tells the shape's sign, unless it may decide that.
+        """
+        grid, field, read = self.grid, self.distance_of(rows, places), self.near_distance(places)
+        # A distance between voxels is no further from theirs than they are, and far off these are rough.
+        wrong = grid.spacing * np.where(np.abs(read) < _EXACT_WITHIN * grid.spacing, 0.87, 1.87)
+        cell = (places - grid.origin) / grid.spacing
+        between = ((cell >= 0) & (cell <= np.array(grid.values.shape) - 1)).all(axis=1)
+        decides = (field <= spacing) & ~(between & (read - wrong > np.maximum(-field, spacing + field)))
+        outside = (read > wrong) & ~decides
+        inside = (read < -wrong) & ((field > spacing) | (read + wrong < -spacing))
+        asked = np.flatnonzero(~(outside | inside))
+        read[asked] = self.measure(places[asked])
+        return read
+
     def stray_weight(self, rows: Rows) -> NDArray[np.float64]:
         """Weight (M,) of the probes that each part alone covers, as they would have it as samples."""
-        hits = np.count_nonzero(self.covered_by(rows, self.probes), axis=1)
+        # Row by row: along an axis NumPy counts by adding, which takes ten times as long.
+        hits = np.array([np.count_nonzero(row) for row in self.covered_by(rows, self.probes)], np.int64)
         return np.asarray(hits * self._probe_weight, dtype=np.float64)
 
     @property
@@ -221,6 +249,19 @@ class FitSamples:
         index = np.concatenate([inside, outside])
         return self.grid_points[index], values[index]
 
+    def lattice_field(self, rows: Rows) -> NDArray[np.float32]:
+        """Distance (n,) of the assembly on the lattice, for which it is asked brick by brick."""
+        order, points = self._lattice_bricks
+        field = np.empty(len(order), np.float32)
+        field[order] = self.distance_of(rows, points)
+        return field
+
+    @cached_property
+    def _lattice_bricks(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        points, _ = self.lattice
+        order = morton_order(points)
+        return order, points[order]
+
     @cached_property
     def voxel(self) -> NDArray[np.int64]:
         """Index into grid.values.ravel() of the voxel that each sample lies in (or is nearest to)."""
@@ -262,8 +303,20 @@ class FitSamples:
         return Target(self.points[index], self.distance[index], weight / max(float(weight.sum()), 1e-9))
 
     def field(self, rows: Rows) -> NDArray[np.float32]:
-        """Distance (N,) of the assembly at the samples."""
-        return self.distance_of(rows, self.points)
+        """Distance (N,) of the assembly at the samples. Of the one that was asked for last it is known: a
+        search asks for its score, its IoU and whether it is the best."""
+        key = rows.tobytes()
+        known = self._last.get(key)
+        if known is None:
+            known = self.distance_of(rows, self.points)
+            self._last.clear()
+            self._last[key] = known
+        return known
+
+    def field_at(self, rows: Rows, index: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Distance (n,) of the assembly at some of the samples."""
+        known = self._last.get(rows.tobytes())
+        return self.distance_of(rows, self.points[index]) if known is None else known[index]
 
     def grid_field(self, rows: Rows) -> NDArray[np.float32]:
         """Distance (X, Y, Z) of the assembly on the grid."""

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from partwright.approximation.collision import geometries
-from partwright.approximation.separation import separated
+from partwright.approximation.separation import _Meetings, separated
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.export import export
 from partwright.export.mjcf import GEOMS
@@ -126,6 +126,25 @@ def test_what_no_cutter_reaches_is_left_alone() -> None:
     assert found[1] == ball
     assert isinstance(found[0], Assembly)
     assert [one.name for one in found[0].parts] == ["block", "hole"]
+
+
+@pytest.mark.parametrize("apart", [0.3, 0.9, 1.0, 1.1, 1.3])
+def test_what_meets_by_distance_meets_as_solids(apart: float) -> None:
+    """Or is left to the solids, where they are near to each other."""
+    rng = np.random.default_rng(0)
+    for turn, way in rng.normal(size=(6, 2, 4)):
+        rotation = tuple((turn / np.linalg.norm(turn)).tolist())
+        place = tuple((apart * way[:3] / np.linalg.norm(way[:3])).tolist())
+        one = Part(SuperFrustum((1, 0.8, 1.2), 0.4, taper=0.7), rotation=rotation)
+        other = Part(SuperFrustum((0.9, 0.9, 0.9), 0.9, bulge=0.3), place)
+        meetings = _Meetings()
+        first, second = meetings.solid(one), meetings.solid(other)
+        assert first is not None
+        assert second is not None
+        assert meetings.of(one, other) == ((first ^ second).volume() > 0)
+        quick = _Meetings()
+        quick.of(one, other)
+        assert bool(quick.known) <= (apart > 0.3)  # deep within each other, neither is meshed
 
 
 def test_nothing_left() -> None:

@@ -37,6 +37,43 @@ def test_the_field_on_the_grid_is_that_of_its_points(box: FitSamples) -> None:
     np.testing.assert_array_equal(box.grid_field(bar(1.0)), field)
 
 
+def test_the_field_on_the_lattice_is_that_of_its_points(box: FitSamples) -> None:
+    points, _ = box.lattice
+    np.testing.assert_array_equal(box.lattice_field(bar(1.0)), box.distance_of(bar(1.0), points))
+
+
+def test_the_field_is_that_of_the_assembly_that_is_asked_for(box: FitSamples) -> None:
+    for reach in (1.0, 1.0, 0.7, 1.0):
+        np.testing.assert_array_equal(box.field(bar(reach)), box.distance_of(bar(reach), box.points))
+    some = np.arange(5, len(box.points), 7)
+    for reach in (1.0, 0.6):  # of which the first is known
+        at = box.distance_of(bar(reach), box.points[some])
+        np.testing.assert_array_equal(box.field_at(bar(reach), some), at)
+    more = box.with_stray_samples(bar(1.0))
+    assert len(more.field(bar(1.0))) == len(more.points) > len(box.points)
+
+
+def test_a_grid_to_carve_by_is_exact_where_that_takes_it() -> None:
+    """What is covered too much is max(F, -S): there, beside it and in its sign all is as in the slow grid."""
+    ring = trimesh.creation.annulus(0.12, 0.9, 0.6, sections=40)
+    samples = FitSamples.of(load_shape(ring), SETTINGS)
+    disc = np.zeros((1, WIDTH), np.float32)
+    disc[0, [Column.QW, Column.TAPER, Column.SIGN, Column.ROUNDNESS]] = 1.0
+    disc[0, SIZE] = 1.7, 1.7, 0.6
+    corner = np.array([0.3, 0.25, 0.35])
+    slow, quick = samples.about(-corner, corner), samples.about(-corner, corner, disc)
+    field, spacing = slow.grid_field(disc), slow.grid.spacing
+    wanted, found = (np.maximum(field, -one.grid.values) for one in (slow, quick))
+    beside = wanted < spacing
+    assert np.count_nonzero(wanted < 0) > 1000
+    np.testing.assert_array_equal(found < spacing, beside)
+    np.testing.assert_array_equal(found[beside], wanted[beside])
+    assert quick.inside_voxels == slow.inside_voxels
+    missed = [(one.grid.values - field > spacing)[beside] for one in (slow, quick)]
+    np.testing.assert_array_equal(*missed)
+    assert (quick.grid.values != slow.grid.values).mean() > 0.2  # or nothing would be saved
+
+
 def test_an_assembly_that_stays_near_the_shape_brings_no_samples(box: FitSamples) -> None:
     assert box.with_stray_samples(bar(0.3)) is box
     assert box.stray_weight(bar(0.3)).tolist() == [0.0, 0.0]
