@@ -37,6 +37,7 @@ _TWICE = 0.02  # unit lengths off at which a sample weighs twice
 _HEAVIEST = 25.0  # times that a sample may weigh
 _SAME_PLACE = 0.02  # unit lengths
 _WORTH_A_TRY = 1e-3  # of the objective
+_IN_VAIN = 8  # tries in a row, after which none bears fruit: parts that are left are less far off
 _AGAIN = 0.01  # of the objective: after so much progress what was given up is tried again
 _STAGES: Stages = ((40.0, 4), (100.0, 5))
 _HOPELESS = 0.02  # of the objective: what is so much worse after a refit goes no further
@@ -76,18 +77,22 @@ class Mending:
         best = self.trial(rows)
         given_up: list[tuple[NDArray[np.float32], float]] = []
         part: int | None = None
+        vain = 0  # tries in a row
         for _ in range(self.settings.mends + 1):
             trials = [self.firmed(best, _all(best.rows))] if part is None else self.ways(best, part)
             allowed = (trial for trial in trials if self.allowed(trial.rows, rows))
             found = max(allowed, key=lambda trial: trial.value, default=best)
-            if part is not None and found.value < best.value + _WORTH_A_TRY:
+            if part is None or found.value >= best.value + _WORTH_A_TRY:
+                vain = 0
+            else:
+                vain += 1
                 given_up.append((best.off.points[best.off.worst(part)], best.value))
             if found.value > best.value:
                 best = found
                 if self.told is not None:
                     self.told(best.rows)
             part = next_to_mend(best, given_up)
-            if part is None:
+            if part is None or vain == _IN_VAIN:
                 break
         slim = self.slimmed(self.joined(best))
         polished = self.trial(refine(self.samples, slim.rows, POLISH, self.settings, self.free(slim.rows)))

@@ -6,7 +6,7 @@ explains more than stopping early.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
@@ -36,7 +36,8 @@ from partwright.superfrusta.symmetry import NEARLY, symmetries
 GROWTH_ALPHA = 1e-3
 PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
 _TRAILING = 0.05  # of the objective, at the same number of parts: what is so far behind is given up
-_HOPELESS = 0.06  # of the objective: what lacks more when it is grown gains too little by being thinned
+_THINNED = 0.04  # of the objective: hardly any assembly gains more by being thinned
+_PACE = 3  # rounds that say how fast growth is
 MENDED = 0.9  # of the work is done when mending begins
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
 
@@ -123,8 +124,7 @@ class ResidualFit:
         if self.settings.subtract and not len(start) and self.rival is None:
             start = Carving(self).started()
         rows, converged = self.growth(start, range(first, self.settings.rounds))
-        hopeless = self.rival is not None and self.best_objective < self.rival - _HOPELESS
-        if not hopeless and not self.trailing:
+        if not self.trailing and not self.out_of_reach(self.best_objective):
             self.thin(rows)
         return converged
 
@@ -155,7 +155,7 @@ class ResidualFit:
             with self.timed("optimise"):
                 rows = optimise(self.samples, rows, FINE, settings, self.locked)
             self.keep(rows, "start", 0)
-        stale = 0
+        stale, reached = 0, [self.best_objective]
         for round_ in rounds:
             with self.timed("grow"):
                 most = settings.at_once(round_, settings.regions)
@@ -168,7 +168,9 @@ class ResidualFit:
             with self.timed("prune"):
                 rows = prune(self.samples, rows, min(GROWTH_ALPHA, settings.price), self.locked)
             stale = 0 if self.keep(rows, "grow", round_ + 1) else stale + 1
-            if stale >= settings.patience or self.trailing:
+            reached.append(self.best_objective)
+            hopeless = self.trailing or self.too_slow(reached, rounds.stop - round_ - 1)
+            if stale >= settings.patience or hopeless:
                 return rows, True
             if settings.min_iou is not None and volume_iou(self.samples, rows) > settings.min_iou + _SPARE:
                 return rows, True
@@ -180,6 +182,22 @@ class ResidualFit:
         if self.best is None:
             return False
         return self.is_behind(self.reached_before.lead(len(self.best), self.best_objective))
+
+    def out_of_reach(self, objective: float) -> bool:
+        """Whether what has grown to an objective will not have its rival's, if there is one, thinned out."""
+        return self.rival is not None and objective + _THINNED < self.rival
+
+    def too_slow(self, reached: Sequence[float], rounds: int) -> bool:
+        """Whether an attempt to carve, with as many parts no better than those before it, has its rival out
+        of reach at the pace of its last rounds. reached: the best after each; rounds: those to come.
+
+        One that is better with as many parts may yet find what it is about: a cut that empties a ring.
+        """
+        if self.best is None or len(reached) <= _PACE:
+            return False
+        pace = (reached[-1] - reached[-1 - _PACE]) / _PACE
+        behind = self.reached_before.lead(len(self.best), self.best_objective) < 0
+        return behind and self.out_of_reach(reached[-1] + rounds * pace)
 
     @staticmethod
     def is_behind(lead: float) -> bool:

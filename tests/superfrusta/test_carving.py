@@ -9,6 +9,7 @@ from partwright.methods import Run
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Settings, carving
 from partwright.superfrusta.carving import Carving
+from partwright.superfrusta.frontier import Frontier
 from partwright.superfrusta.objective import volume_iou
 from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
@@ -71,3 +72,30 @@ def test_what_is_far_behind_with_as_many_parts_is_not_gone_on_with(monkeypatch: 
     search.reached.add(1, 2.0)
     assert Carving(search).tried(cut)
     assert len(search.history) == told
+
+
+@pytest.mark.parametrize(
+    ("pace", "rounds", "others", "given_up"),
+    [
+        pytest.param(0.01, 3, 0.7, True, id="too slow"),
+        pytest.param(0.05, 3, 0.7, False, id="quick enough"),
+        pytest.param(0.01, 12, 0.7, False, id="time enough"),
+        pytest.param(0.01, 3, 0.5, False, id="better with as many parts"),
+    ],
+)
+def test_an_attempt_that_its_pace_leaves_behind_is_given_up(
+    table_search: ResidualFit, pace: float, rounds: int, others: float, given_up: bool
+) -> None:
+    search = table_search
+    search.best, search.best_objective, search.rival = np.repeat(SLAB, 8, axis=0), 0.6, 0.75
+    search.reached_before = Frontier([(4, 0.4), (8, others), (12, 0.8)])
+    reached = [0.6 - pace * ago for ago in range(5, -1, -1)]
+    assert search.too_slow(reached, rounds) == given_up
+    assert not search.too_slow(reached[-2:], rounds)  # which say no pace
+    search.rival = None
+    assert not search.too_slow(reached, rounds)
+
+
+@pytest.fixture
+def table_search() -> ResidualFit:
+    return search_of(load_shape(table()))

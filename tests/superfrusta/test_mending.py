@@ -14,7 +14,7 @@ from partwright.fields.columns import WIDTH, Column
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
 from partwright.superfrusta.deviations import OUTSIDE, deviations, walked
-from partwright.superfrusta.mending import Mending, next_to_mend
+from partwright.superfrusta.mending import Mending, Trial, next_to_mend
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.samples import FitSamples
@@ -280,6 +280,23 @@ def test_what_was_given_up_is_tried_again_after_progress(samples: FitSamples, ex
     assert next_to_mend(best, []) == 2
     assert next_to_mend(best, [(place, best.value)]) is None
     assert next_to_mend(best, [(place, best.value - 0.02)]) == 2
+
+
+def test_mending_ends_when_nothing_bears_fruit_any_more(
+    samples: FitSamples, exact: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tabs = [box_row((0.1, 0.1, 0.3), (x, 0.3, 0.3)) for x in np.linspace(-0.8, 0.2, 11)]
+    rows = np.vstack([exact, *tabs])
+    tried: list[int] = []
+
+    def in_vain(mending: Mending, best: Trial, part: int) -> list[Trial]:
+        tried.append(part)
+        return []
+
+    monkeypatch.setattr(Mending, "ways", in_vain)
+    monkeypatch.setattr(Mending, "firmed", lambda mending, given, moving: given)
+    Mending(samples, dataclasses.replace(SETTINGS, mends=16))(rows)
+    assert len(tried) == len(set(tried)) == 8
 
 
 def test_a_sheet_over_a_hole_is_off_although_it_passes_between_voxels() -> None:
