@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from partwright.fields.columns import ROTATION, Column
+from partwright.rows import lengths
 from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.repeat_candidates import Occupancies, Repeat, without_twins
 from partwright.superfrusta.samples import FitSamples, Rows
@@ -95,16 +96,17 @@ class _Forms:
 
     def powers(self, base: int, way: Isometry, known: Sequence[Floats]) -> Iterator[Isometry]:
         """Of a move and of its inverse, for as long as each leads where what the part stands for is, and not
-        back to the part; but for those to a place that is `known`, which all powers of a turn lead to again
-        and again."""
+        back to the part. Those to a place that is `known`, where powers of a turn lead again and again, are
+        not refined where they need not be."""
         for step in (way, way.inverse()):
             power = step
             while _apart(self.place(base, power), [self.middles[base]]) > _ONE_PLACE:
-                if _apart(self.place(base, power), known) > _ONE_PLACE / 2:
+                there = power
+                if _apart(self.place(base, power), known) > _ONE_PLACE / 2 or not self.there(base, power):
                     there = self.refined(base, power, self.tolerance / 2)
-                    if not self.there(base, there):
-                        break
-                    yield there
+                if not self.there(base, there):
+                    break
+                yield there
                 power = step @ power
 
     def place(self, base: int, isometry: Isometry) -> Floats:
@@ -182,4 +184,4 @@ class _Forms:
 
 def _apart(place: Floats, others: Sequence[Floats]) -> float:
     """How far a place (3,) is from the nearest of others."""
-    return min((float(np.linalg.norm(place - other)) for other in others), default=np.inf)
+    return float(lengths(np.array(others) - place).min()) if others else np.inf
