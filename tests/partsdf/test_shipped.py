@@ -75,7 +75,7 @@ def test_training_shapes_are_those_that_were_made(shipped: Model) -> None:
     assert np.mean(ious) > LEAST[shipped.name]
 
 
-@pytest.mark.parametrize(("name", "closer"), [("chairs", 1.5), ("cars", 1.15)])
+@pytest.mark.parametrize(("name", "closer"), [("chairs", 1.5), ("cars", 1.15), ("vehicles", 1.15)])
 def test_a_shape_is_seen_in_one_picture(name: str, closer: float) -> None:
     """Shapes that no training saw, each from another side: closer than the mean shape, and where from."""
     encoder = load_image_encoder(load_model(name))
