@@ -36,7 +36,7 @@ from partwright.superfrusta.symmetry import NEARLY, symmetries
 GROWTH_ALPHA = 1e-3
 PROGRESS = 1e-3  # rise of the objective below which a round counts as stale
 _TRAILING = 0.05  # of the objective, at the same number of parts: what is so far behind is given up
-_THINNED = 0.04  # of the objective: hardly any assembly gains more by being thinned
+_THINNED = 0.06  # of the objective: hardly any assembly gains more by being thinned
 _PACE = 3  # rounds that say how fast growth is
 MENDED = 0.9  # of the work is done when mending begins
 _SPARE = 0.01  # IoU that growth goes beyond a target, for thinning to spend
