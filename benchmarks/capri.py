@@ -41,7 +41,7 @@ VOXELS = 64  # along a side of [-1, 1]^3 (section 4.2)
 POINTS = 8192  # section 4.3
 
 NOTES = (  # what the present table is made of; to be taken out when all of its rows are run anew
-    "From the mesh and from points: run after convexes alike became copies of one, and after places far",
+    "From the mesh, voxels and points: run after convexes alike became copies of one, and after places far",
     "off are mended; the other rows lack both, and their seconds are those of a slower machine.",
 )
 
