@@ -13,10 +13,13 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from partwright.approximation.sketches.bodies import bodies
+from partwright.assembly import Assembly
+from partwright.meshing.csg import solid_of
 from partwright.meshing.manifolds import surface_of
 from partwright.metrics.deviation import buried
+from partwright.rows import units
 from partwright.shapes import MeshDistance
-from partwright.shapes.topology import EdgeTable, signed_volumes
+from partwright.shapes.topology import EdgeTable, area_vectors, signed_volumes
 from partwright.superfrusta.feature_mending import FAR
 
 Floats = NDArray[np.float64]
@@ -27,6 +30,8 @@ NEARLY = 0.95
 _REGION = 0.75  # of `FAR`: what is as far belongs to the place
 _SPACING = 0.03  # unit lengths between points of a surface
 _FINE = 60_000  # triangles of a surface that is as fine
+CHORD = 1e-3
+"""Unit lengths."""
 _ONE = 0.07  # unit lengths between points of one place, at most
 _ON = 1e-6  # unit lengths: what is as near to a box's sides lies on them
 _CRUMB = 1e-5  # of the volume: a body that is smaller is rounding
@@ -60,6 +65,11 @@ class Solid:
     body: Manifold
     distance: Distance
 
+    @classmethod
+    def of(cls, whole: Assembly) -> Solid:
+        """Of an assembly with an exact mesh, in unit lengths."""
+        return cls(solid_of(whole, CHORD), whole.distance)
+
     def points(self, box: Floats | None = None) -> Floats:
         """(N, 3) of its surface, within a box (2, 3) if one is given."""
         body = self.body
@@ -72,8 +82,19 @@ class Solid:
         return found[((found > box[0] + _ON) & (found < box[1] - _ON)).all(axis=1)]
 
     @cached_property
+    def mesh(self) -> tuple[Floats, NDArray[np.int64]]:
+        """Vertices (V, 3) and faces (F, 3)."""
+        return surface_of(self.body)
+
+    @cached_property
+    def walls(self) -> Floats:
+        """(F, 3) unit normals of its faces."""
+        vertices, faces = self.mesh
+        return units(area_vectors(vertices[faces]))
+
+    @cached_property
     def surface(self) -> MeshDistance:
-        vertices, faces = surface_of(self.body)
+        vertices, faces = self.mesh
         return MeshDistance(vertices, faces, faces, True)
 
     def away(self, points: Floats) -> NDArray[np.floating]:
@@ -89,7 +110,7 @@ class Solid:
     @cached_property
     def count(self) -> int:
         """Connected bodies, crumbs left out; such as touch along an edge are one, as they are in a mesh."""
-        vertices, faces = surface_of(self.body)
+        vertices, faces = self.mesh
         same = np.unique(vertices, axis=0, return_inverse=True)[1].reshape(-1)[faces]
         volume = signed_volumes(vertices, faces, EdgeTable(same).bodies)
         return int((volume > _CRUMB * self.body.volume()).sum())
@@ -97,7 +118,7 @@ class Solid:
     @cached_property
     def cavities(self) -> list[Floats]:
         """(N, 3) the corners of each."""
-        vertices, faces = surface_of(self.body)
+        vertices, faces = self.mesh
         label = EdgeTable(faces).bodies
         volume = signed_volumes(vertices, faces, label)
         found = np.flatnonzero(volume < -_VOID * self.body.volume())

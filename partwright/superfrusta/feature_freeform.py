@@ -19,6 +19,7 @@ from partwright.approximation.sketches.terraces import terraces
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.meshing.csg import solid_of
 from partwright.superfrusta.far_places import (
+    CHORD,
     NEARLY,
     Place,
     Solid,
@@ -44,7 +45,6 @@ _LOOKED = 0.1  # unit lengths around a place that is looked at again
 _BETTER = 0.9  # of what a place was off, that it may be when mended
 _LOSS = 3e-3  # of R, that mending one place may cost
 _JOINED = 0.1  # of the share of the volume that floats, which joining it may cost of R besides
-_CHORD = 1e-3  # unit lengths
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def with_freeform(
     tree = replace(tree, covered=covered, score=search.score_of(covered))
     given_up: list[Place] = []
     for _ in range(_PLACES):
-        other = _solid(made(tree))
+        other = Solid.of(made(tree))
         places = [
             place
             for place in (*far_places(shape, other), *loose_places(shape, other))
@@ -102,12 +102,8 @@ def with_freeform(
 
 def far_off(search: FeatureSearch, whole: Assembly) -> float:
     """How far an assembly in the unit frame is off where it is far off, unit lengths; else 0."""
-    places = far_places(Solid(search.body, search.samples.measure), _solid(whole))
+    places = far_places(Solid(search.body, search.samples.measure), Solid.of(whole))
     return max((place.off for place in places), default=0.0)
-
-
-def _solid(whole: Assembly) -> Solid:
-    return Solid(solid_of(whole, _CHORD), whole.distance)
 
 
 def _tries(
@@ -164,7 +160,7 @@ def _joined(
     price = tree.price + (_DEARER if freeform else 1.0) * search.alpha * len(parts)
     tree = replace(tree, features=[*tree.features, *features], covered=covered, score=score, price=price)
     for part in parts:
-        whole = solid_of(part, _CHORD)
+        whole = solid_of(part, CHORD)
         body = body + whole if place.lacks else body - whole
 
     def distance(points: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -189,7 +185,7 @@ def _left(shape: Solid, solid: Solid, place: Place, others: Sequence[Place]) -> 
     known = (
         other.off for other in others if (other.box[0] < around[1]).all() and (other.box[1] > around[0]).all()
     )
-    if off > max(known, default=0.0) + _CHORD:
+    if off > max(known, default=0.0) + CHORD:
         return off
     return reach(shape, solid, place.box + np.array([[-_AROUND], [_AROUND]]))
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
 from partwright.meshing.csg import solid_of
-from partwright.superfrusta.far_places import Solid, far_places, reach
+from partwright.superfrusta.far_places import CHORD, Solid, far_places, reach
 from partwright.superfrusta.feature_pruning import fold_of_masks, mask_of
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, with_open_ends_everywhere
 
@@ -29,7 +29,6 @@ SEEN = 0.018
 _LITTLE = 2.0  # prices of a feature, that what goes explains at most
 _AROUND = 2 * SEEN  # unit lengths around a feature that are looked at; others matter twice as far
 _FURTHER = 4e-3  # unit lengths, by which what is further off already may be so still more
-_CHORD = 1e-3  # unit lengths
 _TRIES = 5  # times that what is made is looked at
 
 
@@ -44,10 +43,10 @@ def thinned(search: FeatureSearch, tree: FeatureTree, made: Callable[[FeatureTre
     if not gone:
         return tree
     shape = Solid(search.body, search.samples.measure)
-    bodies = _solid(made(tree)).count
+    bodies = Solid.of(made(tree)).count
     for _ in range(_TRIES):
         thinner = _without(search, tree, gone)
-        result = _solid(made(thinner))
+        result = Solid.of(made(thinner))
         off = [place for place in far_places(shape, result) if place.off > tree.off + _FURTHER]
         if not off and result.count <= bodies:
             return thinner
@@ -99,10 +98,6 @@ def _reaches(feature: Feature, box: NDArray[np.float64]) -> bool:
     return any((low - _AROUND < box[1]).all() and (high + _AROUND > box[0]).all() for low, high in ends)
 
 
-def _solid(whole: Assembly) -> Solid:
-    return Solid(solid_of(whole, _CHORD), whole.distance)
-
-
 class _Bodies:
     """The features of a tree as bodies, whose folds are held against the shape. Open ends go on outside, as
     in what is made of them: a hole in a round wall that ends flat leaves a skin over its mouth."""
@@ -111,7 +106,7 @@ class _Bodies:
         measure = search.samples.measure
         rest = [with_open_ends_everywhere(feature, measure) for feature in features[1:]]
         self._search, self._features = search, [*features[:1], *rest]
-        self._wholes = [[solid_of(part, _CHORD) for part in feature.parts] for feature in self._features]
+        self._wholes = [[solid_of(part, CHORD) for part in feature.parts] for feature in self._features]
 
     def off(self, kept: Sequence[int], around: Feature) -> float:
         """How far the fold of those kept and the shape are apart around a feature, unit lengths; 0 where that

@@ -9,8 +9,11 @@ import numpy as np
 
 from partwright.assembly import Assembly
 from partwright.errors import CancelledError, EmptyShapeError
+from partwright.meshing import has_exact_mesh
 from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outcome, timed
 from partwright.shapes import Shape
+from partwright.superfrusta.far_places import Solid
+from partwright.superfrusta.feature_assembly import in_unit_frame
 from partwright.superfrusta.feature_steps import FeatureTree
 from partwright.superfrusta.featured import SURE, FeaturedFit, freeform_warnings, wants_features
 from partwright.superfrusta.hole_search import HoleSearch
@@ -106,10 +109,12 @@ def _of_features(
     history: list[dict[str, float | str]],
 ) -> Fitted:
     told = freeform_warnings(shape, whole)
-    if outcome != "interrupted":
+    if outcome != "interrupted" and has_exact_mesh(whole):
         with timed(seconds, "edges"):
-            details = left_out(shape, whole)
-            told += left_out_warnings(shape, details) + sharp_edge_warnings(shape, whole, details)
+            own = in_unit_frame(shape, whole)
+            fitted = Solid.of(own)
+            details = left_out(shape, own, fitted)
+            told += left_out_warnings(shape, details) + sharp_edge_warnings(shape, fitted, details)
     return Fitted(whole, outcome, seconds, history, warnings=told)
 
 

@@ -13,14 +13,11 @@ from numpy.typing import NDArray
 
 from partwright.approximation.part_roles import FREEFORM
 from partwright.assembly import Assembly
-from partwright.meshing import has_exact_mesh
-from partwright.meshing.csg import solid_of
-from partwright.meshing.manifolds import surface_of
 from partwright.metrics.deviation import place_in
 from partwright.rows import units
-from partwright.shapes import MeshDistance, Shape
+from partwright.shapes import Shape
 from partwright.shapes.topology import EdgeTable, area_vectors, components
-from partwright.superfrusta.feature_assembly import in_unit_frame
+from partwright.superfrusta.far_places import Solid
 from partwright.superfrusta.feature_mending import FAR
 
 _LEAST = 3e-3  # unit lengths: what is less deep is no detail; what is deeper than `FAR` is told otherwise
@@ -29,7 +26,6 @@ _ON = 1e-3  # unit lengths: what is as near to what was fitted lies on it
 _ALIKE = 0.95  # length of the mean of unit normals, and cosine, of what faces one way
 _AROUND = 0.8  # of its outline, along which the face that it is on goes on
 _GOOD = 0.95  # of the rest of the surface, that is off by less than the least: else places are other faults
-_CHORD = 1e-3  # unit lengths
 
 
 @dataclass(frozen=True)
@@ -64,14 +60,11 @@ def left_out_warnings(shape: Shape, found: Sequence[Detail]) -> tuple[str, ...]:
     )
 
 
-def left_out(shape: Shape, whole: Assembly) -> list[Detail]:
+def left_out(shape: Shape, own: Assembly, fitted: Solid) -> list[Detail]:
     """Of a shape beside what was fitted to it, the largest first; none where the fit is poor, and none of
-    what freeform steps leave."""
-    if not has_exact_mesh(whole):
-        return []
-    own = in_unit_frame(shape, whole)
+    what freeform steps leave. own: what was fitted, in the unit frame; fitted: its solid."""
     steps = [part.bounds() for part in own.parts if part.name.startswith(FREEFORM)]
-    found = _details(*shape.unit_mesh, *surface_of(solid_of(own, _CHORD)))
+    found = _details(*shape.unit_mesh, fitted)
     return [
         detail
         for detail in found
@@ -79,19 +72,13 @@ def left_out(shape: Shape, whole: Assembly) -> list[Detail]:
     ]
 
 
-def _details(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    own: NDArray[np.float64],
-    own_faces: NDArray[np.int64],
-) -> list[Detail]:
+def _details(vertices: NDArray[np.float64], faces: NDArray[np.int64], fitted: Solid) -> list[Detail]:
     corners = vertices[faces]
     normal = area_vectors(corners) / 2
     area = np.linalg.norm(normal, axis=1)
-    surface = MeshDistance(own, own_faces, own_faces, True)
-    at_middle, nearest = surface.signed_nearest(corners.mean(axis=1))
-    wall = units(area_vectors(own[own_faces]))[nearest]
-    off = np.column_stack([at_middle, surface.signed(vertices)[faces]])
+    at_middle, nearest = fitted.surface.signed_nearest(corners.mean(axis=1))
+    wall = fitted.walls[nearest]
+    off = np.column_stack([at_middle, fitted.surface.signed(vertices)[faces]])
     off = np.take_along_axis(off, np.abs(off).argmax(axis=1)[:, None], axis=1)[:, 0]
     is_off = np.abs(off) > _ON
     edges, beside = EdgeTable(faces).pairs

@@ -15,15 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from partwright.assembly import Assembly
-from partwright.meshing import has_exact_mesh
-from partwright.meshing.csg import solid_of
-from partwright.meshing.manifolds import surface_of
 from partwright.metrics.deviation import place_in
 from partwright.rows import units
-from partwright.shapes import MeshDistance, Shape
+from partwright.shapes import Shape
 from partwright.shapes.topology import EdgeTable, area_vectors, components
-from partwright.superfrusta.feature_assembly import in_unit_frame
+from partwright.superfrusta.far_places import Solid
 from partwright.superfrusta.left_out import Detail
 
 _LEAST, _MOST = 3e-3, 0.1  # unit lengths, that a strip is off in its middle
@@ -39,7 +35,6 @@ _SHARP, _SPACING = 0.77, 2e-3  # cosine between faces at a sharp edge, and unit 
 _AT_45 = np.cos(np.radians([53.0, 37.0]))  # between a chamfer and both walls
 _ALIKE = 1.15  # times another's size
 _TOLD = 4  # sizes at most
-_CHORD = 1e-3  # unit lengths
 _MANY = 60_000  # triangles, from which on only their middles are looked at
 
 
@@ -56,12 +51,10 @@ class _Strip:
         return self.name == other.name and 1 / _ALIKE < self.size / other.size < _ALIKE
 
 
-def sharp_edge_warnings(shape: Shape, whole: Assembly, details: Sequence[Detail] = ()) -> tuple[str, ...]:
-    """A sentence for each size of what was left off, the longest first. details: that are told by themselves,
-    with their walls, which may lean."""
-    if not has_exact_mesh(whole):
-        return ()
-    strips = [one for one in _strips(shape, whole) if not any(d.is_beside(one.middle) for d in details)]
+def sharp_edge_warnings(shape: Shape, fitted: Solid, details: Sequence[Detail] = ()) -> tuple[str, ...]:
+    """A sentence for each size of what was left off, the longest first. fitted: what the shape was fitted by,
+    in its unit frame. details: that are told by themselves, with their walls, which may lean."""
+    strips = [one for one in _strips(shape, fitted) if not any(d.is_beside(one.middle) for d in details)]
     found: list[list[_Strip]] = []
     for strip in sorted(strips, key=lambda strip: -strip.length):
         alike = next((group for group in found if strip.is_like(group[0])), None)
@@ -82,8 +75,8 @@ def _sentence(shape: Shape, strips: list[_Strip]) -> str:
     )
 
 
-def _strips(shape: Shape, whole: Assembly) -> list[_Strip]:
-    seen = _Seen.of(shape, whole)
+def _strips(shape: Shape, fitted: Solid) -> list[_Strip]:
+    seen = _Seen.of(shape, fitted)
     if seen.good < _GOOD:
         return []
     return [strip for index in seen.long_and_narrow() if (strip := seen.strip(index)) is not None]
@@ -109,16 +102,14 @@ class _Seen:
     around: _Around
 
     @classmethod
-    def of(cls, shape: Shape, whole: Assembly) -> _Seen:
+    def of(cls, shape: Shape, fitted: Solid) -> _Seen:
         vertices, faces = shape.unit_mesh
         corners = vertices[faces]
         middle, normal = corners.mean(axis=1), area_vectors(corners)
         halfway = [(corners[:, k] + corners[:, k - 1]) / 2 for k in range(3)] if len(faces) < _MANY else []
         points = np.stack([middle, *halfway], axis=1)
-        own = surface_of(solid_of(in_unit_frame(shape, whole), _CHORD))
-        surface = MeshDistance(*own, own[1], True)
-        signed, nearest = surface.signed_nearest(points.reshape(-1, 3))
-        off, walls = signed.reshape(points.shape[:2]), units(area_vectors(own[0][own[1]]))[nearest]
+        signed, nearest = fitted.surface.signed_nearest(points.reshape(-1, 3))
+        off, walls = signed.reshape(points.shape[:2]), fitted.walls[nearest]
         cosine = np.einsum("fki,fi->fk", walls.reshape(points.shape), units(normal))
         leans = (cosine > _LEANS[0]) & (cosine < _LEANS[1]) & (np.abs(off) > _OWN)
         deep = np.where(leans, off, 0.0)
@@ -126,8 +117,8 @@ class _Seen:
         edges, beside = EdgeTable(faces).pairs
         one, other = deep[farthest][beside].T
         label = components(len(faces), *beside[one * other > 0].T)
-        around = _Around.of(vertices, edges, label[beside], np.abs(surface.signed(vertices)))
-        beyond = _from_edges(*own, points.reshape(-1, 3)).reshape(off.shape)
+        around = _Around.of(vertices, edges, label[beside], np.abs(fitted.surface.signed(vertices)))
+        beyond = _from_edges(fitted, points.reshape(-1, 3)).reshape(off.shape)
         area = np.linalg.norm(normal, axis=1) / 2
         rest = np.where((deep == 0).all(axis=1), area, 0.0)
         good = float(rest[np.abs(off[:, 0]) < _LEAST].sum() / max(rest.sum(), 1e-300))
@@ -162,13 +153,11 @@ def _length(area: Any, depth: Any) -> Any:
     return area / (2 * math.sqrt(2) * np.maximum(depth, 1e-300))
 
 
-def _from_edges(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], points: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _from_edges(fitted: Solid, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """How far (N,) points (N, 3) are from the nearest sharp edge of a surface."""
+    vertices, faces = fitted.mesh
     edges, beside = EdgeTable(faces).pairs
-    normal = units(area_vectors(vertices[faces]))
-    cosine = np.einsum("ni,ni->n", normal[beside[:, 0]], normal[beside[:, 1]])
+    cosine = np.einsum("ni,ni->n", *fitted.walls[beside].transpose(1, 0, 2))
     start, end = vertices[edges[np.abs(cosine) < _SHARP]].transpose(1, 0, 2)
     if not len(start):
         return np.full(len(points), np.inf)

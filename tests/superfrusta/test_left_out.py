@@ -9,6 +9,8 @@ from manifold3d import CrossSection, FillRule, Manifold
 import partwright as pw
 from partwright.assembly import Assembly, Part
 from partwright.fields import Box
+from partwright.superfrusta.far_places import Solid
+from partwright.superfrusta.feature_assembly import in_unit_frame
 from partwright.superfrusta.left_out import left_out, left_out_warnings
 from partwright.superfrusta.sharp_edges import sharp_edge_warnings
 
@@ -35,9 +37,10 @@ def letters(height: float, at: float) -> Manifold:
 def told(drawn: Manifold, *found: Part) -> tuple[str, ...]:
     mesh = drawn.to_mesh64()
     shape = pw.load_shape(trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts), unit="mm")
-    whole = Assembly(found)
-    details = left_out(shape, whole)
-    return left_out_warnings(shape, details) + sharp_edge_warnings(shape, whole, details)
+    own = in_unit_frame(shape, Assembly(found))
+    fitted = Solid.of(own)
+    details = left_out(shape, own, fitted)
+    return left_out_warnings(shape, details) + sharp_edge_warnings(shape, fitted, details)
 
 
 @pytest.mark.parametrize(

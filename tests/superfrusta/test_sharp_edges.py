@@ -13,6 +13,8 @@ import partwright as pw
 from partwright.assembly import Assembly, Part
 from partwright.fields import Box, Cylinder, Extrusion, Profile
 from partwright.meshing import mesh_assembly
+from partwright.superfrusta.far_places import Solid
+from partwright.superfrusta.feature_assembly import in_unit_frame
 from partwright.superfrusta.sharp_edges import sharp_edge_warnings
 
 PLATE = Profile.rectangle(60, 40)
@@ -25,7 +27,8 @@ def told(drawn: Assembly | Manifold, *found: Part) -> tuple[str, ...]:
         surface = trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts)
     else:
         surface = mesh_assembly(drawn)
-    return sharp_edge_warnings(pw.load_shape(surface, unit="mm"), Assembly(found))
+    shape = pw.load_shape(surface, unit="mm")
+    return sharp_edge_warnings(shape, Solid.of(in_unit_frame(shape, Assembly(found))))
 
 
 @pytest.mark.parametrize(

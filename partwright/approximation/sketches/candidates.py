@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -23,6 +24,7 @@ from partwright.approximation.sketches.rods import (
     is_rod,
     rod,
     round_at_ends,
+    span,
 )
 from partwright.approximation.sketches.sections import FINE, Region, View, area_centre
 from partwright.approximation.sketches.teeth import drawn_corners
@@ -64,7 +66,7 @@ def silhouettes(body: Manifold, frames: Sequence[np.ndarray]) -> list[Candidate]
         if len(seen) == 1:
             low, high = view.levels[0], view.levels[-1]
             for one in (
-                *_extruded(view, seen[0], low, high, True),
+                *_extruded(view, seen[0].outlines(True), low, high),
                 *_rounded(view, seen[0], [(low, high)], 0, 0, True),
             ):
                 found.setdefault(one.key, one)
@@ -81,29 +83,29 @@ def _extrusions(view: View, holes: bool) -> Iterator[Candidate]:
         by_itself = list(round_at_ends(view, *slabs[i]))
         yield from drafted(view, slabs, i, holes)
         for region in _regions(view, *slabs[i]):
-            first = last = i
-            while first > 0 and goes_on(region, view.regions(middles[first - 1])):
-                first -= 1
-            while last + 1 < len(slabs) and goes_on(region, view.regions(middles[last + 1])):
-                last += 1
-            spans = {(first, last), (i, i)}
+            spans = {span(i, middles, partial(_goes_on_at, view, region)), (i, i)}
             if region.is_round and all(goes_on(o, [region]) for m in middles for o in view.regions(m)):
                 spans.add((0, len(slabs) - 1))  # the ends of a hole through a round wall are not flat
+            upright = [one for one in region.outlines(holes) if slope_of(view, one[0], slabs[i]) is None]
             for a, b in spans:
                 key = (a, b, round(region.area * 1e5))
                 if key not in done:
                     done.add(key)
-                    yield from _extruded(view, region, slabs[a][0], slabs[b][1], holes, slabs[i])
+                    yield from _extruded(view, upright, slabs[a][0], slabs[b][1])
                     yield from _rounded(view, region, slabs, a, b, holes)
             if region.is_round or is_rod(region, *slabs[i]):
                 by_itself.append((region, (middles[i], middles[i])))
         for region, heights in by_itself:
             reach = rod(view, region, slabs, i, heights)
             if reach is not None:
-                yield from _extruded(view, region, *reach, holes)
+                yield from _extruded(view, region.outlines(holes), *reach)
     seen = view.silhouette
     if len(seen) == 1 and seen[0].is_round:  # of what a drill leaves where it comes through a round wall
-        yield from _extruded(view, seen[0], slabs[0][0], slabs[-1][1], False)
+        yield from _extruded(view, seen[0].outlines(False), slabs[0][0], slabs[-1][1])
+
+
+def _goes_on_at(view: View, region: Region, height: float) -> bool:
+    return goes_on(region, view.regions(height))
 
 
 def _regions(view: View, low: float, high: float) -> Iterator[Region]:
@@ -143,17 +145,9 @@ def _corners(region: Region) -> int:
 
 
 def _extruded(
-    view: View,
-    region: Region,
-    low: float,
-    high: float,
-    holes: bool,
-    slab: tuple[float, float] | None = None,
+    view: View, outlines: Iterable[tuple[CrossSection, Profile | None]], low: float, high: float
 ) -> Iterator[Candidate]:
-    """slab: in which walls must not lean all alike, or they are no upright ones."""
-    for section, profile in region.outlines(holes):
-        if slab is not None and slope_of(view, section, slab) is not None:
-            continue
+    for section, profile in outlines:
         one = extrusion(section, profile, view.frame, low, high)
         if one is not None:
             yield one

@@ -15,7 +15,7 @@ from manifold3d import CrossSection, JoinType, Manifold
 
 from partwright.approximation.profile_parts import extruded_part
 from partwright.approximation.sketches.candidate import Candidate
-from partwright.approximation.sketches.rods import MOST_REGIONS
+from partwright.approximation.sketches.rods import MOST_REGIONS, span
 from partwright.approximation.sketches.sections import FINE, Region, View, profile_of
 from partwright.approximation.sketches.teeth import drawn_corners
 from partwright.assembly import Part
@@ -48,11 +48,7 @@ def drafted(view: View, slabs: Sequence[tuple[float, float]], i: int, holes: boo
             if slope is None:
                 continue
             lean = _Lean(view, section, middles[i], slope)
-            first = last = i
-            while first > 0 and lean.at(middles[first - 1]) is not None:
-                first -= 1
-            while last + 1 < len(slabs) and lean.at(middles[last + 1]) is not None:
-                last += 1
+            first, last = span(i, middles, lean.goes_on)
             thickest = max(range(first, last + 1), key=lambda k: slabs[k][1] - slabs[k][0])
             one = lean.candidate(slabs[first][0], slabs[last][1]) if thickest == i else None
             if one is not None:
@@ -79,6 +75,9 @@ class _Lean:
         wanted = _within(self.section, by)
         found = (one for one in _alike(self.view, height, self.section) if _are_same(wanted, one, abs(by)))
         return None if wanted.is_empty() else next(found, None)
+
+    def goes_on(self, height: float) -> bool:
+        return self.at(height) is not None
 
     def candidate(self, low: float, high: float) -> Candidate | None:
         """None where its wide end is no profile, or one that has no room for the walls."""

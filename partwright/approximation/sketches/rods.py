@@ -3,7 +3,7 @@ meet, to where they bend."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from partwright.approximation.sketches.sections import Region, View
 
@@ -97,6 +97,16 @@ def is_rod(region: Region, low: float, high: float) -> bool:
     """Whether it is much longer than wide."""
     left, bottom, right, top = region.section.bounds()
     return bool(high - low > _SLENDER * max(right - left, top - bottom))
+
+
+def span(i: int, heights: Sequence[float], holds: Callable[[float], bool]) -> tuple[int, int]:
+    """The first and the last of heights around one of them, up to which something holds."""
+    first = last = i
+    while first > 0 and holds(heights[first - 1]):
+        first -= 1
+    while last + 1 < len(heights) and holds(heights[last + 1]):
+        last += 1
+    return first, last
 
 
 def goes_on(region: Region, others: Sequence[Region], least: float = _INSIDE) -> bool:
