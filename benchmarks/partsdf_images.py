@@ -17,7 +17,7 @@ from partwright.datasets import family as made_family
 from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import EmptyShapeError
 from partwright.metrics.reconstruction import ReconstructionScores, mean_scores, reconstruction_scores
-from partwright.partsdf.from_photo import needed_encoder
+from partwright.partsdf.from_photo import moved_to_outline, needed_encoder
 from partwright.partsdf.image_encoder import ImageEncoder
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model, load_model
@@ -49,10 +49,11 @@ def imaging(arguments: argparse.Namespace) -> None:
         f"Trained on {scale_of(model)}. {len(shapes)} test shapes, {arguments.views} pictures of each, from "
         f"all sides, with shadows, {PIXELS} pixels, looked at in 64; meshed at {arguments.resolution}^3. The "
         "nearest training shape is told by the true shape's distances, which no picture gives. Camera: the "
-        f"median error of the azimuth; outline: the mean IoU of silhouettes; told: pictures that are said "
+        "median error of the azimuth; outline: the mean IoU of silhouettes; moved: parts and camera, until "
+        "the outline is the picture's; told, as seen: pictures that are said "
         f"to be of no shape of the family, maybe, and that share of those seen within {SIDE} degrees of the "
         "true azimuth. Seconds of the "
-        "processor, one thread, to see, without meshing.", "",
+        "processor, one thread: to see, without meshing; to see, mesh coarsely and move.", "",
         command_line(), "",
         "| | IoU % | pIoU % | CD x1e4 | parts right % | camera, degrees | outline % | told % | "
         "of well seen % | s |",
@@ -79,13 +80,29 @@ def imaging(arguments: argparse.Namespace) -> None:
         start = time.process_time()
         seen = [seen_in(encoder, photo) for _, _, photo in taken]
         seconds = (time.process_time() - start) / len(taken)
-        off = [away(one, azimuth) for one, (_, azimuth, _) in zip(seen, taken, strict=True)]
+        off = [
+            degrees_off(one.sight.azimuth if one else None, azimuth)
+            for one, (_, azimuth, _) in zip(seen, taken, strict=True)
+        ]
         found = [(one and one.sight.shape, s) for one, (s, _, _) in zip(seen, taken, strict=True)]
         ious, told = outlines(encoder, seen)
         well = told[np.array(off) < SIDE]
         add(
             f"| seen, {label} | {scored(found)} | {np.median(off):.0f} | {100 * ious.mean():.0f} | "
             f"{100 * told.mean():.0f} | {100 * well.mean():.0f} | {seconds:.3f} |"
+        )
+        start = time.process_time()
+        fits = [one and moved_to_outline(one)[1] for one in seen]
+        seconds += (time.process_time() - start) / len(taken)
+        found = [(fit and fit.shape, s) for fit, (s, _, _) in zip(fits, taken, strict=True)]
+        off = [
+            degrees_off(fit.eye.camera.azimuth if fit else None, azimuth)
+            for fit, (_, azimuth, _) in zip(fits, taken, strict=True)
+        ]
+        iou = np.mean([fit.iou if fit else 0.0 for fit in fits])
+        add(
+            f"| moved, {label} | {scored(found)} | {np.median(off):.0f} | {100 * iou:.0f} | | | "
+            f"{seconds:.3f} |"
         )
     for name in OTHERS:
         if name != family.name and (family.folder.parent / name).is_dir():
@@ -113,9 +130,9 @@ def complete(found: NeuralShape, truth: PreparedShape) -> bool:
     return bool((found.present.numpy() == truth.present.astype(bool)).all())
 
 
-def away(seen: Looked | None, azimuth: float) -> float:
-    """Degrees between the azimuth that is seen and the true one."""
-    return abs((seen.sight.azimuth - azimuth + 180) % 360 - 180) if seen else 180.0
+def degrees_off(found: float | None, azimuth: float) -> float:
+    """Between the azimuth that was found and the true one, degrees."""
+    return 180.0 if found is None else abs((found - azimuth + 180) % 360 - 180)
 
 
 def outlines(encoder: ImageEncoder, seen: list[Looked | None]) -> tuple[np.ndarray, np.ndarray]:

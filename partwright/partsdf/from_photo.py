@@ -1,4 +1,5 @@
-"""One picture to parts (section 3.4, appendix H): what an image encoder sees, held against the outline."""
+"""One picture to parts (section 3.4, appendix H): what an image encoder sees, moved until its outline is the
+picture's."""
 
 from __future__ import annotations
 
@@ -17,11 +18,13 @@ from partwright.export import export
 from partwright.export.ply import write_mesh
 from partwright.partsdf.assemblies import to_assembly
 from partwright.partsdf.image_encoder import ImageEncoder, load_image_encoder
-from partwright.partsdf.meshing import mesh_shape
+from partwright.partsdf.meshing import mesh_shape, resolution_for_wall
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.outline_fit import OutlineFit, fit_outline
 from partwright.partsdf.photos import Looked, Photo, look_at, read_photo
 from partwright.partsdf.pictures import picture
+from partwright.partsdf.pinhole import Pinhole
 from partwright.partsdf.standpoint import Standpoint
 from partwright.partsdf.strangers import standpoint_of, warnings_of
 from partwright.render import Camera, render_mesh, sheet, write_png
@@ -30,20 +33,21 @@ if TYPE_CHECKING:
     import trimesh
 
 FILES = ("assembly.json", "parts.glb", "surface.ply", "report.json", "preview.png")
+_COARSE, _FINE = 48, 112  # cells of the mesh that is moved, by the thinnest wall
 _PANEL = 320  # pixels
 _UNSEEN = 0.25  # of its light that is left of what is not the shape, in the preview
 
 
 @dataclass(frozen=True)
 class PhotoParts:
-    """shape: as its family stands, unit frame; the assembly of it; the surface; what was looked at, and from
-    where; report: as it is written."""
+    """shape: as its family stands, unit frame; the assembly of it; the surface; what was looked at, and with
+    which camera; report: as it is written."""
 
     shape: NeuralShape
     assembly: Assembly
     surface: trimesh.Trimesh
     looked: Looked
-    standpoint: Standpoint
+    camera: Camera
     report: dict[str, Any]
 
     @property
@@ -63,7 +67,7 @@ class PhotoParts:
     def preview(self) -> np.ndarray:
         """(H, W, 3) uint8: the picture, what is taken for the shape in it, and the parts from there and from
         beside."""
-        camera = replace(self.standpoint.camera, margin=0.05)
+        camera = replace(self.camera, margin=0.05)
         aside = Camera(camera.azimuth + 60, 22.0, up=camera.up)
         seen = np.kron(self.looked.silhouette, np.ones((2, 2)))[..., None]
         closely = self.looked.closely
@@ -108,11 +112,11 @@ def reconstruct_seen(
     """As `reconstruct_photo`, of a photo in memory. name: of its file."""
     start, model = time.perf_counter(), encoder.model
     looked = look_at(encoder, photo)
-    shape, seen = looked.sight.shape, time.perf_counter()
+    sight, seen = looked.sight, time.perf_counter()
+    standpoint, fit = moved_to_outline(looked)
+    shape, camera, moved = fit.shape, fit.eye.camera, time.perf_counter()
     meshed = mesh_shape(shape, resolution, parts=False)
     surface = meshed.whole
-    standpoint = standpoint_of(looked, surface)
-    camera = standpoint.camera
     report = {
         "method": "parts",
         "picture": name,
@@ -124,17 +128,34 @@ def reconstruct_seen(
             "elevation": round(camera.elevation, 1),
             "field_of_view": camera.field_of_view,
         },
-        "silhouette_iou": round(standpoint.iou, 4),
-        "certainty": round(looked.sight.certainty, 4),
-        "oddness": round(looked.sight.oddness, 4),
-        "doubt": round(looked.sight.doubt, 4),
+        "silhouette_iou": round(fit.iou, 4),
+        "silhouette_iou_as_seen": round(standpoint.iou, 4),
+        "certainty": round(sight.certainty, 4),
+        "oddness": round(sight.oddness, 4),
+        "doubt": round(sight.doubt, 4),
         "mirrored_iou": round(looked.mirrored, 4),
         "resolution": meshed.resolution,
-        "seconds": {"see": round(seen - start, 3), "mesh": round(time.perf_counter() - seen, 3)},
+        "seconds": {
+            "see": round(seen - start, 3),
+            "fit": round(moved - seen, 3),
+            "mesh": round(time.perf_counter() - moved, 3),
+        },
         "warnings": warnings_of(encoder, looked, standpoint),
     }
     assembly = to_assembly(shape, up=model.up, source=name)
-    return PhotoParts(shape, assembly, surface, looked, standpoint, report)
+    return PhotoParts(shape, assembly, surface, looked, camera, report)
+
+
+def moved_to_outline(looked: Looked) -> tuple[Standpoint, OutlineFit]:
+    """Where what was seen is seen from, and the shape, moved until its outline is the picture's.
+
+    Raises NoSurfaceError where nothing has a surface.
+    """
+    shape = looked.sight.shape
+    coarse = mesh_shape(shape, min(_FINE, resolution_for_wall(shape.thinnest, _COARSE)))
+    standpoint = standpoint_of(looked, coarse.whole)
+    filling = Pinhole.filling(standpoint.camera, coarse.whole.vertices, looked.covered.box)
+    return standpoint, fit_outline(shape, coarse.parts, looked.covered, filling)
 
 
 def _enlarged(picture: np.ndarray) -> np.ndarray:

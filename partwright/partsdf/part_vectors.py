@@ -84,12 +84,18 @@ class PartVectors:
 
     def poses(self, vectors: Tensor) -> PoseTensors:
         """(..., P, ...) of vectors (..., P, 12)."""
+        place, turned, size = self.frames(vectors)
+        return PoseTensors(place, quaternions(turned), size)
+
+    def frames(self, vectors: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Translations (..., P, 3), rotations as matrices (..., P, 3, 3) and half-lengths (..., P, 3) of the
+        poses of vectors (..., P, 12)."""
         place, turn, size = (vectors * self.pose_spread + self.pose_mean).split((3, 6, 3), dim=-1)
         first = torch.nn.functional.normalize(turn[..., :3], dim=-1)
         second = turn[..., 3:] - (first * turn[..., 3:]).sum(-1, keepdim=True) * first
         second = torch.nn.functional.normalize(second, dim=-1)
         columns = (first, second, torch.linalg.cross(first, second))
-        return PoseTensors(place, quaternions(torch.stack(columns, dim=-1)), size.exp())
+        return place, torch.stack(columns, dim=-1), size.exp()
 
     def split(self, found: Tensor) -> tuple[Tensor, PoseTensors, Tensor]:
         """Latents (..., P, Z), poses (..., P, ...) and logits of presence (..., P) of what a network gives,

@@ -27,6 +27,7 @@ _BLANK = 4 / 255  # of full scale, between the darkest and the brightest pixel o
 _FILLED = 0.9  # of the picture that the silhouette is cut out to, as views are
 _CLOSER = 2  # times that it is cut out anew
 _SMALLEST = 6  # cells of a silhouette along its longer side, of SIDE / 2
+_UNSURE, _SURE, _LEAST_TRUST = 0.8, 0.95, 0.1  # IoU with what is seen in the mirror image
 _LIGHT, _DARK = 0.97, 0.15  # backgrounds of what is transparent
 
 
@@ -40,6 +41,32 @@ class Photo:
 
 
 @dataclass(frozen=True)
+class Covered:
+    """share (N, N): how much of each pixel a shape covers, 0 to 1; trust (N, N): how sure that is, 0 to 1."""
+
+    share: np.ndarray
+    trust: np.ndarray
+
+    @property
+    def cells(self) -> int:
+        """N."""
+        return len(self.share)
+
+    @property
+    def mask(self) -> np.ndarray:
+        """(N, N) bool: pixels that are covered by half; of what is thinner than pixels all over, half as much
+        as most."""
+        return np.asarray(self.share >= min(0.5, self.share.max() / 2))
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right and top of what is covered, from the picture's middle; its sides are 1."""
+        rows, columns = (np.flatnonzero(self.mask.any(axis=a)) for a in (1, 0))
+        left, right = columns[0] / self.cells - 0.5, (columns[-1] + 1) / self.cells - 0.5
+        return left, 0.5 - (rows[-1] + 1) / self.cells, right, 0.5 - rows[0] / self.cells
+
+
+@dataclass(frozen=True)
 class Looked:
     """What was seen: the part of the photo that was looked at closely (SIDE, SIDE, 3), 0 to 1, the sight, and
     the silhouette (SIDE / 2, SIDE / 2) bool there."""
@@ -47,6 +74,7 @@ class Looked:
     closely: np.ndarray
     sight: Sight
     silhouette: np.ndarray
+    covered: Covered
     mirrored: float
     """IoU of the silhouette that the encoder sees with the one that it sees in the mirror image: near 1 where
     the picture shows something, less where it shows nothing, of which the encoder makes a shape anyway."""
@@ -107,8 +135,12 @@ def look_at(encoder: ImageEncoder, photo: Photo) -> Looked:
         seen = _largest(sight.silhouette.numpy() > 0.5)
         if photo.shape is not None:
             given = np.repeat(photo.shape[..., None], 3, axis=2).astype(np.float32)
-            covered = _mostly(_halved(_cut_out(given, box, outside=0.0)[..., 0]))
-            return Looked(closely, sight, covered, _mirrored(encoder, closely, sight))
+            share = _cut_out(given, box, outside=0.0)[..., 0]
+            if not share.any():
+                raise EmptyShapeError("what is opaque in the picture is too small to be seen")
+            halved = Covered(_halved(share), np.ones(sight.silhouette.shape))
+            covered = Covered(share, np.ones_like(share))
+            return Looked(closely, sight, halved.mask, covered, _mirrored(encoder, closely, sight))
         rows, columns = (np.flatnonzero(seen.any(axis=a)) for a in (1, 0))
         if max(len(rows), len(columns)) < _SMALLEST:
             raise EmptyShapeError("no shape is seen in the picture; cut it out, or make what is around plain")
@@ -116,7 +148,22 @@ def look_at(encoder: ImageEncoder, photo: Photo) -> Looked:
             cell = (box[2] - box[0]) / len(seen)
             corners = np.array([rows[0], columns[0], rows[-1] + 1, columns[-1] + 1]) * cell
             box = _squared(np.tile(box[:2], 2) + corners, _FILLED)
-    return Looked(closely, sight, seen, _mirrored(encoder, closely, sight))
+    mirrored = _mirrored(encoder, closely, sight)
+    return Looked(closely, sight, seen, _believed(sight.silhouette.numpy(), seen, mirrored), mirrored)
+
+
+def _believed(likely: np.ndarray, seen: np.ndarray, mirrored: float) -> Covered:
+    """What is covered where cells are likely (SIDE / 2, SIDE / 2) to be the shape. Pieces that are not `seen`
+    count for nothing, and cells that may be either for little; where the mirror image is seen otherwise, as
+    before stripes, all do."""
+    near = ndimage.binary_dilation(seen, np.ones((3, 3)))
+    sure = np.where(seen | (likely < 0.5), abs(2 * likely - 1), 0.0)
+    sure *= np.sqrt(np.clip((mirrored - _UNSURE) / (_SURE - _UNSURE), _LEAST_TRUST, 1.0))
+    share, trust = (
+        np.clip(ndimage.zoom(each, 2, order=1, mode="nearest", grid_mode=True), 0, 1)
+        for each in (np.where(near, likely, 0.0), sure)
+    )
+    return Covered(share, trust)
 
 
 def _mirrored(encoder: ImageEncoder, closely: np.ndarray, sight: Sight) -> float:
@@ -165,13 +212,6 @@ def _tensor(picture: np.ndarray) -> Tensor:
 
 def _halved(mask: np.ndarray) -> np.ndarray:
     return np.asarray(mask.reshape(SIDE // 2, 2, SIDE // 2, 2).mean(axis=(1, 3)))
-
-
-def _mostly(covered: np.ndarray) -> np.ndarray:
-    """Where cells are covered by half; of what is thinner than cells all over, half as much as most."""
-    if not covered.any():
-        raise EmptyShapeError("what is opaque in the picture is too small to be seen")
-    return np.asarray(covered >= min(0.5, covered.max() / 2))
 
 
 def _largest(mask: np.ndarray) -> np.ndarray:
