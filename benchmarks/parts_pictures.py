@@ -97,7 +97,7 @@ def seen(name: str, family: PreparedFamily) -> np.ndarray:
     for i in range(len(shapes)):
         truth, _, photo = (cluttered if i % 2 else plain)[i]
         parts = reconstruct_seen(encoder, photo, resolution=96)
-        there = replace(parts.standpoint.camera, margin=0.1)
+        there = replace(parts.camera, margin=0.1)
         aside = replace(there, azimuth=there.azimuth + 60, elevation=22.0)
         image = Image.fromarray(np.rint(255 * photo.pixels).astype(np.uint8)).resize((PANEL, PANEL))
         panels += [np.asarray(image), picture(parts.shape, size=PANEL, camera=there)]
