@@ -6,11 +6,9 @@ fitted anew, split, joined by another or taken away, whichever serves an objecti
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +25,11 @@ from partwright.superfrusta.pruning import cheapest_removal, neighbours
 from partwright.superfrusta.refining import POLISH, TOUCH_UP, Stages, refine
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
+from partwright.threads import at_once
 
 Mask = NDArray[np.bool_]
+Change = tuple[Rows, Mask]
+"""An assembly before any refit, and which of its parts move: those marked, and new ones."""
 
 _ENOUGH = 0.026  # unit lengths, 1.4 % of the longest side: below, hardly any try bears fruit
 _FAR = 0.045  # unit lengths off from which on a part makes room for several
@@ -152,7 +153,7 @@ class Mending:
         part_of = np.arange(len(best.rows))  # which of the parts as they were each row is; -1: a joined one
         while left := [one for one in left if one.gain > -_HOPELESS and np.isin(one.pair, part_of).all()]:
             first = left[:_JOINED]
-            tried = self.at_once([partial(self.merged, best, one, part_of) for one in first])
+            tried = at_once([partial(self.merged, best, one, part_of) for one in first], self.samples.threads)
             gaining = [(trial, one) for trials, one in zip(tried, first, strict=True) for trial in trials]
             if not gaining:
                 break
@@ -192,19 +193,18 @@ class Mending:
         moving[part] = True
         if part < self.locked:
             return [self.firmed(best, moving)]
-        changes = [(self.trial(rows), changed) for rows, changed in self.changes(best, part, moving)]
+        threads = self.samples.threads
+        found = [one for some in at_once(self.changes(best, part, moving), threads) for one in some]
+        plain = at_once([partial(self.trial, rows) for rows, _ in found], threads)
+        changes = [(trial, changed) for trial, (_, changed) in zip(plain, found, strict=True)]
         changes = sorted(changes, key=lambda one: -one[0].value)[:_REFITTED]
         refits = [partial(self.refitted, trial, changed, best) for trial, changed in changes]
         # The change that promises most is mostly the best; another is only tried where it does not help.
-        tried = self.at_once([lambda: [self.firmed(best, moving)], *refits[:1]])
+        jobs: list[Callable[[], list[Trial]]] = [lambda: [self.firmed(best, moving)], *refits[:1]]
+        tried = at_once(jobs, threads)
         if all(trial.value <= best.value for trials in tried for trial in trials):
-            tried = self.at_once(refits[1:])
+            tried = at_once(refits[1:], threads)
         return [trial for trials in tried for trial in trials]
-
-    def at_once(self, jobs: Sequence[Callable[[], list[Trial]]]) -> list[list[Trial]]:
-        """What jobs return, which take turns on the threads: half of their work is none of the kernel's."""
-        with ThreadPoolExecutor(self.samples.threads or cpu_count() or 1) as pool:
-            return [future.result() for future in [pool.submit(job) for job in jobs]]
 
     def refitted(self, changed: Trial, moving: Mask, best: Trial) -> list[Trial]:
         """A change, its parts moved to where they explain the most, and to where they are nowhere far off."""
@@ -235,8 +235,8 @@ class Mending:
             (weight / weight.sum()).astype(np.float32),
         )
 
-    def changes(self, best: Trial, part: int, moving: Mask) -> Iterator[tuple[Rows, Mask]]:
-        """Assemblies before any refit, and which of their parts move: those marked, and new ones."""
+    def changes(self, best: Trial, part: int, moving: Mask) -> list[Callable[[], list[Change]]]:
+        """What may be changed about a part that is far off, by jobs that each find some of it."""
         samples, rows, off = self.samples, best.rows, best.off
         worst = off.worst(part)
         others, still = np.delete(rows, part, axis=0), np.delete(moving, part)
@@ -244,37 +244,43 @@ class Mending:
         # In the part's own place, what is new is cut by what cuts the part.
         cut = _cut(rows, part)
 
-        def instead(*new: Rows) -> tuple[Rows, Mask]:
+        def instead(*voxels: Mask) -> list[Change]:
+            new = [self.fitted(one, others, rows[part], cut) for one in voxels]
             places = [part if cut else len(others)] * len(new)
-            return np.insert(others, places, np.concatenate(new), axis=0), np.insert(still, places, True)
+            return [(np.insert(others, places, np.concatenate(new), axis=0), np.insert(still, places, True))]
 
-        def with_new(new: Rows) -> tuple[Rows, Mask]:
+        def with_new(new: Rows) -> Change:
             return np.concatenate([rows, new]), np.append(moving, _all(new))
 
-        if (others[:, Column.SIGN] > 0).any():
-            yield others, still
-        mine = owners(samples, rows) == part
-        if mine.any():
-            yield instead(self.fitted(mine, others, rows[part], cut))
-        if off.off[worst] > _FAR:
+        def regrown() -> list[Change]:
             grown = grow(samples, others, self.settings, _REGROWN)
-            if len(grown):
-                begun = np.insert(still, [self.locked] * len(grown.first), True)
-                yield grown.joined(others, self.locked), np.append(begun, _all(grown.last))
+            begun = np.insert(still, [self.locked] * len(grown.first), True)
+            together = grown.joined(others, self.locked), np.append(begun, _all(grown.last))
+            return [together] if len(grown) else []
+
+        def carved() -> list[Change]:
+            anywhere = self.carved(rows).last
+            return [with_new(anywhere)] if len(anywhere) else []
+
+        def filled() -> list[Change]:
+            found = [self.fitted(voxels, rows, rows[part]) for voxels in self.missed(rows, off, worst)]
+            return [with_new(np.concatenate(found[:count])) for count in sorted({1, len(found)}) if found]
+
+        mine = owners(samples, rows) == part
+        jobs: list[Callable[[], list[Change]]] = []
+        if (others[:, Column.SIGN] > 0).any():
+            jobs.append(lambda: [(others, still)])
+        if mine.any():
+            jobs.append(partial(instead, mine))
+        if off.off[worst] > _FAR:
+            jobs.append(regrown)
         if self.settings.carving and off.distance[worst] > 0:
-            carved = self.carved(rows)
-            if len(carved):
-                yield with_new(carved.last)
-            for one in self.holes(rows, off, worst):
-                yield with_new(one[None])
-        missed = self.missed(rows, off, worst) if off.distance[worst] <= 0 else []
-        found = [self.fitted(voxels, rows, rows[part]) for voxels in missed]
-        if found:
-            yield with_new(found[0])
-        if len(found) > 1:
-            yield with_new(np.concatenate(found))
+            jobs += [carved, lambda: [with_new(one[None]) for one in self.holes(rows, off, worst)]]
+        if off.distance[worst] <= 0:
+            jobs.append(filled)
         if np.count_nonzero(mine) > _LEAST_HALVED:
-            yield instead(*(self.fitted(half, others, rows[part], cut) for half in _halves(samples, mine)))
+            jobs.append(lambda: instead(*_halves(samples, mine)))
+        return jobs
 
     def carved(self, rows: Rows) -> Grown:
         """What could be subtracted anywhere: the same for every part that is tried in vain."""
