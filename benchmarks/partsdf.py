@@ -11,6 +11,7 @@
     python benchmarks/partsdf.py shortlist --families FOLDER [--names A,B] [--shapes N]
     python benchmarks/partsdf.py real --shapes-from FOLDER
     python benchmarks/partsdf.py generate --family FOLDER --model MODEL [--held N] [--fresh N]
+    python benchmarks/partsdf.py layouts [--names A,B] [--count N]
     python benchmarks/partsdf.py soundness [--names A,B] [--count N]
     python benchmarks/partsdf.py ablations --family FOLDER [--epochs N] [--width N] [--shapes N]
     python benchmarks/partsdf.py decoders --family FOLDER [--seconds S]
@@ -22,7 +23,8 @@
 encoder, `scans` from few points, noise and missing halves, `generate` new ones against held-out ones.
 `nothing` says who is told that a picture shows no shape, `unseen` which parts come back that half a scan does
 not show; both take minutes, and need but the models that ship.
-`soundness` says how many of these come apart, and what it costs to make them anew.
+`layouts` says what these are told by, `soundness` how many of them come apart, and what it costs to make
+them anew.
 `real` finds real chairs and vehicles by models of made ones. `familiarity` shows every model that ships
 new shapes of its own family and of the others, and real ones: who is warned of. `shortlist` says
 what it costs to judge
@@ -48,6 +50,7 @@ from partsdf_encoder import encoding
 from partsdf_familiarity import strangers
 from partsdf_generation import generation
 from partsdf_images import imaging, pictures_of_nothing
+from partsdf_layouts import layouts_or_forms
 from partsdf_real import reality
 from partsdf_reconstruct import reconstruction, robots
 from partsdf_scans import halving, scanning
@@ -117,6 +120,10 @@ def main() -> None:
     one.add_argument("--shapes-from", type=Path, required=True, help="folder of toys/ and parts/")
     one.add_argument("--names", default="cars,chairs,mixers,vehicles")
     one.add_argument("--others", type=int, default=2, help="shapes of each other family")
+    one = command("layouts", layouts_or_forms)
+    one.add_argument("--names", default="vehicles,chairs")
+    one.add_argument("--count", type=int, default=60, help="shapes of each kind")
+    one.add_argument("--seed", type=int, default=0)
     one = command("generate", generation)
     one.add_argument("--family", required=True)
     one.add_argument("--model", required=True)
