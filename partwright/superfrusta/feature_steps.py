@@ -122,6 +122,11 @@ class FeatureTree:
     def objective(self) -> float:
         return self.score - self.price
 
+    @property
+    def freeform(self) -> int:
+        """How many of the features are the shape's own form, and none that was drawn."""
+        return sum(feature.freeform for feature in self.features)
+
 
 def fold(steps: Iterable[tuple[bool, NDArray[np.bool_]]], count: int) -> NDArray[np.bool_]:
     """Which of so many samples are covered: whether each step is added or cut, and its samples (N,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -40,6 +41,16 @@ def wants_features(request: FitRequest[Settings]) -> bool:
     settings = request.settings
     allowed = getattr(settings, "profiles", False) and settings.subtract and not settings.curve
     return bool(allowed and request.start is None)
+
+
+@dataclass(frozen=True)
+class MendedSolids:
+    """Solids that were found by the search. off: how far they are off where that is far, unit lengths; else
+    0. score: R, 0 where it is not known."""
+
+    assembly: Assembly
+    off: float
+    score: float
 
 
 class FeaturedFit:
@@ -94,21 +105,22 @@ class FeaturedFit:
             return tree
         return self._thinned(self._with_freeform(tree))
 
-    def mended_assembly(self, whole: Assembly) -> tuple[Assembly, float]:
+    def mended_assembly(self, whole: Assembly) -> MendedSolids:
         """Solids that were found by the search, with freeform where they are far off, or only made anew of
         the same parts where these are not: cuts then belong to what they meet, and leave no chip of others.
-        Itself where nothing is off or nothing helps. And how far it is off even so, unit lengths, 0 where
-        that is not far."""
+        Themselves where nothing is off or nothing helps."""
         search = self._search
         if not has_exact_mesh(whole) or search.body.is_empty() or search.volume <= 0:
-            return whole, 0.0
+            return MendedSolids(whole, 0.0, 0.0)
         none = np.zeros(0, bool)
         own = in_unit_frame(self._request.shape, whole)
         tree = search.scored(FeatureTree([Feature(added, part, none, 0) for part, added in flattened(own)]))
         better = self._thinned(self._with_freeform(tree))
         same = [f.part for f in better.features] == [f.part for f in tree.features]
         off = far_off(search, own) if same else math.inf
-        return (self.assembly(better), better.off) if off > better.off else (whole, off)
+        if off > better.off:
+            return MendedSolids(self.assembly(better), better.off, better.score)
+        return MendedSolids(whole, off, tree.score)
 
     @cached_property
     def _search(self) -> FeatureSearch:

@@ -125,21 +125,29 @@ def _mended(
     features.
 
     rival: the search's objective. The one that explains more is mended first, the other only where that does
-    not bring it near: nothing may be far off that need not be. Where both stay far off, how far counts with
-    each.
+    not bring it near, or with freeform alone: nothing may be far off that need not be. Where both stay far
+    off, how far counts with each. Where the features need freeform, so that they do not say either how all of
+    it would be drawn, fewer parts of the search that explain no less, and are near, are preferred.
     """
     mended: FeatureTree | None = None
     if features.objective >= rival:
         mended = featured.mended(features)
-        if not mended.off and mended.objective >= rival:
+        if not (mended.off or mended.freeform) and mended.objective >= rival:
             return featured.assembly(mended), True
-    whole, off = featured.mended_assembly(whole)
-    if off and mended is None:
+    other = featured.mended_assembly(whole)
+    if other.off and mended is None:
         mended = featured.mended(features)
     if mended is None:
-        return whole, False
-    preferred = mended.objective - mended.off >= rival - off if mended.off else off > 0
-    return (featured.assembly(mended) if preferred else whole), preferred
+        return other.assembly, False
+    drawn = featured.assembly(mended)
+    explains = mended.freeform and not other.off and other.score >= mended.score
+    if explains and len(other.assembly.parts) < len(drawn.parts):
+        preferred = False
+    elif mended.off:
+        preferred = mended.objective - mended.off >= rival - other.off
+    else:
+        preferred = other.off > 0 or mended.objective >= rival
+    return (drawn if preferred else other.assembly), preferred
 
 
 def _with_locked(whole: Assembly, request: FitRequest[Settings]) -> Assembly:

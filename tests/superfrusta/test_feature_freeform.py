@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -26,7 +27,8 @@ from partwright.superfrusta.feature_freeform import with_freeform
 from partwright.superfrusta.feature_mending import FAR
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
-from partwright.superfrusta.featured import FeaturedFit, freeform_warnings
+from partwright.superfrusta.featured import FeaturedFit, MendedSolids, freeform_warnings
+from partwright.superfrusta.fit import _mended as chosen
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.solids import Settings
 
@@ -175,11 +177,13 @@ def test_a_chip_that_a_cut_leaves_beside_the_shape_goes() -> None:
     drawn = Assembly((PLATE, Part(Box((0.5, 0.4, 0.5)), (0.65, 0.0, 0.0))))
     shape, settings = pw.load_shape(mesh_assembly(drawn)), Settings.for_quality("draft")
     fit = FeaturedFit(FitRequest(shape, settings), FitSamples.of(shape, settings), lambda: None)
-    after, off = fit.mended_assembly(whole)
-    assert (off, len(after.parts)) == (0, 3)
+    after = fit.mended_assembly(whole)
+    assert (after.off, len(after.assembly.parts)) == (0, 3)
     assert mesh_assembly(whole).body_count == 2
-    assert mesh_assembly(after).body_count == 1
-    assert fit.mended_assembly(drawn) == (drawn, 0.0)
+    assert mesh_assembly(after.assembly).body_count == 1
+    right = fit.mended_assembly(drawn)
+    assert (right.assembly, right.off) == (drawn, 0.0)
+    assert min(right.score, after.score) > 0.99
 
 
 def test_solids_that_are_right_keep_their_own_deviation() -> None:
@@ -191,7 +195,41 @@ def test_solids_that_are_right_keep_their_own_deviation() -> None:
     whole = Assembly(tuple(cuts))
     shape, settings = pw.load_shape(mesh_assembly(whole)), Settings.for_quality("draft", max_parts=4)
     fit = FeaturedFit(FitRequest(shape, settings), FitSamples.of(shape, settings), lambda: None)
-    assert fit.mended_assembly(whole) == (whole, 0.0)
+    mended = fit.mended_assembly(whole)
+    assert (mended.assembly, mended.off) == (whole, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("freeform", "off", "score", "parts", "drawn"),
+    [
+        (2, 0.0, 0.90, 3, False),
+        (2, 0.0, 0.90, 4, True),  # no fewer parts
+        (2, 0.0, 0.89, 3, True),  # explains less
+        (2, 0.1, 0.90, 3, True),  # is far off
+        (0, 0.0, 0.95, 3, True),  # the features are all drawn
+    ],
+)
+def test_fewer_solids_that_explain_as_much_are_preferred_to_freeform(
+    freeform: int, off: float, score: float, parts: int, drawn: bool
+) -> None:
+    own, found = (Assembly(tuple(replace(PLATE, name=f"{k}") for k in range(n))) for n in (4, parts))
+    features = [Feature(True, PLATE, np.zeros(0, bool), 0, freeform=k < freeform) for k in range(4)]
+    tree = FeatureTree(features, score=0.90, price=0.02)
+
+    class Fit:
+        """Of features that come near with their freeform."""
+
+        def mended(self, tree: FeatureTree) -> FeatureTree:
+            return tree
+
+        def assembly(self, tree: FeatureTree) -> Assembly:
+            return own
+
+        def mended_assembly(self, whole: Assembly) -> MendedSolids:
+            return MendedSolids(whole, off, score)
+
+    whole, preferred = chosen(cast(FeaturedFit, Fit()), tree, found, 0.80)
+    assert (whole, preferred) == ((own, True) if drawn else (found, False))
 
 
 @pytest.mark.heavy
