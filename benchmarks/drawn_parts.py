@@ -1,8 +1,9 @@
-"""Parts as a person draws them, whose every feature and number is known: plates, flanges, housings, shafts.
+"""Parts as a person draws them, whose every feature and number is known: plates, flanges, housings, shafts,
+mouldings.
 
 Lengths are whole or half millimetres. A feature is one part of a tree: a body with the rims it has, holes
 of one size with all their copies, a pocket. Its numbers are those that can be seen: levels of faces along the
-axes, diameters, radii of corners, fillets and chamfers; where a cut ends in the open is none.
+axes, diameters, radii of corners, fillets and chamfers, drafts; where a cut ends in the open is none.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from partwright.fields.profile import circle_of
 Rng = np.random.Generator
 Number = tuple[str, float]
 ACROSS_Y = (0.5**0.5, 0.5**0.5, 0.0, 0.0)  # the solid's z along y
+OVERTURNED = (0.0, 1.0, 0.0, 0.0)  # the solid's z downwards
 OVER = 5.0  # beyond a face that a cut opens
 
 
@@ -81,6 +83,7 @@ def numbers(part: Part) -> list[Number]:
         sides = (s for loop, one in zip(field.profile.sides, whole, strict=True) if one is None for s in loop)
         found += [("radius", side.radius) for side in sides if side.centre is not None]
         found += [(name.split("_")[1], getattr(field, name)) for name in RIMS if getattr(field, name)]
+        found += [("taper", field.taper)] if field.taper else []
     return list(dict.fromkeys((kind, round(value, 6)) for kind, value in found))
 
 
@@ -204,9 +207,42 @@ def shaft(rng: Rng) -> Drawn:
     return Drawn("shaft", tuple(features))
 
 
+def moulding(rng: Rng) -> Drawn:
+    """A block whose walls lean, hollow from below as a cap, or from above; then it stands on a plate with
+    four holes. There may be a hole through its floor."""
+    x, y, z = half(rng, 50, 90), half(rng, 36, 60), half(rng, 18, 30)
+    wall, floor, corner = half(rng, 4, 6), half(rng, 3, 6), half(rng, 7, 10)
+    draft, core, is_cap = half(rng, 1, 4), half(rng, 0.5, 2), bool(rng.integers(2))
+    thick, rim = (0.0, 0.0) if is_cap else (half(rng, 4, 6), half(rng, 10, 14))
+    top = thick + z
+    block = Extrusion(Profile.rectangle(x, y, corner), z, taper=draft)
+    features = [Feature(Part(block, (0, 0, thick + z / 2), name="block"), True)]
+    if not is_cap:
+        plate = Extrusion(Profile.rectangle(x + 2 * rim, y + 2 * rim, corner), thick)
+        place = (x / 2 + rim / 2, y / 2 + rim / 2)
+        features += [
+            Feature(Part(plate, (0, 0, thick / 2), name="plate"), True),
+            drilled(half(rng, 4, 6), thick, 0, place, corners_of(*place)),
+        ]
+    lost = 0.0 if is_cap else z * np.tan(np.radians(draft))  # of the wall, up to where the pocket opens
+    around = wall + np.ceil(2 * lost) / 2
+    cavity = Extrusion(Profile.rectangle(x - 2 * around, y - 2 * around, 3.0), z - floor, taper=core)
+    mouth, middle = (0.0, (z - floor) / 2) if is_cap else (top, top - (z - floor) / 2)
+    turn = (1.0, 0.0, 0.0, 0.0) if is_cap else OVERTURNED
+    features.append(Feature(Part(cavity, (0, 0, middle), turn, name="pocket"), False, (("z", mouth),)))
+    if rng.integers(2):
+        features.append(drilled(half(rng, 5, 10), top, 0, (0, 0), ()))
+    return Drawn("moulding", tuple(features))
+
+
 FAMILIES: tuple[Callable[[Rng], Drawn], ...] = (plate, flange, housing, shaft)
 
 
+def drawn_moulding(number: int) -> Drawn:
+    """The moulding of that number, always the same; they have numbers of their own."""
+    return moulding(np.random.default_rng([number, 18, 1]))
+
+
 def drawn_part(number: int) -> Drawn:
-    """The part of that number, always the same; families take turns."""
+    """The part of that number, always the same; families take turns, all but mouldings."""
     return FAMILIES[number % len(FAMILIES)](np.random.default_rng([number, 18]))

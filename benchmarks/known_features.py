@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from drawn_parts import FAMILIES, Drawn, Feature, Number, drawn_part, numbers
+from drawn_parts import FAMILIES, Drawn, Feature, Number, drawn_moulding, drawn_part, moulding, numbers
 from fit import machine
 from scipy.optimize import linear_sum_assignment
 
@@ -78,8 +78,7 @@ def compared(drawn: Drawn, found: pw.Assembly) -> tuple[list[tuple[Feature, pw.P
     return matched, len(found.parts) - len(pairs)
 
 
-def measured(number: int, quality: str) -> Row:
-    drawn = drawn_part(number)
+def measured(number: int, drawn: Drawn, quality: str) -> Row:
     shape = pw.load_shape(mesh_assembly(drawn.assembly, 128), unit="mm")
     started = time.process_time()
     result = pw.fit(shape, "solids", quality=quality)
@@ -113,7 +112,7 @@ def table(rows: Sequence[Row], command: str, quality: str) -> str:
     found = sum(row.found for row in rows) / sum(row.features for row in rows)
     right = sum(row.right for row in rows) / max(1, sum(row.numbers for row in rows))
     reached = "reached" if found >= WANTED[0] and right >= WANTED[1] else "not reached"
-    families = [[row for row in rows if row.family == family.__name__] for family in FAMILIES]
+    families = [[row for row in rows if row.family == family.__name__] for family in (*FAMILIES, moulding)]
     return "\n".join(
         [
             "# Parts of known features, found again",
@@ -145,13 +144,17 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--count", type=int, default=100, help="parts, a quarter of each family")
+    parser.add_argument(
+        "--count", type=int, default=100, help="parts, a quarter of each family, and as many mouldings"
+    )
     parser.add_argument("--quality", default="draft")
     parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results/known_features.md")
     options = parser.parse_args()
     rows = []
-    for number in range(options.count):
-        rows.append(measured(number, options.quality))
+    parts = [(number, drawn_part(number)) for number in range(options.count)]
+    parts += [(number, drawn_moulding(number)) for number in range(options.count // len(FAMILIES))]
+    for number, drawn in parts:
+        rows.append(measured(number, drawn, options.quality))
         shown = replace(rows[-1], seconds=round(rows[-1].seconds, 1), iou=round(rows[-1].iou, 4))
         print(shown, flush=True)
     command = f"python benchmarks/known_features.py --count {options.count}"

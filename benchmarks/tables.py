@@ -162,7 +162,7 @@ TABLES = (
     Table("threads.md", "threads.py", "", 1, "--shapes {data}", 1),
     Table("wheels.md", "wheels.py", "--counts 12 --quality draft", 1, "", 4),
     Table("perforations.md", "perforations.py", "--names drilled --quality draft", 0.5, "", 3),
-    Table("known_features.md", "known_features.py", "--count 4", 1, "--count 100", 15),
+    Table("known_features.md", "known_features.py", "--count 4", 1, "--count 40", 8),
     Table("convexes_by_hand.md", "convexes_by_hand.py", "", 0.1, "", 0.1, "solids.csv and capri.csv"),
     Table("pretraining_cost.md", "pretraining_cost.py", "--steps 2", 1, "", 2),
     Table("rivals.md", "rivals.py", "--count 1", 1, "--count 8", 3),
