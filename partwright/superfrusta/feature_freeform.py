@@ -1,7 +1,8 @@
 """What no feature explains, kept as freeform: where a tree is far off, it takes the shape's own form.
 
-Around such a place the shape, or the space beside it, is cut along one of the directions of the whole. Where
-it is one extrusion there, that is one more feature. Else a few extrusions follow it: worse to read than a
+A part that ends there goes on, where that is enough. Else around such a place the shape, or the space beside
+it, is cut along one of the directions of the whole. Where it is one extrusion there, that is one more
+feature. Else a few extrusions follow it: worse to read than a
 feature, but no further off than is allowed. They are called `freeform_1` and so on.
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +29,7 @@ from partwright.superfrusta.far_places import (
     loose_places,
     reach,
 )
+from partwright.superfrusta.feature_lengthening import lengthened
 from partwright.superfrusta.feature_mending import FAR
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, as_move, covers, image_of
 from partwright.superfrusta.feature_symmetry import reflected
@@ -92,9 +95,13 @@ def with_freeform(
         if not places or left < 1:
             break
         start = _Mended(tree, other, [], places[0].off)
-        best = min(_tries(search, shape, start, places, left), key=lambda one: one.rank, default=None)
+        longer = _longer(search, shape, start, places, made)
+        tries = chain(longer, _tries(search, shape, start, places, left))
+        best = min(tries, key=lambda one: one.rank, default=None)
         if best is None:
             given_up.append(places[0])
+        elif not best.parts:
+            tree = best.tree
         else:
             tree = _with_copies(search, shape, start, best, places).tree
     return replace(tree, off=far_off(search, made(tree)))
@@ -104,6 +111,35 @@ def far_off(search: FeatureSearch, whole: Assembly) -> float:
     """How far an assembly in the unit frame is off where it is far off, unit lengths; else 0."""
     places = far_places(Solid(search.body, search.samples.measure), Solid.of(whole))
     return max((place.off for place in places), default=0.0)
+
+
+def _longer(
+    search: FeatureSearch,
+    shape: Solid,
+    start: _Mended,
+    places: Sequence[Place],
+    made: Callable[[FeatureTree], Assembly],
+) -> Iterator[_Mended]:
+    """With a part that ends at the first of places going on, where that brings it near enough: it is no
+    further part."""
+    place, *others = places
+    for k, feature in enumerate(start.tree.features):
+        if feature.added is not place.lacks or feature.image is not None or feature.freeform:
+            continue
+        for part in lengthened(feature.part, feature.added, search.samples.measure):
+            if part.distance(place.points.astype(np.float32)).max() > NEARLY * FAR:
+                continue
+            features = list(start.tree.features)
+            features[k] = replace(feature, part=part, covers=covers(part, search.points))
+            tree = replace(start.tree, features=features)
+            covered = tree.at(search.points)
+            tree = replace(tree, covered=covered, score=search.score_of(covered))
+            solid = Solid.of(made(tree))
+            off = _left(shape, solid, place, others)
+            fewer = start.solid.count - solid.count
+            near = off < NEARLY * FAR and fewer >= (1 if place.gap else 0)
+            if near and tree.score >= start.tree.score - _LOSS:
+                yield _Mended(tree, solid, [], off)
 
 
 def _tries(

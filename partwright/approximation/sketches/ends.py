@@ -18,7 +18,8 @@ BARELY = 1e-3
 """Unit lengths: the same of the wide end of leaning walls, which move with it, and by less than is seen."""
 STEPS = (0.004, 0.012, 0.02, BEYOND + 0.004)
 """Unit lengths beyond an end, where it has to be open."""
-_LONG = Box, Cylinder, Tube, Extrusion
+LONG = Box, Cylinder, Tube, Extrusion
+"""What has ends along z."""
 _LATTICE = 24
 _FEW = 16
 _EDGE = 0.004  # unit lengths: so near to its edge an end is not looked at
@@ -32,10 +33,10 @@ def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.
     z of a box, a cylinder, a tube or an extrusion; all copies have to agree.
     """
     field = part.field
-    if not isinstance(field, _LONG):
+    if not isinstance(field, LONG):
         return part
     low, high = field.bounds()
-    flat = _interior(field, low, high)
+    flat = interior(field, low, high)
     if not len(flat):
         return part
     looks = flat[::_FEW], flat  # most ends that are closed show it in a few points
@@ -60,13 +61,14 @@ def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.
     axis = rotation_matrix(part.rotation)[:, 2]
     x, y, z = (np.array(part.translation) + axis * (up - down) / 2).tolist()
     try:
-        return dataclasses.replace(part, field=_longer(field, up + down), translation=(x, y, z))
+        return dataclasses.replace(part, field=longer(field, up + down), translation=(x, y, z))
     except ParameterError:  # a leaning side would vanish
         return part
 
 
-def _interior(field: Field, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """(K, 2) points of its middle section, away from the edge where there are such."""
+def interior(field: Field, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(K, 2) points of the middle section of what has ends along z, away from the edge where there are such.
+    low, high: (3,) its bounds."""
     steps = (np.arange(_LATTICE) + 0.5) / _LATTICE
     grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
     flat = low[:2] + grid * (high - low)[:2]
@@ -75,7 +77,8 @@ def _interior(field: Field, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return within if len(within) else flat[deep < 0]
 
 
-def _longer(field: Box | Cylinder | Tube | Extrusion, more: float) -> Field:
+def longer(field: Box | Cylinder | Tube | Extrusion, more: float) -> Field:
+    """By a length along z."""
     if isinstance(field, Box):
         x, y, z = field.size
         return Box((x, y, z + more))
