@@ -1,4 +1,5 @@
-"""Small detail that no feature has: letters that are engraved in a face or stand out of it, a shallow mark.
+"""Small detail that no feature has: letters that are engraved in a face or stand out of it, a shallow mark, a
+small hole right through.
 
 It hardly shows in any score, yet who reads the features should know that it is not among them.
 """
@@ -72,6 +73,13 @@ def left_out(shape: Shape, own: Assembly, fitted: Solid) -> list[Detail]:
     ]
 
 
+def _facing(normals: NDArray[np.float64], area: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """(3,) unit, the way in which walls (N, 3) face, or face away, as both sides do of what a hole goes
+    through; and how nearly they do, 1 at most."""
+    weight, axes = np.linalg.eigh(np.einsum("n,ni,nj->ij", area, normals, normals))
+    return axes[:, 2], float(np.sqrt(weight[2] / weight.sum()))
+
+
 def _details(vertices: NDArray[np.float64], faces: NDArray[np.int64], fitted: Solid) -> list[Detail]:
     corners = vertices[faces]
     normal = area_vectors(corners) / 2
@@ -94,13 +102,13 @@ def _details(vertices: NDArray[np.float64], faces: NDArray[np.int64], fitted: So
             continue
         mine = label == k
         depth = float(off[mine][np.abs(off[mine]).argmax()])
-        up = np.average(wall[mine], axis=0, weights=area[mine])
+        up, alike = _facing(wall[mine], area[mine])
         covered = abs(float((normal[mine] @ up).sum()))
-        if not _LEAST < abs(depth) < FAR or np.linalg.norm(up) < _ALIKE or covered > _SMALL * whole:
+        if not _LEAST < abs(depth) < FAR or alike < _ALIKE or covered > _SMALL * whole:
             continue
         rim = mine[one] != mine[other]
         outer = np.where(mine[one], other, one)[rim]
-        goes_on = ~is_off[outer] & (units(normal[outer]) @ units(up) > _ALIKE)
+        goes_on = ~is_off[outer] & (np.abs(units(normal[outer]) @ up) > _ALIKE)
         if length[rim][goes_on].sum() > _AROUND * length[rim].sum():
             ends = corners[mine].min(axis=(0, 1)), corners[mine].max(axis=(0, 1))
             found.append(Detail(depth, covered, np.stack(ends)))

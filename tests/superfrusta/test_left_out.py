@@ -56,6 +56,15 @@ def test_letters_have_one_line(drawn: Manifold, how: str) -> None:
     assert how in line
 
 
+def test_small_holes_through_a_sheet_have_one_line() -> None:
+    """Their walls face neither way of the sheet, both of whose sides go on around them."""
+    hole = Manifold.cylinder(4, 1.0, center=True)
+    holes = [hole.translate((x, y, 0)) for x in (-20, 20) for y in (-10, 10)]
+    sheet = Manifold.cube((60, 40, 2), center=True)
+    (line,) = told(sheet - sum(holes[1:], holes[0]), Part(Box((60, 40, 2))))
+    assert line.startswith("left out: small detail (4 places, as letters are) that is cut in by")
+
+
 def test_what_freeform_steps_leave_is_no_detail() -> None:
     step = Part(Box((10, 10, 10)), (-20, 0, 0), name="freeform_1")
     (line,) = told(PLATE - letters(1.0, 4.5), FOUND, step)
