@@ -125,15 +125,17 @@ def _mended(
     features.
 
     rival: the search's objective. The one that explains more is mended first, the other only where that does
-    not bring it near, or with freeform alone: nothing may be far off that need not be. Where both stay far
-    off, how far counts with each. Where the features need freeform, so that they do not say either how all of
-    it would be drawn, fewer parts of the search that explain no less, and are near, are preferred.
+    not bring it near, or with freeform and more parts: nothing may be far off that need not be. Where both
+    stay far off, how far counts with each. Where the features need freeform, so that they do not say either
+    how all of it would be drawn, fewer parts of the search that explain no less, and are near, are preferred.
     """
     mended: FeatureTree | None = None
     if features.objective >= rival:
         mended = featured.mended(features)
-        if not (mended.off or mended.freeform) and mended.objective >= rival:
-            return featured.assembly(mended), True
+        drawn = featured.assembly(mended)
+        has_rival = mended.freeform > 0 and len(whole.parts) < len(drawn.parts)
+        if not (mended.off or has_rival) and mended.objective >= rival:
+            return drawn, True
     other = featured.mended_assembly(whole)
     if other.off and mended is None:
         mended = featured.mended(features)
