@@ -33,6 +33,7 @@ from partwright.superfrusta.feature_lengthening import lengthened
 from partwright.superfrusta.feature_mending import FAR
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, as_move, covers, image_of
 from partwright.superfrusta.feature_symmetry import reflected
+from partwright.superfrusta.feature_thinning import reaches
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
@@ -125,6 +126,8 @@ def _longer(
     place, *others = places
     for k, feature in enumerate(start.tree.features):
         if feature.added is not place.lacks or feature.image is not None or feature.freeform:
+            continue
+        if not reaches(feature, place.box):
             continue
         for part in lengthened(feature.part, feature.added, search.samples.measure):
             if part.distance(place.points.astype(np.float32)).max() > NEARLY * FAR:

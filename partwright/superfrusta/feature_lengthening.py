@@ -17,6 +17,7 @@ from partwright.fields import Box, Cylinder, Extrusion, Revolution, Tube
 
 _STEPS = 16  # in which a part goes on by its own narrower width, at most
 _LATTICE = 16
+_POINTS = 50  # of a section, about, that are looked at
 _SHARES = np.arange(1, _STEPS + 1) / _STEPS
 _EDGE = 0.004  # unit lengths: so near to its edge a half section is not looked at
 
@@ -58,7 +59,7 @@ def _span(
     part: Part, field: Box | Cylinder | Tube | Extrusion, side: int
 ) -> tuple[Points, Callable[[float], Part]]:
     low, high = field.bounds()
-    section, width = interior(field, low, high), float((high - low)[:2].min())
+    section, width = _some(interior(field, low, high)), float((high - low)[:2].min())
     heights = (high[2] if side > 0 else low[2]) + side * width * _SHARES
     levels = [np.column_stack([section, np.full(len(section), height)]) for height in heights]
 
@@ -96,4 +97,8 @@ def _half_section(field: Revolution) -> Points:
     whole = replace(field, angle=360.0)
     deep = whole(np.column_stack([flat[:, 0], np.zeros(len(flat)), flat[:, 1]]))
     within = flat[deep < -_EDGE]
-    return within if len(within) else flat[deep < 0]
+    return _some(within if len(within) else flat[deep < 0])
+
+
+def _some(section: Points) -> Points:
+    return section[:: max(1, len(section) // _POINTS)]

@@ -50,7 +50,7 @@ def thinned(search: FeatureSearch, tree: FeatureTree, made: Callable[[FeatureTre
         off = [place for place in far_places(shape, result) if place.off > tree.off + _FURTHER]
         if not off and result.count <= bodies:
             return thinner
-        kept = {i for place in off for i in gone if _reaches(tree.features[i], place.box)}
+        kept = {i for place in off for i in gone if reaches(tree.features[i], place.box)}
         kept = kept or {gone[-1]}
         gone = [i for i in gone if i not in kept]
         if not gone:
@@ -92,7 +92,7 @@ def _without(search: FeatureSearch, tree: FeatureTree, gone: Sequence[int]) -> F
     return replace(thinner, covered=covered, score=search.score_of(covered))
 
 
-def _reaches(feature: Feature, box: NDArray[np.float64]) -> bool:
+def reaches(feature: Feature, box: NDArray[np.float64]) -> bool:
     """Whether a feature, or a copy of it, comes near to a box (2, 3)."""
     ends = [copy.bounds() for part in feature.parts for copy in part.copies]
     return any((low - _AROUND < box[1]).all() and (high + _AROUND > box[0]).all() for low, high in ends)
