@@ -99,6 +99,7 @@ TABLES = (
           "generate --family families/chairs --model chairs --fresh 140 --threads 1", 8, "families/"),
     Table("partsdf-generation-cars.md", "partsdf.py", None, 0,
           "generate --family families/cars --model cars --fresh 140 --threads 1", 5, "families/"),
+    Table("partsdf-layouts-or-forms.md", "partsdf.py", None, 0, "layouts --threads 1", 8),
     Table("partsdf-soundness.md", "partsdf.py", None, 0,
           "soundness --names chairs,mixers,vehicles,cars --count 48 --threads 1", 14),
     Table("partsdf-ablations-cars.md", "partsdf.py", None, 0,
