@@ -23,7 +23,7 @@ def layout_oddness(shape: NeuralShape) -> float:
     if count < 2:
         return 0.0
     vectors = PartVectors.of(model)
-    known = _together(vectors.of_poses(model.poses), model.present)
+    known = together(vectors.of_poses(model.poses), model.present)
     factor = torch.linalg.cholesky(covariance(known))
 
     def squared(rows: Tensor) -> Tensor:
@@ -32,10 +32,10 @@ def layout_oddness(shape: NeuralShape) -> float:
     own = squared(known)
     # By the spread without the row itself (Sherman and Morrison).
     usual = (own / (1 - own / count).clamp(min=1.0 / count)).mean()
-    found = squared(_together(vectors.of_poses(shape.poses)[None], shape.present[None]))
+    found = squared(together(vectors.of_poses(shape.poses)[None], shape.present[None]))
     return float((found[0] / usual.clamp(min=1e-12)).sqrt())
 
 
-def _together(poses: Tensor, present: Tensor) -> Tensor:
+def together(poses: Tensor, present: Tensor) -> Tensor:
     """(S, P 12) of poses' numbers (S, P, 12); a part that is not there lies as is usual."""
     return torch.where(present[..., None], poses, 0.0).flatten(1).double()

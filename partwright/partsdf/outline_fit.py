@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from scipy import ndimage
 
+from partwright.partsdf.layout import together
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import POSE, PartVectors, covariance
 from partwright.partsdf.photos import Covered
@@ -75,8 +76,8 @@ class _Layout:
         self._shape, self._vectors = shape, PartVectors.of(shape.model)
         self._there = np.flatnonzero(shape.present.numpy())
         model, v = shape.model, self._vectors
-        known = torch.where(model.present[..., None], v.of_poses(model.poses), 0.0)[:, self._there]
-        values, ways = torch.linalg.eigh(covariance(known.flatten(1).double()))
+        known = together(v.of_poses(model.poses)[:, self._there], model.present[:, self._there])
+        values, ways = torch.linalg.eigh(covariance(known))
         self.basis = (ways * values.sqrt()).numpy()
         self.size = len(self.basis)
         self._begun = v.of_poses(shape.poses)[self._there].double()
