@@ -147,7 +147,7 @@ NB_MODULE(_kernel, m) {
     {
       nb::gil_scoped_release release;
       const auto parts = parts_of(rows);
-      SampleBlocks samples(samples_of(points, distance, weight, background), false, threads);
+      SampleBlocks samples(samples_of(points, distance, weight, background), false);
       samples.sharpen(beta);
       PartDistances distances(parts.size(), samples);
       measure(parts, samples, threads, distances);
@@ -169,7 +169,7 @@ NB_MODULE(_kernel, m) {
                    float overlap, float blending, int threads) {
     nb::gil_scoped_release release;
     const auto parts = parts_of(rows);
-    SampleBlocks samples(samples_of(points, distance, weight, background), false, threads);
+    SampleBlocks samples(samples_of(points, distance, weight, background), false);
     samples.sharpen(beta);
     PartDistances distances(parts.size(), samples);
     return loss(parts, std::vector<char>(parts.size(), 1), samples, {overlap, blending}, threads, distances);

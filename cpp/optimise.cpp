@@ -119,7 +119,7 @@ Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const 
 Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied,
                             const Samples& samples, const std::vector<Stage>& stages, Penalties penalties,
                             const Limits& limits, int threads) {
-  SampleBlocks blocks(samples, rows.size() > COLUMNS, threads);
+  SampleBlocks blocks(samples, rows.size() > COLUMNS);
   return minimised(std::move(rows), free, tied, std::move(blocks), stages, penalties, limits, threads);
 }
 

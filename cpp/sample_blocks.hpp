@@ -33,7 +33,7 @@ class SampleBlocks {
  public:
   // compact: in an order in which the samples of a block lie close together: most parts are then far from most
   // blocks.
-  SampleBlocks(const Samples& given, bool compact, int threads);
+  SampleBlocks(const Samples& given, bool compact);
 
   // Sets the targets; every use is at the sharpness `beta` from then on.
   void sharpen(float beta);
@@ -45,15 +45,10 @@ class SampleBlocks {
   float beta() const { return beta_; }
 
  private:
-  // Calls work(block) for every block.
-  template <typename Work>
-  void in_pieces(Work work);
-
   std::vector<SampleBlock> blocks_;
   int64_t count_;
   bool background_;
   float beta_ = 0;
-  int threads_;
 };
 
 }  // namespace partwright

@@ -205,7 +205,7 @@ class _Task:
                 cleaned, outcome = self.cleaned(assembly, outcome)
             assembly = cleaned.assembly if cleaned else assembly
         made = fitted[0].surface if len(fitted) == 1 and not (enforced or cleaned) else None
-        scores, surface = _scored(self.shape, assembly, self.run, seconds, made)
+        scores, surface = _scored(self.shape, assembly, self.run.seed, seconds, made)
         seconds["all"] = self.shape.reading_seconds + time.perf_counter() - started
         told = report(
             self.shape, assembly, surface, scores, how=self.how(outcome), run=self.run, seconds=seconds,
@@ -312,7 +312,7 @@ def _seconds(fitted: Sequence[Fitted]) -> dict[str, float]:
 
 
 def _scored(
-    shape: Shape, assembly: Assembly, run: Run, seconds: dict[str, float], made: trimesh.Trimesh | None
+    shape: Shape, assembly: Assembly, seed: int, seconds: dict[str, float], made: trimesh.Trimesh | None
 ) -> tuple[Scores, trimesh.Trimesh]:
     from partwright.meshing import mesh_assembly
     from partwright.metrics import evaluate
@@ -320,5 +320,5 @@ def _scored(
     with timed(seconds, "meshing"):
         surface = made if made is not None else mesh_assembly(assembly)
     with timed(seconds, "scores"):
-        scores = evaluate(assembly, shape, run.seed, emd=False, surface=surface, threads=run.threads)
+        scores = evaluate(assembly, shape, seed=seed, emd=False, surface=surface)
     return scores, surface

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from partwright.assembly.repeated_groups import parts_once
@@ -15,15 +14,12 @@ from partwright.metrics.comparison import Comparison
 from partwright.metrics.deviation import place_in
 from partwright.metrics.table import METRICS
 from partwright.shapes import LONGEST_SIDE
-from partwright.threads import at_once
 
 if TYPE_CHECKING:
     import trimesh
 
     from partwright.assembly import Assembly
     from partwright.shapes import Shape
-
-_LENGTHS = ("max_deviation", "max_protrusion", "deviation_95")
 
 
 @dataclass(frozen=True)
@@ -64,7 +60,6 @@ def evaluate(
     surface: trimesh.Trimesh | None = None,
     cad_points: int | None = None,
     metrics: Sequence[str] = (),
-    threads: int = 0,
 ) -> Scores:
     """Measure an assembly against the shape it stands for. docs/metrics.md defines each score.
 
@@ -72,33 +67,25 @@ def evaluate(
     surface: `mesh_assembly(assembly)` in the input's units, if it is known already.
     cad_points: also take the measures of CAPRI-Net's tables (`cad_scores`), from this many points.
     metrics: names of further ones to take, see `metrics.METRICS`; `scores.further` has them.
-    threads: on which they are taken side by side, 0 for one a core.
 
     Raises NoSurfaceError where nothing is left of the assembly, SettingError where there is no such metric.
     """
     further = {name: METRICS[name] for name in metrics}
     pair = Comparison(assembly, shape, surface, seed)
 
-    # Longest first; what is measured on the way to one serves those beside it.
-    groups = (_LENGTHS, ("iou",), ("overlap",), ("bi_surface_iou",), ("chamfer",), ("emd",) if emd else ())
+    def of(name: str) -> float:
+        return METRICS[name](pair)
 
-    def measured(names: tuple[str, ...]) -> dict[str, float]:
-        return {name: METRICS[name](pair) for name in names}
-
-    jobs: list[Callable[[], dict[str, float]]] = [partial(measured, names) for names in groups]
-    jobs.append(lambda: {"floor": chamfer_floor(pair)})
-    found = at_once(jobs, threads)
-    of = {name: value for some in found for name, value in some.items()}
     worst = pair.deviation.worst_point
     longest = float(shape.frame.length_from_unit(LONGEST_SIDE))
-    largest, beyond, most = (of[name] for name in _LENGTHS)
+    largest, beyond, most = (of(name) for name in ("max_deviation", "max_protrusion", "deviation_95"))
     return Scores(
-        iou=of["iou"],
-        bi_surface_iou=of["bi_surface_iou"],
-        chamfer=of["chamfer"],
-        chamfer_floor=of["floor"],
-        emd=of.get("emd"),
-        overlap=of["overlap"],
+        iou=of("iou"),
+        bi_surface_iou=of("bi_surface_iou"),
+        chamfer=of("chamfer"),
+        chamfer_floor=chamfer_floor(pair),
+        emd=of("emd") if emd else None,
+        overlap=of("overlap"),
         parts=len(parts_once(assembly)),
         max_deviation=largest,
         max_protrusion=beyond,

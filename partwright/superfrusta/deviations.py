@@ -6,7 +6,6 @@ An overlap hardly feels either: a tab as thin as a sheet holds no volume, and is
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 from partwright.fields.columns import Column
 from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.samples import FitSamples, Rows
-from partwright.threads import at_once
 
 Floats = NDArray[np.float32]
 
@@ -72,12 +70,12 @@ def deviations(samples: FitSamples, rows: Rows) -> Deviations:
     """Of an assembly, over points of its parts' surfaces and of the shape's."""
     added = np.flatnonzero(rows[:, Column.SIGN] > 0)
     surfaces = surface_points(rows)
-    jobs = [
-        partial(_of_parts, samples, rows, added, surfaces),
-        partial(_of_shape, samples, rows, added),
-        partial(_of_voxels, samples, rows, added, surfaces),
-    ]
-    found = zip(*at_once(jobs, samples.threads), strict=True)
+    found = zip(
+        _of_parts(samples, rows, added, surfaces),
+        _of_shape(samples, rows, added),
+        _of_voxels(samples, rows, added, surfaces),
+        strict=True,
+    )
     points, distance, off, part = (np.concatenate(one) for one in found)
     # At an edge, what is read off the grid may be wrong by half a voxel.
     kept = off > max(_CLOSE, samples.grid.spacing / 2)

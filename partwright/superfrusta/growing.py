@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,6 @@ from partwright.superfrusta.refining import freedom, sharpened, ties
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.solid_kinds import plainness
-from partwright.threads import at_once
 
 _LEAST_DEPTH = 0.15  # voxels: thinner regions are noise (half a voxel would lose thin walls)
 _LEAST_VOLUME = 2e-4  # of the shape
@@ -86,10 +84,10 @@ class View:
 def regions(samples: FitSamples, rows: Rows, settings: Settings) -> list[Region]:
     """Pieces of the residual max(S, -F), to add, and, where settings allow, of max(F, -S), to subtract."""
     field = samples.grid_field(rows)
-    jobs = [partial(_pieces, samples, samples.grid.values, field, rows, settings, 1.0)]
+    found = _pieces(samples, samples.grid.values, field, rows, settings, 1.0)
     if settings.subtract and len(rows):
-        jobs.append(partial(_excess, samples, field, rows, settings))
-    return [region for some in at_once(jobs, samples.threads) for region in some]
+        found += _excess(samples, field, rows, settings)
+    return found
 
 
 def _excess(samples: FitSamples, field: NDArray[np.float32], rows: Rows, settings: Settings) -> list[Region]:
@@ -114,28 +112,22 @@ def _pieces(
     residual = np.maximum(wanted, -found)
     carved = sign > 0 and bool((rows[:, Column.SIGN] < 0).any())
     least_depth, least = _LEAST_DEPTH * grid.spacing, _LEAST_VOLUME * samples.inside_voxels
-    depths: list[float] = []
-
-    def decomposed() -> list[NDArray[np.bool_]]:
-        labels, found = samples.kernel.decompose(
-            residual, grid.spacing, settings.regions, settings.kappa, least_depth, least
-        )
-        depths.extend(found)
-        return [(labels == label).ravel() for label in range(len(found))]
-
-    def thin() -> list[NDArray[np.bool_]]:
-        beside = (found - wanted > least_depth) & (residual < _BESIDE * grid.spacing)
-        return _largest(beside, _TOUCHING, 1, least) if len(rows) else []
-
-    pieces, whole = at_once([decomposed, thin], samples.threads)
+    labels, depths = samples.kernel.decompose(
+        residual, grid.spacing, settings.regions, settings.kappa, least_depth, least
+    )
+    pieces = []
+    for label, depth in enumerate(depths):
+        voxels = (labels == label).ravel()
+        pieces.append(Region(voxels, rows, depth, 0.2, 0.15, sign=sign))
+        pieces.append(Region(voxels, rows, depth, 0.5, 1.0, sign=sign, under=carved))
+    whole = []
+    if len(rows):
+        thin = (found - wanted > least_depth) & (residual < _BESIDE * grid.spacing)
+        whole += _largest(thin, _TOUCHING, 1, least)
     if len(depths) > 1:
         whole += _largest(residual < -least_depth, None, _LARGEST, least)
-    regions = []
-    for voxels, depth in zip(pieces, depths, strict=True):
-        regions.append(Region(voxels, rows, depth, 0.2, 0.15, sign=sign))
-        regions.append(Region(voxels, rows, depth, 0.5, 1.0, sign=sign, under=carved))
-    depth = float(np.median(depths)) if depths else _BESIDE * grid.spacing
-    return regions + [Region(voxels, rows, depth, 0.1, 0.3, sign=sign) for voxels in whole]
+    depth = float(np.median(depths)) if len(depths) else _BESIDE * grid.spacing
+    return pieces + [Region(voxels, rows, depth, 0.1, 0.3, sign=sign) for voxels in whole]
 
 
 def _largest(
@@ -209,10 +201,8 @@ def finalists(
     # Regions of the same voxels, which differ in what they count around them, start alike.
     of_voxels = {id(region.voxels): region for region in wanted}
     points = {key: samples.grid_points[np.flatnonzero(one.voxels)] for key, one in of_voxels.items()}
-    viewing = [partial(_view, samples, region, points[id(region.voxels)]) for region in wanted]
-    views = at_once(viewing, samples.threads)
-    guessing = [partial(_guesses, samples, one, points[key], settings) for key, one in of_voxels.items()]
-    starting = dict(zip(of_voxels, at_once(guessing, samples.threads), strict=True))
+    views = [_view(samples, region, points[id(region.voxels)]) for region in wanted]
+    starting = {key: _guesses(samples, one, points[key], settings) for key, one in of_voxels.items()}
     guesses = [starting[id(region.voxels)] for region in wanted]
     owner = np.repeat(np.arange(len(wanted)), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import chain
 
 import numpy as np
@@ -22,7 +22,6 @@ from partwright.superfrusta.repeat_candidates import Occupancies, Repeat, withou
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.symmetric_fit import images
 from partwright.superfrusta.symmetry import Isometry, image_error, refined, shifted
-from partwright.threads import at_once
 
 Floats = NDArray[np.float64]
 
@@ -54,14 +53,14 @@ def local_repeats(
     """
     forms = _Forms(samples, rows, locked, tolerance)
     seen = Occupancies.of(samples, rows)
-
-    def of_part(base: int) -> list[Repeat]:
-        groups = [group for group in (forms.group(base), *forms.nearly(base, nearly)) if group]
-        wanted = [one for group in groups for one in seen.candidates(group, [base], locked)]
-        return [one for one in wanted if forms.hold(one)]
-
-    jobs = [partial(of_part, base) for base in range(locked, len(rows))]
-    return without_twins(chain.from_iterable(at_once(jobs, samples.threads)))
+    found = (
+        one
+        for base in range(locked, len(rows))
+        for group in (forms.group(base), *forms.nearly(base, nearly))
+        if group
+        for one in seen.candidates(group, [base], locked)
+    )
+    return without_twins(one for one in found if forms.hold(one))
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,11 @@ fitted anew, split, joined by another or taken away, whichever serves an objecti
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
+from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +27,8 @@ from partwright.superfrusta.pruning import cheapest_removal, neighbours
 from partwright.superfrusta.refining import POLISH, TOUCH_UP, Stages, refine
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
-from partwright.threads import at_once
 
 Mask = NDArray[np.bool_]
-Change = tuple[Rows, Mask]
-"""An assembly before any refit, and which of its parts move: those marked, and new ones."""
 
 _ENOUGH = 0.026  # unit lengths, 1.4 % of the longest side: below, hardly any try bears fruit
 _FAR = 0.045  # unit lengths off from which on a part makes room for several
@@ -153,7 +152,7 @@ class Mending:
         part_of = np.arange(len(best.rows))  # which of the parts as they were each row is; -1: a joined one
         while left := [one for one in left if one.gain > -_HOPELESS and np.isin(one.pair, part_of).all()]:
             first = left[:_JOINED]
-            tried = at_once([partial(self.merged, best, one, part_of) for one in first], self.samples.threads)
+            tried = self.at_once([partial(self.merged, best, one, part_of) for one in first])
             gaining = [(trial, one) for trials, one in zip(tried, first, strict=True) for trial in trials]
             if not gaining:
                 break
@@ -193,18 +192,19 @@ class Mending:
         moving[part] = True
         if part < self.locked:
             return [self.firmed(best, moving)]
-        threads = self.samples.threads
-        found = [one for some in at_once(self.changes(best, part, moving), threads) for one in some]
-        plain = at_once([partial(self.trial, rows) for rows, _ in found], threads)
-        changes = [(trial, changed) for trial, (_, changed) in zip(plain, found, strict=True)]
+        changes = [(self.trial(rows), changed) for rows, changed in self.changes(best, part, moving)]
         changes = sorted(changes, key=lambda one: -one[0].value)[:_REFITTED]
         refits = [partial(self.refitted, trial, changed, best) for trial, changed in changes]
         # The change that promises most is mostly the best; another is only tried where it does not help.
-        jobs: list[Callable[[], list[Trial]]] = [lambda: [self.firmed(best, moving)], *refits[:1]]
-        tried = at_once(jobs, threads)
+        tried = self.at_once([lambda: [self.firmed(best, moving)], *refits[:1]])
         if all(trial.value <= best.value for trials in tried for trial in trials):
-            tried = at_once(refits[1:], threads)
+            tried = self.at_once(refits[1:])
         return [trial for trials in tried for trial in trials]
+
+    def at_once(self, jobs: Sequence[Callable[[], list[Trial]]]) -> list[list[Trial]]:
+        """What jobs return, which take turns on the threads: half of their work is none of the kernel's."""
+        with ThreadPoolExecutor(self.samples.threads or cpu_count() or 1) as pool:
+            return [future.result() for future in [pool.submit(job) for job in jobs]]
 
     def refitted(self, changed: Trial, moving: Mask, best: Trial) -> list[Trial]:
         """A change, its parts moved to where they explain the most, and to where they are nowhere far off."""
@@ -235,8 +235,8 @@ class Mending:
             (weight / weight.sum()).astype(np.float32),
         )
 
-    def changes(self, best: Trial, part: int, moving: Mask) -> list[Callable[[], list[Change]]]:
-        """What may be changed about a part that is far off, by jobs that each find some of it."""
+    def changes(self, best: Trial, part: int, moving: Mask) -> Iterator[tuple[Rows, Mask]]:
+        """Assemblies before any refit, and which of their parts move: those marked, and new ones."""
         samples, rows, off = self.samples, best.rows, best.off
         worst = off.worst(part)
         others, still = np.delete(rows, part, axis=0), np.delete(moving, part)
@@ -244,43 +244,37 @@ class Mending:
         # In the part's own place, what is new is cut by what cuts the part.
         cut = _cut(rows, part)
 
-        def instead(*voxels: Mask) -> list[Change]:
-            new = [self.fitted(one, others, rows[part], cut) for one in voxels]
+        def instead(*new: Rows) -> tuple[Rows, Mask]:
             places = [part if cut else len(others)] * len(new)
-            return [(np.insert(others, places, np.concatenate(new), axis=0), np.insert(still, places, True))]
+            return np.insert(others, places, np.concatenate(new), axis=0), np.insert(still, places, True)
 
-        def with_new(new: Rows) -> Change:
+        def with_new(new: Rows) -> tuple[Rows, Mask]:
             return np.concatenate([rows, new]), np.append(moving, _all(new))
 
-        def regrown() -> list[Change]:
-            grown = grow(samples, others, self.settings, _REGROWN)
-            begun = np.insert(still, [self.locked] * len(grown.first), True)
-            together = grown.joined(others, self.locked), np.append(begun, _all(grown.last))
-            return [together] if len(grown) else []
-
-        def carved() -> list[Change]:
-            anywhere = self.carved(rows).last
-            return [with_new(anywhere)] if len(anywhere) else []
-
-        def filled() -> list[Change]:
-            found = [self.fitted(voxels, rows, rows[part]) for voxels in self.missed(rows, off, worst)]
-            return [with_new(np.concatenate(found[:count])) for count in sorted({1, len(found)}) if found]
-
-        mine = owners(samples, rows) == part
-        jobs: list[Callable[[], list[Change]]] = []
         if (others[:, Column.SIGN] > 0).any():
-            jobs.append(lambda: [(others, still)])
+            yield others, still
+        mine = owners(samples, rows) == part
         if mine.any():
-            jobs.append(partial(instead, mine))
+            yield instead(self.fitted(mine, others, rows[part], cut))
         if off.off[worst] > _FAR:
-            jobs.append(regrown)
+            grown = grow(samples, others, self.settings, _REGROWN)
+            if len(grown):
+                begun = np.insert(still, [self.locked] * len(grown.first), True)
+                yield grown.joined(others, self.locked), np.append(begun, _all(grown.last))
         if self.settings.carving and off.distance[worst] > 0:
-            jobs += [carved, lambda: [with_new(one[None]) for one in self.holes(rows, off, worst)]]
-        if off.distance[worst] <= 0:
-            jobs.append(filled)
+            carved = self.carved(rows)
+            if len(carved):
+                yield with_new(carved.last)
+            for one in self.holes(rows, off, worst):
+                yield with_new(one[None])
+        missed = self.missed(rows, off, worst) if off.distance[worst] <= 0 else []
+        found = [self.fitted(voxels, rows, rows[part]) for voxels in missed]
+        if found:
+            yield with_new(found[0])
+        if len(found) > 1:
+            yield with_new(np.concatenate(found))
         if np.count_nonzero(mine) > _LEAST_HALVED:
-            jobs.append(lambda: instead(*_halves(samples, mine)))
-        return jobs
+            yield instead(*(self.fitted(half, others, rows[part], cut) for half in _halves(samples, mine)))
 
     def carved(self, rows: Rows) -> Grown:
         """What could be subtracted anywhere: the same for every part that is tried in vain."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from itertools import combinations
 from typing import Any
 
@@ -19,7 +18,6 @@ from partwright.superfrusta.pruning import neighbours
 from partwright.superfrusta.refining import TOUCH_UP, refine
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
-from partwright.threads import ahead, at_once
 
 _TOUCHING = 0.03  # unit lengths
 _UNREFITTED_SCORE_LOSS = 0.02  # of R: a merger that costs more before its refit is not tried
@@ -44,25 +42,18 @@ def merge(samples: FitSamples, rows: Rows, settings: Settings, locked: int = 0) 
     The most promising mergers are tried one after another with a refit of their neighbours.
     """
     whole = score(samples, rows)
+    gone: set[int] = set()
     alive = np.arange(len(rows))
-
-    def tried(rows: Rows, alive: NDArray[np.int64], merger: Merger) -> tuple[Rows, float]:
+    for merger in mergers(samples, rows, settings, locked)[:_TRIED]:
+        if merger.gain < -_UNREFITTED_SCORE_LOSS or gone & set(merger.pair):
+            continue
         first, second = (int(np.flatnonzero(alive == part)[0]) for part in merger.pair)
         trial = carried_out(samples, rows, first, second, merger.part, settings, locked)
-        return trial, score(samples, trial)
-
-    left = mergers(samples, rows, settings, locked)[:_TRIED]
-    left = [merger for merger in left if merger.gain >= -_UNREFITTED_SCORE_LOSS]
-    while left:
-        trials = ahead([partial(tried, rows, alive, merger) for merger in left], samples.threads)
-        for number, (trial, reached) in enumerate(trials):
-            if reached + settings.alpha >= whole:
-                rows, whole, gone = trial, reached, left[number].pair
-                alive = alive[alive != gone[1]]
-                left = [merger for merger in left[number + 1 :] if not set(gone) & set(merger.pair)]
-                break
-        else:
-            break
+        reached = score(samples, trial)
+        if reached + settings.alpha >= whole:
+            rows, whole = trial, reached
+            gone |= set(merger.pair)
+            alive = np.delete(alive, second)
     return rows
 
 
@@ -73,14 +64,13 @@ def cheapest_merger(
 
     Any two parts may merge, near or far: a pair of legs into one block.
     """
-
-    def tried(merger: Merger) -> tuple[Rows, float]:
+    best: tuple[Rows, float] | None = None
+    for merger in mergers(samples, rows, settings, locked, apart=True)[: 2 * settings.trials]:
         trial = carried_out(samples, rows, *merger.pair, merger.part, settings, locked)
-        return trial, coverage(samples, trial)
-
-    found = mergers(samples, rows, settings, locked, apart=True)[: 2 * settings.trials]
-    trials = at_once([partial(tried, merger) for merger in found], samples.threads)
-    return max(trials, key=lambda one: one[1], default=None)
+        reached = coverage(samples, trial)
+        if best is None or reached > best[1]:
+            best = trial, reached
+    return best
 
 
 def mergers(

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +13,6 @@ from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid, grid_indices
 from partwright.superfrusta.hollows import closed_sections
 from partwright.superfrusta.samples import FitSamples
-from partwright.threads import at_once
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -69,13 +66,13 @@ class Hole:
 def narrow_holes(shape: Shape, samples: FitSamples) -> list[Hole]:
     """Those across the walls that there is the most of; one that is found across several comes once."""
     normals = shape.unit_surface(_NORMALS, samples.seed).normals.astype(np.float64)
-    across = at_once([partial(_across, samples, way) for way in directions(normals)], samples.threads)
     found: list[Hole] = []
-    for one in chain.from_iterable(across):
-        if len(found) == _MOST:
-            break
-        if not any(one.meets(other) for other in found):
-            found.append(one)
+    for direction in directions(normals):
+        for one in _across(samples, direction):
+            if len(found) == _MOST:
+                return found
+            if not any(one.meets(other) for other in found):
+                found.append(one)
     return found
 
 
@@ -96,7 +93,7 @@ def directions(normals: Floats) -> list[Floats]:
     return found
 
 
-def _across(samples: FitSamples, along: Floats) -> list[Hole]:
+def _across(samples: FitSamples, along: Floats) -> Iterator[Hole]:
     """Empty voxels that the shape goes all around in layers across a direction, where they are narrow."""
     spacing = samples.grid.spacing
     axes = _axes(along)
@@ -109,7 +106,6 @@ def _across(samples: FitSamples, along: Floats) -> list[Hole]:
     narrow = closed & (np.bincount(labels.ravel(), minlength=len(closed)) * spacing**2 < _WIDEST)
     pieces, _ = ndimage.label(narrow[labels])
     most = _LARGEST * np.count_nonzero(occupied)
-    found: list[Hole] = []
     for number, box in enumerate(ndimage.find_objects(pieces), 1):
         cells = np.argwhere(pieces[box] == number)
         sections = np.bincount(cells[:, 2])
@@ -123,9 +119,8 @@ def _across(samples: FitSamples, along: Floats) -> list[Hole]:
                 return there
 
             hole = _hole(samples, (low + spacing * cells) @ axes.T, axes, within)
-            if len(hole.voxels) and len(found) < _MOST:
-                found.append(hole)
-    return found
+            if len(hole.voxels):
+                yield hole
 
 
 def _hole(samples: FitSamples, points: Floats, axes: Floats, within: Callable[[Floats], Mask]) -> Hole:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,6 @@ from partwright.superfrusta.objective import removal_scores, score
 from partwright.superfrusta.refining import TOUCH_UP, refine
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
-from partwright.threads import at_once
 
 _TOUCHING = 0.06  # unit lengths within which parts count as neighbours
 
@@ -50,20 +48,21 @@ def cheapest_removal(
     """
     without, whole = removal_scores(samples, rows)
     without[~_removable(rows, locked)] = -np.inf
-
-    def removed(index: int) -> tuple[Rows, float]:
-        moving = neighbours(samples, rows, index)
+    best: tuple[Rows, float] | None = None
+    for index in np.argsort(-without, kind="stable")[: settings.trials]:
+        if not np.isfinite(without[index]):
+            continue
+        moving = neighbours(samples, rows, int(index))
         moving[:locked] = False
         thinned = refine(
             samples, np.delete(rows, index, axis=0), TOUCH_UP, settings, np.delete(moving, index)
         )
-        return thinned, measure(samples, thinned)
-
-    least = np.argsort(-without, kind="stable")[: settings.trials]
-    jobs = [partial(removed, int(index)) for index in least if np.isfinite(without[index])]
-    if not jobs:
+        kept = measure(samples, thinned)
+        if best is None or kept > best[1]:
+            best = thinned, kept
+    if best is None:
         return rows, whole, whole
-    return *max(at_once(jobs, samples.threads), key=lambda one: one[1]), whole
+    return best[0], best[1], whole
 
 
 def _removable(rows: Rows, locked: int) -> NDArray[np.bool_]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, refit
 from partwright.superfrusta.symmetry import TOLERANCE, Symmetry, groups
-from partwright.threads import at_once
 
 _PRICE = 0.5  # of a part's: at the whole price repeats that save a part buy it with much of the surface
 _TRIED = 64  # repeats at most
@@ -68,31 +66,25 @@ def repeat(
             return True
         return _grid_iou(samples, trial) >= min(_grid_iou(samples, whole), settings.min_iou)
 
-    def refitted(chosen: Sequence[Repeat]) -> list[Trial]:
-        """Those that are good, of the refits for as long as they come near to that."""
-        trials = [measured(samples, _leaves(rows, chosen), settings)]
-        for stages in _REFITS:
-            leaves = refit(samples, trials[0].leaves, stages, settings, locked)
-            trials.append(measured(samples, leaves, settings))
-            nearer = trials[-1].off <= whole.off + 2 * _FURTHER
-            if not nearer or trials[-1].value < whole.value - _HOPELESS:
-                break
-        return [trial for trial in trials if good(trial)]
-
     best = whole
     tolerance = max(LOCAL_TOLERANCE, symmetry_tolerance(samples, rows))
     wanted = repeat_candidates(samples, rows, groups(found), locked)
     mirrors = [one.isometry for one in nearly if one.kind == "mirror"]
     wanted += local_repeats(samples, rows, locked, tolerance, mirrors[:_NEARLY])
-    choices = _choices(samples, whole, wanted, settings)
-    trials = at_once([partial(refitted, chosen) for chosen in choices], samples.threads)
-    for chosen, better in zip(choices, trials, strict=True):
-        best = max([best, *better], key=lambda trial: trial.value)
-        for _ in range(_GIVEN_UP):
-            if best is not whole or len(chosen) == 1:
+    for chosen in _choices(samples, whole, wanted, settings):
+        for left in range(_GIVEN_UP, -1, -1):
+            trials = [measured(samples, _leaves(rows, chosen), settings)]
+            for stages in _REFITS:
+                leaves = refit(samples, trials[0].leaves, stages, settings, locked)
+                trials.append(measured(samples, leaves, settings))
+                nearer = trials[-1].off <= whole.off + 2 * _FURTHER
+                if not nearer or trials[-1].value < whole.value - _HOPELESS:
+                    break
+            better = [trial for trial in trials if good(trial)]
+            best = max([best, *better], key=lambda trial: trial.value)
+            if best is not whole or len(chosen) == 1 or not left:
                 break
             chosen = _without_the_worst(samples, rows, chosen, settings)
-            best = max([best, *refitted(chosen)], key=lambda trial: trial.value)
     return best.leaves
 
 
@@ -110,9 +102,7 @@ def _without_the_worst(
     samples: FitSamples, rows: Rows, chosen: Sequence[Repeat], settings: Settings
 ) -> list[Repeat]:
     rest = [[other for other in chosen if other is not one] for one in chosen]
-    jobs = [partial(measured, samples, _leaves(rows, some), settings) for some in rest]
-    values = [trial.value for trial in at_once(jobs, samples.threads)]
-    return rest[int(np.argmax(values))]
+    return max(rest, key=lambda some: measured(samples, _leaves(rows, some), settings).value)
 
 
 def measured(samples: FitSamples, leaves: list[RepeatedPart], settings: Settings) -> Trial:
@@ -134,7 +124,7 @@ def _grid_iou(samples: FitSamples, trial: Trial) -> float:
 
 def _choices(
     samples: FitSamples, whole: Trial, wanted: list[Repeat], settings: Settings
-) -> list[list[Repeat]]:
+) -> Iterator[list[Repeat]]:
     """Repeats that get along, in several ways, none twice.
 
     Those are taken first that are worth the most by themselves, that save the most for what they cost of R
@@ -143,18 +133,17 @@ def _choices(
     """
     rows = expanded(whole.leaves)
     wanted = sorted(wanted, key=lambda one: -len(one.replaced))[:_TRIED]
-    jobs = [partial(score, samples, expanded(_leaves(rows, [one]))) for one in wanted]
-    costs = score(samples, rows) - np.array(at_once(jobs, samples.threads))
+    scores = [score(samples, expanded(_leaves(rows, [one]))) for one in wanted]
+    costs = score(samples, rows) - np.array(scores)
     saved = np.array([len(one.replaced) for one in wanted])
     likely = costs - _PRICE * settings.alpha * saved <= _UNREFITTED_SCORE_LOSS
     every = np.flatnonzero(likely).tolist()
     cheap = sorted(every, key=lambda i: float(costs[i] - _PRICE * settings.alpha * saved[i]))
     many = sorted(every, key=lambda i: (-int(saved[i]), float(costs[i])))
-    measuring = [partial(measured, samples, _leaves(rows, [wanted[i]]), settings) for i in cheap]
-    alone = dict(zip(cheap, at_once(measuring, samples.threads), strict=True))
+    alone = {i: measured(samples, _leaves(rows, [wanted[i]]), settings) for i in cheap}
     near = [i for i, trial in alone.items() if trial.off <= whole.off + _UNREFITTED_OFF]
     worthy = sorted(near, key=lambda i: -alone[i].value)
-    found: list[list[int]] = []
+    seen: list[list[int]] = [[]]
     for order in (worthy, cheap, near, many):
         chosen: list[int] = []
         taken: frozenset[int] = frozenset()
@@ -162,9 +151,9 @@ def _choices(
             if not taken & wanted[i].parts:
                 chosen.append(i)
                 taken |= wanted[i].parts
-        if chosen and chosen not in found:
-            found.append(chosen)
-    return [[wanted[i] for i in chosen] for chosen in found]
+        if chosen not in seen:
+            seen.append(chosen)
+            yield [wanted[i] for i in chosen]
 
 
 def _leaves(rows: Rows, repeats: Sequence[Repeat]) -> list[RepeatedPart]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from partwright.shapes.sampling import morton_order
 from partwright.superfrusta.backend import Kernel, backend, watched
 from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.settings import Settings
-from partwright.threads import at_once
 
 Rows = NDArray[np.float32]
 NOTHING: Rows = np.empty((0, WIDTH), np.float32)
@@ -81,12 +80,8 @@ class FitSamples:
     ) -> FitSamples:
         """Of a shape. The checkpoint is passed before every call of the kernel."""
         run = run or Run()
-        asked: list[Callable[[], object]] = [
-            grid_of := partial(shape.unit_grid, settings.resolution),
-            draw := partial(shape.samples, settings.near, settings.uniform, run.seed),
-        ]
-        at_once(asked, run.threads)  # the shape keeps what was asked of it
-        grid, drawn = grid_of(), draw()
+        grid = shape.unit_grid(settings.resolution)
+        drawn = shape.samples(settings.near, settings.uniform, run.seed)
         around, padding_weight = padding(grid, settings.uniform, run.seed)
         return cls(
             np.concatenate([drawn.points, around]),

@@ -61,15 +61,6 @@ def test_tines_become_one_leaf_however_they_were_found(comb: trimesh.Trimesh, ti
     assert all(move.rotation[0] == pytest.approx(1, abs=1e-3) for move in leaves[2].moves)
 
 
-def test_repeats_are_the_same_at_any_number_of_threads(comb: trimesh.Trimesh) -> None:
-    samples, found = known(comb, [HANDLE, BACK, *TINES[:2], *HALVES, TINES[3]])
-    one, two, many = (
-        expanded(repeat(replace(samples, threads=threads), found, (), DRAFT)) for threads in (1, 2, 5)
-    )
-    assert np.array_equal(two, one)
-    assert np.array_equal(many, one)
-
-
 def test_locked_parts_are_in_no_repeat(comb: trimesh.Trimesh) -> None:
     samples, found = known(comb, [*TINES, HANDLE, BACK])
     leaves = repeat(samples, found, (), DRAFT, locked=2)

@@ -209,17 +209,6 @@ def test_mending_takes_away_what_only_sticks_out(samples: FitSamples, exact: np.
     assert deviations(samples, mended).norm < 0.02
 
 
-def test_mending_is_the_same_at_any_number_of_threads(samples: FitSamples, exact: np.ndarray) -> None:
-    tab = box_row((0.3, 0.3, 0.01), (-0.3, 0.55, 0.1))
-    given = np.vstack([exact[:1], tab])
-    one, two, many = (
-        Mending(dataclasses.replace(samples, threads=threads), SETTINGS)(given) for threads in (1, 2, 7)
-    )
-    assert len(one) == 2
-    assert np.array_equal(two, one)
-    assert np.array_equal(many, one)
-
-
 def test_a_pin_that_has_become_a_box_is_round_again() -> None:
     """It is nowhere so far off that it would be mended."""
     radius, height, place = 0.05, 0.8, (0.1, 0.2, 0.0)

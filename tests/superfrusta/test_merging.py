@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from partwright.methods import Run
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings, merging
 from partwright.superfrusta.merging import carried_out, merge, mergers
@@ -38,17 +37,3 @@ def test_halves_of_a_plank_are_tried_though_each_is_worth_more_than_what_is_chea
     assert np.array_equal(alone[1:], found[2:])
     assert score(samples, alone) > score(samples, found) - 1e-3
     assert len(merge(samples, found, DRAFT)) == 3
-
-
-def test_mergers_that_are_tried_at_once_are_taken_as_one_after_another() -> None:
-    """Of a plank in four, a pair that was taken makes what was tried beside it void."""
-    shape = load_shape(union(box(*PLANK), *(box(*post) for post in POSTS)))
-    (dx, dy, dz) = shape.frame.centre
-    quarters = [((0.45, 0.5, 0.12), (0.45 * i - 0.675, 0.0, 0.0)) for i in range(4)]
-    found = np.array([box_row(size, (x - dx, y - dy, z - dz)) for size, (x, y, z) in (*quarters, *POSTS)])
-    one, two, many = (
-        merge(FitSamples.of(shape, DRAFT, Run(threads=threads)), found, DRAFT) for threads in (1, 2, 6)
-    )
-    assert len(one) < len(found) - 1
-    assert np.array_equal(two, one)
-    assert np.array_equal(many, one)
