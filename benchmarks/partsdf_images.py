@@ -28,6 +28,7 @@ from partwright.partsdf.starts import nearest_trained
 from partwright.partsdf.strangers import standpoint_of, warnings_of
 from partwright.partsdf.targets import Target
 from partwright.render import Camera, render_mesh
+from partwright.shapes import LONGEST_SIDE
 
 # Azimuth and elevation, degrees; another of these for each shape first, so that all sides are seen.
 PLACES = ((30.0, 20.0), (150.0, 10.0), (260.0, 35.0), (330.0, 5.0), (80.0, 25.0), (200.0, 40.0))
@@ -237,12 +238,17 @@ def noise(seed: int, side: int, square: int, channels: int) -> Photo:
     return Photo(pixels.astype(np.float32), None)
 
 
+def new_meshes(name: str, count: int) -> Iterator[trimesh.Trimesh]:
+    """Whole shapes that no model was trained on, in the unit frame."""
+    for shape in made_family(name, count, seed=NEW):
+        mesh = shape.whole
+        vertices = (mesh.vertices - mesh.bounds.mean(axis=0)) * (LONGEST_SIDE / mesh.extents.max())
+        yield trimesh.Trimesh(vertices, mesh.faces, process=False)
+
+
 def new_pictures(name: str, count: int) -> Iterator[Photo]:
     rng = np.random.default_rng(0)
-    for shape in made_family(name, count, seed=NEW):
-        mesh = shape.whole.copy()
-        mesh.apply_translation(-mesh.bounds.mean(axis=0))
-        mesh.apply_scale(1.8 / mesh.extents.max())
+    for mesh in new_meshes(name, count):
         for view in range(VIEWS):
             camera = Camera(rng.uniform(0, 360), rng.uniform(5, 40))
             image = render_mesh(mesh, camera, (PIXELS, PIXELS), ground=view % 2 == 0)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import torch
+import trimesh
 from partsdf_generation import POINTS, points_on
+from partsdf_images import new_meshes
 from partsdf_scores import command_line, write
 
-from partwright.datasets import family as made_family
 from partwright.errors import NoSurfaceError
 from partwright.metrics.sets import chamfer_matrix, scores_of_distances
 from partwright.partsdf.generator import load_generator
@@ -20,9 +22,8 @@ from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import POSE, PartVectors
-from partwright.shapes import LONGEST_SIDE
 
-NEW, CELLS, OFF = 99, 64, 0.1  # seed of held-out shapes; along the unit frame; in poses' spreads
+CELLS, OFF = 64, 0.1  # along the unit frame; in poses' spreads
 
 
 def layouts_or_forms(arguments: argparse.Namespace) -> None:
@@ -42,7 +43,7 @@ def layouts_or_forms(arguments: argparse.Namespace) -> None:
     ]  # fmt: skip
     rows: dict[str, list[str]] = {}
     for name in names:
-        held = held_out(name, count)
+        held = [cloud(mesh) for mesh in new_meshes(name, count)]
         among = chamfer_matrix(held)
         for label, make in variants(load_model(name), count, arguments.seed).items():
             start, made = time.process_time(), clouds_of(make())
@@ -92,24 +93,14 @@ def variants(model: Model, count: int, seed: int) -> dict[str, Callable[[], list
     }
 
 
-def held_out(name: str, count: int) -> list[np.ndarray]:
-    found = []
-    for shape in made_family(name, count, seed=NEW):
-        mesh = shape.whole
-        vertices = (mesh.vertices - mesh.bounds.mean(axis=0)) * (LONGEST_SIDE / mesh.extents.max())
-        found.append(points_on(vertices, np.asarray(mesh.faces), POINTS))
-    return found
+def cloud(mesh: trimesh.Trimesh) -> np.ndarray:
+    return points_on(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64), POINTS)
 
 
 def clouds_of(shapes: Sequence[NeuralShape]) -> list[np.ndarray]:
     """Of those that have a surface."""
     found = []
     for shape in shapes:
-        try:
-            mesh = mesh_shape(shape, CELLS, parts=False).whole
-        except NoSurfaceError:
-            continue
-        found.append(
-            points_on(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64), POINTS)
-        )
+        with suppress(NoSurfaceError):
+            found.append(cloud(mesh_shape(shape, CELLS, parts=False).whole))
     return found

@@ -18,6 +18,7 @@ from torch import Tensor
 from partwright.errors import EmptyShapeError, UnreadableFileError
 from partwright.generators.generating import check_image
 from partwright.partsdf.image_encoder import ImageEncoder, Sight
+from partwright.partsdf.standpoint import extent
 from partwright.partsdf.views import SIDE
 
 _LARGEST = 1024  # pixels along the longer side: more than anything here looks at
@@ -61,9 +62,8 @@ class Covered:
     @property
     def box(self) -> tuple[float, float, float, float]:
         """Left, bottom, right and top of what is covered, from the picture's middle; its sides are 1."""
-        rows, columns = (np.flatnonzero(self.mask.any(axis=a)) for a in (1, 0))
-        left, right = columns[0] / self.cells - 0.5, (columns[-1] + 1) / self.cells - 0.5
-        return left, 0.5 - (rows[-1] + 1) / self.cells, right, 0.5 - rows[0] / self.cells
+        top, left, bottom, right = (side / self.cells - 0.5 for side in extent(self.mask))
+        return left, -bottom, right, -top
 
 
 @dataclass(frozen=True)
@@ -125,8 +125,7 @@ def look_at(encoder: ImageEncoder, photo: Photo) -> Looked:
     height, width = photo.pixels.shape[:2]
     box = np.array([0.0, 0.0, height, width])
     if photo.shape is not None:
-        rows, columns = (np.flatnonzero(photo.shape.any(axis=a)) for a in (1, 0))
-        box = _squared(np.array([rows[0], columns[0], rows[-1] + 1, columns[-1] + 1.0]), _FILLED)
+        box = _squared(np.array(extent(photo.shape), float), _FILLED)
     else:
         box = _squared(box, 1.0)
     for again in range(1 + _CLOSER):
@@ -146,7 +145,7 @@ def look_at(encoder: ImageEncoder, photo: Photo) -> Looked:
             raise EmptyShapeError("no shape is seen in the picture; cut it out, or make what is around plain")
         if again < _CLOSER:
             cell = (box[2] - box[0]) / len(seen)
-            corners = np.array([rows[0], columns[0], rows[-1] + 1, columns[-1] + 1]) * cell
+            corners = np.array(extent(seen)) * cell
             box = _squared(np.tile(box[:2], 2) + corners, _FILLED)
     mirrored = _mirrored(encoder, closely, sight)
     return Looked(closely, sight, seen, _believed(sight.silhouette.numpy(), seen, mirrored), mirrored)

@@ -47,10 +47,19 @@ class Pinhole:
         return replace(self, numbers=numbers)
 
     @property
+    def near(self) -> float:
+        """The reciprocal of its distance."""
+        return float(self.numbers[NEAR])
+
+    @property
+    def size(self) -> float:
+        """How long a unit length in the middle is in the picture."""
+        return math.exp(self.numbers[4])
+
+    @property
     def camera(self) -> Camera:
         """That sees the same side, from as near; what is seen fills its picture."""
-        near, size = self.numbers[NEAR], math.exp(self.numbers[4])
-        field = 2 * math.degrees(math.atan(near / (2 * size)))
+        field = 2 * math.degrees(math.atan(self.near / (2 * self.size)))
         azimuth, elevation = np.degrees(self.numbers[:2]).tolist()
         return Camera(azimuth, elevation, float(np.clip(field, _LEAST, _WIDEST)), self.up, 0.0)
 
@@ -69,16 +78,15 @@ class Pinhole:
     def project(self, points: np.ndarray) -> np.ndarray:
         """(N, 2) places in the picture, to the right of its middle and above it, of points (N, 3)."""
         right, up, back = self.axes
-        scale = math.exp(self.numbers[4]) / (1 - self.numbers[NEAR] * (points @ back))
+        scale = self.size / (1 - self.near * (points @ back))
         return np.stack([points @ right * scale, points @ up * scale], axis=1) + self.numbers[5:]
 
     def by_points(self, points: np.ndarray) -> np.ndarray:
         """(N, 2, 3): how places change with points (N, 3)."""
         right, up, back = self.axes
-        near, size = self.numbers[NEAR], math.exp(self.numbers[4])
-        deep = 1 / (1 - near * (points @ back))
+        deep = 1 / (1 - self.near * (points @ back))
         along = [
-            size * (deep[:, None] * axis + (near * deep**2 * (points @ axis))[:, None] * back)
+            self.size * (deep[:, None] * axis + (self.near * deep**2 * (points @ axis))[:, None] * back)
             for axis in (right, up)
         ]
         return np.stack(along, axis=1)
@@ -95,10 +103,9 @@ class Pinhole:
     def rays(self, cells: int) -> tuple[np.ndarray, np.ndarray]:
         """The eye (3,), and unit directions (cells * cells, 3) through the pixels, by rows from the top."""
         right, up, back = self.axes
-        size = math.exp(self.numbers[4])
         place = (np.arange(cells) + 0.5) / cells - 0.5
-        across = np.tile((place - self.numbers[5]) / size, cells)
-        above = np.repeat((-place - self.numbers[6]) / size, cells)
-        eye = back / self.numbers[NEAR]
+        across = np.tile((place - self.numbers[5]) / self.size, cells)
+        above = np.repeat((-place - self.numbers[6]) / self.size, cells)
+        eye = back / self.near
         ways = across[:, None] * right + above[:, None] * up - eye
         return eye, (ways / np.linalg.norm(ways, axis=1, keepdims=True)).astype(np.float32)

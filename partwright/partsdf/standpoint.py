@@ -75,11 +75,18 @@ def outline(scene: Scene, camera: Camera, cells: int = _CELLS) -> np.ndarray:
     return (face >= 0).reshape(cells, cells)
 
 
+def extent(mask: np.ndarray) -> tuple[int, int, int, int]:
+    """Top, left, bottom and right of the pixels that are marked in a mask (H, W), which has some; the latter
+    two are the first beyond."""
+    rows, columns = (np.flatnonzero(mask.any(axis=a)) for a in (1, 0))
+    return int(rows[0]), int(columns[0]), int(rows[-1]) + 1, int(columns[-1]) + 1
+
+
 def boxed(silhouette: np.ndarray) -> np.ndarray:
     """(64, 64) bool: a silhouette (H, W) cut out to its bounding box, in the middle of a square."""
-    rows, columns = (np.flatnonzero(silhouette.any(axis=a)) for a in (1, 0))
-    middle = np.array([rows[0] + rows[-1] + 1, columns[0] + columns[-1] + 1]) / 2
-    side = max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1
+    top, left, bottom, right = extent(silhouette)
+    middle = np.array([top + bottom, left + right]) / 2
+    side = max(bottom - top, right - left)
     place = ((np.arange(_CELLS) + 0.5) / _CELLS - 0.5) * side
     down, across = (np.floor(m + place).astype(int) for m in middle)
     inside = (

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -96,8 +95,10 @@ def with_freeform(
         if not places or left < 1:
             break
         start = _Mended(tree, other, [], places[0].off)
-        longer = _longer(search, shape, start, places, made)
-        tries = chain(longer, _tries(search, shape, start, places, left))
+        # A part that goes on is no further one, so nothing that adds parts comes before it.
+        tries = list(_longer(search, shape, start, places, made)) or _tries(
+            search, shape, start, places, left
+        )
         best = min(tries, key=lambda one: one.rank, default=None)
         if best is None:
             given_up.append(places[0])

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.approximation.sketches.ends import LONG, interior, longer
+from partwright.approximation.sketches.ends import EDGE, LONG, interior, longer, within
 from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Cylinder, Extrusion, Revolution, Tube
@@ -19,7 +19,6 @@ _STEPS = 16  # in which a part goes on by its own narrower width, at most
 _LATTICE = 16
 _POINTS = 50  # of a section, about, that are looked at
 _SHARES = np.arange(1, _STEPS + 1) / _STEPS
-_EDGE = 0.004  # unit lengths: so near to its edge a half section is not looked at
 
 Points = NDArray[np.float64]
 Distance = Callable[[NDArray[np.float32]], NDArray[np.float32]]
@@ -90,14 +89,12 @@ def _turn(part: Part, field: Revolution, side: int) -> tuple[Points, Callable[[f
 
 def _half_section(field: Revolution) -> Points:
     """(K, 2) points of the profile, away from its edge where there are such."""
-    low, high = field.profile.bounds()
-    steps = (np.arange(_LATTICE) + 0.5) / _LATTICE
-    grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    flat = low + grid * (high - low)
     whole = replace(field, angle=360.0)
-    deep = whole(np.column_stack([flat[:, 0], np.zeros(len(flat)), flat[:, 1]]))
-    within = flat[deep < -_EDGE]
-    return _some(within if len(within) else flat[deep < 0])
+
+    def depth(flat: Points) -> Points:
+        return whole(np.column_stack([flat[:, 0], np.zeros(len(flat)), flat[:, 1]]))
+
+    return _some(within(*field.profile.bounds(), depth, _LATTICE, EDGE))
 
 
 def _some(section: Points) -> Points:

@@ -129,19 +129,22 @@ def _mended(
     stay far off, how far counts with each. Where the features need freeform, so that they do not say either
     how all of it would be drawn, fewer parts of the search that explain no less, and are near, are preferred.
     """
-    mended: FeatureTree | None = None
-    if features.objective >= rival:
-        mended = featured.mended(features)
-        drawn = featured.assembly(mended)
+
+    def drawn_features() -> tuple[FeatureTree, Assembly]:
+        tree = featured.mended(features)
+        return tree, featured.assembly(tree)
+
+    features_first = features.objective >= rival
+    if features_first:
+        mended, drawn = drawn_features()
         has_rival = mended.freeform > 0 and len(whole.parts) < len(drawn.parts)
         if not (mended.off or has_rival) and mended.objective >= rival:
             return drawn, True
     other = featured.mended_assembly(whole)
-    if other.off and mended is None:
-        mended = featured.mended(features)
-    if mended is None:
-        return other.assembly, False
-    drawn = featured.assembly(mended)
+    if not features_first:
+        if not other.off:
+            return other.assembly, False
+        mended, drawn = drawn_features()
     explains = mended.freeform and not other.off and other.score >= mended.score
     if explains and len(other.assembly.parts) < len(drawn.parts):
         preferred = False

@@ -22,7 +22,7 @@ LONG = Box, Cylinder, Tube, Extrusion
 """What has ends along z."""
 _LATTICE = 24
 _FEW = 16
-_EDGE = 0.004  # unit lengths: so near to its edge an end is not looked at
+EDGE = 0.004  # unit lengths: so near to its edge an end is not looked at
 
 
 def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.ndarray]) -> Part:
@@ -69,12 +69,24 @@ def with_open_ends(part: Part, added: bool, distance: Callable[[np.ndarray], np.
 def interior(field: Field, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """(K, 2) points of the middle section of what has ends along z, away from the edge where there are such.
     low, high: (3,) its bounds."""
-    steps = (np.arange(_LATTICE) + 0.5) / _LATTICE
+
+    def depth(flat: np.ndarray) -> np.ndarray:
+        return field(np.column_stack([flat, np.zeros(len(flat))]))
+
+    return within(low[:2], high[:2], depth, _LATTICE, min(EDGE, 0.4 * float(high[2])))
+
+
+def within(
+    low: np.ndarray, high: np.ndarray, depth: Callable[[np.ndarray], np.ndarray], lattice: int, edge: float
+) -> np.ndarray:
+    """(K, 2) points of a lattice between two corners (2,) that lie in a section, by an edge from its border
+    where there are such. depth: (N,) of points (N, 2), negative in the section."""
+    steps = (np.arange(lattice) + 0.5) / lattice
     grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    flat = low[:2] + grid * (high - low)[:2]
-    deep = field(np.column_stack([flat, np.zeros(len(flat))]))
-    within = flat[deep < -min(_EDGE, 0.4 * float(high[2]))]
-    return within if len(within) else flat[deep < 0]
+    flat = low + grid * (high - low)
+    deep = depth(flat)
+    inner = flat[deep < -edge]
+    return inner if len(inner) else flat[deep < 0]
 
 
 def longer(field: Box | Cylinder | Tube | Extrusion, more: float) -> Field:
