@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.fields.columns import Column
+from partwright.superfrusta.far_cells import CELL, middles_within
 from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.samples import FitSamples, Rows
 
@@ -20,6 +21,7 @@ Floats = NDArray[np.float32]
 _ON = 0.004  # unit lengths: points this near to a surface are on it
 _CLOSE = 0.009  # unit lengths, half a hundredth of the longest side: what is nearer is not off
 _BESIDE = 0.005  # unit lengths from a surface at which a gap is looked for
+_MOST_FAR = 60_000  # cells at most that are looked at
 _DEEP, _SLIVER = 0.05, 5e-4  # unit lengths: so deep inside, any place is a void whose field is more
 _AROUND = _BESIDE * np.concatenate([np.eye(3), -np.eye(3)])[:, None].astype(np.float32)
 _STEPS, _FLAT = 4, 0.1  # of a walk to the surface; least squared slope that a step is taken by
@@ -73,7 +75,8 @@ def deviations(samples: FitSamples, rows: Rows) -> Deviations:
     found = zip(
         _of_parts(samples, rows, added, surfaces),
         _of_shape(samples, rows, added),
-        _of_voxels(samples, rows, added, surfaces),
+        _of_voxels(samples, rows, added),
+        _of_far_cells(samples, rows, added, surfaces[added]),
         strict=True,
     )
     points, distance, off, part = (np.concatenate(one) for one in found)
@@ -126,12 +129,12 @@ def walked(samples: FitSamples, rows: Rows, points: Floats, gap: Floats) -> Floa
     Beside thin, bent and blended parts the field is less than the distance: what is missing of a tip counted
     half. So points walk to the surface, and the way that they are off is measured.
     """
-    place, arrived = _arrived(samples, rows, points, gap)
-    return np.where(arrived, np.maximum(gap, np.linalg.norm(place - points, axis=1)), gap)
+    place, field = _walked_to(samples, rows, points, gap)
+    return np.where(np.abs(field) < _CLOSE, np.maximum(gap, np.linalg.norm(place - points, axis=1)), gap)
 
 
-def _arrived(samples: FitSamples, rows: Rows, points: Floats, field: Floats) -> tuple[Floats, Any]:
-    """Where points (n, 3) come to that walk to the assembly's surface, and which of them are on it then."""
+def _walked_to(samples: FitSamples, rows: Rows, points: Floats, field: Floats) -> tuple[Floats, Floats]:
+    """Where points (n, 3) come to that walk to the assembly's surface, and its field (n,) there."""
     place = points
     for _ in range(_STEPS):
         around = samples.distance_of(rows, (place + _AROUND).reshape(-1, 3)).reshape(len(_AROUND), -1)
@@ -139,28 +142,43 @@ def _arrived(samples: FitSamples, rows: Rows, points: Floats, field: Floats) -> 
         steepness = np.maximum((slope**2).sum(axis=1), _FLAT)
         place = place - (field / steepness)[:, None] * slope
         field = samples.distance_of(rows, place)
-    return place, np.abs(field) < _CLOSE
+    return place, field
 
 
-def _of_voxels(
-    samples: FitSamples, rows: Rows, added: NDArray[np.int64], surfaces: NDArray[np.float64]
-) -> tuple[NDArray[Any], ...]:
+def _of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
     """Places inside the shape that no part fills, and outside that one does.
 
     Where blends wall a void no part's surface is near it, and a hole may lie between the points of a face. A
-    sheet passes between voxels: those beside it walk onto it. Further out lie chips of what is
-    mostly cut away.
+    sheet passes between voxels: those beside it walk onto it.
     """
     points, distance = samples.lattice
     field = samples.lattice_field(rows)
     beside = np.flatnonzero((field > 0) & (field < samples.grid.spacing) & (distance - field > _CLOSE))
-    onto, arrived = _arrived(samples, rows, points[beside], field[beside])
+    onto, field_there = _walked_to(samples, rows, points[beside], field[beside])
     wrong = np.where(distance < 0, field, -field) > np.where(distance < -_DEEP, _SLIVER, _BESIDE / 2)
-    onto = onto[arrived]
-    chips, far = samples.chips(rows, surfaces[added].reshape(-1, 3))
-    wrong_points = np.concatenate([points[wrong], chips])
-    deepest = samples.parts_of(rows[added], wrong_points).argmin(axis=0)
+    onto = onto[np.abs(field_there) < _CLOSE]
+    deepest = samples.parts_of(rows[added], points[wrong]).argmin(axis=0)
     nearest = np.abs(samples.parts_of(rows[added], onto)).argmin(axis=0)
-    points = np.concatenate([wrong_points, onto])
-    distance = np.concatenate([distance[wrong], far, np.maximum(samples.near_distance(onto), 0)])
+    points = np.concatenate([points[wrong], onto])
+    distance = np.concatenate([distance[wrong], np.maximum(samples.near_distance(onto), 0)])
     return points, distance, np.abs(distance), added[np.concatenate([deepest, nearest])]
+
+
+def _of_far_cells(
+    samples: FitSamples, rows: Rows, added: NDArray[np.int64], surfaces: NDArray[np.float64]
+) -> tuple[NDArray[Any], ...]:
+    """Places that an assembly fills further out than the lattice of voxels goes. surfaces: (M, K, 3) of the
+    parts that are added.
+
+    Of a part that reaches there and is mostly cut away chips may be left, between the points of all
+    surfaces. Where one is between the middles of cells, too, those beside it walk onto it.
+    """
+    points = middles_within(samples.far_cells, surfaces.min(axis=1), surfaces.max(axis=1))
+    points = points[:: 1 + len(points) // _MOST_FAR]
+    field = samples.distance_of(rows, points)
+    beside = np.flatnonzero((field > 0) & (field < CELL))
+    onto, field_there = _walked_to(samples, rows, points[beside], field[beside])
+    points = np.concatenate([points[field < 0], onto[np.abs(field_there) < _SLIVER]])
+    distance = samples.measure(points).astype(np.float32)
+    part = np.abs(samples.parts_of(rows[added], points)).argmin(axis=0)
+    return points, distance, np.maximum(distance, 0), added[part]

@@ -18,18 +18,14 @@ from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid, grid_indices
 from partwright.shapes.sampling import morton_order
 from partwright.superfrusta.backend import Kernel, backend, watched
+from partwright.superfrusta.far_cells import ALONG, CELL, HALF_SIDE, beyond_too, cell_middles, cell_of
 from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.settings import Settings
 
 Rows = NDArray[np.float32]
 NOTHING: Rows = np.empty((0, WIDTH), np.float32)
 
-_HALF_SIDE = 1.2  # unit lengths: half the side of the cube that padding and probes fill
 _MOST_PADDING_WEIGHT = 3.0  # of one point, where the weight of a sample in the box is 1
-_PROBES = 48  # along a side of that cube
-_CELL = 2 * _HALF_SIDE / _PROBES
-_MOST_BEYOND = 60_000  # probes beyond the cube at most, where chips are looked for again and again
-_FURTHEST = 2.4  # unit lengths from the middle: how far parts are followed
 _SURFACE = 8000  # points of the shape's surface
 _STRAY = 0.05  # unit lengths: what an assembly covers further than this from the shape is astray
 _LOCAL_CELLS = 40  # of a local grid, along the longest side
@@ -125,37 +121,27 @@ class FitSamples:
             probes=np.delete(self.probes, hit[hit < len(self.probes)], axis=0),
         )
 
-    def chips(
-        self, rows: Rows, surfaces: NDArray[np.floating]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Points (n, 3) of an assembly so far out that no voxel lies there, samples or not, and the shape's
-        distance (n,). surfaces: points (N, 3) of the surfaces of its parts that are added."""
-        probes = self._probes_beyond(surfaces, with_samples=True)
-        probes = probes[:: 1 + len(probes) // _MOST_BEYOND]
-        points = probes[self.distance_of(rows, probes) < 0] if len(probes) else probes
-        return points, self.measure(points).astype(np.float32)
+    @cached_property
+    def far_cells(self) -> NDArray[np.bool_]:
+        """Those further from the shape than the `lattice` goes, as `middles_within` takes them."""
+        return beyond_too(self.near_distance(cell_middles()) > _NOT_FAR)
 
-    def _probes_beyond(
-        self, surfaces: NDArray[np.floating], with_samples: bool = False
-    ) -> NDArray[np.float32]:
-        """Probes (n, 3) as dense as the others, about parts, of whose surfaces points (N, 3) are given, that
-        reach out of the cube that those fill: of a body that is mostly cut away a chip may be left there.
-        None that are samples already, or those too."""
-        if len(surfaces) == 0 or np.abs(surfaces).max() <= _HALF_SIDE:
+    def _probes_beyond(self, surfaces: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Probes (n, 3) as dense as the others, none that are samples already, about parts, of whose surfaces
+        points (N, 3) are given, that reach out of the cube that those fill: of a body that is mostly cut away
+        a chip may be left there."""
+        if len(surfaces) == 0 or np.abs(surfaces).max() <= HALF_SIDE:
             return NOTHING[:, :3]
-        first, last = (
-            _cell(np.clip(end, -_FURTHEST, _FURTHEST)) for end in (surfaces.min(0), surfaces.max(0))
-        )
+        first, last = cell_of(surfaces.min(0)), cell_of(surfaces.max(0))
         counts = last - first + 1
         cells = first + np.asarray(grid_indices(tuple(counts)))
-        wanted = (np.abs(cells + 0.5).max(axis=1) > _PROBES / 2).reshape(counts)
-        if not with_samples:
-            wanted[tuple(self._cells_of_samples(first, counts))] = False
-        return (_CELL * (cells[wanted.ravel()] + 0.5)).astype(np.float32)
+        wanted = (np.abs(cells + 0.5).max(axis=1) > ALONG / 2).reshape(counts)
+        wanted[tuple(self._cells_of_samples(first, counts))] = False
+        return (CELL * (cells[wanted.ravel()] + 0.5)).astype(np.float32)
 
     def _cells_of_samples(self, first: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:
         """(3, n) beyond the cube, counted from the first of so many (3,)."""
-        known = _cell(self.points[np.abs(self.points).max(axis=1) > _HALF_SIDE]) - first
+        known = cell_of(self.points[np.abs(self.points).max(axis=1) > HALF_SIDE]) - first
         return known[((known >= 0) & (known < counts)).all(axis=1)].T
 
     def about(
@@ -210,7 +196,7 @@ class FitSamples:
 
     @property
     def _probe_weight(self) -> float:
-        return self.density * _CELL**3
+        return self.density * CELL**3
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
@@ -364,24 +350,19 @@ def padding(grid: DistanceGrid, uniform: int, seed: int) -> tuple[NDArray[np.flo
     low = grid.origin
     high = low + grid.spacing * (np.array(grid.values.shape) - 1)
     rng = np.random.default_rng(seed + 1)
-    points = rng.uniform(-_HALF_SIDE, _HALF_SIDE, (uniform // 3, 3)).astype(np.float32)
+    points = rng.uniform(-HALF_SIDE, HALF_SIDE, (uniform // 3, 3)).astype(np.float32)
     points = points[((points < low) | (points > high)).any(axis=1)]
     points = points[morton_order(points)]
-    around = (2 * _HALF_SIDE) ** 3 - float(np.prod(high - low))
+    around = (2 * HALF_SIDE) ** 3 - float(np.prod(high - low))
     density = around / max(len(points), 1) * uniform / float(np.prod(high - low))
     return points, min(density, _MOST_PADDING_WEIGHT)
 
 
-def _cell(points: NDArray[np.floating]) -> NDArray[np.int64]:
-    """The cell of the lattice of probes that each point lies in, as whole numbers from the middle."""
-    return np.floor(points / _CELL).astype(np.int64)
-
-
 def _probes(grid: DistanceGrid) -> NDArray[np.float32]:
     """Lattice points (n, 3), each moved within its cell, that may lie well outside the shape."""
-    corner = grid_indices((_PROBES,) * 3)
+    corner = grid_indices((ALONG,) * 3)
     within = np.random.default_rng(0).uniform(0.1, 0.9, corner.shape)
-    points = (_CELL * (corner + within) - _HALF_SIDE).astype(np.float32)
+    points = (CELL * (corner + within) - HALF_SIDE).astype(np.float32)
     voxel = voxel_of(grid, points)
     values, nearest = grid.values.ravel()[voxel], grid.points_of(voxel).astype(np.float32)
     points = points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]

@@ -123,23 +123,65 @@ def test_a_void_that_blends_nearly_fill_is_one(samples: FitSamples) -> None:
     assert deviations(samples, filled).by_part.max() < 0.1  # blends bulge
 
 
-def test_a_chip_beyond_all_voxels_is_off(samples: FitSamples, exact: np.ndarray) -> None:
+def chip_rows(low: tuple[float, float, float], high: tuple[float, float, float], blend: float) -> np.ndarray:
+    """Of a block far above the body what lies between two corners: six cuts take the rest of it, and with a
+    blend a little more."""
+    middle, size = np.array([0.1, 0.05, 0.85]), np.array([0.7, 0.6, 0.5])
+    rows = [box_row(tuple(size), tuple(middle))]
+    for axis in range(3):
+        for side, end in ((-1, low[axis]), (1, high[axis])):
+            outer = middle[axis] + side * (size[axis] / 2 + 0.1)
+            cut, centre = size + 0.2, middle.copy()
+            cut[axis], centre[axis] = abs(outer - end), (outer + end) / 2
+            one = box_row(tuple(cut), tuple(centre))
+            one[Column.SIGN], one[Column.BLEND] = -1, blend
+            rows.append(one)
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("blend", [0.001, 0.02])
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [
+        ((0.161, 0.083, 0.778), (0.229, 0.147, 0.842)),  # a crumb
+        ((-0.1, 0.098, 0.836), (0.26, 0.142, 0.876)),  # a rod
+        ((-0.06, -0.06, 0.832), (0.22, 0.22, 0.861)),  # a sheet
+    ],
+)
+def test_a_chip_far_from_the_shape_is_off(
+    samples: FitSamples,
+    exact: np.ndarray,
+    low: tuple[float, float, float],
+    high: tuple[float, float, float],
+    blend: float,
+) -> None:
+    """Within the cube of the samples, but no voxel is there, and it is between the points of all surfaces."""
+    rows = np.vstack([exact, chip_rows(low, high, blend)])
+    middle = (np.array(low) + high) / 2
+    assert kernel.evaluate(rows, middle[None].astype(np.float32))[0] < 0
+    off = deviations(samples, rows)
+    told = off.points[off.worst(2)]
+    assert (np.abs(told - middle) < (np.array(high) - low) / 2 + 0.005).all()
+    assert off.by_part[2] == pytest.approx(OUTSIDE * (middle[2] - BODY[0][2] / 2), abs=0.06)
+
+
+def test_a_chip_beyond_all_samples_is_off(samples: FitSamples, exact: np.ndarray) -> None:
     """A bar that reaches far out, and is cut away but for its end."""
     bar, cut = box_row((1.0, 0.3, 0.3), (1.3, 0.0, 0.0)), box_row((0.55, 0.5, 0.5), (1.175, 0.0, 0.0))
     cut[Column.SIGN] = -1
     rows = np.vstack([exact, bar, cut])
-    own = surface_points(rows[:-1]).reshape(-1, 3)
-    points, distance = samples.chips(rows, own)
-    assert len(points) > 100
-    assert np.abs(points[:, 0] - 1.625).max() < 0.18
-    assert distance == pytest.approx(points[:, 0] - 0.9, abs=0.02)
-    assert len(samples.chips(exact, surface_points(exact).reshape(-1, 3))[0]) == 0
+    off = deviations(samples, rows)
+    far = off.points[:, 0] > 1.2
+    assert np.count_nonzero(far) > 100
+    assert set(off.part[far]) == {2, 3}  # the bar and what cuts it
+    assert np.abs(off.points[far, 0] - 1.625).max() < 0.18
+    error = np.abs(off.distance[far] - (off.points[far, 0] - 0.9))
+    assert np.count_nonzero(error < 0.003) > 100  # places in the bar
+    assert error.max() < 0.03  # of surfaces: read off the grid, which ends far from them
     # Growth, which comes first, makes samples of such places; they are off all the same.
     after = samples.with_stray_samples(rows)
     assert len(after.points) > len(samples.points)
-    assert np.array_equal(after.chips(rows, own)[0], points)
-    found = deviations(after, rows)
-    assert {tuple(point) for point in points.tolist()} <= {tuple(point) for point in found.points.tolist()}
+    assert np.array_equal(deviations(after, rows).points, off.points)
 
 
 def test_a_thin_tab_is_off_by_its_length(samples: FitSamples, exact: np.ndarray) -> None:
