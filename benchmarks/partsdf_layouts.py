@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -24,6 +25,7 @@ from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import POSE, PartVectors
 
 CELLS, OFF = 64, 0.1  # along the unit frame; in poses' spreads
+LAYOUTS = 480  # to see how they spread, without meshes
 
 
 def layouts_or_forms(arguments: argparse.Namespace) -> None:
@@ -42,7 +44,9 @@ def layouts_or_forms(arguments: argparse.Namespace) -> None:
         "|---|" + "---|---|---|" * len(names),
     ]  # fmt: skip
     rows: dict[str, list[str]] = {}
+    spreads = []
     for name in names:
+        spreads.append(f"- {name}: {how_layouts_spread(load_model(name), arguments.seed)}")
         held = [cloud(mesh) for mesh in new_meshes(name, count)]
         among = chamfer_matrix(held)
         for label, make in variants(load_model(name), count, arguments.seed).items():
@@ -53,7 +57,25 @@ def layouts_or_forms(arguments: argparse.Namespace) -> None:
             )
             rows.setdefault(label, []).append(said)
             print(f"{name}, {label}: {said}, {time.process_time() - start:.0f} s", flush=True)
-    write("layouts-or-forms", lines + [f"| {label} | {' | '.join(said)} |" for label, said in rows.items()])
+    table = [f"| {label} | {' | '.join(said)} |" for label, said in rows.items()]
+    write("layouts-or-forms", [*lines, *table, "", f"Of {LAYOUTS} made layouts:", "", *spreads])
+
+
+def how_layouts_spread(model: Model, seed: int) -> str:
+    """How wide made layouts are, and how many have a set of parts that no training shape has."""
+    generator = load_generator(model)
+    training = generator.layout_of(model.poses, model.present)
+    made = torch.stack([
+        generator.layout_of(shape.poses, shape.present) for shape in generator.generate(LAYOUTS, seed)
+    ])  # fmt: skip
+    wide, known = (float(one.var(dim=0).sum()) for one in (made, training))
+    sets = Counter(map(tuple, model.present.tolist()))
+    new = sum(tuple(row) not in sets for row in (made[..., -1] > 0).tolist()) / len(made)
+    alone = sum(count for count in sets.values() if count == 1) / len(training)
+    return (
+        f"{wide / known:.2f} of the training layouts' variance; {100 * new:.0f} % have a set of parts that "
+        f"no training shape has ({100 * alone:.0f} % of training shapes have one that no other has)"
+    )
 
 
 def variants(model: Model, count: int, seed: int) -> dict[str, Callable[[], list[NeuralShape]]]:
