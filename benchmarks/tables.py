@@ -58,7 +58,7 @@ TABLES = (
     Table("solids.md", "solids.py", "--shapes examples/shapes --sets shapes --names bracket", 2,
           "--shapes {data} --sets cad", 90),
     Table("solids-unseen.md", "solids.py", None, 0,
-          "--shapes unseen --sets voron,prusa,others,robot,reprap --variants solids --tag unseen "
+          "--shapes unseen --sets voron,prusa,others,robot,reprap,arms,bots --variants solids --tag unseen "
           "--untimed", 30,
           "unseen/ with an index.json and the files of the public repositories that the table names"),
     Table("capri.md", "capri.py", "--names bracket --rows mesh,planes", 2,

@@ -78,6 +78,18 @@ def test_a_bore_through_two_walls_is_one_and_bolt_holes_are_copies() -> None:
     assert [len(hole.copies) for hole in merged_holes(pairs, in_the_way.distance)] == [4]
 
 
+def test_small_holes_of_one_size_are_copies_though_their_chords_differ() -> None:
+    """Radii .25 % apart are one where that is less than numbers become plain by, as of small ones."""
+    rows = [Part(Cylinder(radius, 0.1), (0, y, 0)) for radius, y in ((0.02370, -0.3), (0.02376, 0.3))]
+    (both,) = merged_holes(rows, lambda points: np.ones(len(points)))
+    assert len(both.copies) == 2
+    wide = [Part(Cylinder(radius, 0.1), (0, y, 0)) for radius, y in ((0.2370, -0.3), (0.2376, 0.3))]
+    assert len(merged_holes(wide, lambda points: np.ones(len(points)))) == 2
+    holes = (circle(0.02370, (-0.3, 0)), circle(0.02376, (0.3, 0)))
+    _, cuts = holes_apart(Part(Extrusion(Profile(Profile.rectangle(1.6, 1.0).outline, holes), 0.2)))
+    assert [len(cut.copies) for cut in cuts] == [2]
+
+
 def test_holes_that_were_turned_copies_of_one_are_one() -> None:
     """Three set screws in a round wall point three ways; four are two bores through it."""
     wall = Part(Tube(0.6, 0.1, 1.0))

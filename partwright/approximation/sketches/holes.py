@@ -18,6 +18,7 @@ from partwright.fields import Cylinder, Extrusion
 from partwright.fields.profile import Loop, Profile, circle_of, is_same_loop
 
 _SAME = 2e-3  # of its size, by which holes that are alike may differ
+_PLAIN = 1e-4  # unit lengths, by which they may differ, too: numbers become plain by as much
 _SAME_BULGE = 0.02  # and their bulges by this
 _PARALLEL = 1e-12  # of a cosine
 _ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and heights of copies differ
@@ -66,6 +67,11 @@ def hole_parts(part: Part) -> tuple[Part, ...]:
     return (*holes, *own)
 
 
+def _near(radius: float) -> float:
+    """By how much the radii of holes of one size may differ."""
+    return max(_SAME * radius, _PLAIN)
+
+
 def _middle(loop: Loop) -> np.ndarray:
     """(2,) of its box."""
     lower, upper = Profile(loop).bounds()
@@ -76,7 +82,7 @@ def _alike(one: Loop, other: Loop) -> bool:
     """Whether a shift takes one loop to the other, whichever corner each begins with."""
     round_, also = circle_of(one), circle_of(other)
     if round_ is not None and also is not None:
-        return abs(round_[0] - also[0]) < _SAME * round_[0]
+        return abs(round_[0] - also[0]) < _near(round_[0])
     if round_ is not None or also is not None:
         return False
     a, b = (np.array(loop) - (*_middle(loop), 0.0) for loop in (one, other))
@@ -173,7 +179,7 @@ class _Drilled:
         ends = np.stack([self.start, self.end, other.start, other.end])
         along = (ends - self.start) @ axis
         aside = np.linalg.norm(ends - self.start - along[:, None] * axis, axis=1)
-        near = _SAME * max(self.radius, other.radius)
+        near = _near(max(self.radius, other.radius))
         if abs(self.radius - other.radius) > near or aside.max() > max(near, _ASIDE):
             return None
         low, high = float(along.min()), float(along.max())
@@ -218,9 +224,8 @@ def _is_alike(one: Part, other: Part) -> bool:
     """Whether they are of one size."""
     assert isinstance(one.field, Cylinder)
     assert isinstance(other.field, Cylinder)
-    near = _SAME * one.field.radius
     return (
-        abs(one.field.radius - other.field.radius) < near
+        abs(one.field.radius - other.field.radius) < _near(one.field.radius)
         and abs(one.field.height - other.field.height) < _ASIDE
     )
 
