@@ -80,7 +80,8 @@ class Extrusion(Swept):
         total = sum(rim.depth for rim in self.rims)
         if total > self.height * (1 + 1e-9):
             raise ParameterError(f"{self.kind}: rims take {total:.6g} of a height of {self.height:.6g}")
-        _ = self.within(self.deepest)
+        for depth in (*(depth for depth in self.collapses if depth < self.deepest), self.deepest):
+            _ = self.within(depth)  # on the way, too, where nothing may fall apart that meshes have to pass
 
     @property
     def has_rims(self) -> bool:

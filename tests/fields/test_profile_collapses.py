@@ -79,3 +79,16 @@ def test_what_falls_apart_or_leaves_nothing_is_refused() -> None:
         Extrusion(Profile(neck), 8, top_fillet=1.5)
     with pytest.raises(ParameterError, match="further inside"):
         Extrusion(Profile.rectangle(20, 12, 1), 8, top_fillet=6.5)
+
+
+def test_what_falls_apart_on_the_way_is_refused_though_it_is_whole_further_inside() -> None:
+    """A neck whose walls, a little out of line, meet before either is gone: no mesh leads past that."""
+    left, right = (
+        [(-10, 60), (-10, 56), (-8, 56), (-8, 40), (-10, 40)],
+        [(10, 40), (8.01, 40), (8.01, 56), (10, 56)],
+    )
+    shaft = Profile([(-10, 0), (10, 0), *right, (10, 60), *left])
+    with pytest.raises(ParameterError, match="falls apart"):
+        Extrusion(shaft, 40, bottom_fillet=9)
+    shallow = Extrusion(shaft, 40, bottom_fillet=1.5)
+    assert extruded(shallow, 1e-2).genus() == 0
