@@ -15,13 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.approximation.sketches.candidate import Candidate
+from partwright.superfrusta.feature_blanks import worth
 from partwright.superfrusta.feature_copying import replayed
+from partwright.superfrusta.feature_mending import mended
 from partwright.superfrusta.feature_steps import FeatureTree, Step
 
 if TYPE_CHECKING:
     from partwright.superfrusta.feature_search import FeatureSearch
 
 _ROUNDS = 3
+_CARVED = 0.1  # of the samples in the first body: a cut that takes as many carves it, a hole does not
 
 
 def exchanged(search: FeatureSearch, tree: FeatureTree, own: Sequence[Candidate]) -> FeatureTree:
@@ -39,6 +42,31 @@ def exchanged(search: FeatureSearch, tree: FeatureTree, own: Sequence[Candidate]
             break
         tree = other
     return tree
+
+
+def rebased(search: FeatureSearch, tree: FeatureTree, own: Sequence[Candidate]) -> FeatureTree:
+    """The tree, or one of no more steps that is worth more, begins with another body and goes on without the
+    cuts that carve the first. own: candidates of the whole."""
+    carving = _carving(tree.steps)
+    if not carving or not _is_once(tree.steps[0]):
+        return tree
+    rest = [step for k, step in enumerate(tree.steps) if k not in carving]
+    steps = _with_other(search, rest, 0, own)
+    if steps[0].chosen.key == rest[0].chosen.key:
+        return tree
+    other = mended(search, search.grown(replayed(search, steps), own, None, most=len(tree.steps)))
+    by_chance = search.tie if other.price >= tree.price else 0.0  # what is plainer need be no better
+    return other if worth(other) > worth(tree) + by_chance else tree
+
+
+def _carving(steps: Sequence[Step]) -> set[int]:
+    """The cuts that take much of what a tree begins with."""
+
+    def taken(k: int) -> float:
+        return float((steps[0].within & steps[k - 1].covered & ~steps[k].covered).sum())
+
+    least = _CARVED * float(steps[0].within.sum()) if steps else 0.0
+    return {k for k in range(1, len(steps)) if not steps[k].added and taken(k) >= least}
 
 
 def _is_once(step: Step) -> bool:

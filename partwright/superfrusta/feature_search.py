@@ -31,7 +31,7 @@ from partwright.superfrusta.feature_bases import bases, is_nearly_whole, lacks_d
 from partwright.superfrusta.feature_blanks import BEHIND, PERFECT, cut_from_blanks, worth
 from partwright.superfrusta.feature_bores import bores, bores_of
 from partwright.superfrusta.feature_copying import StepBodies, joined_by, with_copies
-from partwright.superfrusta.feature_exchange import exchanged
+from partwright.superfrusta.feature_exchange import exchanged, rebased
 from partwright.superfrusta.feature_linings import lines_a_hole
 from partwright.superfrusta.feature_mending import mended
 from partwright.superfrusta.feature_own_bodies import is_own_body
@@ -112,8 +112,7 @@ class FeatureSearch:
         own = candidates(self.body, self.frames, holes=True)
         if not own:
             return None
-        empty = self.empty
-        gains = self.gains(empty, own, True)
+        gains = self.gains(self.empty, own, True)
         order = bases(own, gains)
         grown: list[FeatureTree] = []
         tried: set[tuple[float, ...]] = set()
@@ -128,10 +127,12 @@ class FeatureSearch:
                     break
                 continue
             tried.add(own[index].key)
-            grown.append(self.grown(self.extended(empty, own[index], True), others, best))
+            grown.append(self.grown(self.extended(self.empty, own[index], True), others, best))
             if best is None and not self._is_done(grown[0]):
-                grown += self._built_up(empty, own, others, gains, grown[0])
-        return cut_from_blanks(self, self._nearest(grown, others), others, tried) if grown else None
+                grown += self._built_up(self.empty, own, others, gains, grown[0])
+        if not grown:
+            return None
+        return rebased(self, cut_from_blanks(self, self._nearest(grown, others), others, tried), others)
 
     def _nearest(self, grown: Sequence[FeatureTree], others: Sequence[Candidate]) -> FeatureTree:
         """The best of trees, ended; where that is far off, the second where it is worth more."""
