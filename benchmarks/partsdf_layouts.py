@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -46,7 +45,7 @@ def layouts_or_forms(arguments: argparse.Namespace) -> None:
     rows: dict[str, list[str]] = {}
     spreads = []
     for name in names:
-        spreads.append(f"- {name}: {how_layouts_spread(load_model(name), arguments.seed)}")
+        spreads.append(how_wide(load_model(name), arguments.seed))
         held = [cloud(mesh) for mesh in new_meshes(name, count)]
         among = chamfer_matrix(held)
         for label, make in variants(load_model(name), count, arguments.seed).items():
@@ -58,24 +57,19 @@ def layouts_or_forms(arguments: argparse.Namespace) -> None:
             rows.setdefault(label, []).append(said)
             print(f"{name}, {label}: {said}, {time.process_time() - start:.0f} s", flush=True)
     table = [f"| {label} | {' | '.join(said)} |" for label, said in rows.items()]
-    write("layouts-or-forms", [*lines, *table, "", f"Of {LAYOUTS} made layouts:", "", *spreads])
+    said = f"Of the variance of training layouts, {LAYOUTS} made ones have: {', '.join(spreads)}."
+    write("layouts-or-forms", [*lines, *table, "", said])
 
 
-def how_layouts_spread(model: Model, seed: int) -> str:
-    """How wide made layouts are, and how many have a set of parts that no training shape has."""
+def how_wide(model: Model, seed: int) -> str:
+    """How much of the variance of training layouts made ones have."""
     generator = load_generator(model)
     training = generator.layout_of(model.poses, model.present)
     made = torch.stack([
         generator.layout_of(shape.poses, shape.present) for shape in generator.generate(LAYOUTS, seed)
     ])  # fmt: skip
     wide, known = (float(one.var(dim=0).sum()) for one in (made, training))
-    sets = Counter(map(tuple, model.present.tolist()))
-    new = sum(tuple(row) not in sets for row in (made[..., -1] > 0).tolist()) / len(made)
-    alone = sum(count for count in sets.values() if count == 1) / len(training)
-    return (
-        f"{wide / known:.2f} of the training layouts' variance; {100 * new:.0f} % have a set of parts that "
-        f"no training shape has ({100 * alone:.0f} % of training shapes have one that no other has)"
-    )
+    return f"{model.name} {wide / known:.2f}"
 
 
 def variants(model: Model, count: int, seed: int) -> dict[str, Callable[[], list[NeuralShape]]]:

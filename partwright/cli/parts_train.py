@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 _EPILOG = """\
-CONFIG is a TOML file; configs/ has some, docs/parts.md says what they may hold.
+CONFIG is a TOML file; configs/ has some, docs/parts-train.md says what they may hold.
 Ctrl-C keeps what is done; the same command goes on from there, to the same result.
 """
 

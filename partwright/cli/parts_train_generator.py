@@ -15,5 +15,5 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "noise, and latents that suit them (two diffusions). `parts generate` uses it. Ctrl-C ends with what "
         "it has learned.",
     )
-    add_training(command, "generator", 1600, "64 shapes")
+    add_training(command, "generator", 3200, "64 shapes")
     command.set_defaults(run="parts_train_generator")

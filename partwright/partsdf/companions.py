@@ -21,7 +21,7 @@ from partwright.input_files import check_file
 from partwright.methods import check_count
 from partwright.partsdf.model import SUFFIX, Model, about_file, file_of
 
-VERSION = 1
+VERSIONS = {"encoder": 1, "image-encoder": 1, "generator": 2}  # by kind; 2: parts are drawn before poses
 _TRAINED_BY = {
     "encoder": "parts train-encoder",
     "image-encoder": "parts train-encoder --from images",
@@ -44,7 +44,12 @@ def save_companion(
     """Write weights in half precision, with the settings that they are read with. Raises OutputError."""
     from safetensors.torch import save
 
-    about = {"format": f"partwright-{kind}", "version": VERSION, "model": model.hash, "settings": settings}
+    about = {
+        "format": f"partwright-{kind}",
+        "version": VERSIONS[kind],
+        "model": model.hash,
+        "settings": settings,
+    }
     half = {k: v.detach().cpu().half().contiguous() for k, v in tensors.items()}
     write_bytes(path, save(half, {"partwright": json.dumps(about)}))
 
@@ -76,13 +81,13 @@ def load_companion(
         tensors, about = load(data), about_file(data)
         if about.get("format") != f"partwright-{kind}":
             raise ModelError(f"{path}: holds no {kind}; expected one that `{_TRAINED_BY[kind]}` wrote")
-        if about["version"] > VERSION:
+        if about["version"] > VERSIONS[kind]:
             raise NewerVersionError(f"{path}: version {about['version']}; upgrade Partwright to open it")
+        again = f"train it again with `{_TRAINED_BY[kind]}`, or remove it"
+        if about["version"] < VERSIONS[kind]:
+            raise ModelError(f"{path}: an earlier Partwright trained it, whose {kind} was another; {again}")
         if about["model"] != model.hash:
-            raise ModelError(
-                f"{path}: was trained for another model than {model.name}; train it again with "
-                f"`{_TRAINED_BY[kind]}`, or remove it"
-            )
+            raise ModelError(f"{path}: was trained for another model than {model.name}; {again}")
         if not all(value.isfinite().all() for value in tensors.values()):
             raise ValueError("weights are not all finite")
         return made(about["settings"], {name: value.float() for name, value in tensors.items()})

@@ -1,7 +1,8 @@
-"""From noise to shapes: poses and presence of all parts first, then latents that suit them (section 4.2).
+"""From noise to shapes: which parts, their poses, then latents that suit them (section 4.2).
 
 SALAD's cascade of two diffusions (Koo et al. 2023), small. Latents are along their principal directions, each
 in its own spread, which the paper found crucial (appendix B.3), and every part's latent hears of all poses.
+Which parts there are is drawn before: a training shape's.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from partwright.partsdf.companions import (
 from partwright.partsdf.diffusion import denoised
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.part_sets import Near, drawn_sets
 from partwright.partsdf.part_vectors import POSE, PartVectors
 from partwright.partsdf.pose_range import within_range
 from partwright.partsdf.poses import PoseTensors
@@ -48,7 +50,8 @@ class GeneratorSettings:
 
 
 class Layouts(nn.Module):
-    """Noisy poses and presence (B, P, 13) at times (B,) to their velocities: self-attention among parts."""
+    """Noisy poses (B, P, 12) at times (B,), where there are the parts (B, P, 1), 1 or -1, to their
+    velocities: self-attention among parts."""
 
     def __init__(self, parts: int, settings: GeneratorSettings) -> None:
         super().__init__()
@@ -58,11 +61,13 @@ class Layouts(nn.Module):
         self.time = _Time(width)
         block = _block(nn.TransformerEncoderLayer, settings, 0.0)
         self.blocks = nn.TransformerEncoder(block, settings.blocks, enable_nested_tensor=False)
-        self.out = _last(width, POSE + 1)
+        self.out = _last(width, POSE)
 
-    def forward(self, layout: Tensor, time: Tensor) -> Tensor:
+    def forward(self, poses: Tensor, time: Tensor, present: Tensor) -> Tensor:
+        there = present > 0
+        layout = torch.cat([torch.where(there, poses, 0.0), present], dim=-1)
         tokens = self.enter(layout) + self.part + self.time(time)[:, None]
-        result: Tensor = self.out(self.blocks(tokens))
+        result: Tensor = torch.where(there, self.out(self.blocks(tokens)), 0.0)
         return result
 
 
@@ -152,26 +157,45 @@ class Generator:
         for name in keep:
             kept[self.model.index(name)] = True
         self._check(source, kept, keep_layout, change)
-        noise = _noise(draws, seed, (len(kept), POSE + 1 + self.vectors.width))
-        layout, latents = noise[..., : POSE + 1], noise[..., POSE + 1 :]
+        noise = _noise(draws, seed, (len(kept), POSE + 2 + self.vectors.width))
+        begun, sets, latents = noise.split([POSE, 2, self.vectors.width], dim=-1)
+        present = self._present(sets, source, kept, keep_layout, change)
+
+        def placed(**known: Any) -> Tensor:
+            poses = denoised(lambda x, t: self.layouts(x, t, present), begun, **known)
+            return tidy(torch.cat([poses, present], dim=-1))
+
+        def formed(layout: Tensor, **known: Any) -> Tensor:
+            return denoised(lambda x, t: self.forms(x, t, layout), latents, **known)
+
         if source is None:
-            layout = self._within(denoised(self.layouts, layout))
-            latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents)
-        elif change:
-            near = self.layout_of(source.poses, source.present).expand_as(layout)
-            layout = self._within(denoised(self.layouts, layout, like=near, since=change), like=near[0])
-            form = self.vectors.of_latents(source.latents).expand_as(latents)
-            latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents, like=form, since=change)
-            source = None
+            layout = self._within(placed())
+            latents = formed(layout)
         else:
-            known = self.layout_of(source.poses, source.present).expand_as(layout)
-            fixed = torch.ones_like(kept) if keep_layout else kept
-            layout = denoised(self.layouts, layout, known, fixed[:, None].expand_as(layout))
-            layout = self._within(layout, fixed)
+            near = self.layout_of(source.poses, source.present).expand(len(draws), -1, -1)
             form = self.vectors.of_latents(source.latents).expand_as(latents)
-            same = kept[:, None].expand_as(latents)
-            latents = denoised(lambda x, t: self.forms(x, t, tidy(layout)), latents, form, same)
+            if change:
+                layout = self._within(placed(like=near[..., :POSE], since=change), like=near[0])
+                latents = formed(layout, like=form, since=change)
+                source = None
+            else:
+                fixed = torch.ones_like(kept) if keep_layout else kept
+                layout = placed(known=near[..., :POSE], kept=fixed[:, None].expand_as(begun))
+                layout = self._within(layout, fixed)
+                latents = formed(layout, known=form, kept=kept[:, None].expand_as(latents))
         return [self._shape(layout[i], latents[i], source, kept, keep_layout) for i in range(len(draws))]
+
+    def _present(
+        self, noise: Tensor, source: NeuralShape | None, kept: Tensor, keep_layout: bool, change: float
+    ) -> Tensor:
+        """Which parts there are (B, P, 1), 1 or -1, by noise (B, P, 2)."""
+        if source is not None and keep_layout:
+            drawn = source.present.expand(len(noise), -1)
+        else:
+            near = Near(source.present, change) if source is not None and change else None
+            chance = torch.special.ndtr(noise[:, 0, 1])
+            drawn = drawn_sets(self.model.present, chance, noise[..., 0], kept, near)
+        return torch.where(drawn, 1.0, -1.0)[..., None]
 
     def layout_of(self, poses: PoseTensors, present: Tensor) -> Tensor:
         """(..., P, 13) of poses (..., P, ...) and presence (..., P)."""
@@ -207,7 +231,6 @@ class Generator:
         self, layout: Tensor, latents: Tensor, source: NeuralShape | None, kept: Tensor, keep_layout: bool
     ) -> NeuralShape:
         present = layout[:, -1] > 0
-        present[layout[:, -1].argmax()] = True  # one at least
         made = NeuralShape.of(
             self.model, self.vectors.latents(latents), self.vectors.poses(layout[:, :POSE]), present
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -19,18 +20,20 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import POSE, PartVectors
 
-BATCH = 64
+BATCH, STEPS = 64, 3200
 _RATE = 1e-3
 _FIRST = "are generated first"
 _AVERAGE = 0.995  # of the weights that are kept, a step
 _TOLD = 50  # steps
-_SLOWER = 0.5  # rate of forms over that of layouts: learned by heart, they would narrow for new layouts
+# Forms' share of a step's shapes, and of its rate: poses tell little of them, and learned by heart, they
+# would narrow for new layouts.
+_SHARE, _SLOWER = 0.5, 0.25
 
 
 @dataclass(frozen=True)
 class GeneratorStep:
-    """layouts, forms: the mean squared errors of both velocities, 1 where nothing is known; those of forms
-    as their directions tell."""
+    """layouts, forms: the mean squared errors of both velocities, of parts that are there, 1 where nothing
+    is known; those of forms as their directions tell."""
 
     number: int
     of: int
@@ -41,7 +44,7 @@ class GeneratorStep:
 def train_generator(
     model: Model,
     *,
-    steps: int = 1600,
+    steps: int = STEPS,
     batch: int = BATCH,
     seed: int = 0,
     device: str = "auto",
@@ -100,21 +103,23 @@ def train_generator(
 def _errors(
     made: dict[str, nn.Module], layout: Tensor, form: Tensor, tells: Tensor, generator: torch.Generator
 ) -> Tensor:
-    """(2,) of the velocities of layouts (B, P, 13) and forms (B, P, K); what is absent has no form.
+    """(2,) of the velocities of poses, of layouts (B, P, 13), and of forms (B, P, K) of some of them; what is
+    absent has neither.
 
     tells: (P, K) weights of forms, 1 in the mean."""
-    there = (layout[..., -1] > 0).float()
+    poses, present = layout[..., :POSE], layout[..., POSE:]
+    some = slice(math.ceil(_SHARE * len(layout)))
 
-    def error(clean: Tensor, velocity: Callable[[Tensor, Tensor], Tensor]) -> Tensor:
+    def error(network: str, clean: Tensor, given: Tensor, weights: Tensor) -> Tensor:
         time = torch.rand(len(clean), generator=generator)
         noisy, wanted = noised(clean, torch.randn(clean.shape, generator=generator), time)
-        return (velocity(noisy, time) - wanted).square()
+        unlike = (weights * (made[network](noisy, time, given) - wanted).square()).mean(dim=-1)
+        there = (given[..., -1] > 0).float()
+        return (there * unlike).sum() / there.sum().clamp(min=1)
 
-    off = error(form, lambda noisy, time: made["forms"](noisy, time, layout))
-    unlike = (tells * off).mean(dim=-1)
     return torch.stack([
-        error(layout, made["layouts"]).mean(),
-        (there * unlike).sum() / there.sum().clamp(min=1),
+        error("layouts", poses, present, torch.ones(())),
+        error("forms", form[some], layout[some], tells),
     ])  # fmt: skip
 
 

@@ -12,6 +12,7 @@ import torch
 import trimesh
 
 from partwright.errors import ModelError, SettingError
+from partwright.partsdf import companions
 from partwright.partsdf.companion_training import descend
 from partwright.partsdf.companions import beside
 from partwright.partsdf.diffusion import denoised, levels, noised
@@ -170,6 +171,16 @@ def test_its_file(generator: Generator, tmp_path: Path) -> None:
     assert torch.equal(two.latents, load_generator(generator.model).generate(1, 5)[0].latents)
     with pytest.raises(ModelError, match="lamps has no generator; make one with `parts train-generator`"):
         load_generator(replace(generator.model, hash="3" * 64))
+
+
+def test_a_file_of_an_earlier_version_is_to_be_trained_again(
+    generator: Generator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(companions.VERSIONS, KIND, 1)
+    generator.save(tmp_path / "old.safetensors")
+    monkeypatch.undo()
+    with pytest.raises(ModelError, match=r"earlier Partwright.*train it again with `parts train-generator`"):
+        load_generator(generator.model, tmp_path / "old.safetensors")
 
 
 def test_a_gaussian_to_compare_with_and_the_distance_to_what_is_known(generator: Generator) -> None:
