@@ -12,20 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.errors import EmptyShapeError, FlatShapeError, OpenShellError
-from partwright.rows import units
 from partwright.shapes.boolean import unite
-from partwright.shapes.cleaning import drop_doubles, merge_vertices, weld_boundary
+from partwright.shapes.cleaning import counted, drop_doubles, merge_vertices, weld_boundary
 from partwright.shapes.distance import MeshDistance
 from partwright.shapes.frame import UnitFrame
 from partwright.shapes.hidden_faces import Ground, close_hidden, drop_sheets, lift_from_ground
 from partwright.shapes.holes import Openings, fill_holes, openings_of, with_what_stays_open
 from partwright.shapes.orientation import orient
+from partwright.shapes.outer_faces import facing, outer_faces
 from partwright.shapes.sampling import sample_triangles
 from partwright.shapes.sealing import GAP, seal
 from partwright.shapes.thickening import thicken
 from partwright.shapes.topology import (
     EdgeTable,
-    area_vectors,
     doubled_areas,
     is_plane,
     signed_volumes,
@@ -35,7 +34,6 @@ from partwright.shapes.winding import winding_grid
 _SAME_FRAME = 1e-4  # of the scale, and unit lengths: vertices are welded and middles added within it
 _NO_VOLUME = 1e-9
 _LEAST_CONFIDENCE, _SURE = 0.5, 0.8  # of the winding number
-_SIDE_STEP = 2e-5  # how far off a triangle its two sides are looked at
 _CLEAR = 0.2  # a winding number this near to 0 or 1 is clear
 _CHECK = 64  # cells along a side in the search for overlaps
 _THICKEN = "give its sheets a thickness (partwright fit --thickness 1%)"
@@ -255,7 +253,7 @@ def _drop_shared_walls(
     order = np.lexsort((-area, patch))
     rank = np.arange(len(order)) - np.searchsorted(patch[order], patch[order])
     probe = order[rank < _PROBES]
-    parts = _facing(MeshDistance(vertices, faces, faces, closed=True), vertices[faces[probe]]) != 0
+    parts = facing(MeshDistance(vertices, faces, faces, closed=True), vertices[faces[probe]]) != 0
     kept = faces[(np.bincount(patch[probe], parts) > 0)[patch]]
     if len(kept) in (0, len(faces)) or EdgeTable(kept).balance.any():
         return faces
@@ -271,31 +269,14 @@ def _surface_of_sheets(
     closed: bool,
 ) -> Surface:
     """Keep only triangles with the inside on one side and the outside on the other as the surface."""
-    source = MeshDistance(vertices, faces, faces, closed)
-    facing = _facing(source, vertices[faces])
-    outer = facing != 0
-    if not outer.any():
+    outer = outer_faces(MeshDistance(vertices, faces, faces, closed), vertices, faces)
+    if not len(outer.faces):
         raise FlatShapeError(f"the surface is open and encloses no volume; close it, or {_THICKEN}")
-    if not outer.all():
-        notes.append(
-            f"{np.count_nonzero(~outer)} triangles lie within the shape and are no part of its surface"
-        )
-    outward = np.where(facing[outer, None] > 0, faces[outer], faces[outer, ::-1])
-    return Surface(vertices, outward, faces, closed, False, tuple(notes), confidence)
-
-
-def _facing(source: MeshDistance, corners: NDArray[np.float64]) -> NDArray[np.int64]:
-    """+1 where a triangle (F, 3, 3) parts inside from outside and faces out, -1 where it faces in, 0 where it
-    parts nothing: looked at in its middle and near its corners."""
-    normal = units(area_vectors(corners))
-    facing = np.zeros(len(corners), dtype=np.int64)
-    for weight in ((1 / 3, 1 / 3, 1 / 3), (0.9, 0.05, 0.05), (0.05, 0.9, 0.05), (0.05, 0.05, 0.9)):
-        rest = np.flatnonzero(facing == 0)
-        place = np.einsum("fcd,c->fd", corners[rest], np.array(weight))
-        step = _SIDE_STEP * normal[rest]
-        behind, before = source.inside(place - step), source.inside(place + step)
-        facing[rest] = behind.astype(np.int64) - before
-    return facing
+    if outer.hidden:
+        notes.append(f"{outer.hidden} triangles lie within the shape and are no part of its surface")
+    if outer.cut:
+        notes.append(f"of {counted(outer.cut, 'triangle')} only pieces are outside of the shape")
+    return Surface(outer.vertices, outer.faces, faces, closed, False, tuple(notes), confidence)
 
 
 def _confidence_of_open(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> float | None:

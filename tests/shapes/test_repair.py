@@ -193,6 +193,6 @@ def test_sizes_do_not_matter(size):
 
 def test_a_surface_that_seems_to_part_nothing_is_kept_whole(monkeypatch):
     """Two boxes with a common edge, were their triangles too close to others to see what is behind them."""
-    monkeypatch.setattr(repair, "_facing", lambda source, corners: np.zeros(len(corners), dtype=np.int64))
+    monkeypatch.setattr(repair, "facing", lambda source, corners: np.zeros(len(corners), dtype=np.int64))
     shape = load_shape(together(box(), box(centre=(1, 1, 0))))
     assert shape.volume == pytest.approx(2)
