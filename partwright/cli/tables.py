@@ -14,6 +14,7 @@ from rich.table import Table
 
 from partwright.cli.interrupts import INTERRUPTED
 from partwright.cli.terminal import counted, printable, say, warn
+from partwright.shapes import length_text
 
 if TYPE_CHECKING:
     from partwright.cleaning import Cleaned
@@ -40,7 +41,7 @@ def finish_fit(result: Result, folder: Path) -> int:
 
 def print_result(result: Result, folder: Path) -> None:
     """The outcome of a fit: scores, time, and where the files are."""
-    length = f" {result.shape.unit}" if result.shape.unit else ""
+    unit = result.shape.unit
     if points := result.report.get("points"):
         table = _table(result.shape.name, result.scores.parts)
         for name, label in (
@@ -48,13 +49,14 @@ def print_result(result: Result, folder: Path) -> None:
             ("deviation_95", "95 %"),
             ("max_deviation", "most"),
         ):
-            table.add_row(label, f"{points[name]:.3g}{length}, {_percent(points[f'{name}_share'])}")
+            table.add_row(label, f"{length_text(points[name], unit)}, {_percent(points[f'{name}_share'])}")
     else:
-        table = _scores_table(result.shape.name, result.scores, result.shape.unit)
+        table = _scores_table(result.shape.name, result.scores, unit)
     for name, bound in result.report.get("bounds", {}).items():
         if isinstance(bound, dict):
             kept = "kept" if bound["kept"] else "missed"
-            table.add_row(f"{name} {bound['asked']:.3g}{length}", f"{kept}: {bound['reached']:.3g}{length}")
+            asked, reached = (length_text(bound[which], unit) for which in ("asked", "reached"))
+            table.add_row(f"{name} {asked}", f"{kept}: {reached}")
         else:
             table.add_row("volume, of the shape's", f"{bound:.3f}")
     table.add_row("outcome", result.outcome.replace("_", " "))
@@ -89,10 +91,10 @@ def print_cleaned(cleaned: Cleaned, path: Path) -> None:
     """The relations, and how much was lost."""
     print_relations(cleaned)
     before, after, unit = cleaned.before, cleaned.after, cleaned.assembly.unit
-    length = f" {unit}" if unit else ""
+    was, now = (length_text(one.mean_deviation, unit) for one in (before, after))
     say(
         f"{counted(before.parts, 'part')} -> {after.parts}, IoU {before.iou:.4f} -> {after.iou:.4f}, "
-        f"mean deviation {before.mean_deviation:.3g} -> {after.mean_deviation:.3g}{length}: {path}"
+        f"mean deviation {was} -> {now}: {path}"
     )
 
 
@@ -106,20 +108,19 @@ def _table(name: str, parts: int) -> Table:
 
 def _scores_table(name: str, scores: Scores, unit: str | None) -> Table:
     table = _table(name, scores.parts)
-    length = f" {unit}" if unit else ""
     table.add_row("IoU", f"{scores.iou:.4f}")
     table.add_row("bi-surface IoU", f"{scores.bi_surface_iou:.4f}")
     table.add_row("Chamfer x 1000", f"{1e3 * scores.chamfer:.3f} (floor {1e3 * scores.chamfer_floor:.3f})")
     if scores.emd is not None:
         table.add_row("EMD", f"{scores.emd:.4f}")
     table.add_row("overlap", f"{scores.overlap:.3f}")
-    table.add_row(
-        "95 % deviation", f"{scores.deviation_95:.3g}{length}, {_percent(scores.deviation_95_share)}"
-    )
+    off = length_text(scores.deviation_95, unit)
+    table.add_row("95 % deviation", f"{off}, {_percent(scores.deviation_95_share)}")
     share = _percent(scores.max_deviation_share)
-    table.add_row("largest deviation", f"{scores.max_deviation:.3g}{length}, {share}, {scores.worst_place}")
+    most = length_text(scores.max_deviation, unit)
+    table.add_row("largest deviation", f"{most}, {share}, {scores.worst_place}")
     beyond = _percent(scores.max_protrusion_share)
-    table.add_row("sticks out by", f"{scores.max_protrusion:.3g}{length}, {beyond}")
+    table.add_row("sticks out by", f"{length_text(scores.max_protrusion, unit)}, {beyond}")
     if scores.cad is not None:
         _add_cad_rows(table, scores.cad)
     return table

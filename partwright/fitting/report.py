@@ -15,7 +15,7 @@ from partwright.assembly.repeated_groups import parts_once
 from partwright.errors import SettingError
 from partwright.fitting.structure_warnings import structure_warnings
 from partwright.methods import Fitted, Run
-from partwright.shapes import METRES, Shape
+from partwright.shapes import METRES, Shape, length_text
 from partwright.shapes.distance import MeshDistance
 from partwright.tolerances import Bounded, bounds_report, bounds_warnings
 
@@ -159,9 +159,9 @@ def points_warnings(shape: Shape, points: PointDeviations) -> list[str]:
     """One line where the surface passes many of the points by; single ones may be strays."""
     if points.deviation_95_share <= POOR_DEVIATION:
         return []
-    unit = f" {shape.unit}" if shape.unit else ""
+    off = length_text(points.deviation_95, shape.unit)
     return [
-        f"the surface passes the points by: a twentieth of them lie {points.deviation_95:.3g}{unit} or more "
+        f"the surface passes the points by: a twentieth of them lie {off} or more "
         f"from it, {points.deviation_95_share:.0%} of the longest side; look at preview.png"
     ]
 
@@ -179,12 +179,12 @@ def warnings(shape: Shape, scores: Scores, more: str) -> list[str]:
     """Of the fitted surface against the shape's. more: what to try where it is poor."""
     result = []
     if scores.iou < POOR_IOU or scores.max_deviation > POOR_DEVIATION * _side(shape):
-        unit = f" {shape.unit}" if shape.unit else ""
+        off = length_text(scores.max_deviation, shape.unit)
         out = scores.max_protrusion >= scores.max_deviation
         how = "where it sticks out of the shape" if out else "where it does not reach the shape"
         result.append(
             f"the fit is poor in places: IoU {scores.iou:.3f}; it is furthest off, by "
-            f"{scores.max_deviation:.3g}{unit}, at the {scores.worst_place}, {how}; {more}"
+            f"{off}, at the {scores.worst_place}, {how}; {more}"
         )
     if shape.openings.share > MUCH_MISSING:
         result.append(_about_openings(shape))

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from partwright.render.sheet import SOFT_INK, draw_text
+from partwright.shapes import length_text
 
 # Blue where the result is missing material, light grey where it fits, red where it has too much.
 _STOPS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
@@ -47,11 +48,10 @@ def add_legend(image: np.ndarray, limit: float, unit: str | None, most: float = 
     y = height - 30
     result = image.copy()
     result[y : y + 8, left:right] = deviation_colours(np.linspace(-limit, limit, right - left), limit)
-    suffix = f" {unit}" if unit else ""
     labels = [
-        (left, y + 17, f"-{limit:g}{suffix}"),
-        ((left + right) / 2, y + 17, "0" if most <= limit else f"largest {most:.2g}{suffix}"),
-        (right, y + 17, f"+{limit:g}{suffix}"),
+        (left, y + 17, f"-{length_text(limit, unit)}"),
+        ((left + right) / 2, y + 17, "0" if most <= limit else f"largest {length_text(most, unit, 2)}"),
+        (right, y + 17, f"+{length_text(limit, unit)}"),
         (left - 34, y + 3, "missing"),
         (right + 36, y + 3, "too much"),
     ]

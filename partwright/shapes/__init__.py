@@ -10,7 +10,7 @@ from partwright.shapes.lengths import Length, own_length, parse_length
 from partwright.shapes.reading import MESH_SUFFIXES, PICTURE_SUFFIXES, SUFFIXES
 from partwright.shapes.sampling import Samples, SurfaceSamples
 from partwright.shapes.shape import Node, NodeLeftOutWarning, Shape, load_shape
-from partwright.shapes.units import METRES, UP_AXES, canonical_unit, canonical_up
+from partwright.shapes.units import METRES, UP_AXES, canonical_unit, canonical_up, length_text
 
 __all__ = [
     "LONGEST_SIDE",
@@ -32,6 +32,7 @@ __all__ = [
     "UnitFrame",
     "canonical_unit",
     "canonical_up",
+    "length_text",
     "load_shape",
     "own_length",
     "parse_length",

@@ -33,6 +33,7 @@ _ALIASES = {
     "foot": "ft",
     "feet": "ft",
 }
+_SMALL = 0.1  # of a metre or a centimetre: shorter lengths are told in millimetres
 UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
 
 
@@ -47,6 +48,14 @@ def canonical_unit(unit: str) -> str:
         if short in METRES:
             return short
     raise SettingError(f"unknown length unit {unit!r}; expected one of {', '.join(METRES)}")
+
+
+def length_text(length: float, unit: str | None, digits: int = 3) -> str:
+    """A length for people, to so many digits: 0.25 of a metre is "0.25 m", 0.0002 is "0.2 mm". Without a unit
+    it is the number alone."""
+    if unit in ("m", "cm") and 0 < abs(length) < _SMALL:
+        length, unit = length * METRES[unit] / METRES["mm"], "mm"
+    return f"{length:.{digits}g}{f' {unit}' if unit else ''}"
 
 
 def canonical_up(up: str) -> str:

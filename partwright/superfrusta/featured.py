@@ -9,6 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from partwright.approximation.part_roles import FREEFORM
+from partwright.approximation.sketches.round_holes import RoundHole
 from partwright.assembly import Assembly
 from partwright.errors import CancelledError
 from partwright.meshing import has_exact_mesh
@@ -17,6 +18,7 @@ from partwright.metrics.deviation import place_in
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
 from partwright.superfrusta.feature_boxes import with_whole_boxes
+from partwright.superfrusta.feature_drilling import empty_round_holes, with_holes_drilled
 from partwright.superfrusta.feature_freeform import far_off, with_freeform
 from partwright.superfrusta.feature_outlines import with_plain_outlines
 from partwright.superfrusta.feature_pockets import with_pockets
@@ -99,11 +101,11 @@ class FeaturedFit:
         return None, False
 
     def mended(self, tree: FeatureTree) -> FeatureTree:
-        """The tree with freeform where it is far off, without what then hardly shows; the one that comes as
-        near as an IoU that is asked for as it is."""
+        """The tree with freeform where it is far off, without what then hardly shows, and with round holes
+        that it lacks; the one that comes as near as an IoU that is asked for as it is."""
         if self._request.settings.min_iou is not None:
             return tree
-        return self._thinned(self._with_freeform(tree))
+        return self._finished(tree)
 
     def mended_assembly(self, whole: Assembly) -> MendedSolids:
         """Solids that were found by the search, with freeform where they are far off, or only made anew of
@@ -115,7 +117,7 @@ class FeaturedFit:
         none = np.zeros(0, bool)
         own = in_unit_frame(self._request.shape, whole)
         tree = search.scored(FeatureTree([Feature(added, part, none, 0) for part, added in flattened(own)]))
-        better = self._thinned(self._with_freeform(tree))
+        better = self._finished(tree)
         same = [f.part for f in better.features] == [f.part for f in tree.features]
         off = far_off(search, own) if same else math.inf
         if off > better.off:
@@ -142,8 +144,13 @@ class FeaturedFit:
             self._freeform[id(tree)] = tree, made
         return self._freeform[id(tree)][1]
 
-    def _thinned(self, tree: FeatureTree) -> FeatureTree:
-        return thinned(self._search, tree, self._assemblies.in_unit_frame)
+    def _finished(self, tree: FeatureTree) -> FeatureTree:
+        thin = thinned(self._search, self._with_freeform(tree), self._assemblies.in_unit_frame)
+        return with_holes_drilled(self._search, thin, self._round_holes)
+
+    @cached_property
+    def _round_holes(self) -> list[RoundHole]:
+        return empty_round_holes(self._request.shape)
 
     def _told(self, tree: FeatureTree) -> None:
         seen = self._seen

@@ -14,6 +14,7 @@ from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outco
 from partwright.shapes import Shape
 from partwright.superfrusta.far_places import Solid
 from partwright.superfrusta.feature_assembly import in_unit_frame
+from partwright.superfrusta.feature_drilling import empty_round_holes, hole_warnings, without_feature
 from partwright.superfrusta.feature_steps import FeatureTree
 from partwright.superfrusta.featured import SURE, FeaturedFit, freeform_warnings, wants_features
 from partwright.superfrusta.hole_search import HoleSearch
@@ -98,6 +99,9 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         one = assembled(step.rows, smaller=smaller)
         curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
     told = freeform_warnings(shape, whole)
+    if wants_features(request) and outcome != "interrupted":
+        own = in_unit_frame(shape, whole)
+        told += hole_warnings(shape, without_feature(empty_round_holes(shape), own.distance))
     return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)), warnings=told)
 
 
@@ -113,8 +117,14 @@ def _of_features(
         with timed(seconds, "edges"):
             own = in_unit_frame(shape, whole)
             fitted = Solid.of(own)
-            details = left_out(shape, own, fitted)
-            told += left_out_warnings(shape, details) + sharp_edge_warnings(shape, fitted, details)
+            holes = without_feature(empty_round_holes(shape), own.distance)
+            apart = [
+                detail
+                for detail in left_out(shape, own, fitted)
+                if not any(detail.is_beside(hole.middle) for hole in holes)
+            ]
+            told += hole_warnings(shape, holes)
+            told += left_out_warnings(shape, apart) + sharp_edge_warnings(shape, fitted, apart)
     return Fitted(whole, outcome, seconds, history, warnings=told)
 
 

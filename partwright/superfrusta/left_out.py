@@ -16,7 +16,7 @@ from partwright.approximation.part_roles import FREEFORM
 from partwright.assembly import Assembly
 from partwright.metrics.deviation import place_in
 from partwright.rows import units
-from partwright.shapes import Shape
+from partwright.shapes import Shape, length_text
 from partwright.shapes.topology import EdgeTable, area_vectors, components
 from partwright.superfrusta.far_places import Solid
 from partwright.superfrusta.feature_mending import FAR
@@ -54,9 +54,8 @@ def left_out_warnings(shape: Shape, found: Sequence[Detail]) -> tuple[str, ...]:
     ways = {True: "stands out", False: "is cut in"}
     how = " or ".join(dict.fromkeys(ways[detail.depth > 0] for detail in found))
     many = f" ({len(found)} places, as letters are)" if len(found) > 2 else ""
-    unit = f" {shape.unit}" if shape.unit else ""
     return (
-        f"left out: small detail{many} that {how} by {depth:.2g}{unit} at the {places[0]}"
+        f"left out: small detail{many} that {how} by {length_text(depth, shape.unit, 2)} at the {places[0]}"
         f"{' and elsewhere' if len(places) > 1 else ''}: no feature has it",
     )
 

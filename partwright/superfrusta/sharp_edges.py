@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from partwright.metrics.deviation import place_in
 from partwright.rows import units
-from partwright.shapes import Shape
+from partwright.shapes import Shape, length_text
 from partwright.shapes.topology import EdgeTable, area_vectors, components
 from partwright.superfrusta.far_places import Solid
 from partwright.superfrusta.left_out import Detail
@@ -70,7 +70,7 @@ def _sentence(shape: Shape, strips: list[_Strip]) -> str:
     places = list(dict.fromkeys(place_in(shape, strip.middle) for strip in strips))
     more = f" and {len(strips) - 1} more places" if len(strips) > 2 else " and one more place"
     return (
-        f"left sharp: {strips[0].name} of about {size:.2g}{' ' + shape.unit if shape.unit else ''} at the "
+        f"left sharp: {strips[0].name} of about {length_text(size, shape.unit, 2)} at the "
         f"{places[0]}{more if len(strips) > 1 else ''}: no feature has it"
     )
 

@@ -17,7 +17,7 @@ from partwright.assembly import Assembly, Part
 from partwright.assembly.metadata import THREAD, thread_key
 from partwright.meshing.manifolds import surface_of
 from partwright.methods import Fitted
-from partwright.shapes import Shape, load_shape
+from partwright.shapes import Shape, length_text, load_shape
 from partwright.superfrusta.thread_standards import standard_thread
 
 _NEAR = 0.08  # of the thread's depth, that a part's wall may be away from its crests
@@ -63,7 +63,7 @@ def with_threads(fitted: Fitted, threads: Sequence[Thread]) -> Fitted:
         kind, depth = f"{said['thread_kind']} thread {said['thread']}", thread.outer - thread.inner
         counts[
             f"{part.name if part is not None else fitted.assembly.name}: {kind}, drawn plain, as wide as its "
-            f"crests: its grooves, {depth:.2g} deep, count as deviation"
+            f"crests: its grooves, {length_text(depth, whole.unit, 2)} deep, count as deviation"
         ] += 1
         if part is not None:
             noted = dataclasses.replace(part, metadata=_noted(part.metadata, said))

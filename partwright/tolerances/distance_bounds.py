@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from partwright.errors import BoundsError, SettingError
-from partwright.shapes import LONGEST_SIDE, Length, Shape, own_length
+from partwright.shapes import LONGEST_SIDE, Length, Shape, length_text, own_length
 from partwright.tolerances.noise import roughness
 
 # Of the longest side. Samples 0.7 % apart on each surface tell no finer difference reliably.
@@ -103,7 +103,7 @@ def format_length(length: float, shape: Shape) -> str:
     if own > 0:
         digit = 10.0 ** (math.floor(math.log10(own)) - 2)
         own = math.ceil(own / digit - 1e-6) * digit
-    return f"{own:.3g}{' ' + shape.unit if shape.unit else ''}"
+    return length_text(own, shape.unit)
 
 
 def _slack(name: str, given: Length | bool | None, shape: Shape) -> float | None:

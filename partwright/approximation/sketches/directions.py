@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -42,7 +43,7 @@ def frames(vertices: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
     clusters += _prism_axes([direction for _, direction in clusters], normal[kept], area[kept])
     found = [direction for _, direction in sorted(clusters, key=lambda one: -one[0])[:_MOST]]
     found = _with_square(found) or list(np.eye(3))
-    return [_frame(direction, found) for direction in found]
+    return [frame_along(direction, found) for direction in found]
 
 
 def long_axis(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray | None:
@@ -54,7 +55,7 @@ def long_axis(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray | None:
     spread, axes = np.linalg.eigh(np.einsum("n,ni,nj->ij", area, off, off))
     if spread[2] < _ELONGATED**2 * spread[1]:
         return None
-    return _frame(_snapped(axes[:, 2]), [axes[:, 1]])
+    return frame_along(snapped(axes[:, 2]), [axes[:, 1]])
 
 
 def _round_axes(faces: np.ndarray, normal: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -81,7 +82,7 @@ def _prism_axes(
         sine = float(np.linalg.norm(axis))
         if sine < _SLANTED:
             continue
-        axis = _snapped(axis / sine)
+        axis = snapped(axis / sine)
         if any(
             abs(float(axis @ other)) > _SAME
             for other in (*known[:_MOST], *(direction for _, direction in found))
@@ -119,7 +120,7 @@ def _clusters(votes: np.ndarray, weights: np.ndarray, least: float) -> list[tupl
         # The middle of the largest votes: small faces of a fillet lean to one side.
         heavy = weights[near] >= 0.2 * weights[near].max()
         mean = (signed[heavy] * weights[near][heavy, None]).sum(axis=0)
-        found.append((total, _snapped(mean / np.linalg.norm(mean))))
+        found.append((total, snapped(mean / np.linalg.norm(mean))))
     return _between_equals(sorted(found, key=lambda f: -f[0]))
 
 
@@ -133,7 +134,7 @@ def _between_equals(found: list[tuple[float, np.ndarray]]) -> list[tuple[float, 
         for k, (other_weight, other) in enumerate(left):
             if float(direction @ other) > _BESIDE and other_weight > (1 - _EQUAL) * weight:
                 mean = direction + other
-                direction = _snapped(mean / np.linalg.norm(mean))
+                direction = snapped(mean / np.linalg.norm(mean))
                 del left[k]
                 break
         result.append((weight, direction))
@@ -150,18 +151,18 @@ def _with_square(found: list[np.ndarray]) -> list[np.ndarray]:
     if near.max() < _BESIDE or near.max() > _SAME_AS:
         return found
     first = int(np.argmax(near >= _BESIDE))
-    others = [_snapped(across) if k == first else d for k, d in enumerate(found)]
+    others = [snapped(across) if k == first else d for k, d in enumerate(found)]
     return [d for k, d in enumerate(others) if k == first or near[k] < _BESIDE]
 
 
-def _snapped(direction: np.ndarray) -> np.ndarray:
+def snapped(direction: np.ndarray) -> np.ndarray:
     """Upwards, and along a coordinate axis where it is within rounding of one."""
     axis = int(np.abs(direction).argmax())
     direction = direction * np.sign(direction[axis])
     return np.eye(3)[axis] if direction[axis] > 1 - 1e-7 else direction
 
 
-def _frame(direction: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
+def frame_along(direction: np.ndarray, others: Sequence[np.ndarray] = ()) -> np.ndarray:
     """The direction as z; x along another one across it, or along the coordinate axis that is most across."""
     across = [d for d in (*np.eye(3), *others) if abs(float(d @ direction)) < 1e-4]
     x = across[0] if across else np.eye(3)[int(np.abs(direction).argmin())]

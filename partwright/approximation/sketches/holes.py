@@ -96,10 +96,10 @@ def _shift(frame: np.ndarray, offset: np.ndarray) -> Similarity:
 
 def is_empty(hole: Part, distance: Callable[[np.ndarray], np.ndarray]) -> bool:
     """Whether a cut holds nothing of the shape, all copies; distance: as of `merged_holes`."""
-    return all(bool((distance(_within(copy)) > -_BURR).all()) for copy in hole.copies)
+    return all(bool((distance(points_within(copy)) > -_BURR).all()) for copy in hole.copies)
 
 
-def _within(hole: Part) -> np.ndarray:
+def points_within(hole: Part) -> np.ndarray:
     """(N, 3) points within a cut."""
     if isinstance(hole.field, Cylinder):
         return _Drilled.of(hole).points()

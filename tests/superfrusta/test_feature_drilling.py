@@ -1,0 +1,57 @@
+"""Round holes that a tree fills are drilled, each size once, or told; none of others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import partwright as pw
+from partwright.assembly import Assembly, Part, Similarity
+from partwright.fields import Box, Cylinder
+from partwright.meshing import mesh_assembly
+from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
+from partwright.superfrusta.feature_drilling import (
+    empty_round_holes,
+    hole_warnings,
+    with_holes_drilled,
+    without_feature,
+)
+from partwright.superfrusta.feature_search import FeatureSearch
+from partwright.superfrusta.feature_steps import Feature, FeatureTree
+from partwright.superfrusta.samples import FitSamples
+from partwright.superfrusta.solids import Settings
+
+PLATE = Part(Box((180.0, 100.0, 6.0)))
+MOVES = [Similarity(translation=(x, y, 0.0)) for x, y in ((140, 0), (0, 80), (140, 80))]
+SMALL = Part(Cylinder(1.0, 8.0), (-70.0, -40.0, 0.0), instances=tuple(MOVES))
+BORE = Part(Cylinder(20.0, 8.0))
+SHAPE = pw.load_shape(mesh_assembly(Assembly((PLATE, SMALL, BORE), operation="difference")), unit="mm")
+
+
+@pytest.mark.parametrize(("most", "copies"), [(None, 4), (2, 0)])
+def test_what_a_tree_fills_is_drilled_within_the_budget(most: int | None, copies: int) -> None:
+    settings = Settings.for_quality("draft")
+    search = FeatureSearch(SHAPE, FitSamples.of(SHAPE, settings), settings.alpha, most=most)
+    drawn = in_unit_frame(SHAPE, Assembly((PLATE, BORE), operation="difference"))
+    none = np.zeros(0, bool)
+    plate, bore = drawn.parts
+    tree = search.scored(FeatureTree([Feature(True, plate, none, 4), Feature(False, bore, none, 2)]))
+    holes = empty_round_holes(SHAPE)
+    assert len(holes) == 5
+    drilled = with_holes_drilled(search, tree, holes)
+    assert drilled.price == tree.price
+    assert drilled.score == search.scored(drilled).score >= tree.score
+    result = FeatureAssembly(SHAPE).named(drilled)
+    found = {part.name: (part.field.radius, len(part.copies)) for part in result.parts[1:]}
+    assert found == {"hole": (20.0, 1)} | ({"bolt_hole": (1.0, copies)} if copies else {})
+    left = without_feature(holes, in_unit_frame(SHAPE, result).distance)
+    told = hole_warnings(SHAPE, left)
+    assert len(left) == 4 - copies
+    assert told == () if copies else told[0].startswith("left out: 4 round holes, up to 2 mm wide, at the")
+
+
+def test_what_stands_in_a_ring_is_not_drilled_away() -> None:
+    ring = Part(Cylinder(30.0, 6.0), (0.0, 0.0, 3.0))
+    post = Part(Cylinder(20.0, 12.0))
+    whole = Assembly((Assembly((PLATE, ring), operation="difference"), post))
+    assert not empty_round_holes(pw.load_shape(mesh_assembly(whole)))
