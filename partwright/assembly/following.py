@@ -28,8 +28,12 @@ AnyNode = TypeVar("AnyNode", Part, Assembly)
 
 def followed(assembly: Assembly, before: Part, after: Part, told: list[str]) -> Assembly:
     """The assembly, which holds `after` in place of `before`, with what depended on it moved with its faces;
-    told: gets a sentence for each."""
+    told: gets a sentence for each. What carries the part, wider than it is, stays where it is,
+    and the part goes on standing on it."""
     near = _FLUSH * float(np.ptp(assembly.bounds(), axis=0).max())
+    standing = _on_its_carrier(assembly, before, after, near, told)
+    if standing is not after:
+        assembly, after = assembly.replace_part(before.name, standing), standing
     return _Following(before, list(_moves(before, after)), near, told).through(assembly)
 
 
@@ -98,6 +102,41 @@ def _shoulder_moves(before: Part, after: Part, old: Profile, new: Profile) -> It
         if was != is_ and (up, was, is_) not in found:
             found.add((up, was, is_))
             yield _Move(axis, was, is_, True, across, int(up))
+
+
+def _on_its_carrier(assembly: Assembly, before: Part, after: Part, near: float, told: list[str]) -> Part:
+    """The part moved back to what carries it, along each axis along which it grew away from that or into it;
+    between two that do so it stays as it is."""
+    if _is_cut(assembly, before.name):
+        return after
+    others = [one for one in assembly.parts if one.name != before.name and not _is_cut(assembly, one.name)]
+    for move in _moves(before, after):
+        if not move.flat or move.shoulder is not None:
+            continue
+        carriers = [[one for one in others if _carries(one, move, face, near)] for face in (0, 1)]
+        if bool(carriers[0]) == bool(carriers[1]):
+            continue
+        face = 0 if carriers[0] else 1
+        back = move.before[face] - move.after[face]
+        if back:
+            x, y, z = (np.array(after.translation) + back * move.axis).tolist()
+            after = dataclasses.replace(after, translation=(x, y, z))
+            told.append(f"{before.name} still stands on {carriers[face][0].name}")
+    return after
+
+
+def _carries(other: Part, move: _Move, face: int, near: float) -> bool:
+    """Whether another part, or a copy of it, ends at a face of the part and is wider than that both ways."""
+
+    def is_wider(copy: Part, axis: np.ndarray, begin: float, end: float) -> bool:
+        low, high = _extent(copy, axis)
+        return low <= begin + near and high >= end - near and high - low > end - begin + near
+
+    return any(
+        abs(_extent(copy, move.axis)[1 - face] - move.before[face]) <= near
+        and all(is_wider(copy, axis, *reach) for axis, reach in move.across)
+        for copy in other.copies
+    )
 
 
 @dataclass(frozen=True)

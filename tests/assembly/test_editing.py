@@ -51,6 +51,26 @@ def test_a_thicker_plate_takes_along_what_it_carries() -> None:
     assert mesh.volume - before.volume == pytest.approx(40 * 20 * 4 - holes - 3.1416 * 4, rel=0.01)
 
 
+def test_what_carries_a_part_stays_where_it_is() -> None:
+    """A boss that gets higher stands on its plate as before: neither that nor what is beside it moves."""
+    plate = Part(Box((40, 20, 5)), (0, 0, 2.5), name="plate")
+    rib = Part(Box((20, 2, 6)), (0, 5, 8), name="rib")
+    ring = Profile(((2, -2, 0), (3, -2, 0), (3, 2, 0), (2, 2, 0)))
+    across = (Similarity(translation=(10, 0, 0)),)
+    boss = Part(Revolution(ring), (-5, -5, 7), name="boss", instances=across)
+    whole = Assembly((plate, boss, rib))
+    for number, value, height in (("boss.profile.y.1", -1.0, 3.0), ("boss.profile.y.2", 4.0, 6.0)):
+        edited = with_numbers(whole, {number: value})
+        assert (edited.assembly["plate"], edited.assembly["rib"]) == (plate, rib)
+        for copy in edited.assembly["boss"].copies:
+            assert copy.bounds()[:, 2] == pytest.approx((5.0, 5.0 + height))
+    assert with_numbers(whole, {"boss.profile.y.1": -1.0}).followed == ("boss still stands on plate",)
+    lid = Part(Box((40, 20, 5)), (0, 0, 11.5), name="lid")  # a post between two plates grows about its middle
+    post = Part(Box((2, 2, 4)), (0, -5, 7), name="post")
+    between = with_numbers(Assembly((plate, post, lid)), {"post.size.z": 6.0}).assembly
+    assert [between[name].translation[2] for name in ("plate", "post", "lid")] == [1.5, 7.0, 12.5]
+
+
 def test_copies_change_together_and_patterns_name_several() -> None:
     after = with_numbers(bracket(), {"hole.diameter": 6.0}).assembly
     assert after["hole"].field == Cylinder(3, 7)
