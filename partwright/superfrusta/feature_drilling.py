@@ -10,10 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.approximation.profile_parts import with_profile
 from partwright.approximation.sketches.holes import is_empty, merged_holes, points_within
 from partwright.approximation.sketches.round_holes import RoundHole, round_holes
+from partwright.assembly import Part
+from partwright.fields import Extrusion
+from partwright.fields.profile import Loop, Profile, circle_of
 from partwright.metrics.deviation import place_in
 from partwright.shapes import Shape, length_text
+from partwright.superfrusta.feature_pruning import mask_of
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
 
 if TYPE_CHECKING:
@@ -34,11 +39,13 @@ def empty_round_holes(shape: Shape) -> list[RoundHole]:
 def without_feature(holes: Sequence[RoundHole], distance: Distance) -> list[RoundHole]:
     """Those of holes that a solid fills; distance: (N,) of that at points (N, 3), unit lengths."""
 
-    def is_filled(hole: RoundHole) -> bool:
-        points = points_within(hole.part()).astype(np.float32)
-        return bool((distance(points) < -_DEEP).mean() > _FILLED)
+    return [hole for hole in holes if _is_filled(hole.part(), distance)]
 
-    return [hole for hole in holes if is_filled(hole)]
+
+def _is_filled(hole: Part, distance: Distance) -> bool:
+    """Whether a solid is where a hole, without its copies, would be."""
+    points = points_within(hole).astype(np.float32)
+    return bool((distance(points) < -_DEEP).mean() > _FILLED)
 
 
 def hole_warnings(shape: Shape, holes: Sequence[RoundHole]) -> tuple[str, ...]:
@@ -55,16 +62,40 @@ def hole_warnings(shape: Shape, holes: Sequence[RoundHole]) -> tuple[str, ...]:
 
 
 def with_holes_drilled(search: FeatureSearch, tree: FeatureTree, holes: Sequence[RoundHole]) -> FeatureTree:
-    """The tree with those of holes cut that it fills, each size once, as many as its features may be.
+    """The tree with those of holes cut that it fills, each size once, as many as its features may be; round
+    holes that some copies of a profile have only in the tree are none of it before.
 
     They cost nothing where trees are compared: what is known to be there needs no other reason.
     """
-    missing = without_feature(holes, tree.distance)
+    features = [_with_true_holes(search, feature) for feature in tree.features]
+    missing = without_feature(holes, FeatureTree(features).distance)
     parts = merged_holes([hole.part() for hole in missing], search.samples.measure)
-    parts = parts[: max(0, search.limit - len(tree.features))]
-    if not parts:
+    parts = parts[: max(0, search.limit - len(features))]
+    if not parts and all(one is other for one, other in zip(features, tree.features, strict=True)):
         return tree
     cuts = [Feature(False, part, covers(part, search.points), _SIDES) for part in parts]
-    drilled = replace(tree, features=[*tree.features, *cuts], steps=())
+    drilled = replace(tree, features=[*features, *cuts], steps=())
     covered = drilled.at(search.points)
     return replace(drilled, covered=covered, score=search.score_of(covered))
+
+
+def _with_true_holes(search: FeatureSearch, feature: Feature) -> Feature:
+    """The feature without round holes of its profile that the shape fills in one of its copies."""
+    field = feature.part.field
+    if not feature.added or feature.freeform or not isinstance(field, Extrusion):
+        return feature
+
+    def is_true(loop: Loop) -> bool:
+        if circle_of(loop) is None:
+            return True
+        part = replace(with_profile(feature.part, Profile(loop)), instances=feature.part.instances)
+        copies = (copy for own in replace(feature, part=part).parts for copy in own.copies)
+        return not any(_is_filled(copy, search.samples.measure) for copy in copies)
+
+    kept = tuple(loop for loop in field.profile.holes if is_true(loop))
+    if len(kept) == len(field.profile.holes):
+        return feature
+    profile = Profile(field.profile.outline, kept)
+    part = replace(feature.part, field=replace(field, profile=profile))
+    filled = replace(feature, part=part)
+    return replace(filled, covers=mask_of(filled, search.points))

@@ -7,7 +7,8 @@ import pytest
 
 import partwright as pw
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.fields import Box, Cylinder
+from partwright.fields import Box, Cylinder, Extrusion, Profile
+from partwright.fields.profile import circle
 from partwright.meshing import mesh_assembly
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
 from partwright.superfrusta.feature_drilling import (
@@ -48,6 +49,26 @@ def test_what_a_tree_fills_is_drilled_within_the_budget(most: int | None, copies
     told = hole_warnings(SHAPE, left)
     assert len(left) == 4 - copies
     assert told == () if copies else told[0].startswith("left out: 4 round holes, up to 2 mm wide, at the")
+
+
+def test_a_hole_that_a_copy_has_only_in_the_tree_is_none_of_it() -> None:
+    """Two ears of one outline, drilled at different places: the outline's own hole gives way to both."""
+    plain = Profile.rectangle(60.0, 40.0)
+    apart = Similarity(translation=(0.0, 0.0, 80.0))
+    web = Part(Box((10.0, 40.0, 80.0)), (-25.0, 0.0, 40.0))
+    holes = [Part(Cylinder(4.0, 12.0), (10.0, y, z)) for y, z in ((0.0, 0.0), (10.0, 80.0))]
+    ears = Part(Extrusion(plain, 8.0), instances=(apart,))
+    shape = pw.load_shape(mesh_assembly(Assembly((Assembly((web, ears)), *holes), operation="difference")))
+    drilled = Profile(plain.outline, (tuple((x + 10.0, y, b) for x, y, b in circle(4.0)),))
+    settings = Settings.for_quality("draft")
+    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+    own = in_unit_frame(shape, Assembly((Part(Extrusion(drilled, 8.0), instances=(apart,)), web)))
+    tree = search.scored(FeatureTree([Feature(True, part, np.zeros(0, bool), 4) for part in own.parts]))
+    result = FeatureAssembly(shape).named(with_holes_drilled(search, tree, empty_round_holes(shape)))
+    assert mesh_assembly(result).volume == pytest.approx(shape.volume, rel=1e-3)
+    assert not without_feature(empty_round_holes(shape), in_unit_frame(shape, result).distance)
+    middles = shape.frame.to_unit(np.array([(10.0, y, z) for z in (0.0, 80.0) for y in (0.0, 10.0)]))
+    assert (in_unit_frame(shape, result).distance(middles) < 0).tolist() == [False, True, True, False]
 
 
 def test_what_stands_in_a_ring_is_not_drilled_away() -> None:
