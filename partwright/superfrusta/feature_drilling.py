@@ -42,10 +42,13 @@ def without_feature(holes: Sequence[RoundHole], distance: Distance) -> list[Roun
     return [hole for hole in holes if _is_filled(hole.part(), distance)]
 
 
-def _is_filled(hole: Part, distance: Distance) -> bool:
-    """Whether a solid is where a hole, without its copies, would be."""
+def _is_filled(hole: Part, distance: Distance, opened: Distance | None = None) -> bool:
+    """Whether a solid is where a hole, without its copies, would be; opened: and another is not."""
     points = points_within(hole).astype(np.float32)
-    return bool((distance(points) < -_DEEP).mean() > _FILLED)
+    filled = distance(points) < -_DEEP
+    if opened is not None:
+        filled &= opened(points) > _DEEP
+    return bool(filled.mean() > _FILLED)
 
 
 def hole_warnings(shape: Shape, holes: Sequence[RoundHole]) -> tuple[str, ...]:
@@ -67,7 +70,7 @@ def with_holes_drilled(search: FeatureSearch, tree: FeatureTree, holes: Sequence
 
     They cost nothing where trees are compared: what is known to be there needs no other reason.
     """
-    features = [_with_true_holes(search, feature) for feature in tree.features]
+    features = [_with_true_holes(search, tree, feature) for feature in tree.features]
     missing = without_feature(holes, FeatureTree(features).distance)
     parts = merged_holes([hole.part() for hole in missing], search.samples.measure)
     parts = parts[: max(0, search.limit - len(features))]
@@ -79,8 +82,9 @@ def with_holes_drilled(search: FeatureSearch, tree: FeatureTree, holes: Sequence
     return replace(drilled, covered=covered, score=search.score_of(covered))
 
 
-def _with_true_holes(search: FeatureSearch, feature: Feature) -> Feature:
-    """The feature without round holes of its profile that the shape fills in one of its copies."""
+def _with_true_holes(search: FeatureSearch, tree: FeatureTree, feature: Feature) -> Feature:
+    """The feature without round holes of its profile that the shape fills in one of its copies, where
+    nothing else of the tree does, as a shaft in a ring."""
     field = feature.part.field
     if not feature.added or feature.freeform or not isinstance(field, Extrusion):
         return feature
@@ -90,7 +94,7 @@ def _with_true_holes(search: FeatureSearch, feature: Feature) -> Feature:
             return True
         part = replace(with_profile(feature.part, Profile(loop)), instances=feature.part.instances)
         copies = (copy for own in replace(feature, part=part).parts for copy in own.copies)
-        return not any(_is_filled(copy, search.samples.measure) for copy in copies)
+        return not any(_is_filled(copy, search.samples.measure, tree.distance) for copy in copies)
 
     kept = tuple(loop for loop in field.profile.holes if is_true(loop))
     if len(kept) == len(field.profile.holes):

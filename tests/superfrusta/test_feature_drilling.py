@@ -76,3 +76,15 @@ def test_what_stands_in_a_ring_is_not_drilled_away() -> None:
     post = Part(Cylinder(20.0, 12.0))
     whole = Assembly((Assembly((PLATE, ring), operation="difference"), post))
     assert not empty_round_holes(pw.load_shape(mesh_assembly(whole)))
+
+
+def test_a_ring_in_which_another_part_stands_keeps_its_hole() -> None:
+    ring = Part(Extrusion(Profile(circle(60.0), (circle(30.0),)), 8.0))
+    shaft = Part(Cylinder(25.0, 40.0))
+    bridge = Part(Box((80.0, 6.0, 4.0)))
+    shape = pw.load_shape(mesh_assembly(Assembly((ring, shaft, bridge))))
+    settings = Settings.for_quality("draft")
+    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
+    own = in_unit_frame(shape, Assembly((ring, shaft, bridge)))
+    tree = search.scored(FeatureTree([Feature(True, part, np.zeros(0, bool), 4) for part in own.parts]))
+    assert with_holes_drilled(search, tree, empty_round_holes(shape)) is tree
