@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -183,6 +183,13 @@ def place_in(shape: Shape, unit_point: np.ndarray) -> str:
     """Where a point (3,) of the unit frame is in a shape, in words."""
     size = shape.frame.length_to_unit(np.ptp(shape.vertices, axis=0))
     return place_name(unit_point, size, shape.up)
+
+
+def places_in(shape: Shape, unit_points: Iterable[np.ndarray]) -> str:
+    """Where points (3,) of the unit frame are in a shape, in words: that of the first, and whether others are
+    elsewhere."""
+    first, *others = dict.fromkeys(place_in(shape, point) for point in unit_points)
+    return f"{first} and elsewhere" if others else first
 
 
 def _in_input_units(pair: Comparison, length: float) -> float:

@@ -54,8 +54,7 @@ def outer_faces(source: MeshDistance, vertices: NDArray[np.float64], faces: NDAr
     pieces, of, parting = (np.concatenate(one) for one in zip(*looked_at, strict=True))
     shown = np.bincount(of[parting != 0], minlength=len(faces))
     whole = shown == np.bincount(of, minlength=len(faces))
-    way = np.zeros(len(faces), np.int64)
-    np.add.at(way, of, parting)
+    way = np.bincount(of, parting, len(faces)).astype(np.int64)
     partly = (parting != 0) & ~whole[of]
     found = np.concatenate([_turned(faces, way)[whole], _turned(pieces, parting)[partly]])
     used, numbered = np.unique(found[found >= len(vertices)], return_inverse=True)

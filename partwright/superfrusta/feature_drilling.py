@@ -16,7 +16,7 @@ from partwright.approximation.sketches.round_holes import RoundHole, round_holes
 from partwright.assembly import Part
 from partwright.fields import Extrusion
 from partwright.fields.profile import Loop, Profile, circle_of
-from partwright.metrics.deviation import place_in
+from partwright.metrics.deviation import places_in
 from partwright.shapes import Shape, length_text
 from partwright.superfrusta.feature_pruning import mask_of
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
@@ -38,7 +38,6 @@ def empty_round_holes(shape: Shape) -> list[RoundHole]:
 
 def without_feature(holes: Sequence[RoundHole], distance: Distance) -> list[RoundHole]:
     """Those of holes that a solid fills; distance: (N,) of that at points (N, 3), unit lengths."""
-
     return [hole for hole in holes if _is_filled(hole.part(), distance)]
 
 
@@ -57,11 +56,10 @@ def hole_warnings(shape: Shape, holes: Sequence[RoundHole]) -> tuple[str, ...]:
         return ()
     wide = float(shape.frame.length_from_unit(2 * max(hole.radius for hole in holes)))
     many = f"{len(holes)} round holes, up to" if len(holes) > 1 else "a round hole,"
-    places = list(dict.fromkeys(place_in(shape, hole.middle) for hole in holes))
-    more = " and elsewhere" if len(places) > 1 else ""
+    places = places_in(shape, (hole.middle for hole in holes))
     it = "them" if len(holes) > 1 else "it"
     size = length_text(wide, shape.unit)
-    return (f"left out: {many} {size} wide, at the {places[0]}{more}: no feature has {it}",)
+    return (f"left out: {many} {size} wide, at the {places}: no feature has {it}",)
 
 
 def with_holes_drilled(search: FeatureSearch, tree: FeatureTree, holes: Sequence[RoundHole]) -> FeatureTree:

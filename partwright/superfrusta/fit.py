@@ -14,7 +14,7 @@ from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outco
 from partwright.shapes import Shape
 from partwright.superfrusta.far_places import Solid
 from partwright.superfrusta.feature_assembly import in_unit_frame
-from partwright.superfrusta.feature_drilling import empty_round_holes, hole_warnings, without_feature
+from partwright.superfrusta.feature_drilling import hole_warnings
 from partwright.superfrusta.feature_steps import FeatureTree
 from partwright.superfrusta.featured import SURE, FeaturedFit, freeform_warnings, wants_features
 from partwright.superfrusta.hole_search import HoleSearch
@@ -53,11 +53,11 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         with timed(seconds, "features"):
             features, interrupted = featured.tree()
         if features is not None and interrupted:
-            return _of_features(shape, featured.assembly(features), "interrupted", seconds, [])
+            return _of_features(shape, featured, featured.assembly(features), "interrupted", seconds, [])
         if features is not None and (features.score >= SURE or settings.min_iou is not None):
             with timed(seconds, "freeform"):
                 features = featured.mended(features)
-            return _of_features(shape, featured.assembly(features), "converged", seconds, [])
+            return _of_features(shape, featured, featured.assembly(features), "converged", seconds, [])
     assembled = partial(assembly_of, shape, settings=settings, fixed=fixed)
     search = ResidualFit(samples, settings, run.told, len(fixed), assembled, checkpoint, seconds=seconds)
     holes = HoleSearch.of(shape, search, rows)
@@ -91,7 +91,7 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         elif preferred:
             whole = featured.assembly(features)
         if preferred:
-            return _of_features(shape, whole, outcome, search.seconds, search.history)
+            return _of_features(shape, featured, whole, outcome, search.seconds, search.history)
     whole = _with_locked(whole, request)
     curve: list[CurvePoint] = []
     for step in search.curve:
@@ -100,13 +100,13 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
     told = freeform_warnings(shape, whole)
     if wants_features(request) and outcome != "interrupted":
-        own = in_unit_frame(shape, whole)
-        told += hole_warnings(shape, without_feature(empty_round_holes(shape), own.distance))
+        told += hole_warnings(shape, featured.holes_left_out(in_unit_frame(shape, whole)))
     return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)), warnings=told)
 
 
 def _of_features(
     shape: Shape,
+    featured: FeaturedFit,
     whole: Assembly,
     outcome: Outcome,
     seconds: dict[str, float],
@@ -117,7 +117,7 @@ def _of_features(
         with timed(seconds, "edges"):
             own = in_unit_frame(shape, whole)
             fitted = Solid.of(own)
-            holes = without_feature(empty_round_holes(shape), own.distance)
+            holes = featured.holes_left_out(own)
             apart = [
                 detail
                 for detail in left_out(shape, own, fitted)

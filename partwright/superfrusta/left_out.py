@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from partwright.approximation.part_roles import FREEFORM
 from partwright.assembly import Assembly
-from partwright.metrics.deviation import place_in
+from partwright.metrics.deviation import places_in
 from partwright.rows import units
 from partwright.shapes import Shape, length_text
 from partwright.shapes.topology import EdgeTable, area_vectors, components
@@ -50,13 +50,13 @@ def left_out_warnings(shape: Shape, found: Sequence[Detail]) -> tuple[str, ...]:
     if not found:
         return ()
     depth = float(shape.frame.length_from_unit(max(abs(detail.depth) for detail in found)))
-    places = list(dict.fromkeys(place_in(shape, detail.box.mean(axis=0)) for detail in found))
+    places = places_in(shape, (detail.box.mean(axis=0) for detail in found))
     ways = {True: "stands out", False: "is cut in"}
     how = " or ".join(dict.fromkeys(ways[detail.depth > 0] for detail in found))
     many = f" ({len(found)} places, as letters are)" if len(found) > 2 else ""
     return (
-        f"left out: small detail{many} that {how} by {length_text(depth, shape.unit, 2)} at the {places[0]}"
-        f"{' and elsewhere' if len(places) > 1 else ''}: no feature has it",
+        f"left out: small detail{many} that {how} by {length_text(depth, shape.unit, 2)} at the {places}: "
+        "no feature has it",
     )
 
 

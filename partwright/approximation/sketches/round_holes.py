@@ -57,11 +57,10 @@ class RoundHole:
 def round_holes(vertices: Floats, faces: NDArray[np.int64]) -> list[RoundHole]:
     """Those of a closed mesh, vertices (V, 3) in the unit frame, the widest first; whether anything stands in
     them is not asked."""
-    corners = vertices[faces]
-    cross = area_vectors(corners)
-    normals = units(cross)
+    normals = units(area_vectors(vertices[faces]))
     edges, beside = EdgeTable(faces).pairs
-    along = units(vertices[edges[:, 1]] - vertices[edges[:, 0]])
+    ways = vertices[edges[:, 1]] - vertices[edges[:, 0]]
+    along, length = units(ways), np.linalg.norm(ways, axis=1)
     one, two = normals[beside[:, 0]], normals[beside[:, 1]]
     cosine = (one * two).sum(axis=1)
     inner = (np.cross(one, two) * along).sum(axis=1) < 0
@@ -69,7 +68,6 @@ def round_holes(vertices: Floats, faces: NDArray[np.int64]) -> list[RoundHole]:
     turns = inner & (cosine > _TURN) & ~flat
     smooth = turns | flat
     region = components(len(faces), *beside[smooth].T)
-    length = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
     found: list[RoundHole] = []
     order = np.flatnonzero(smooth)
     order = order[np.argsort(region[beside[order, 0]], kind="stable")]
