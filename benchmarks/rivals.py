@@ -176,7 +176,7 @@ def table(
 def told(further: Sequence[tuple[int, Cadfit]], limit: float) -> list[str]:
     """What is said of CADFit."""
     if not further:
-        return ["CADFit was not run with this table; docs/solids.md says what it made of one part."]
+        return ["CADFit was not run with this table; docs/solids-measured.md says what it made of one part."]
     made = [(faces, one) for faces, one in further if one.faces is not None and one.iou is not None]
     lines = [
         "CADFit (CC BY-NC 4.0: run, not copied; one process, its filter of loops off, as it is by default,",

@@ -35,7 +35,8 @@ class Settings(CommonSettings):
     """Less than for SuperFrusta: a hole is a part and moves R by less than a part of the body does."""
 
     profiles: bool = True
-    """Begins with features read off the surface: extrusions, turned profiles, holes (docs/solids.md)."""
+    """Begins with features read off the surface: extrusions, turned profiles, holes
+    (docs/solids-features.md)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
