@@ -77,7 +77,7 @@ class Settings:
     """Thin out down to one part and keep the assembly of every size on the way."""
     symmetry: bool = True
     """Where the shape has a mirror plane or a rotation, or is alike in several places, parts come as repeats
-    (docs/repeats.md)."""
+    (docs/repeats-inside.md)."""
 
     def __post_init__(self) -> None:
         for name in ("rounds", "regions", "attempts", "trials", "patience", "near", "uniform"):
