@@ -22,13 +22,13 @@ import numpy as np
 from PIL import Image
 
 import partwright as pw
-from partwright.assembly.euler_angles import fixed_axes_angles
 from partwright.assembly.palette import palette
+from partwright.assembly.profile_numbers import profile_numbers
 from partwright.atomic_io import write_bytes
 from partwright.cleaning import Cleaned
-from partwright.cleaning.dimensions import dimensions, values
+from partwright.cleaning.dimensions import values
 from partwright.export.solid_source import number
-from partwright.fields import SuperFrustum
+from partwright.fields import Extrusion, Field, Revolution, SuperFrustum
 from partwright.metrics import Scores
 from partwright.render import Camera, sheet
 from partwright.render.output import write
@@ -67,9 +67,17 @@ def named(assembly: pw.Assembly) -> int:
     return sum(not isinstance(part.field, SuperFrustum) for part in assembly.parts)
 
 
+def sizes(field: Field) -> list[float]:
+    """The numbers of a part, those of its profile if it has one."""
+    if isinstance(field, Extrusion | Revolution):
+        places = [v for name, v in profile_numbers(field).items() if ".radius." not in name]
+        return [*places, field.height] if isinstance(field, Extrusion) else places
+    return list(values(field))
+
+
 def plain_share(assembly: pw.Assembly) -> float:
     """Numbers of at most four digits, of all dimensions and places."""
-    found = [v for part in assembly.parts for v in (*values(part.field), *part.translation)]
+    found = [v for part in assembly.parts for v in (*sizes(part.field), *part.translation)]
     return float(np.mean([len(number(abs(v)).replace(".", "").strip("0")) <= 4 for v in found]))
 
 
@@ -100,21 +108,6 @@ def table(rows: list[Row], command: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def typed(part: pw.Part) -> str:
-    """A part as a person would type it."""
-    field = part.field
-    own = ", ".join(
-        f"{d.name} {number(v)}" for d, v in zip(dimensions(type(field)), values(field), strict=True)
-    )
-    if field.kind == "box":
-        own = " x ".join(number(v) for v in values(field))
-    place = ", ".join(number(v) for v in part.translation)
-    angles = fixed_axes_angles(pw.assembly.similarity.rotation_matrix(part.rotation))
-    turn = "" if not any(angles) else f", turned {', '.join(number(a) for a in angles)}"
-    times = f", {len(part.copies)} times" if part.instances else ""
-    return f"{part.name}: {field.kind} {own} at ({place}){turn}{times}"
-
-
 def draw(row: Row, shape: pw.Shape, path: Path) -> None:
     """Input, fit and clean assembly, parts in their colours."""
     from partwright.meshing import mesh_assembly
@@ -142,15 +135,15 @@ def page(rows: list[Row], command: str) -> str:
         "# Cleaned fits",
         "",
         "Input, fit, and the same after `partwright clean --shape`, at the default tolerance; below each,",
-        "the first part as the fit left it and all parts as they are typed now. Lengths are the shapes'",
-        f"own, of which the longest side is 1.8; angles are degrees about x, y and z. Made by `{command}`.",
+        "the first part as the fit left it and all parts as they are now. Lengths are the shapes' own, of",
+        f"which the longest side is 1.8. Made by `{command}`.",
     ]
     for row in rows:
         made = row.cleaned.assembly.parts
         lines += ["", f"## {row.name}, fitted as {row.method}", ""]
         lines += [f"![input, fit, clean](images/clean/{row.method}_{row.name}.png)", "", "```"]
-        lines += [f"before  {typed(row.fitted.parts[0])}", ""]
-        lines += [typed(part) for part in made[:LONGEST_LIST]]
+        lines += [f"before  {row.fitted.parts[0].describe()}", ""]
+        lines += [part.describe() for part in made[:LONGEST_LIST]]
         if len(made) > LONGEST_LIST:
             lines.append(f"... and {len(made) - LONGEST_LIST} more")
         lines += ["```", "", *(f"- {relation}" for relation in row.cleaned.relations[:8])]

@@ -2,8 +2,9 @@
 
     python benchmarks/solids_picture.py
 
-The bracket is meshed, fitted by SuperFrusta and by solids with default settings and seed 0, and the solids
-are cleaned. The listings of the pages come from the same run: they are printed.
+The bracket is meshed, fitted by SuperFrusta and by solids with default settings and seed 0, and solids
+found by the search alone are cleaned: those of features are plain already. The listings of the pages come
+from the same run: they are printed.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+import textwrap
 from pathlib import Path
 
 import numpy as np
-from cleaning import typed
 from PIL import Image
 
 import partwright as pw
@@ -31,6 +32,7 @@ from partwright.render.sheet import SOFT_INK, draw_text
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 PANEL = 440
 LINE = 17  # pixels of a line of text
+LETTERS = 72  # of a line
 ALONG_Y = (math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
 
 
@@ -74,17 +76,21 @@ def main() -> int:
     view = camera.fitted(shape.vertices, PANEL, PANEL)
     given = look(Scene(shape.vertices, shape.faces), camera, view, PANEL, PANEL).image(np.array(NEUTRAL))
     fits = {method: pw.fit(shape, method, seed=0) for method in ("superfrusta", "solids")}
-    solids = fits["solids"]
     panels, captions = [given], ["input"]
     for method, result in fits.items():
         panels.append(coloured(result.assembly, camera, shape.vertices))
         captions.append(f"{method}: {len(result.assembly)} parts, IoU {result.scores.iou:.3f}")
     save(sheet(panels, captions), options.images / "solids.png")
-    cleaned = pw.clean(solids.assembly, shape)
-    before, after = (coloured(one, camera, shape.vertices) for one in (solids.assembly, cleaned.assembly))
+    print(fits["solids"].assembly.describe(), "")
+    searched = pw.fit(shape, "solids", seed=0, profiles=False).assembly
+    cleaned = pw.clean(searched, shape)
+    before, after = (coloured(one, camera, shape.vertices) for one in (searched, cleaned.assembly))
     page = sheet([before, after], ["fitted", "cleaned"])
-    texts = [[typed(part) for part in one.parts] for one in (solids.assembly, cleaned.assembly)]
-    print(solids.assembly.describe(), cleaned.assembly.describe(), *texts[0], "", *texts[1], sep="\n")
+    texts = [
+        [line for part in one.parts for line in textwrap.wrap(part.describe(), LETTERS)]
+        for one in (searched, cleaned.assembly)
+    ]
+    print(searched.describe(), cleaned.assembly.describe(), sep="\n\n")
     print("", *cleaned.relations, "", cleaned.before, cleaned.after, sep="\n")
     rows = max(map(len, texts))
     columns = [written(text + [""] * (rows - len(text)), PANEL) for text in texts]
