@@ -3,6 +3,8 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 # Python compiles what it imports; pip would compile all sixteen thousand files, for longer than it installs them.
 PIP := $(BIN)/pip install --quiet --no-compile
+# Some machines forbid that. Then each process, of which the tests start hundreds, compiles 1,300 files anew.
+export PYTHONDONTWRITEBYTECODE :=
 BUILD_INPUTS := pyproject.toml CMakeLists.txt $(wildcard cpp/*)
 # An editable install knows the Python files of its day, so it is named after their list.
 FILES := $(shell find partwright -name '*.py' | LC_ALL=C sort | cksum | cut -d' ' -f1)

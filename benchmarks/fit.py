@@ -86,6 +86,8 @@ def fit_once(entry: Entry, seed: int, options: list[str], keep: Path | None = No
                 [*command, "--seed", str(seed), *options, *entry.options],
                 stdout=stream,
                 stderr=subprocess.STDOUT,
+                # As on most machines: Python keeps what it compiles, which else is a quarter of a fit.
+                env=os.environ | {"PYTHONDONTWRITEBYTECODE": ""},
             )
             _, status, usage = os.wait4(process.pid, 0)
             seconds = time.perf_counter() - start

@@ -31,9 +31,15 @@ COMMANDS = {
 }
 
 
+def in_tree(tree: Path) -> dict[str, str]:
+    """The environment of a process that finds the package in the tree. Python keeps what it compiles, as it
+    does on most machines."""
+    return os.environ | {"PYTHONPATH": str(tree.resolve()), "PYTHONDONTWRITEBYTECODE": ""}
+
+
 def seconds(tree: Path, command: list[str]) -> float:
     """Of one process that finds the package in the tree."""
-    environment = os.environ | {"PYTHONPATH": str(tree.resolve())}
+    environment = in_tree(tree)
     start = time.perf_counter()
     subprocess.run(
         [sys.executable, *command], cwd=tree, env=environment, stdout=subprocess.DEVNULL, check=True
@@ -53,7 +59,7 @@ sys.exit(main(sys.argv[1:]))
 
 def stages(tree: Path, shape: Path, quality: str) -> dict[str, float]:
     """CPU seconds of one fit by stage; "fit" is all that the method does, "fixed" all the rest."""
-    environment = os.environ | {"PYTHONPATH": str(tree.resolve())}
+    environment = in_tree(tree)
     with tempfile.TemporaryDirectory() as folder:
         options = ["--quality", quality, "-o", f"{folder}/out"]
         command = [sys.executable, "-c", FIT, "fit", str(shape.resolve()), *options]
