@@ -77,7 +77,7 @@ def stacked(one: Part, other: Part, near: float) -> Part | None:
 
     near: lengths that differ by less are equal.
     """
-    first, second = _drawn(one.field), _drawn(other.field)
+    first, second = drawn_profile(one.field), drawn_profile(other.field)
     if first is None or second is None:
         return None
     way = one.pose.inverse() @ other.pose
@@ -106,8 +106,9 @@ def _are_same(one: Profile, other: Profile, near: float) -> bool:
     return len(one.holes) == len(other.holes) and max(off) < near
 
 
-def _drawn(field: Field) -> tuple[Profile, float] | None:
-    """The profile that is extruded, without taper, and how far."""
+def drawn_profile(field: Field) -> tuple[Profile, float] | None:
+    """The profile that is extruded along z, without taper, and how far; None of what is no such solid. Rims
+    are left out."""
     if isinstance(field, Extrusion):
         return (field.profile, field.height) if not field.taper else None
     if isinstance(field, Cylinder):

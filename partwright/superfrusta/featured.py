@@ -28,6 +28,7 @@ from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
 from partwright.superfrusta.feature_teeth import with_teeth_apart
 from partwright.superfrusta.feature_thinning import thinned
+from partwright.superfrusta.feature_unions import with_common_outlines
 from partwright.superfrusta.flat_tree import flattened
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
@@ -93,7 +94,8 @@ class FeaturedFit:
             points = self._samples.points
             tree = with_pockets(with_shared_bores(tree, points), points)
             toothed = with_teeth_apart(search, tree)
-            return with_plain_outlines(search, with_whole_boxes(toothed, points)), False
+            united = with_common_outlines(search, with_whole_boxes(toothed, points))
+            return with_plain_outlines(search, united), False
         for count in range(1, len(tree.features) + 1):
             shorter = tree.first(count)
             if volume_iou(shorter, self._samples) >= settings.min_iou:
