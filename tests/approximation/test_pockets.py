@@ -9,7 +9,7 @@ import pytest
 from manifold3d import Manifold
 
 from partwright.approximation.sketches.candidates import candidates
-from partwright.approximation.sketches.pockets import as_pockets
+from partwright.approximation.sketches.pockets import as_pockets, closed_by
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution
 from partwright.fields.profile import circle
@@ -134,3 +134,33 @@ def test_volumes_are_those_of_the_pieces() -> None:
     ((body, pockets, _),) = as_pockets(*whole.parts)
     made = mesh_assembly(Assembly((body, *pockets), "difference"), 64)
     assert made.volume == pytest.approx(mesh_assembly(whole, 64).volume, rel=1e-6)
+
+
+@pytest.mark.parametrize("turn", [QUARTER, OVER], ids=["turned", "upside down"])
+@pytest.mark.parametrize("cut", [Box((0.4, 0.2, 0.6)), Extrusion(Profile.rectangle(0.4, 0.2, 0.05), 0.6)])
+def test_an_opening_with_a_floor_is_a_pocket(turn: tuple, cut: Box | Extrusion) -> None:
+    """As deep as the floor leaves it, wherever the floor ends beside it; each copy with one of its own."""
+    moves = (Similarity(translation=(0.6, 0, 0)),)
+    floor = Part(Box((0.3, 0.6, 0.2)), (0, 0, 0.2), QUARTER, instances=moves)
+    opening, lid = (part.transformed(_turn(turn)) for part in (Part(cut, instances=moves), floor))
+    (pocket,) = closed_by(opening, lid)
+    plate = Part(Box((1.4, 0.5, 0.5))).transformed(_turn(turn))
+    points = np.random.default_rng(0).uniform(-1, 1, (9000, 3))
+    filled = Assembly((Assembly((plate, opening), "difference"), lid)).distance(points) < 0
+    drawn = Assembly((Assembly((plate, pocket), "difference"), lid)).distance(points) < 0
+    assert (filled == drawn).all()
+    depth = pocket.field.size[2] if isinstance(pocket.field, Box) else pocket.field.height
+    assert depth == pytest.approx(0.4)
+    assert len(pocket.copies) == 2
+
+
+@pytest.mark.parametrize(
+    "floor",
+    [
+        Part(Box((0.3, 0.6, 0.2)), (0, 0, -0.25)),  # closes a part of it
+        Part(Box((0.5, 0.5, 0.1)), (0, 0, 0)),  # between its ends
+        Part(Box((0.5, 0.5, 0.7))),  # fills it
+    ],
+)
+def test_openings_without_a_floor_stay(floor: Part) -> None:
+    assert not list(closed_by(Part(Box((0.4, 0.2, 0.6))), floor))

@@ -14,7 +14,7 @@ from manifold3d import Manifold
 import partwright as pw
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.candidates import candidates
-from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly import Assembly, Part, Similarity, ring
 from partwright.fields import Box, Cylinder, Extrusion, Field, Profile, Revolution, Tube
 from partwright.fields.profile import circle
 from partwright.meshing import mesh_assembly
@@ -51,6 +51,15 @@ def found(drawn: Assembly | trimesh.Trimesh, quality: str = "draft") -> tuple[Fe
 
 def kinds(tree: FeatureTree) -> list[tuple[bool, str, int]]:
     return [(f.added, f.part.field.kind, sum(len(part.copies) for part in f.parts)) for f in tree.features]
+
+
+@pytest.mark.parametrize("count", [3, 8, 16])
+def test_a_flange_is_turned_and_drilled(count: int) -> None:
+    """With eight holes, too, through which all of eight half sections go that are as far apart."""
+    section = [(10, 0), (40, 0), (40, 8), (15, 8), (15, 30), (10, 30)]
+    holes = Part(Cylinder(2, 20), (30, 0, 4), instances=ring(count))
+    tree, _ = found(Assembly((Part(Revolution(Profile.polygon(section))), holes), "difference"))
+    assert kinds(tree) == [(True, "revolution", 1), (False, "cylinder", count)]
 
 
 def test_a_plate_with_pockets_and_holes_is_a_box_and_two_patterns() -> None:

@@ -1,9 +1,10 @@
-"""A wall all around and a floor that closes it: what a person draws as a solid with a pocket."""
+"""A wall all around, or an opening, and a floor that closes it: what a person draws as a pocket."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 import numpy as np
 from manifold3d import CrossSection, FillRule, JoinType
@@ -89,6 +90,53 @@ def _pocketed(wall: Part, floor: Part) -> Iterator[Pocketed]:
         walls = (extruded(Profile(field.profile.outline, tuple(closed)), ends) for ends in left)
         pockets = tuple(pocket for one in walls for pocket in hole_parts(one))
         yield dataclasses.replace(body, name=wall.name), pockets, holes
+
+
+def closed_by(cut: Part, floor: Part) -> Iterator[Part]:
+    """A cut as far as a floor does not fill one of its ends, in each direction in which it does.
+
+    Of a cut that is there more than once each has a copy of the floor. Lengths in the unit frame.
+    """
+    field = cut.field
+    shaped = isinstance(field, Extrusion) and (field.taper or field.has_rims)
+    if shaped or not isinstance(field, Box | Cylinder | Extrusion) or len(cut.copies) != len(floor.copies):
+        return
+    frame = rotation_matrix(cut.rotation)
+    corners = np.array(floor.field.bounds())
+    room = (corners[1] - corners[0]) / 2
+    for copy, k in product(floor.copies, range(3) if isinstance(field, Box) else (2,)):
+        axis, turn = frame[:, k], rotation_matrix(copy.rotation)
+        middle = float(axis @ (turn @ corners.mean(axis=0) + copy.translation - cut.translation))
+        reach = float(np.abs(axis @ turn) @ room)
+        low, high = middle - reach, middle + reach
+        half = (field.size[k] if isinstance(field, Box) else field.height) / 2
+        if low < _FLUSH - half < high < half:
+            filled, left = (-half, high), (high, half)
+        elif -half < low < half - _FLUSH < high:
+            filled, left = (low, half), (-half, low)
+        else:
+            continue
+        if _is_within(_between(cut, k, *filled), copy):
+            yield _between(cut, k, *left)
+
+
+def _is_within(one: Part, other: Part) -> bool:
+    """Whether the box of one part, without copies, lies within that of another."""
+    (low, high), (least, most) = (part.copies[0].bounds() for part in (one, other))
+    return bool((low > least - _FLUSH).all() and (high < most + _FLUSH).all())
+
+
+def _between(cut: Part, axis: int, low: float, high: float) -> Part:
+    """From one height to another along an axis of its own."""
+    x, y, z = (cut.translation + rotation_matrix(cut.rotation)[:, axis] * (low + high) / 2).tolist()
+    field: Box | Cylinder | Extrusion
+    if isinstance(cut.field, Box):
+        width, depth, height = (high - low if k == axis else v for k, v in enumerate(cut.field.size))
+        field = dataclasses.replace(cut.field, size=(width, depth, height))
+    else:
+        assert isinstance(cut.field, Cylinder | Extrusion)
+        field = dataclasses.replace(cut.field, height=high - low)
+    return dataclasses.replace(cut, field=field, translation=(x, y, z))
 
 
 def _upright(part: Part) -> Extrusion | None:

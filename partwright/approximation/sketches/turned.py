@@ -18,7 +18,9 @@ from partwright.approximation.sketches.sections import FINE, View, profile_of
 from partwright.errors import ParameterError
 from partwright.fields.profile import Corner, Loop, Profile
 
+_OFFSET = 0.0137  # radians: no plane along faces
 _PLANES = 4  # through an axis, for what goes all around
+_BETWEEN = 3 * math.pi / 16 + _OFFSET  # of one more, beside holes that all of those may go through
 _USUAL = 6  # of their eight halves, that have what is usual
 _HALVES = 32  # half-planes at which partial turns are looked for
 _FEWEST = 3  # of them, that a partial turn goes through
@@ -37,7 +39,6 @@ _GRADUAL = 3.0  # times what is told apart, that a piece is off at most a little
 _DRAWN = math.radians(15)  # the steps in which bends are drawn
 _ABOUT = math.radians(4)  # how well smooth ends are told
 _LONG = 20.0  # tolerances, that a line is long whose direction is told by them
-_OFFSET = 0.0137  # radians: no plane along faces
 _SKIN = 7e-4  # unit lengths: of what rounding leaves over a flat end
 
 
@@ -92,6 +93,7 @@ def turned(view: View, centre: np.ndarray) -> Iterator[Candidate]:
     whole, shared = CrossSection(), halves[0]
     for half in halves:
         whole, shared = whole + half, shared ^ half
+    whole = sum(axis.halves(_BETWEEN), whole)
     middle = sorted(halves, key=lambda half: half.area())[len(halves) // 2]
     if shared.area() <= _ROUND * whole.area():
         usual = _in_many(halves, _USUAL)  # without ribs, and with what a keyway and bolt holes take
