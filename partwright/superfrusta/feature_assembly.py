@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 
 from partwright.approximation.part_roles import FREEFORM, with_role_names
 from partwright.approximation.plain_numbers import plain_move, with_plain_numbers
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
+from partwright.approximation.sketches.round_holes import RoundHole
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.group_copies import in_runs
 from partwright.fields import Cylinder
 from partwright.shapes import Shape
+from partwright.superfrusta.feature_drilling import empty_round_holes
 from partwright.superfrusta.feature_groups import grouped
+from partwright.superfrusta.feature_mouths import HoleMouths
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, with_open_ends_everywhere
 
 _PLAIN = 1e-4  # unit lengths: how far numbers are moved to become plain
@@ -27,6 +31,11 @@ class FeatureAssembly:
     def __init__(self, shape: Shape) -> None:
         self.shape, self.distance = shape, shape.unit_distance
         self._known: dict[tuple[int, bool], tuple[Feature, list[tuple[Feature, bool]]]] = {}
+
+    @cached_property
+    def round_holes(self) -> list[RoundHole]:
+        """Of the shape, in the unit frame, in which there is nothing of it."""
+        return empty_round_holes(self.shape)
 
     def named(self, tree: FeatureTree) -> Assembly:
         """The features as a tree of unions and differences, named, in the shape's own units."""
@@ -42,8 +51,8 @@ class FeatureAssembly:
         return _with_plain_numbers(whole, _PLAIN / frame.scale)
 
     def _numbered(self, tree: FeatureTree) -> list[Feature]:
-        """Round holes of profiles apart, each size once; ends that are open further out; names until they say
-        more."""
+        """Round holes of profiles apart, each size once, with their mouths; ends that are open further out;
+        names until they say more."""
         result: list[Feature] = []
         drilled: list[Part] = []
         for i, feature in enumerate(tree.features):
@@ -53,7 +62,9 @@ class FeatureAssembly:
                 else:
                     result.append(own)
         none = np.zeros(0, bool)
-        result += [Feature(False, hole, none, 0) for hole in merged_holes(drilled, self.distance)]
+        mouths = HoleMouths(self.round_holes, self.distance, FeatureTree(list(result)).distance)
+        holes = (one for hole in merged_holes(drilled, self.distance) for one in mouths.of(hole))
+        result += [Feature(False, hole, none, 0) for hole in holes]
         stems = {True: "part", False: "cut"}
         names = [f"{stems[f.added]}_{i:02d}" for i, f in enumerate(result, start=1)]
         for k, i in enumerate((i for i, f in enumerate(result) if f.freeform), start=1):

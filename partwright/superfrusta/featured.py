@@ -18,7 +18,7 @@ from partwright.metrics.deviation import place_in
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
 from partwright.superfrusta.feature_boxes import with_whole_boxes
-from partwright.superfrusta.feature_drilling import empty_round_holes, with_holes_drilled, without_feature
+from partwright.superfrusta.feature_drilling import with_holes_drilled, without_feature
 from partwright.superfrusta.feature_freeform import far_off, with_freeform
 from partwright.superfrusta.feature_outlines import with_plain_outlines
 from partwright.superfrusta.feature_pockets import with_pockets
@@ -148,15 +148,11 @@ class FeaturedFit:
 
     def _finished(self, tree: FeatureTree) -> FeatureTree:
         thin = thinned(self._search, self._with_freeform(tree), self._assemblies.in_unit_frame)
-        return with_holes_drilled(self._search, thin, self._round_holes)
-
-    @cached_property
-    def _round_holes(self) -> list[RoundHole]:
-        return empty_round_holes(self._request.shape)
+        return with_holes_drilled(self._search, thin, self._assemblies.round_holes)
 
     def holes_left_out(self, own: Assembly) -> list[RoundHole]:
         """Round holes of the shape that an assembly in the unit frame fills."""
-        return without_feature(self._round_holes, own.distance)
+        return without_feature(self._assemblies.round_holes, own.distance)
 
     def _told(self, tree: FeatureTree) -> None:
         seen = self._seen

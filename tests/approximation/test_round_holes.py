@@ -59,3 +59,18 @@ def test_posts_polygons_and_open_walls_are_none() -> None:
     )
     assert not found(PLATE - slot)
     assert not found(PLATE - hole(0.2).translate((0, 0.5, 0)))  # half of it lies in the open
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (20.0, 35.0, 10.0)])
+def test_a_cone_at_a_holes_end_is_its_mouth(turn: tuple[float, float, float]) -> None:
+    """A countersink of 90 degrees above and a steep one below; none of a drill's tip."""
+    sink = Manifold.cylinder(0.03, 0.05, 0.08, 24).translate((0, 0, 0.02))
+    steep = Manifold.cylinder(0.02, 0.06, 0.05, 24).translate((0, 0, -0.05))
+    tip = Manifold.cylinder(0.03, 0.0, 0.04, 24) + Manifold.cylinder(0.1, 0.04, 0.04, 24).translate(
+        (0, 0, 0.03)
+    )
+    body = PLATE - hole(0.05) - sink - steep - tip.translate((0.5, 0, -0.03))
+    both, blind = found(body.rotate(turn))
+    assert blind.mouths == (None, None)
+    depths = [mouth and (mouth.radius, mouth.depth) for mouth in both.mouths]
+    assert sorted(depths) == [pytest.approx((0.06, 0.02), rel=1e-3), pytest.approx((0.08, 0.03), rel=1e-3)]

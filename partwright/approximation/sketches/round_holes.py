@@ -1,4 +1,5 @@
-"""Round holes of a mesh, by their own facets: a ring of narrow faces around an axis that all look at it.
+"""Round holes of a mesh, by their own facets: a ring of narrow faces around an axis that all look at it, and
+the cones in which it ends, as countersinks and chamfers do.
 
 They are found however little of the volume they hold, which no sample need tell.
 """
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from partwright.approximation.sketches.chains import circle_through
 from partwright.approximation.sketches.directions import frame_along, snapped
+from partwright.approximation.sketches.hole_mouths import Mouth, MouthSearch, closes
 from partwright.assembly import Part
 from partwright.assembly.similarity import quaternions
 from partwright.fields import Cylinder
@@ -29,17 +31,18 @@ _PARALLEL = math.cos(math.radians(3))  # edges of one wall may lean so much: cho
 _UPRIGHT = 0.01  # cosine between a wall and its axis
 _AXES = 8  # of one smooth region, that are looked along
 _ROUND = 0.02  # of the radius, by which corners of a wall may be off its circle
-_BINS, _CLOSED = 72, 0.95  # of a turn, so many of which the wall of a hole covers
 _LEAST = 4e-3  # unit lengths: radius and depth of a hole
 
 
 @dataclass(frozen=True)
 class RoundHole:
-    """What a ring of facets goes around. start, end: (3,) on its axis, unit lengths like the radius."""
+    """What a ring of facets goes around. start, end: (3,) on its axis, unit lengths like the radius.
+    mouths: the cones that go on from there."""
 
     radius: float
     start: Floats
     end: Floats
+    mouths: tuple[Mouth | None, Mouth | None] = (None, None)
 
     @property
     def middle(self) -> Floats:
@@ -68,6 +71,7 @@ def round_holes(vertices: Floats, faces: NDArray[np.int64]) -> list[RoundHole]:
     turns = inner & (cosine > _TURN) & ~flat
     smooth = turns | flat
     region = components(len(faces), *beside[smooth].T)
+    search = MouthSearch(vertices, faces, normals, edges, beside)
     found: list[RoundHole] = []
     order = np.flatnonzero(smooth)
     order = order[np.argsort(region[beside[order, 0]], kind="stable")]
@@ -79,7 +83,7 @@ def round_holes(vertices: Floats, faces: NDArray[np.int64]) -> list[RoundHole]:
         for axis in _axes(along[rulings], length[rulings]):
             upright = (np.abs(normals[beside[own]] @ axis) < _UPRIGHT).all(axis=1)
             ring = own[upright & (flat[own] | (np.abs(along[own] @ axis) > _PARALLEL))]
-            found += _rings(vertices, faces, beside[ring], axis)
+            found += _rings(search, beside[ring], axis)
     return sorted(found, key=lambda hole: -hole.radius)
 
 
@@ -97,33 +101,20 @@ def _axes(along: Floats, length: Floats) -> Iterator[Floats]:
         left = left[~near]
 
 
-def _rings(
-    vertices: Floats,
-    faces: NDArray[np.int64],
-    beside: NDArray[np.int64],
-    axis: Floats,
-) -> Iterator[RoundHole]:
+def _rings(search: MouthSearch, beside: NDArray[np.int64], axis: Floats) -> Iterator[RoundHole]:
     """Those of connected walls, pairs (P, 2) of which hang together, that close around an axis."""
+    vertices, faces = search.vertices, search.faces
     own, pairs = np.unique(beside, return_inverse=True)
     label = components(len(own), *pairs.reshape(-1, 2).T)
     frame = frame_along(axis)
     for k in range(int(label.max(initial=-1)) + 1):
-        walls = faces[own[label == k]]
-        points = vertices[np.unique(walls)] @ frame
+        walls = own[label == k]
+        points = vertices[np.unique(faces[walls])] @ frame
         centre, radius, off = circle_through(points[:, :2])
         low, high = float(points[:, 2].min()), float(points[:, 2].max())
         if min(radius, high - low) < _LEAST or not off <= _ROUND * radius < math.inf:
             continue
-        if _closes((vertices[walls] @ frame)[..., :2] - centre):
-            ends = (frame @ (*centre, height) for height in (low, high))
-            yield RoundHole(float(radius), *ends)
-
-
-def _closes(walls: Floats) -> bool:
-    """Whether walls (F, 3, 2) about the origin go all around it."""
-    angle = np.arctan2(walls[..., 1], walls[..., 0])
-    turned = (angle - angle[:, :1] + math.pi) % math.tau - math.pi
-    low, high = angle[:, 0] + turned.min(axis=1), angle[:, 0] + turned.max(axis=1)
-    middles = (np.arange(_BINS) + 0.5) * (math.tau / _BINS)
-    within = (middles - low[:, None]) % math.tau <= (high - low)[:, None]
-    return bool(within.any(axis=0).mean() >= _CLOSED)
+        if closes((vertices[faces[walls]] @ frame)[..., :2] - centre):
+            start, end = (frame @ (*centre, height) for height in (low, high))
+            mouths = search.mouth(walls, start, -axis, radius), search.mouth(walls, end, axis, radius)
+            yield RoundHole(float(radius), start, end, mouths)

@@ -1,0 +1,162 @@
+"""Cones in which drilled holes end, as countersinks and chamfers do: part of the hole, as they are drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.approximation.profile_parts import revolved_part
+from partwright.approximation.sketches.ends import BEYOND, STEPS
+from partwright.approximation.sketches.hole_mouths import Mouth
+from partwright.approximation.sketches.holes import is_one_radius
+from partwright.approximation.sketches.round_holes import RoundHole
+from partwright.assembly import Part, Similarity
+from partwright.assembly.similarity import rotation_matrix
+from partwright.fields import Cylinder
+from partwright.fields.profile import Profile
+from partwright.rows import units
+
+Floats = NDArray[np.float64]
+Distance = Callable[[NDArray[np.float32]], NDArray[np.float32]]
+
+_ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and numbers of copies differ
+_PARALLEL = 1e-6  # of a cosine
+_AROUND = 8  # points around a mouth
+_WITHIN = 0.5, 0.8  # of a mouth's depth, at which it is looked at
+_ACROSS = 0.5, 0.95  # of a mouth's radius, at which what lies beyond is
+_FILLED = 0.5  # of a mouth's points, that are filled where it is not there
+
+
+class _Cone(NamedTuple):
+    """Of a hole along its own axis: from which height to which, and the radius there. over: how far it goes
+    on beyond, in the open. Unit lengths."""
+
+    start: float
+    end: float
+    radius: float
+    over: float
+
+
+class _End(NamedTuple):
+    """Of a hole's wall: how far from its middle, towards its side, and what follows. Unit lengths."""
+
+    height: float
+    mouth: Mouth | None
+
+
+Cones = tuple[_Cone | None, _Cone | None]
+
+
+@dataclass(frozen=True)
+class HoleMouths:
+    """holes: of a shape; empty, fold: distance (N,) at points (N, 3), unit lengths, of the shape and of what
+    the holes are cut from."""
+
+    holes: Sequence[RoundHole]
+    empty: Distance
+    fold: Distance
+
+    def of(self, hole: Part) -> Iterator[Part]:
+        """A drilled hole with the mouths that the shape has and the fold fills; where only some of its copies
+        have them, or others, each sort by itself."""
+        assert isinstance(hole.field, Cylinder)
+        sorts: list[tuple[Cones, list[int]]] = []
+        for k, copy in enumerate(hole.copies):
+            cones = self._cones(copy)
+            same = next((own for known, own in sorts if _are_same(known, cones)), None)
+            if same is None:
+                sorts.append((cones, [k]))
+            else:
+                same.append(k)
+        moves = (Similarity(), *hole.instances)
+        for cones, (first, *others) in sorts:
+            back = moves[first].inverse()
+            part = _turned(hole.copies[first], cones) if any(cones) else hole.copies[first]
+            further = hole.instances if len(sorts) == 1 else [moves[k] @ back for k in others]
+            yield replace(part, name=hole.name, instances=tuple(further))
+
+    def _cones(self, copy: Part) -> Cones:
+        """At its lower and its upper end."""
+        axis, ends = rotation_matrix(copy.rotation)[:, 2], [_End(0.0, None), _End(0.0, None)]
+        for hole in self.holes:
+            if not _is_of(hole, copy, axis):
+                continue
+            order = (0, 1) if axis @ (hole.end - hole.start) > 0 else (1, 0)
+            for k, side, wall in zip((0, 1), (-1.0, 1.0), order, strict=True):
+                at = (hole.start, hole.end)[wall]
+                own = _End(side * float((at - copy.translation) @ axis), hole.mouths[wall])
+                ends[k] = max(ends[k], own, key=_height)
+        return self._cone(copy, -1.0, ends[0]), self._cone(copy, 1.0, ends[1])
+
+    def _cone(self, copy: Part, side: float, wall: _End) -> _Cone | None:
+        """What follows the wall towards one side of a copy, if the fold fills it."""
+        mouth = wall.mouth
+        if mouth is None:
+            return None
+        assert isinstance(copy.field, Cylinder)
+        radius, end = copy.field.radius, wall.height + mouth.depth
+        wider = mouth.radius - radius
+        within = [(radius + share / 2 * wider, wall.height + share * mouth.depth) for share in _WITHIN]
+        if float((self.fold(_around(copy, side, within)) < 0).mean()) < _FILLED:
+            return None
+        beyond = [(share * mouth.radius, end + step) for share in _ACROSS for step in STEPS]
+        is_open = bool((self.empty(_around(copy, side, beyond)) > 0).all())
+        return _Cone(wall.height, end, mouth.radius, BEYOND if is_open else 0.0)
+
+
+def _height(end: _End) -> float:
+    return end.height
+
+
+def _is_of(hole: RoundHole, copy: Part, axis: Floats) -> bool:
+    """Whether a hole of the mesh is a piece of a copy of a drilled one."""
+    assert isinstance(copy.field, Cylinder)
+    way, middle = units(hole.end - hole.start), hole.middle - copy.translation
+    height = float(middle @ axis)
+    aside = float(np.linalg.norm(middle - height * axis))
+    return (
+        abs(float(axis @ way)) > 1 - _PARALLEL
+        and abs(height) < copy.field.height / 2
+        and aside < _ASIDE
+        and is_one_radius(copy.field.radius, hole.radius)
+    )
+
+
+def _around(copy: Part, side: float, rings: Sequence[tuple[float, float]]) -> NDArray[np.float32]:
+    """(N, 3) points around its axis: at distances from it and heights towards one side."""
+    turns = np.arange(_AROUND) * (2 * np.pi / _AROUND)
+    local = [
+        np.column_stack([r * np.cos(turns), r * np.sin(turns), np.full(_AROUND, side * z)]) for r, z in rings
+    ]
+    return (np.concatenate(local) @ rotation_matrix(copy.rotation).T + copy.translation).astype(np.float32)
+
+
+def _are_same(one: Cones, other: Cones) -> bool:
+    return all(
+        a is b or (a is not None and b is not None and np.allclose(a, b, rtol=0, atol=_ASIDE))
+        for a, b in zip(one, other, strict=True)
+    )
+
+
+def _turned(hole: Part, cones: Cones) -> Part:
+    """A copy of a drilled hole, with cones at its ends."""
+    assert isinstance(hole.field, Cylinder)
+    radius, half = hole.field.radius, hole.field.height / 2
+    lower, upper = (_wall(cone, radius, half) for cone in cones)
+    wall = [(r, -z) for r, z in reversed(lower)] + upper
+    frame = rotation_matrix(hole.rotation)
+    x, y, z = (frame.T @ np.array(hole.translation)).tolist()
+    profile = Profile.polygon([(0.0, wall[0][1]), *wall, (0.0, wall[-1][1])])
+    return revolved_part(profile.moved((0.0, z)), frame, np.array([x, y, 0.0]))
+
+
+def _wall(cone: _Cone | None, radius: float, half: float) -> list[tuple[float, float]]:
+    """Distance from the axis and height of the wall's corners from the middle to an end."""
+    if cone is None:
+        return [(radius, half)]
+    top = [(cone.radius, max(half, cone.end + cone.over))] if cone.over else []
+    return [(radius, cone.start), (cone.radius, cone.end), *top]
