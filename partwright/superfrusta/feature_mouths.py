@@ -49,6 +49,7 @@ class _End(NamedTuple):
 
 
 Cones = tuple[_Cone | None, _Cone | None]
+_NONE: Cones = None, None
 
 
 @dataclass(frozen=True)
@@ -61,22 +62,22 @@ class HoleMouths:
     fold: Distance
 
     def of(self, hole: Part) -> Iterator[Part]:
-        """A drilled hole with the mouths that the shape has and the fold fills; where only some of its copies
-        have them, or others, each sort by itself."""
+        """A drilled hole with the mouths that the shape has, where the fold fills one of its copies'; copies
+        that end otherwise are a hole by themselves."""
         assert isinstance(hole.field, Cylinder)
+        copies = hole.copies
         sorts: list[tuple[Cones, list[int]]] = []
-        for k, copy in enumerate(hole.copies):
-            cones = self._cones(copy)
-            same = next((own for known, own in sorts if _are_same(known, cones)), None)
-            if same is None:
-                sorts.append((cones, [k]))
-            else:
-                same.append(k)
+        for k, cones in enumerate(map(self._cones, copies)):
+            _sort_in(sorts, cones, [k])
+        needed: list[tuple[Cones, list[int]]] = []
+        for cones, own in sorts:
+            filled = any(self._is_filled(copies[k], cones) for k in own)
+            _sort_in(needed, cones if filled else _NONE, own)
         moves = (Similarity(), *hole.instances)
-        for cones, (first, *others) in sorts:
+        for cones, (first, *others) in needed:
             back = moves[first].inverse()
-            part = _turned(hole.copies[first], cones) if any(cones) else hole.copies[first]
-            further = hole.instances if len(sorts) == 1 else [moves[k] @ back for k in others]
+            part = copies[first] if cones == _NONE else _turned(copies[first], cones)
+            further = hole.instances if len(needed) == 1 else [moves[k] @ back for k in others]
             yield replace(part, name=hole.name, instances=tuple(further))
 
     def _cones(self, copy: Part) -> Cones:
@@ -93,19 +94,34 @@ class HoleMouths:
         return self._cone(copy, -1.0, ends[0]), self._cone(copy, 1.0, ends[1])
 
     def _cone(self, copy: Part, side: float, wall: _End) -> _Cone | None:
-        """What follows the wall towards one side of a copy, if the fold fills it."""
-        mouth = wall.mouth
-        if mouth is None:
+        """The mouth that follows the wall towards one side of a copy."""
+        if wall.mouth is None:
             return None
-        assert isinstance(copy.field, Cylinder)
-        radius, end = copy.field.radius, wall.height + mouth.depth
-        wider = mouth.radius - radius
-        within = [(radius + share / 2 * wider, wall.height + share * mouth.depth) for share in _WITHIN]
-        if float((self.fold(_around(copy, side, within)) < 0).mean()) < _FILLED:
-            return None
-        beyond = [(share * mouth.radius, end + step) for share in _ACROSS for step in STEPS]
+        radius, end = wall.mouth.radius, wall.height + wall.mouth.depth
+        beyond = [(share * radius, end + step) for share in _ACROSS for step in STEPS]
         is_open = bool((self.empty(_around(copy, side, beyond)) > 0).all())
-        return _Cone(wall.height, end, mouth.radius, BEYOND if is_open else 0.0)
+        return _Cone(wall.height, end, radius, BEYOND if is_open else 0.0)
+
+    def _is_filled(self, copy: Part, cones: Cones) -> bool:
+        """Whether the fold is where one of the cones would be."""
+        assert isinstance(copy.field, Cylinder)
+        radius = copy.field.radius
+        for side, cone in zip((-1.0, 1.0), cones, strict=True):
+            if cone is not None:
+                wider, depth = cone.radius - radius, cone.end - cone.start
+                within = [(radius + share / 2 * wider, cone.start + share * depth) for share in _WITHIN]
+                if float((self.fold(_around(copy, side, within)) < 0).mean()) > _FILLED:
+                    return True
+        return False
+
+
+def _sort_in(sorts: list[tuple[Cones, list[int]]], cones: Cones, own: list[int]) -> None:
+    """Some copies to those that end as they do."""
+    same = next((others for known, others in sorts if _are_same(known, cones)), None)
+    if same is None:
+        sorts.append((cones, list(own)))
+    else:
+        same += own
 
 
 def _height(end: _End) -> float:

@@ -49,8 +49,8 @@ def _with_holes_closed(tree: FeatureTree, wall: int, floor: int) -> Iterator[Fea
             if k == wall:
                 result.append(Feature(True, body, none, feature.sides))
                 result += [Feature(False, pocket, none, 0) for pocket in pockets]
-            elif k == floor:
+            if k == max(wall, floor):  # behind the body, which would fill them
                 result += [Feature(False, hole, none, 0) for hole in holes]
-            else:
+            if k not in (wall, floor):
                 result.append(feature)
         yield FeatureTree(result, score=tree.score, price=tree.price, off=tree.off)
