@@ -2,13 +2,15 @@
 
 SALAD's cascade of two diffusions (Koo et al. 2023), small. Latents are along their principal directions, each
 in its own spread, which the paper found crucial (appendix B.3), and every part's latent hears of all poses.
-Which parts there are is drawn before: a training shape's.
+Which parts there are is drawn before: a training shape's. Latents of shapes of which nothing is kept are then
+brought to match one another.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +26,7 @@ from partwright.partsdf.companions import (
     with_weights,
 )
 from partwright.partsdf.diffusion import denoised
+from partwright.partsdf.matching_forms import WholeShapes
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_sets import Near, drawn_sets
@@ -170,13 +173,14 @@ class Generator:
 
         if source is None:
             layout = self._within(placed())
-            latents = formed(layout)
+            latents = self._trained.matching(layout, formed(layout))
         else:
             near = self.layout_of(source.poses, source.present).expand(len(draws), -1, -1)
             form = self.vectors.of_latents(source.latents).expand_as(latents)
             if change:
                 layout = self._within(placed(like=near[..., :POSE], since=change), like=near[0])
-                latents = formed(layout, like=form, since=change)
+                known = self._trained.with_one(near[0], form[0])  # which little noise comes back to
+                latents = known.matching(layout, formed(layout, like=form, since=change))
                 source = None
             else:
                 fixed = torch.ones_like(kept) if keep_layout else kept
@@ -196,6 +200,13 @@ class Generator:
             chance = torch.special.ndtr(noise[:, 0, 1])
             drawn = drawn_sets(self.model.present, chance, noise[..., 0], kept, near)
         return torch.where(drawn, 1.0, -1.0)[..., None]
+
+    @cached_property
+    def _trained(self) -> WholeShapes:
+        """The training shapes."""
+        model, vectors = self.model, self.vectors
+        layouts = self.layout_of(model.poses, model.present)
+        return WholeShapes(layouts, vectors.of_latents(model.latents), vectors.tells)
 
     def layout_of(self, poses: PoseTensors, present: Tensor) -> Tensor:
         """(..., P, 13) of poses (..., P, ...) and presence (..., P)."""

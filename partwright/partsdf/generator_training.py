@@ -71,10 +71,7 @@ def train_generator(
     kept = {name: copy.deepcopy(one).requires_grad_(False) for name, one in made.items()}
     result = Generator(model, settings, **kept, vectors=vectors)  # type: ignore[arg-type]
     layouts, forms = result.layout_of(model.poses, model.present), vectors.of_latents(model.latents)
-    # Each direction as it tells: a spread of a hundredth of the widest one's is no shape.
-    told_by = (vectors.spread * vectors.directions.norm(dim=2)).square()  # none of those beyond the latents'
-    tells = told_by / told_by.mean(dim=1, keepdim=True).clamp(min=1e-12)
-    layouts, forms, tells = layouts.to(place), forms.to(place), tells.to(place)
+    layouts, forms, tells = layouts.to(place), forms.to(place), vectors.tells.to(place)
     shares = {"layouts": 1.0, "forms": _SLOWER}
     generator = torch.Generator(place).manual_seed(seed)
 

@@ -61,6 +61,13 @@ class PartVectors:
         """K, of a latent's vector; a pose's is `POSE`."""
         return self.spread.shape[1]
 
+    @property
+    def tells(self) -> Tensor:
+        """(P, K): how much of a latent each number of its vector tells, in squares and 1 in the mean: a
+        spread of a hundredth of the widest one's is no shape; 0 beyond the latents' own directions."""
+        told_by = (self.spread * self.directions.norm(dim=2)).square()
+        return told_by / told_by.mean(dim=1, keepdim=True).clamp(min=1e-12)
+
     def of_latents(self, latents: Tensor) -> Tensor:
         """(..., P, K) of latents (..., P, Z)."""
         return torch.einsum("...pz,pkz->...pk", latents - self.mean, self.directions) / self.spread

@@ -12,6 +12,7 @@ import trimesh
 from partwright.partsdf.editing import moved as moved_part
 from partwright.partsdf.generator import Draw, load_generator
 from partwright.partsdf.insets import Inset, Reach, insets, put_back, reaches
+from partwright.partsdf.matching_forms import WholeShapes
 from partwright.partsdf.meshing import mesh_parts
 from partwright.partsdf.model import load_model
 from partwright.partsdf.nearness import from_others
@@ -95,7 +96,14 @@ def judge() -> Judge:
     return Judge(load_model("vehicles"))
 
 
+@pytest.fixture
+def as_denoised(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forms that match one another as badly as noise has them."""
+    monkeypatch.setattr(WholeShapes, "matching", lambda self, layouts, forms: forms)
+
+
 @pytest.mark.heavy
+@pytest.mark.usefixtures("as_denoised")
 @pytest.mark.parametrize(
     ("number", "seed", "fault"),
     [
@@ -132,6 +140,7 @@ def test_what_is_covered_comes_to_show(judge: Judge) -> None:
     assert (from_others(moved, mesh_parts(moved, 64))["windscreen"] > -0.003).mean() > 0.2
 
 
+@pytest.mark.usefixtures("as_denoised")
 def test_parts_that_are_kept_and_poses_that_are_held_stay(
     judge: Judge, monkeypatch: pytest.MonkeyPatch
 ) -> None:
