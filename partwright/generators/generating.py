@@ -45,7 +45,9 @@ def shape_from_image(
         time_limit: seconds after which the generator is ended, with all that it has started.
         keep: where its mesh is written (.glb), as soon as it is there and though it may be none that can be
             fitted; its folder is made if need be.
-        unit, up, thickness: as of `load_shape`; a GLB is in metres with Y up, where nothing else is said.
+        unit: as of `load_shape`; a GLB is in metres, where nothing else is said.
+        up: as of `load_shape`; a GLB has Y up, where nothing else is said.
+        thickness: as of `load_shape`.
         cancel: ends the generator, from any thread.
         progress: called with the seconds that the generator has been at work, some twenty times a second.
 
@@ -58,7 +60,7 @@ def shape_from_image(
         GeneratorError: the generator failed, took too long, or answered with something that is no GLB.
         CancelledError: it was cancelled.
         OutputError: the mesh cannot be kept where it was asked for.
-        And what `load_shape` raises of its mesh.
+        PartwrightError: what `load_shape` raises of its mesh.
     """
     image, started = Path(image), time.perf_counter()
     check_number("time limit", time_limit, low=0.1)
