@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
-import partwright as pw
-from partwright.assembly import Assembly, Part
+from partwright.assembly import Part
 from partwright.fields import Box, Cylinder, Extrusion, Field, Profile, Revolution
-from partwright.meshing import mesh_assembly
-from partwright.superfrusta.feature_assembly import in_unit_frame
 from partwright.superfrusta.feature_outlines import with_plain_outlines
-from partwright.superfrusta.feature_search import FeatureSearch
-from partwright.superfrusta.feature_steps import Feature, FeatureTree
-from partwright.superfrusta.samples import FitSamples
-from partwright.superfrusta.solids import Settings
+from tests.superfrusta.trees import drawn
 
 _UPRIGHT = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)  # y is up
 _DISC = Part(Revolution(Profile.polygon([(5, 0), (20, 0), (20, 5), (9, 5), (9, 20), (5, 20)])))
@@ -24,17 +17,10 @@ _DISC = Part(Revolution(Profile.polygon([(5, 0), (20, 0), (20, 5), (9, 5), (9, 2
 
 def plain(*parts: tuple[bool, Part]) -> tuple[list[Field], float]:
     """The fields with plainer outlines, in lengths as given, and by how much R changes."""
-    drawn = Assembly((parts[0][1],))
-    for added, part in parts[1:]:
-        drawn = Assembly((drawn, part), "union" if added else "difference")
-    shape, settings = pw.load_shape(mesh_assembly(drawn), unit="mm"), Settings.for_quality("draft")
-    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
-    none = np.zeros(0, bool)
-    own = in_unit_frame(shape, drawn).parts
-    tree = FeatureTree([Feature(added, part, none, 9) for (added, _), part in zip(parts, own, strict=True)])
+    search, tree, scale = drawn(*parts, sides=9)
     after = with_plain_outlines(search, tree)
     change = search.scored(after).score - search.scored(tree).score
-    return [f.part.scaled(1 / shape.frame.scale).field for f in after.features], change
+    return [f.part.scaled(1 / scale).field for f in after.features], change
 
 
 def test_a_rib_that_was_read_off_a_section_of_the_whole_is_a_triangle() -> None:

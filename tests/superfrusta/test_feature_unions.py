@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-import partwright as pw
-from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly import Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Profile
-from partwright.meshing import mesh_assembly
-from partwright.superfrusta.feature_assembly import in_unit_frame
-from partwright.superfrusta.feature_search import FeatureSearch
-from partwright.superfrusta.feature_steps import Feature, FeatureTree
 from partwright.superfrusta.feature_unions import with_common_outlines
-from partwright.superfrusta.samples import FitSamples
-from partwright.superfrusta.solids import Settings
+from tests.superfrusta.trees import drawn
 
 _PLATE = Part(Box((60, 40, 4)))
 
 
 def united(*parts: tuple[bool, Part]) -> tuple[list[Part], float]:
     """The parts, in lengths as given, and by how much R changes."""
-    drawn = Assembly((parts[0][1],))
-    for added, part in parts[1:]:
-        drawn = Assembly((drawn, part), "union" if added else "difference")
-    shape, settings = pw.load_shape(mesh_assembly(drawn), unit="mm"), Settings.for_quality("draft")
-    search = FeatureSearch(shape, FitSamples.of(shape, settings), settings.alpha)
-    none = np.zeros(0, bool)
-    own = in_unit_frame(shape, drawn).parts
-    tree = FeatureTree([Feature(added, part, none, 4) for (added, _), part in zip(parts, own, strict=True)])
+    search, tree, scale = drawn(*parts, sides=4)
     after = with_common_outlines(search, tree)
     change = after.score - search.scored(tree).score
-    return [f.part.scaled(1 / shape.frame.scale) for f in after.features], change
+    return [f.part.scaled(1 / scale) for f in after.features], change
 
 
 def twice(field: Box | Cylinder, place: tuple[float, float, float], x: float) -> Part:
