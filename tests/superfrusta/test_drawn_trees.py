@@ -24,12 +24,12 @@ from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_fra
 from partwright.superfrusta.feature_boxes import with_whole_boxes
 from partwright.superfrusta.feature_copying import with_copies
 from partwright.superfrusta.feature_linings import lines_a_hole
-from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, covers
 from partwright.superfrusta.feature_teeth import with_teeth_apart
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.solids import Settings
+from tests.superfrusta.trees import kinds
 
 
 def at(field: Field, *places: tuple[float, float, float]) -> Part:
@@ -48,24 +48,6 @@ def found(drawn: Assembly | trimesh.Trimesh, quality: str = "draft") -> tuple[Fe
     tree = search.run()
     assert tree is not None
     return tree, search
-
-
-def kinds(tree: FeatureTree) -> list[tuple[bool, str, int]]:
-    return [(f.added, f.part.field.kind, sum(len(part.copies) for part in f.parts)) for f in tree.features]
-
-
-@pytest.mark.parametrize("first", ["wall", "floor"])
-def test_a_wall_and_a_drilled_floor_are_a_block_with_a_pocket(first: str) -> None:
-    """Whichever was found first: the floor's holes are not filled by the block that it becomes part of."""
-    outline, none = Profile.rectangle(1.4, 1.0), np.zeros(0, bool)
-    wall = Part(Extrusion(Profile(outline.outline, (Profile.rectangle(1.2, 0.8).outline,)), 0.8))
-    floor = Part(Extrusion(Profile(outline.outline, (circle(0.1),)), 0.2), (0, 0, -0.3))
-    parts = (wall, floor) if first == "wall" else (floor, wall)
-    tree = FeatureTree([Feature(True, part, none, 4) for part in parts])
-    points = np.random.default_rng(0).uniform(-0.8, 0.8, (20_000, 3)).astype(np.float32)
-    after = with_pockets(tree, points)
-    assert kinds(after) == [(True, "box", 1), (False, "extrusion", 1), (False, "cylinder", 1)]
-    assert (after.at(points) == tree.at(points)).mean() > 0.999
 
 
 @pytest.mark.parametrize("count", [3, 8, 16])

@@ -27,3 +27,7 @@ def drawn(*parts: tuple[bool, Part], sides: int) -> tuple[FeatureSearch, Feature
         Feature(added, part, np.zeros(0, bool), sides) for (added, _), part in zip(parts, own, strict=True)
     ]
     return search, FeatureTree(features), shape.frame.scale
+
+
+def kinds(tree: FeatureTree) -> list[tuple[bool, str, int]]:
+    return [(f.added, f.part.field.kind, sum(len(part.copies) for part in f.parts)) for f in tree.features]

@@ -54,10 +54,10 @@ class MouthSearch:
         heights = (self.vertices[self.edges[border]] - end) @ axis
         border = border[(np.abs(heights) < near).all(axis=1)]
         seeds = self.beside[border][~is_wall[border]]
-        sine = self.normals @ axis
-        if not len(seeds) or not _STEEPEST < float(np.median(sine[seeds])) < _FLATTEST:
+        sine = float(np.median(self.normals[seeds] @ axis)) if len(seeds) else 0.0
+        if not _STEEPEST < sine < _FLATTEST:
             return None
-        alike = np.abs(sine - np.median(sine[seeds])) < _SAME
+        alike = np.abs(self.normals @ axis - sine) < _SAME
         pairs = self.beside[alike[self.beside].all(axis=1)]
         label = components(len(self.faces), *pairs.T)
         cone = np.flatnonzero(alike & np.isin(label, label[seeds[alike[seeds]]]))
