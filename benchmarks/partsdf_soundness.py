@@ -46,11 +46,12 @@ def sounding(arguments: argparse.Namespace) -> None:
         f"back, and each shape is made up to {TRIES} times. MMD-CD and COV-CD against "
         f"{count} held-out shapes, made with another seed, {POINTS} points each, meshes of {_RESOLUTION}^3. "
         f"After the coverage: its standard deviation over {_DRAWS} draws of three quarters of either set. "
-        "Seconds of the processor a shape, to make and to judge.", "",
+        "At fault: broken, or a part is seen out of place still, of which `faults` tell. Seconds of the "
+        "processor a shape, to make and to judge.", "",
         command_line(), "",
-        "| family | shapes | broken % | apart | odd | empty | thin | through | out | covered | tries "
-        "| MMD-CD x1e4 | COV-CD % | s |",
-        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+        "| family | shapes | at fault % | broken % | apart | odd | empty | thin | through | out | covered "
+        "| tries | MMD-CD x1e4 | COV-CD % | s |",
+        "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]  # fmt: skip
     for name in arguments.names.split(","):
         model = load_model(name)
@@ -77,6 +78,7 @@ def cells(samples: Sequence[Sample], held: list[np.ndarray]) -> str:
     scores = scores_of_distances(chamfer_matrix(clouds), between, chamfer_matrix(held))
     judged = [one.soundness for one in samples]
     broken = (
+        [bool(one.faults()) for one in judged],
         [bool(one.breaks()) for one in judged],
         [one.gap > one.allowed for one in judged],
         [one.offset > OFFSET for one in judged],

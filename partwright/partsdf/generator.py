@@ -3,7 +3,7 @@
 SALAD's cascade of two diffusions (Koo et al. 2023), small. Latents are along their principal directions, each
 in its own spread, which the paper found crucial (appendix B.3), and every part's latent hears of all poses.
 Which parts there are is drawn before: a training shape's. Latents of shapes of which nothing is kept are then
-brought to match one another.
+brought to match one another, in families some of whose parts lie in others.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.seeds import mixed
 
 KIND = "generator"
+_MATCHED = "matched"  # in a file, beside the settings
 _WAVES = 16  # by which a network sees the time
 _FORGOTTEN = 0.3  # dropout of forms: poses tell little of them, and single shapes would be learned by heart
 
@@ -125,13 +126,15 @@ class Draw(NamedTuple):
 
 @dataclass(frozen=True)
 class Generator:
-    """Both networks, with the model whose parts they make."""
+    """Both networks, with the model whose parts they make. matched: whether forms of new shapes are mixed
+    from those of whole training shapes, as parts that lie in others suit these only so."""
 
     model: Model
     settings: GeneratorSettings
     layouts: Layouts
     forms: Forms
     vectors: PartVectors
+    matched: bool = False
 
     def generate(
         self,
@@ -173,14 +176,18 @@ class Generator:
 
         if source is None:
             layout = self._within(placed())
-            latents = self._trained.matching(layout, formed(layout))
+            latents = formed(layout)
+            if self.matched:
+                latents = self._trained.matching(layout, latents)
         else:
             near = self.layout_of(source.poses, source.present).expand(len(draws), -1, -1)
             form = self.vectors.of_latents(source.latents).expand_as(latents)
             if change:
                 layout = self._within(placed(like=near[..., :POSE], since=change), like=near[0])
-                known = self._trained.with_one(near[0], form[0])  # which little noise comes back to
-                latents = known.matching(layout, formed(layout, like=form, since=change))
+                latents = formed(layout, like=form, since=change)
+                if self.matched:
+                    known = self._trained.with_one(near[0], form[0])  # which little noise comes back to
+                    latents = known.matching(layout, latents)
                 source = None
             else:
                 fixed = torch.ones_like(kept) if keep_layout else kept
@@ -258,7 +265,8 @@ class Generator:
         tensors = {
             f"{n}.{k}": v for n in ("layouts", "forms") for k, v in getattr(self, n).state_dict().items()
         }
-        save_companion(path, KIND, self.model, asdict(self.settings), tensors)
+        about = asdict(self.settings) | {_MATCHED: self.matched}
+        save_companion(path, KIND, self.model, about, tensors)
 
 
 def tidy(layout: Tensor) -> Tensor:
@@ -278,9 +286,13 @@ def load_generator(model: Model, path: str | Path | None = None) -> Generator:
         raise ModelError(f"{model.name} has no generator; make one with `parts train-generator`")
 
     def made(settings: dict[str, Any], tensors: dict[str, Tensor]) -> Generator:
+        matched = settings.pop(_MATCHED, False)
+        if not isinstance(matched, bool):
+            raise ValueError(f"{_MATCHED} is {matched!r}")
         known, vectors = GeneratorSettings(**settings), PartVectors.of(model)
         real = with_weights(lambda: nn.ModuleDict(networks(model, vectors, known)), tensors)
-        return Generator(model, known, **dict(real.items()), vectors=vectors)  # type: ignore[arg-type]
+        how = {"vectors": vectors, "matched": matched}
+        return Generator(model, known, **dict(real.items()), **how)  # type: ignore[arg-type]
 
     return load_companion(source, KIND, model, made)
 

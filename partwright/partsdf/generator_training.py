@@ -19,6 +19,7 @@ from partwright.partsdf.generator import Generator, GeneratorSettings, networks,
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.part_vectors import POSE, PartVectors
+from partwright.partsdf.soundness import Judge
 
 BATCH, STEPS = 64, 3200
 _RATE = 1e-3
@@ -69,7 +70,8 @@ def train_generator(
     with place:
         made = networks(model, vectors, settings)
     kept = {name: copy.deepcopy(one).requires_grad_(False) for name, one in made.items()}
-    result = Generator(model, settings, **kept, vectors=vectors)  # type: ignore[arg-type]
+    matched = bool(Judge(model).lying)
+    result = Generator(model, settings, **kept, vectors=vectors, matched=matched)  # type: ignore[arg-type]
     layouts, forms = result.layout_of(model.poses, model.present), vectors.of_latents(model.latents)
     layouts, forms, tells = layouts.to(place), forms.to(place), vectors.tells.to(place)
     shares = {"layouts": 1.0, "forms": _SLOWER}

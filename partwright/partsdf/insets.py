@@ -55,6 +55,10 @@ class Reach(NamedTuple):
     shown: float
     cells: np.ndarray
 
+    @property
+    def lies_in(self) -> bool:
+        return self.most < np.inf
+
 
 @dataclass(frozen=True)
 class Inset:
@@ -75,10 +79,6 @@ class Inset:
     @property
     def covered(self) -> bool:
         return self.shown < COVERED * self.reach.shown
-
-    @property
-    def lies_in(self) -> bool:
-        return self.reach.most < np.inf
 
     @property
     def amiss(self) -> float:
@@ -148,7 +148,7 @@ def put_back(
     directions, all together, until what stands out is within the limits and what is covered shows; other
     parts, and those of `keep`, stay as they are. move_pose: else, and of models without poses, latents alone
     move."""
-    moving = [one for one in found if (one.lies_in or one.covered) and one.part not in keep]
+    moving = [one for one in found if (one.reach.lies_in or one.covered) and one.part not in keep]
     if not moving:
         return shape
     model = shape.model

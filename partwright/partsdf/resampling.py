@@ -44,7 +44,7 @@ def sound_samples(
 
     What is sound at once is what `generate` makes; 1 try takes all as they come. Parts that stand out of
     others or are covered by them are put back, and one that comes through another is drawn back, unless it is
-    to stay. What is broken else is made anew: new noise takes over more of it with each try, then all.
+    to stay. What is still at fault is made anew: new noise takes over more of it with each try, then all.
     Replaced by anything, shapes that often come apart, as benches, would be rare. What a layout that is kept
     has wrong itself is no reason for another try: all would have it.
 
@@ -71,9 +71,12 @@ def sound_samples(
         sample = Sample(shape, judge(shape), 1)
         return _mended(sample, judge, keep, keep_layout) if tries > 1 else sample
 
+    def faulty(said: Soundness) -> bool:
+        return bool(said.breaks() or said.misplaced - set(keep))
+
     for number, shape in enumerate(first):
         sample = judged(shape)
-        while sample.soundness.breaks() and sample.tries < tries:
+        while faulty(sample.soundness) and sample.tries < tries:
             new = judged(made(number, sample.tries))
             least = min(sample, new, key=lambda one: one.soundness.rank)
             sample = replace(least, tries=sample.tries + 1)

@@ -61,6 +61,16 @@ class Soundness:
     thinnest: str = ""
 
     @property
+    def seen_through(self) -> tuple[str, ...]:
+        """Parts of which an eye sees something come through others, the least area first."""
+        return tuple(tip.part for tip in self.through if tip.share > _SEEN)
+
+    @property
+    def misplaced(self) -> set[str]:
+        """Parts that are seen to come through others, stand out of them or are covered."""
+        return {*self.seen_through, *self.standing_out, *self.covered}
+
+    @property
     def standing_out(self) -> tuple[str, ...]:
         """Parts that lie in others, but for more than is seen."""
         return tuple(one.part for one in self.insets if one.stands_out)
@@ -71,15 +81,13 @@ class Soundness:
         return tuple(one.part for one in self.insets if one.covered)
 
     def faults(self) -> list[str]:
-        """What is broken or seen to come through, a few words each; nothing where it is sound."""
-        seen = [tip.part for tip in self.through if tip.share > _SEEN]
-        through = [f"{part} comes through another part" for part in seen[:1]]
+        """What is broken or seen to be out of place, a few words each; nothing where it is sound."""
+        through = [f"{part} comes through another part" for part in self.seen_through[:1]]
         out = [f"{part} stands out of the others" for part in self.standing_out]
         return self.breaks() + through + out + [f"{part} is covered by others" for part in self.covered]
 
     def breaks(self) -> list[str]:
-        """What is apart or missing, a few words each: worth another try. What comes through is not, as that
-        is in the training shapes of some families, too, and others would take their place."""
+        """What is apart, missing, too thin or odd, a few words each."""
         said = [f"{name} has no surface" for name in self.empty]
         if self.gap > self.allowed:
             said.append(f"{' and '.join(dict.fromkeys(self.gap_between))} are {self.gap:.2f} apart")
@@ -151,6 +159,11 @@ class Judge:
             for part, wall in zip(shape.names(), shape.walls, strict=True):
                 least[part] = min(least.get(part, np.inf), float(wall))
         return {part: wall for part, wall in least.items() if wall < np.inf}
+
+    @property
+    def lying(self) -> tuple[str, ...]:
+        """Parts that lie in others in training shapes, as windows in a body."""
+        return tuple(name for name, reach in self._reaches.items() if reach.lies_in)
 
     @cached_property
     def _reaches(self) -> dict[str, Reach]:

@@ -18,10 +18,12 @@ from partwright.partsdf.companions import beside
 from partwright.partsdf.diffusion import denoised, levels, noised
 from partwright.partsdf.generator import KIND, Generator, GeneratorSettings, load_generator
 from partwright.partsdf.generator_training import gaussian_samples, train_generator
+from partwright.partsdf.matching_forms import WholeShapes
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.novelty import nearest_training_shape
 from partwright.partsdf.settings import ReconstructionSettings
+from partwright.partsdf.soundness import Judge
 from partwright.partsdf.sources import found_in
 
 SMALL = GeneratorSettings(width=48, heads=2, blocks=2)
@@ -171,6 +173,36 @@ def test_its_file(generator: Generator, tmp_path: Path) -> None:
     assert torch.equal(two.latents, load_generator(generator.model).generate(1, 5)[0].latents)
     with pytest.raises(ModelError, match="lamps has no generator; make one with `parts train-generator`"):
         load_generator(replace(generator.model, hash="3" * 64))
+
+
+def test_forms_match_one_another_where_parts_lie_in_others(
+    generator: Generator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Known of a family when its generator is trained, and in the file: then a new shape's latents are mixed
+    of those of training shapes, but where poses are kept."""
+    model = generator.model
+    assert not generator.matched  # no part of a lamp lies in another
+    monkeypatch.setattr(Judge, "lying", ("knob",))
+    matched = train_generator(model, steps=1, settings=SMALL)
+    assert matched.matched
+    path = tmp_path / "matched.safetensors"
+    matched.save(path)
+    assert load_generator(model, path).matched
+    source = NeuralShape.trained(model, "lamp0")
+    monkeypatch.setattr(WholeShapes, "matching", lambda self, layouts, forms: torch.zeros_like(forms))
+    mean = generator.vectors.latents(torch.zeros(len(model.parts), generator.vectors.width))
+    for how, mixes in (
+        ({}, True),
+        ({"source": source, "change": 0.5}, True),
+        ({"source": source, "keep_layout": True}, False),
+    ):
+        for maker in (generator, replace(generator, matched=True)):
+            (made,) = maker.generate(1, 1, **how)  # type: ignore[arg-type]
+            whole = made.present  # what is absent has no form of its own
+            assert torch.allclose(made.latents[whole], mean[whole]) == (mixes and maker.matched)
+    replace(matched, matched=3).save(path)  # type: ignore[arg-type]
+    with pytest.raises(ModelError, match="matched is 3"):
+        load_generator(model, path)
 
 
 def test_a_file_of_an_earlier_version_is_to_be_trained_again(

@@ -71,7 +71,7 @@ def test_what_lies_in_others_is_known_from_training_shapes() -> None:
     assert (usual, most) == pytest.approx((0.025, 0.035), abs=1e-6)
     assert known["block"].most == known["ball"].most == np.inf
     found = _pane(0.0, known)
-    assert (found.share, found.stands_out, found.covered, found.lies_in) == (0.0, False, False, True)
+    assert (found.share, found.stands_out, found.covered, found.reach.lies_in) == (0.0, False, False, True)
     assert found.limit == known["pane"].most
     found = _pane(0.1, known)
     assert (found.share, found.stands_out, found.limit) == (1.0, True, known["pane"].usual)

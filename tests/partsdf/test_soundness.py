@@ -158,6 +158,26 @@ def test_what_is_broken_is_made_anew_and_the_least_broken_stays(
         list(sound_samples(generator, 3, tries=0))  # type: ignore[arg-type]
 
 
+def test_what_is_seen_out_of_place_still_is_made_anew_unless_it_is_to_stay(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Through(ByHeight):
+        def __call__(self, shape: NeuralShape) -> Soundness:
+            said = super().__call__(shape)
+            tip = Tip("ball", said.gap, 0.1, np.zeros((1, 3)), np.zeros((1, 3)))
+            return replace(said, gap=0.0, through=(tip,))
+
+    monkeypatch.setattr("partwright.partsdf.resampling.Judge", Through)
+    monkeypatch.setattr("partwright.partsdf.resampling._mended", lambda sample, *_: sample)
+    seen, hardly = 0.03, 0.01  # of its surface
+    source = NeuralShape.trained(model, "lamp2")
+    for keep, tries in (((), 2), (("plate",), 2), (("ball",), 1)):
+        generator = Scripted(model, {Draw(0): seen, Draw(0, 1): hardly})
+        given = {"source": source, "keep": keep} if keep else {}
+        (made,) = sound_samples(generator, 1, **given)  # type: ignore[arg-type]
+        assert (made.tries, bool(made.soundness.misplaced)) == (tries, tries == 1)
+
+
 def test_what_a_given_layout_has_wrong_is_no_reason_for_another_try(
     model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
