@@ -7,16 +7,16 @@ from collections.abc import Collection
 import numpy as np
 
 from partwright.assembly import Assembly, Part, Similarity
+from partwright.assembly.checks import Quaternion
 from partwright.assembly.metadata import GUESSED
 from partwright.assembly.similarity import quaternion_product
 from partwright.errors import SettingError
 from partwright.partsdf.field import NeuralField
 from partwright.partsdf.meshing import Surfaces
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.poses import UPRIGHT
 from partwright.shapes import UnitFrame
 
-Quaternion = tuple[float, float, float, float]
-UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)
 UNIT_FRAME = UnitFrame((0.0, 0.0, 0.0), 1.0)
 
 

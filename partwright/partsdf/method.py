@@ -12,9 +12,10 @@ from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.familiarity import familiarity
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
+from partwright.partsdf.poses import UPRIGHT
 from partwright.partsdf.reconstruction import Step, mean_error, reconstruct_from
 from partwright.partsdf.settings import Settings
-from partwright.partsdf.starts import UPRIGHT, Start, find_starts, ways_to_stand
+from partwright.partsdf.starts import Start, find_starts, ways_to_stand
 from partwright.partsdf.targets import Target
 from partwright.partsdf.unseen import with_unseen
 

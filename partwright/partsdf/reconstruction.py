@@ -11,10 +11,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
 import torch
 from torch import Tensor
 
+from partwright.assembly.checks import Quaternion
 from partwright.datasets.prepared import PreparedShape
 from partwright.errors import CancelledError, ModelError
 from partwright.methods import Cancellation, Checkpoint
@@ -22,13 +22,12 @@ from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.data import pose_tensors, present_parts
 from partwright.partsdf.losses import aggregate, intersection, terms
 from partwright.partsdf.model import Model
+from partwright.partsdf.needless import needed
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.pose_naming import named_like
-from partwright.partsdf.poses import PoseTensors
+from partwright.partsdf.poses import UPRIGHT, PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.starts import (
-    UPRIGHT,
-    Quaternion,
     Start,
     errors_by_part,
     exchanged_parts,
@@ -60,6 +59,7 @@ LEAST = 1e-3
 _SCOUTED = 8  # of the iterations, the part that a start is given which comes into question
 _BRIEF, _LIKELY = 32, 3  # the part that tells which ones do, where there are more than so many
 _KNOWN = 4  # starts of known parts
+_ABSENT = 10.0  # unit lengths to a part that is not there
 
 
 @one_core_each()
@@ -145,7 +145,28 @@ def reconstruct_from(
     that the target shows."""
     starts = [replace(s, shape=replace(s.shape, present=torch.ones_like(s.shape.present))) for s in starts]
     found = _scouted(starts, settings, seed, told, checkpoint)
-    return replace(found.shape, present=_filling(found.shape, found.target)), found.turn
+    shape = replace(found.shape, present=_filling(found.shape, found.target))
+    return _of_needed(shape, found.target, settings, seed, checkpoint), found.turn
+
+
+def _of_needed(
+    shape: NeuralShape,
+    target: Target,
+    settings: ReconstructionSettings,
+    seed: int,
+    checkpoint: Checkpoint | None,
+) -> NeuralShape:
+    """Without the parts that the target has not. Where there were such, those that are left go on, to what
+    these had kept them from, as in the second half of all iterations."""
+    half, decay = settings.iterations // 2, settings.decay
+    again = replace(
+        settings, iterations=half, decay=1.0, rate=decay * settings.rate, pose_rate=decay * settings.pose_rate
+    )
+    while not torch.equal(present := needed(shape, target), shape.present):
+        fewer, posed = replace(shape, present=present), _posed(shape.model, settings)
+        shape, _ = _optimised(fewer, target, again, seed, None, checkpoint, posed)
+        shape = replace(shape, present=_filling(shape, target))
+    return shape
 
 
 @torch.no_grad()
@@ -155,8 +176,8 @@ def _filling(shape: NeuralShape, target: Target) -> Tensor:
     inside = target.points[target.sdf <= 0]
     if not len(inside):
         return shape.present
-    owner = shape.part_distances(inside.numpy()).argmin(axis=0)
-    share = torch.from_numpy(np.bincount(owner, minlength=len(shape.present)) / len(inside))
+    owner = shape.present.nonzero().squeeze(1)[shape.part_distances(inside.numpy()).argmin(axis=0)]
+    share = torch.bincount(owner, minlength=len(shape.present)) / len(inside)
     return share >= LEAST
 
 
@@ -343,6 +364,8 @@ def _loss(
     """
     poses = unknowns.poses() if moved else shape.poses
     each = shape.model.part_distances(unknowns.latents(), poses, target.points[rows])[None]
+    if target.part is None:
+        each = each.masked_fill(~shape.present[:, None], _ABSENT)
     decoder, losses = shape.model.config.decoder, shape.model.config.losses
     sdf = target.sdf[rows]
     if target.low is not None:

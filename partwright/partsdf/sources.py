@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from partwright.assembly import Assembly, load_assembly
+from partwright.assembly.checks import Quaternion
 from partwright.errors import SettingError
-from partwright.partsdf.assemblies import UNIT_FRAME, UPRIGHT, Quaternion, from_assembly, to_assembly
+from partwright.partsdf.assemblies import UNIT_FRAME, from_assembly, to_assembly
 from partwright.partsdf.familiarity import familiarity
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.poses import UPRIGHT
 from partwright.partsdf.reconstruction import reconstruct_standing
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.starts import ways_to_stand

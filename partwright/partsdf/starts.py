@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from partwright.assembly.checks import Quaternion
 from partwright.assembly.similarity import quaternion_product
 from partwright.datasets.prepared import UP
 from partwright.errors import ModelError, SettingError
@@ -24,14 +25,12 @@ from partwright.partsdf.encoder import Encoder, load_encoder
 from partwright.partsdf.losses import aggregate, clamped_error
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.poses import PoseTensors, local_points
+from partwright.partsdf.poses import UPRIGHT, PoseTensors, local_points
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.targets import Target
 from partwright.partsdf.unknowns import Frame
 from partwright.shapes import LONGEST_SIDE
 
-Quaternion = tuple[float, float, float, float]
-UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)
 _HALF = math.sqrt(0.5)
 # From z up to another axis up.
 _FROM_Z: dict[str, Quaternion] = {

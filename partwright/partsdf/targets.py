@@ -9,9 +9,12 @@ import torch
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.checks import Quaternion
+from partwright.assembly.similarity import Similarity, quaternion_product, rotation_matrix
+from partwright.errors import SettingError
 from partwright.partsdf.config import LossSettings
 from partwright.partsdf.losses import clamped_error
+from partwright.partsdf.poses import UPRIGHT
 from partwright.shapes import Shape
 
 SURFACE = 2048  # points on it
@@ -26,6 +29,9 @@ class Target:
 
     low: (N,) where nothing but points of the surface is known, not what is inside: sdf is then the distance
     from them, and the surface is at least `low` and at most that far. count: then, of these points.
+
+    shape: that was sampled, where it may be asked for more; turn: the unit quaternion (w, x, y, z) that leads
+    to its unit frame.
     """
 
     points: Tensor
@@ -34,13 +40,15 @@ class Target:
     surface: Tensor | None = None
     low: Tensor | None = None
     count: int = 0
+    shape: Shape | None = None
+    turn: Quaternion = UPRIGHT
 
     @classmethod
     def of_shape(cls, shape: Shape, count: int = 40_000, seed: int = 0) -> Target:
         """Of any shape that comes in: near its surface with the paper's two variances, and around it."""
         samples = shape.samples(round(0.95 * count), round(0.05 * count), seed, NEAR)
         surface = torch.tensor(shape.unit_surface(SURFACE, seed).points)
-        return cls(torch.tensor(samples.points), torch.tensor(samples.distance), surface=surface)
+        return cls(torch.tensor(samples.points), torch.tensor(samples.distance), surface=surface, shape=shape)
 
     @classmethod
     def of_points(cls, points: np.ndarray, count: int = 40_000, seed: int = 0) -> Target:
@@ -81,11 +89,18 @@ class Target:
         size = whole.abs()
         return torch.relu(self.low[rows].clamp(max=losses.clamp) - size) + size * (sdf <= 0)
 
-    def turned(self, turn: tuple[float, float, float, float]) -> Target:
+    def distances(self, points: np.ndarray) -> np.ndarray:
+        """(M,) signed, of the shape at points (M, 3); raises SettingError where it may not be asked."""
+        if self.shape is None:
+            raise SettingError("only samples of the shape are known")
+        return self.shape.unit_distance(Similarity(1.0, self.turn)(points))
+
+    def turned(self, turn: Quaternion) -> Target:
         """The same shape in the frame that `turn`, a unit quaternion (w, x, y, z), leads to this one."""
         matrix = torch.tensor(rotation_matrix(turn), dtype=self.points.dtype)
         surface = None if self.surface is None else self.surface @ matrix
-        return replace(self, points=self.points @ matrix, surface=surface)
+        whole = quaternion_product(self.turn, turn)
+        return replace(self, points=self.points @ matrix, surface=surface, turn=whole)
 
     def halves(self) -> tuple[Tensor, Tensor]:
         """Rows that lie inside, or on known points, and the others; each draw takes half of either."""

@@ -19,7 +19,7 @@ from partwright.partsdf import reconstruction
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.poses import rotation_matrices
+from partwright.partsdf.poses import UPRIGHT, rotation_matrices
 from partwright.partsdf.reconstruction import (
     Step,
     _scouted,
@@ -28,7 +28,7 @@ from partwright.partsdf.reconstruction import (
     reconstruct_unknown,
 )
 from partwright.partsdf.settings import ReconstructionSettings
-from partwright.partsdf.starts import UPRIGHT, Start, nearest_trained
+from partwright.partsdf.starts import Start, nearest_trained
 from partwright.partsdf.targets import Target
 
 QUICK = ReconstructionSettings(iterations=150, points=512)
