@@ -36,7 +36,8 @@ def layouts_or_forms(arguments: argparse.Namespace) -> None:
         f"{count} of each kind against as many shapes of the family, made with another seed; meshed at "
         f"{CELLS}^3, {POINTS} points each. 50 % of 1-NNA is what cannot be told, 100 what always is. "
         "Projected: latents along the principal directions that a generator knows. Off: numbers of poses by "
-        f"a normal error of {OFF} of their spreads. Nearest forms: each part's the training shape's that is "
+        f"a normal error of {OFF} of their spreads. Made forms: as they are denoised; mixed: from those of "
+        "three training shapes. Nearest forms: each part's the training shape's that is "
         "nearest; nearest layout: forms of the training shape whose layout is nearest.", "",
         command_line(), "",
         f"| | {' | '.join(f'{name}: MMD-CD x1e4 | COV-CD % | 1-NNA %' for name in names)} |",
@@ -73,7 +74,7 @@ def how_wide(model: Model, seed: int) -> str:
 
 
 def variants(model: Model, count: int, seed: int) -> dict[str, Callable[[], list[NeuralShape]]]:
-    vectors, generator = PartVectors.of(model), load_generator(model)
+    vectors, generator = PartVectors.of(model), replace(load_generator(model), matched=False)
     drawn = np.random.default_rng(0).permutation(len(model.shapes))[:count]
     training = [NeuralShape.trained(model, model.shapes[i]) for i in drawn]
     made = generator.generate(count, seed)
@@ -104,6 +105,7 @@ def variants(model: Model, count: int, seed: int) -> dict[str, Callable[[], list
             generator.generate(1, seed + k, s, keep_layout=True)[0] for k, s in enumerate(training)
         ],
         "made layouts, made forms": lambda: made,
+        "made layouts, mixed forms": lambda: replace(generator, matched=True).generate(count, seed),
         "made layouts, nearest forms": lambda: [nearest_forms(s) for s in made],
         "made layouts, forms of the nearest layout": lambda: [nearest_layout(s) for s in made],
     }

@@ -1,5 +1,6 @@
-"""New shapes that hang together: what a generator makes, and makes anew where parts came apart; those that
-came through others are drawn back, and those that stand out of others or are covered by them put back."""
+"""New shapes that hang together: what a generator makes, and makes anew where parts came apart or are seen out
+of place still; those that came through others are drawn back, and those that stand out of others or are covered
+by them put back."""
 
 from __future__ import annotations
 

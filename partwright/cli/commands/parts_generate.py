@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
     say(
         f"{counted(len(made), 'shape')} of {model.name}'s family: {arguments.output}; the least new "
         f"differs by {100 * least:.2f} hundredths of a unit length from one that was trained on"
-        + (f"; {again} of them made anew, as parts came apart" if again else "")
+        + (f"; {again} of them made anew, as parts came apart or out of place" if again else "")
     )
     if cancel.requested:
         warn([f"interrupted: {counted(len(made), 'sample')} of {arguments.count} written"])
