@@ -20,6 +20,7 @@ from partwright.errors import CancelledError, ModelError
 from partwright.methods import Cancellation, Checkpoint
 from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.data import pose_tensors, present_parts
+from partwright.partsdf.familiarity import familiarity
 from partwright.partsdf.losses import aggregate, intersection, terms
 from partwright.partsdf.model import Model
 from partwright.partsdf.needless import needed
@@ -157,12 +158,15 @@ def _of_needed(
     checkpoint: Checkpoint | None,
 ) -> NeuralShape:
     """Without the parts that the target has not. Where there were such, those that are left go on, to what
-    these had kept them from, as in the second half of all iterations."""
+    these had kept them from, as in the second half of all iterations. What is none of the family stays as it
+    was found: how oddly all its parts lie is what it is told by."""
     half, decay = settings.iterations // 2, settings.decay
     again = replace(
         settings, iterations=half, decay=1.0, rate=decay * settings.rate, pose_rate=decay * settings.pose_rate
     )
     while not torch.equal(present := needed(shape, target), shape.present):
+        if familiarity(shape, target).warnings():
+            break
         fewer, posed = replace(shape, present=present), _posed(shape.model, settings)
         shape, _ = _optimised(fewer, target, again, seed, None, checkpoint, posed)
         shape = replace(shape, present=_filling(shape, target))

@@ -1,6 +1,6 @@
-"""New shapes that hang together: what a generator makes, and makes anew where parts came apart or are seen out
-of place still; those that came through others are drawn back, and those that stand out of others or are covered
-by them put back."""
+"""New shapes that hang together: what a generator makes. Parts that came through others are drawn back, and
+those that stand out of others or are covered by them put back; what came apart, or is out of place still, is
+made anew."""
 
 from __future__ import annotations
 

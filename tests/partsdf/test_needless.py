@@ -71,14 +71,22 @@ def test_points_do_not_tell_where_air_is(lamp: NeuralShape, lamps: PreparedFamil
         told.distances(np.zeros((1, 3)))
 
 
-def test_what_is_left_goes_on(lamp: NeuralShape, lamps: PreparedFamily) -> None:
+def test_what_is_left_goes_on(
+    lamp: NeuralShape, lamps: PreparedFamily, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """To where it was kept from: a ball too far aside, beside a knob that is not there."""
     target = target_of(without_knob(lamp), lamps)
     found = moved(lamp, "ball", (0.1, 0, 0))
     settings = ReconstructionSettings(iterations=200, points=512)
+    strange = "partwright.partsdf.familiarity.STRANGE"
+    monkeypatch.setattr(strange, 9.0)  # a model of so few shapes finds most lamps odd
     after = _of_needed(found, target, settings, 0, None)
     assert after.present.tolist() == [True, True, False]
     assert mean_error(after, target) < 0.7 * mean_error(without_knob(found), target)
+    # A stranger is told by how oddly all its parts lie, so these stay.
+    with monkeypatch.context() as patch:
+        patch.setattr(strange, 0.0)
+        assert _of_needed(found, target, settings, 0, None) is found
     good = _of_needed(lamp, target_of(lamp, lamps), settings, 0, None)
     assert good is lamp  # to the bit, and at no cost
 
