@@ -20,16 +20,18 @@ from partwright.superfrusta.feature_drilling import empty_round_holes
 from partwright.superfrusta.feature_groups import grouped
 from partwright.superfrusta.feature_mouths import HoleMouths
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, with_open_ends_everywhere
+from partwright.superfrusta.flat_tree import Meetings
 
 _PLAIN = 1e-4  # unit lengths: how far numbers are moved to become plain
 
 
 class FeatureAssembly:
-    """Makes assemblies of the trees of one shape; what a feature becomes by itself is asked once for all of
-    them."""
+    """Makes assemblies of the trees of one shape; what a feature becomes by itself, and which parts meet, is
+    asked once for all of them."""
 
     def __init__(self, shape: Shape) -> None:
         self.shape, self.distance = shape, shape.unit_distance
+        self._meetings = Meetings()
         self._known: dict[tuple[int, bool], tuple[Feature, list[tuple[Feature, bool]]]] = {}
 
     @cached_property
@@ -47,12 +49,12 @@ class FeatureAssembly:
 
     def _plain(self, tree: FeatureTree) -> Assembly:
         frame = self.shape.frame
-        whole = grouped(self._numbered(tree)).scaled(1 / frame.scale).translated(frame.centre)
+        whole = grouped(self._numbered(tree), self._meetings).scaled(1 / frame.scale).translated(frame.centre)
         return _with_plain_numbers(whole, _PLAIN / frame.scale)
 
     def _numbered(self, tree: FeatureTree) -> list[Feature]:
-        """Round holes of profiles apart, each size once, with their mouths; ends that are open further out;
-        names until they say more."""
+        """Round holes of profiles apart, each size once, with their mouths and counterbores; ends that are
+        open further out; names until they say more."""
         result: list[Feature] = []
         drilled: list[Part] = []
         for i, feature in enumerate(tree.features):
@@ -63,7 +65,7 @@ class FeatureAssembly:
                     result.append(own)
         none = np.zeros(0, bool)
         mouths = HoleMouths(self.round_holes, self.distance, FeatureTree(list(result)).distance)
-        holes = (one for hole in merged_holes(drilled, self.distance) for one in mouths.of(hole))
+        holes = [one for hole in merged_holes(drilled, self.distance) for one in mouths.of(hole)]
         result += [Feature(False, hole, none, 0) for hole in holes]
         stems = {True: "part", False: "cut"}
         names = [f"{stems[f.added]}_{i:02d}" for i, f in enumerate(result, start=1)]

@@ -30,7 +30,7 @@ from partwright.superfrusta.far_places import (
 )
 from partwright.superfrusta.feature_lengthening import lengthened
 from partwright.superfrusta.feature_mending import FAR
-from partwright.superfrusta.feature_steps import Feature, FeatureTree, as_move, covers, image_of
+from partwright.superfrusta.feature_steps import Feature, FeatureTree, as_move, covers, image_of, within_box
 from partwright.superfrusta.feature_symmetry import reflected
 from partwright.superfrusta.feature_thinning import reaches
 
@@ -113,6 +113,20 @@ def far_off(search: FeatureSearch, whole: Assembly) -> float:
     """How far an assembly in the unit frame is off where it is far off, unit lengths; else 0."""
     places = far_places(Solid(search.body, search.samples.measure), Solid.of(whole))
     return max((place.off for place in places), default=0.0)
+
+
+def most_explained(search: FeatureSearch, whole: Assembly, covered: NDArray[np.bool_]) -> float:
+    """R of an assembly in the unit frame if freeform brought all that it lacks, and all that it has too much,
+    near places that are far off: what comes of it is hardly ever more, and this is quickly known.
+
+    covered: (N,) the samples within the assembly.
+    """
+    shape, other = Solid(search.body, search.samples.measure), Solid.of(whole)
+    for place in (*far_places(shape, other), *loose_places(shape, other)):
+        low, high = place.box
+        near = within_box(search.points, low - _BESIDE, high + _BESIDE)
+        covered = np.where(near & (search.inside == place.lacks), place.lacks, covered)
+    return search.score_of(covered)
 
 
 def _longer(

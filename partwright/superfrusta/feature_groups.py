@@ -15,7 +15,7 @@ import numpy as np
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.assembly.group_copies import GroupCopy
 from partwright.superfrusta.feature_steps import Feature, as_move, image_of
-from partwright.superfrusta.flat_tree import joined_by_cuts, nested
+from partwright.superfrusta.flat_tree import Meetings, joined_by_cuts, nested
 
 _MOST = 150  # copies that are looked at
 _SAME = 1e-3  # unit lengths: how far copies may be from where the group's move takes them
@@ -34,10 +34,14 @@ class _Leaf:
     part: Part
 
 
-def grouped(features: Sequence[Feature]) -> Assembly:
-    """The fold of the features as a tree of unions and differences, groups with their copies last."""
+def grouped(features: Sequence[Feature], meetings: Meetings | None = None) -> Assembly:
+    """The fold of the features as a tree of unions and differences, groups with their copies last.
+
+    meetings: what is known of such parts from other trees.
+    """
+    meetings = meetings or Meetings()
     leaves = [_Leaf(i, copy) for i, f in enumerate(features) for part in f.parts for copy in part.copies]
-    groups = _groups(features, leaves) if len(leaves) <= _MOST else []
+    groups = _groups(features, leaves, meetings) if len(leaves) <= _MOST else []
     taken = {id(leaf) for group in groups for body in group.bodies for leaf in body}
     parts: list[Part] = []
     added: list[bool] = []
@@ -49,10 +53,10 @@ def grouped(features: Sequence[Feature]) -> Assembly:
         added += [feature.added] * len(whole)
     nodes: list[Node] = []
     if any(added):
-        rest = nested(parts, added, plain=True)
+        rest = nested(parts, added, True, meetings)
         nodes += rest.children if rest.operation == "union" else (rest,)
     for group in groups:
-        nodes += group.nodes(features)
+        nodes += group.nodes(features, meetings)
     only = nodes[0]
     return only if len(nodes) == 1 and isinstance(only, Assembly) else Assembly(tuple(nodes))
 
@@ -64,17 +68,18 @@ class _Group:
     bodies: list[list[_Leaf]]
     copies: list[GroupCopy]
 
-    def nodes(self, features: Sequence[Feature]) -> list[Node]:
+    def nodes(self, features: Sequence[Feature], meetings: Meetings) -> list[Node]:
         first = self.bodies[0]
         parts = _with_copies([leaf.part for leaf in first], [leaf.feature for leaf in first])
-        body = nested([part for _, part in parts], [features[i].added for i, _ in parts], plain=True)
+        added = [features[i].added for i, _ in parts]
+        body = nested([part for _, part in parts], added, True, meetings)
         return [body, *(copy.of(body, k) for k, copy in enumerate(self.copies, start=2))]
 
 
-def _groups(features: Sequence[Feature], leaves: list[_Leaf]) -> list[_Group]:
+def _groups(features: Sequence[Feature], leaves: list[_Leaf], meetings: Meetings) -> list[_Group]:
     added = [features[leaf.feature].added for leaf in leaves]
     alike: dict[tuple[int, ...], list[list[_Leaf]]] = {}
-    for members in joined_by_cuts([leaf.part for leaf in leaves], added):
+    for members in joined_by_cuts([leaf.part for leaf in leaves], added, meetings):
         body = [leaves[i] for i in members]
         key = tuple(sorted(leaf.feature for leaf in body))
         if len(set(key)) > 1 or features[key[0]].image is not None:

@@ -19,7 +19,7 @@ from partwright.shapes import Shape
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
 from partwright.superfrusta.feature_boxes import with_whole_boxes
 from partwright.superfrusta.feature_drilling import with_holes_drilled, without_feature
-from partwright.superfrusta.feature_freeform import far_off, with_freeform
+from partwright.superfrusta.feature_freeform import far_off, most_explained, with_freeform
 from partwright.superfrusta.feature_outlines import with_plain_outlines
 from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_pruning import pruned
@@ -113,18 +113,33 @@ class FeaturedFit:
         """Solids that were found by the search, with freeform where they are far off, or only made anew of
         the same parts where these are not: cuts then belong to what they meet, and leave no chip of others.
         Themselves where nothing is off or nothing helps."""
-        search = self._search
-        if not has_exact_mesh(whole) or search.body.is_empty() or search.volume <= 0:
+        tree = self._tree_of(whole)
+        if tree is None:
             return MendedSolids(whole, 0.0, 0.0)
-        none = np.zeros(0, bool)
-        own = in_unit_frame(self._request.shape, whole)
-        tree = search.scored(FeatureTree([Feature(added, part, none, 0) for part, added in flattened(own)]))
+        search, own = self._search, in_unit_frame(self._request.shape, whole)
         better = self._finished(tree)
         same = [f.part for f in better.features] == [f.part for f in tree.features]
         off = far_off(search, own) if same else math.inf
         if off > better.off:
             return MendedSolids(self.assembly(better), better.off, better.score)
         return MendedSolids(whole, off, tree.score)
+
+    def may_explain(self, whole: Assembly, least: float) -> bool:
+        """Whether solids that were found by the search, mended, may explain as much: an R of `least`."""
+        tree = self._tree_of(whole)
+        if tree is None:
+            return False
+        covered = tree.at(self._search.points)
+        return most_explained(self._search, in_unit_frame(self._request.shape, whole), covered) >= least
+
+    def _tree_of(self, whole: Assembly) -> FeatureTree | None:
+        """Solids that were found by the search as features; None where they cannot be mended."""
+        search = self._search
+        if not has_exact_mesh(whole) or search.body.is_empty() or search.volume <= 0:
+            return None
+        none = np.zeros(0, bool)
+        own = in_unit_frame(self._request.shape, whole)
+        return search.scored(FeatureTree([Feature(added, part, none, 0) for part, added in flattened(own)]))
 
     @cached_property
     def _search(self) -> FeatureSearch:

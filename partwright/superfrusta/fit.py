@@ -148,7 +148,8 @@ def _mended(
     if features_first:
         mended, drawn = drawn_features()
         has_rival = mended.freeform > 0 and len(whole.parts) < len(drawn.parts)
-        if not (mended.off or has_rival) and mended.objective >= rival:
+        ahead = mended.objective - mended.off >= rival
+        if ahead and not (has_rival and featured.may_explain(whole, mended.score)):
             return drawn, True
     other = featured.mended_assembly(whole)
     if not features_first:

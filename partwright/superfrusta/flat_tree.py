@@ -6,7 +6,7 @@ subtracted belongs to those alone that it meets, so the chain falls apart into a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -30,15 +30,43 @@ class _Stage:
     cuts: list[int] = field(default_factory=list)
 
 
-def nested(parts: Sequence[Part], added: Sequence[bool], plain: bool) -> Assembly:
+class Meetings:
+    """Which parts meet. Each pair is asked once, however many trees it is in."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[Hashable, Hashable], bool] = {}
+
+    def of(self, parts: Sequence[Part], added: Sequence[bool]) -> NDArray[np.bool_]:
+        """(M, M): whether the interiors of a subtracted part and an added one meet, in any copies."""
+        meets = np.zeros((len(parts), len(parts)), bool)
+        cuts = [i for i, plus in enumerate(added) if not plus]
+        for i in cuts:
+            for j in set(range(len(parts))) - set(cuts):
+                # Copy by copy: in a box around a row of them, a lattice may miss what is thin.
+                pairs = product(parts[i].copies, parts[j].copies)
+                meets[i, j] = meets[j, i] = any(self._meet(one, other) for one, other in pairs)
+        return meets
+
+    def _meet(self, cut: Part, other: Part) -> bool:
+        key = _solid(cut), _solid(other)
+        if key not in self._known:
+            self._known[key] = _meet(cut, other)
+        return self._known[key]
+
+
+def nested(
+    parts: Sequence[Part], added: Sequence[bool], plain: bool, meetings: Meetings | None = None
+) -> Assembly:
     """The fold of the parts as a tree of unions and differences.
 
     plain: no part blends, so that each subtracted part may go to those that it cuts; one that cuts nothing is
-    left out. Otherwise the tree is the chain itself. Parts are in the unit frame.
+    left out. Otherwise the tree is the chain itself. Parts are in the unit frame. meetings: what is known of
+    such parts from other trees.
     """
     if all(added):
         return Assembly(tuple(parts))
-    meets = _meetings(parts, added) if plain else np.ones((len(parts), len(parts)), bool)
+    found = meetings or Meetings()
+    meets = found.of(parts, added) if plain else np.ones((len(parts), len(parts)), bool)
     groups = _groups(added, meets)
     nodes = [_node(parts, _stages(group, added, meets)) for group in groups]
     if len(nodes) == 1 and isinstance(nodes[0], Assembly):
@@ -46,9 +74,9 @@ def nested(parts: Sequence[Part], added: Sequence[bool], plain: bool) -> Assembl
     return Assembly(tuple(nodes))
 
 
-def joined_by_cuts(parts: Sequence[Part], added: Sequence[bool]) -> list[list[int]]:
+def joined_by_cuts(parts: Sequence[Part], added: Sequence[bool], meetings: Meetings) -> list[list[int]]:
     """Indices of added parts that belong together because something is subtracted from both, and of that."""
-    return _groups(added, _meetings(parts, added))
+    return _groups(added, meetings.of(parts, added))
 
 
 def flattened(node: Node) -> list[tuple[Part, bool]]:
@@ -73,16 +101,9 @@ def flattened(node: Node) -> list[tuple[Part, bool]]:
     return leaves[0] + [(part, False) for branch in leaves[1:] for part, _ in branch]
 
 
-def _meetings(parts: Sequence[Part], added: Sequence[bool]) -> NDArray[np.bool_]:
-    """(M, M): whether the interiors of a subtracted part and an added one meet, in any of their copies."""
-    meets = np.zeros((len(parts), len(parts)), bool)
-    cuts = [i for i, plus in enumerate(added) if not plus]
-    for i in cuts:
-        for j in set(range(len(parts))) - set(cuts):
-            # Copy by copy: in a box around a row of them, a lattice may miss what is thin.
-            pairs = product(parts[i].copies, parts[j].copies)
-            meets[i, j] = meets[j, i] = any(_meet(one, other) for one, other in pairs)
-    return meets
+def _solid(part: Part) -> Hashable:
+    """What tells a part without copies from others, whatever it is called."""
+    return part.field, part.translation, part.rotation
 
 
 def _meet(a: Part, b: Part) -> bool:
@@ -92,7 +113,8 @@ def _meet(a: Part, b: Part) -> bool:
         return False
     lattice = (grid_indices((_PER_SIDE,) * 3) + 0.5) / _PER_SIDE
     points = (low + lattice * (high - low)).astype(np.float32)
-    return bool((np.maximum(a.distance(points), b.distance(points)) < _MEETS).any())
+    within = points[a.distance(points) < _MEETS]
+    return len(within) > 0 and bool((b.distance(within) < _MEETS).any())
 
 
 def _groups(added: Sequence[bool], meets: NDArray[np.bool_]) -> list[list[int]]:

@@ -225,11 +225,30 @@ def test_fewer_solids_that_explain_as_much_are_preferred_to_freeform(
         def assembly(self, tree: FeatureTree) -> Assembly:
             return own
 
+        def may_explain(self, whole: Assembly, least: float) -> bool:
+            return score >= least
+
         def mended_assembly(self, whole: Assembly) -> MendedSolids:
+            assert score >= 0.90, "what cannot explain as much is not mended"
             return MendedSolids(whole, off, score)
 
     whole, preferred = chosen(cast(FeaturedFit, Fit()), tree, found, 0.80)
     assert (whole, preferred) == ((own, True) if drawn else (found, False))
+
+
+def test_what_solids_may_explain_is_known_before_they_are_mended() -> None:
+    """A block that stands out far may be mended; a plate that is a little too thick may not."""
+    block = Part(Box((0.3, 0.3, 0.3)), (0.5, 0.2, 0.2))
+    drawn = Assembly((PLATE, block))
+    shape, settings = pw.load_shape(mesh_assembly(drawn)), Settings.for_quality("draft")
+    fit = FeaturedFit(FitRequest(shape, settings), FitSamples.of(shape, settings), lambda: None)
+    lacking = Assembly((PLATE,))
+    after = fit.mended_assembly(lacking).score
+    assert after > 0.98
+    assert fit.may_explain(lacking, after)
+    thicker = Assembly((Part(Box((1.8, 1.0, 0.26))),))
+    assert fit.mended_assembly(thicker).score < 0.95
+    assert not fit.may_explain(thicker, 0.95)
 
 
 @pytest.mark.heavy

@@ -31,7 +31,8 @@ from partwright.fields import (
 from partwright.fields.columns import WIDTH, Column
 from partwright.methods import FitRequest, Fitted, Run
 from partwright.shapes import Shape, load_shape
-from partwright.superfrusta.flat_tree import flattened, nested
+from partwright.superfrusta import flat_tree
+from partwright.superfrusta.flat_tree import Meetings, flattened, nested
 from partwright.superfrusta.growing import Region, fit_regions
 from partwright.superfrusta.samples import NOTHING, FitSamples
 from partwright.superfrusta.simplification import extend_cuts
@@ -168,6 +169,17 @@ def test_a_pin_in_a_hole_is_a_nested_union() -> None:
     assert isinstance(carved, Assembly)
     assert carved.operation == "difference"
     assert isinstance(pin, Part)
+
+
+def test_parts_that_come_again_are_not_asked_again_whether_they_meet(monkeypatch: pytest.MonkeyPatch) -> None:
+    parts, added, known = (BLOCK, FAR, HOLE, OTHER), (True, True, False, False), Meetings()
+    first = nested(parts, added, True, known)
+    monkeypatch.setattr(flat_tree, "_meet", None)
+    assert nested(parts, added, True, known) == first
+    renamed = [dataclasses.replace(part, name=f"part_{k}") for k, part in enumerate(parts)]
+    assert [part.name for part in nested(renamed, added, True, known).parts] == [
+        "part_0", "part_2", "part_1", "part_3",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("plain", [True, False])
