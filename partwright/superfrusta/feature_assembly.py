@@ -19,6 +19,7 @@ from partwright.shapes import Shape
 from partwright.superfrusta.feature_drilling import empty_round_holes
 from partwright.superfrusta.feature_groups import grouped
 from partwright.superfrusta.feature_mouths import HoleMouths
+from partwright.superfrusta.feature_stepped_holes import with_stepped_holes
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, with_open_ends_everywhere
 from partwright.superfrusta.flat_tree import Meetings
 
@@ -66,7 +67,7 @@ class FeatureAssembly:
         none = np.zeros(0, bool)
         mouths = HoleMouths(self.round_holes, self.distance, FeatureTree(list(result)).distance)
         holes = [one for hole in merged_holes(drilled, self.distance) for one in mouths.of(hole)]
-        result += [Feature(False, hole, none, 0) for hole in holes]
+        result += [Feature(False, hole, none, 0) for hole in with_stepped_holes(holes, self.distance)]
         stems = {True: "part", False: "cut"}
         names = [f"{stems[f.added]}_{i:02d}" for i, f in enumerate(result, start=1)]
         for k, i in enumerate((i for i, f in enumerate(result) if f.freeform), start=1):

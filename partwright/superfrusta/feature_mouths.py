@@ -99,7 +99,7 @@ class HoleMouths:
             return None
         radius, end = wall.mouth.radius, wall.height + wall.mouth.depth
         beyond = [(share * radius, end + step) for share in _ACROSS for step in STEPS]
-        is_open = bool((self.empty(_around(copy, side, beyond)) > 0).all())
+        is_open = bool((self.empty(around(copy, side, beyond)) > 0).all())
         return _Cone(wall.height, end, radius, BEYOND if is_open else 0.0)
 
     def _is_filled(self, copy: Part, cones: Cones) -> bool:
@@ -110,7 +110,7 @@ class HoleMouths:
             if cone is not None:
                 wider, depth = cone.radius - radius, cone.end - cone.start
                 within = [(radius + share / 2 * wider, cone.start + share * depth) for share in _WITHIN]
-                if float((self.fold(_around(copy, side, within)) < 0).mean()) > _FILLED:
+                if float((self.fold(around(copy, side, within)) < 0).mean()) > _FILLED:
                     return True
         return False
 
@@ -142,7 +142,7 @@ def _is_of(hole: RoundHole, copy: Part, axis: Floats) -> bool:
     )
 
 
-def _around(copy: Part, side: float, rings: Sequence[tuple[float, float]]) -> NDArray[np.float32]:
+def around(copy: Part, side: float, rings: Sequence[tuple[float, float]]) -> NDArray[np.float32]:
     """(N, 3) points around its axis: at distances from it and heights towards one side."""
     turns = np.arange(_AROUND) * (2 * np.pi / _AROUND)
     local = [
