@@ -1,4 +1,5 @@
-"""Cones in which drilled holes end, as countersinks and chamfers do: part of the hole, as they are drawn."""
+"""Cones in which drilled holes end, as countersinks and chamfers do: part of the hole, as they are drawn.
+Those that no hole has are told."""
 
 from __future__ import annotations
 
@@ -18,7 +19,9 @@ from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Cylinder
 from partwright.fields.profile import Profile
+from partwright.metrics.deviation import places_in
 from partwright.rows import units
+from partwright.shapes import Shape, length_text
 
 Floats = NDArray[np.float64]
 Distance = Callable[[NDArray[np.float32]], NDArray[np.float32]]
@@ -108,11 +111,61 @@ class HoleMouths:
         radius = copy.field.radius
         for side, cone in zip((-1.0, 1.0), cones, strict=True):
             if cone is not None:
-                wider, depth = cone.radius - radius, cone.end - cone.start
-                within = [(radius + share / 2 * wider, cone.start + share * depth) for share in _WITHIN]
-                if float((self.fold(around(copy, side, within)) < 0).mean()) > _FILLED:
+                within = _within(radius, cone.radius, cone.start, cone.end)
+                if _is_filled(self.fold, copy, side, within):
                     return True
         return False
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A mouth that a shape has and what was fitted fills. place: (3,) where it is widest, on its axis;
+    radius: there; unit lengths."""
+
+    place: Floats
+    radius: float
+
+    def is_beside(self, point: Floats) -> bool:
+        """Whether a point (3,) is one of its own."""
+        return float(np.linalg.norm(point - self.place)) < self.radius
+
+
+def mouths_left_out(holes: Sequence[RoundHole], distance: Distance) -> list[LeftOut]:
+    """Those of holes of a shape that a solid fills, the widest first; distance: (N,) of that at points
+    (N, 3), unit lengths."""
+    found: list[LeftOut] = []
+    for hole in holes:
+        part, half = hole.part(), float(np.linalg.norm(hole.end - hole.start)) / 2
+        axis = units(hole.end - hole.start)
+        for side, mouth in zip((-1.0, 1.0), hole.mouths, strict=True):
+            if mouth is None:
+                continue
+            top = half + mouth.depth
+            if _is_filled(distance, part, side, _within(hole.radius, mouth.radius, half, top)):
+                found.append(LeftOut(hole.middle + side * top * axis, mouth.radius))
+    return sorted(found, key=lambda mouth: -mouth.radius)
+
+
+def mouth_warnings(shape: Shape, mouths: Sequence[LeftOut]) -> tuple[str, ...]:
+    """One sentence for all that no feature has; none where there are none."""
+    if not mouths:
+        return ()
+    wide = float(shape.frame.length_from_unit(2 * max(mouth.radius for mouth in mouths)))
+    several = f"countersinks or chamfers of {len(mouths)} holes, up to"
+    many = several if len(mouths) > 1 else "a countersink or chamfer of a hole,"
+    places = places_in(shape, (mouth.place for mouth in mouths))
+    it = "them" if len(mouths) > 1 else "it"
+    return (f"left out: {many} {length_text(wide, shape.unit)} wide, at the {places}: no feature has {it}",)
+
+
+def _within(narrow: float, wide: float, low: float, high: float) -> list[tuple[float, float]]:
+    """Distances from the axis and heights in a cone from one height to another, outside of the hole."""
+    return [(narrow + share / 2 * (wide - narrow), low + share * (high - low)) for share in _WITHIN]
+
+
+def _is_filled(distance: Distance, hole: Part, side: float, rings: Sequence[tuple[float, float]]) -> bool:
+    """Whether a solid is at most points of rings around a hole's axis, towards one side."""
+    return float((distance(around(hole, side, rings)) < 0).mean()) > _FILLED
 
 
 def _sort_in(sorts: list[tuple[Cones, list[int]]], cones: Cones, own: list[int]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -20,6 +21,7 @@ from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_fra
 from partwright.superfrusta.feature_boxes import with_whole_boxes
 from partwright.superfrusta.feature_drilling import with_holes_drilled, without_feature
 from partwright.superfrusta.feature_freeform import far_off, most_explained, with_freeform
+from partwright.superfrusta.feature_mouths import LeftOut, mouths_left_out
 from partwright.superfrusta.feature_outlines import with_plain_outlines
 from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_pruning import pruned
@@ -168,6 +170,12 @@ class FeaturedFit:
     def holes_left_out(self, own: Assembly) -> list[RoundHole]:
         """Round holes of the shape that an assembly in the unit frame fills."""
         return without_feature(self._assemblies.round_holes, own.distance)
+
+    def mouths_left_out(self, own: Assembly, holes: Sequence[RoundHole]) -> list[LeftOut]:
+        """Countersinks and chamfers of holes that an assembly in the unit frame fills, but those of `holes`,
+        which it fills altogether."""
+        others = [hole for hole in self._assemblies.round_holes if not any(hole is one for one in holes)]
+        return mouths_left_out(others, own.distance)
 
     def _told(self, tree: FeatureTree) -> None:
         seen = self._seen

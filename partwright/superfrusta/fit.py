@@ -15,6 +15,7 @@ from partwright.shapes import Shape
 from partwright.superfrusta.far_places import Solid
 from partwright.superfrusta.feature_assembly import in_unit_frame
 from partwright.superfrusta.feature_drilling import hole_warnings
+from partwright.superfrusta.feature_mouths import mouth_warnings
 from partwright.superfrusta.feature_steps import FeatureTree
 from partwright.superfrusta.featured import SURE, FeaturedFit, freeform_warnings, wants_features
 from partwright.superfrusta.hole_search import HoleSearch
@@ -100,7 +101,10 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         curve.append(CurvePoint(len(step.rows), step.score, step.iou, one))
     told = freeform_warnings(shape, whole)
     if wants_features(request) and outcome != "interrupted":
-        told += hole_warnings(shape, featured.holes_left_out(in_unit_frame(shape, whole)))
+        own = in_unit_frame(shape, whole)
+        missing = featured.holes_left_out(own)
+        told += hole_warnings(shape, missing)
+        told += mouth_warnings(shape, featured.mouths_left_out(own, missing))
     return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)), warnings=told)
 
 
@@ -118,13 +122,14 @@ def _of_features(
             own = in_unit_frame(shape, whole)
             fitted = Solid.of(own)
             holes = featured.holes_left_out(own)
+            mouths = featured.mouths_left_out(own, holes)
             apart = [
                 detail
                 for detail in left_out(shape, own, fitted)
                 if not any(detail.is_beside(hole.middle) for hole in holes)
             ]
-            told += hole_warnings(shape, holes)
-            told += left_out_warnings(shape, apart) + sharp_edge_warnings(shape, fitted, apart)
+            told += hole_warnings(shape, holes) + mouth_warnings(shape, mouths)
+            told += left_out_warnings(shape, apart) + sharp_edge_warnings(shape, fitted, [*apart, *mouths])
     return Fitted(whole, outcome, seconds, history, warnings=told)
 
 

@@ -20,6 +20,7 @@ from partwright.rows import units
 from partwright.shapes import Shape, length_text
 from partwright.shapes.topology import EdgeTable, area_vectors, components
 from partwright.superfrusta.far_places import Solid
+from partwright.superfrusta.feature_mouths import LeftOut
 from partwright.superfrusta.left_out import Detail
 
 _LEAST, _MOST = 3e-3, 0.1  # unit lengths, that a strip is off in its middle
@@ -51,7 +52,9 @@ class _Strip:
         return self.name == other.name and 1 / _ALIKE < self.size / other.size < _ALIKE
 
 
-def sharp_edge_warnings(shape: Shape, fitted: Solid, details: Sequence[Detail] = ()) -> tuple[str, ...]:
+def sharp_edge_warnings(
+    shape: Shape, fitted: Solid, details: Sequence[Detail | LeftOut] = ()
+) -> tuple[str, ...]:
     """A sentence for each size of what was left off, the longest first. fitted: what the shape was fitted by,
     in its unit frame. details: that are told by themselves, with their walls, which may lean."""
     strips = [one for one in _strips(shape, fitted) if not any(d.is_beside(one.middle) for d in details)]

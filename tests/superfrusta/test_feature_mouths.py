@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,14 @@ import partwright as pw
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Frustum, Revolution
 from partwright.meshing import mesh_assembly
+from partwright.methods import FitRequest
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
+from partwright.superfrusta.featured import FeaturedFit
+from partwright.superfrusta.fit import _of_features
+from partwright.superfrusta.samples import FitSamples
+from partwright.superfrusta.solids import Settings
 
 PLATE = Part(Box((120.0, 80.0, 10.0)))
 MOVES = [Similarity(translation=(x, y, 0.0)) for x, y in ((80, 0), (0, 50), (80, 50))]
@@ -59,3 +66,25 @@ def test_holes_from_below_and_at_an_angle_have_theirs() -> None:
     made = FeatureAssembly(shape).named(tree)
     assert sorted(len(part.copies) for part in made.parts) == [1, 2, 2]
     assert mesh_assembly(made).volume == pytest.approx(mesh_assembly(drawn).volume, rel=1e-4)
+
+
+def test_those_that_are_filled_are_told_with_their_place_however_poor_the_fit() -> None:
+    """Countersinks of two holes are left out, and a block beside them, so that the fit is poor."""
+    block = Part(Box((60.0, 30.0, 40.0)), (0.0, 0.0, 20.0))
+    drawn = Assembly((Assembly((PLATE, block)), HOLES, SINK), operation="difference")
+    shape, settings = pw.load_shape(mesh_assembly(drawn), unit="mm"), Settings.for_quality("draft")
+    fit = FeaturedFit(FitRequest(shape, settings), FitSamples.of(shape, settings), lambda: None)
+
+    def left(*added: Part, cuts: tuple[Part, ...]) -> list[str]:
+        whole = Assembly((Assembly(added), *cuts), operation="difference", unit="mm")
+        told = _of_features(shape, fit, whole, "converged", {}, []).warnings
+        return [line for line in told if line.startswith("left")]
+
+    for added in ((PLATE,), (PLATE, block)):
+        assert left(*added, cuts=(HOLES,)) == [
+            "left out: countersinks or chamfers of 2 holes, up to 12 mm wide, at the front lower left "
+            "and elsewhere: no feature has them"
+        ]
+        assert not left(*added, cuts=(HOLES, SINK))
+    (told,) = left(PLATE, block, cuts=(replace(HOLES, instances=MOVES[1:]), replace(SINK, instances=())))
+    assert told.startswith("left out: a round hole,"), "its mouth is not told besides"
