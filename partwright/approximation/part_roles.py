@@ -22,6 +22,7 @@ _FLAT = 0.3  # a plate's thickness over its next longer side, at most
 _LONG = 3.0  # a bar's length over its next shorter side, at least
 _BORE = 0.5  # of the narrowest side of what it is in: a hole that is wider is its bore
 _BEYOND = 1e-3  # of its height: how far outside a hole's ends have to lie
+_ACROSS = 9  # points each way across an end
 
 
 def with_role_names(assembly: Assembly) -> Assembly:
@@ -92,7 +93,7 @@ def _name(node: Node, cut_from: Node | None, roles: dict[str, str], beside: Sequ
     if isinstance(node, Part):
         if _is_solid(node):
             roles[node.name] = tooth_role(node, cut_from, beside) or (
-                _cut(node, cut_from) if cut_from else _added(node.field)
+                _cut(node, cut_from, beside) if cut_from else _added(node.field)
             )
         return
     first, *others = node.children
@@ -133,7 +134,7 @@ def _upright(field: Cylinder) -> str:
     return "shaft" if field.height > _LONG * 2 * field.radius else "boss"
 
 
-def _cut(part: Part, cut_from: Node) -> str:
+def _cut(part: Part, cut_from: Node, beside: Sequence[Node]) -> str:
     field = part.field
     if isinstance(field, Cone | Frustum):
         return "countersink"
@@ -143,7 +144,7 @@ def _cut(part: Part, cut_from: Node) -> str:
         return _turned_cut(field.profile)
     if isinstance(field, Extrusion) and _is_slot(field.profile):
         return "slot"
-    through = _goes_through(part, cut_from)
+    through = _goes_through(part, cut_from, beside)
     if not isinstance(field, Cylinder):
         return "opening" if through and isinstance(field, Box | Extrusion) else "pocket"
     axis = rotation_matrix(part.rotation)[:, 2]
@@ -181,10 +182,25 @@ def _is_slot(profile: Profile) -> bool:
     return parallel and turns[0] > 0 and abs(sum(turns) - 2 * math.pi) < _BEYOND * 10
 
 
-def _goes_through(part: Part, cut_from: Node) -> bool:
-    """Whether both of its ends lie outside of what it cuts."""
+def _goes_through(part: Part, cut_from: Node, beside: Sequence[Node]) -> bool:
+    """Whether both of its ends lie outside of what it cuts, or all across in what else is cut from that, as
+    that of a hole in a pocket's floor does."""
     lower, upper = part.field.bounds()
-    axis = rotation_matrix(part.rotation)[:, 2]
     inset = _BEYOND * float(upper[2] - lower[2])
-    ends = np.array([part.translation + (z * axis) for z in (lower[2] + inset, upper[2] - inset)])
-    return bool((cut_from.distance(ends) > 0).all())
+    steps = (np.arange(_ACROSS) + 0.5) / _ACROSS
+    x, y = (low + steps * (high - low) for low, high in zip(lower[:2], upper[:2], strict=True))
+    section = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    frame = rotation_matrix(part.rotation)
+
+    def is_open(z: float) -> bool:
+        middle = part.translation + z * frame[:, 2]
+        if cut_from.distance(middle[None])[0] > 0:
+            return True
+        local = np.column_stack([section, np.full(len(section), z)])
+        across = local[part.field(local) < 0] @ frame.T + part.translation
+        opened = cut_from.distance(across) > 0
+        for other in beside:
+            opened |= other.distance(across) < 0
+        return len(across) > 0 and bool(opened.all())
+
+    return all(is_open(float(z)) for z in (lower[2] + inset, upper[2] - inset))

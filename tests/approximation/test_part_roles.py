@@ -49,9 +49,25 @@ def test_what_stands_in_a_cut_is_an_island_and_quadrics_keep_their_names() -> No
 
 def test_a_blind_hole_ends_within() -> None:
     body = Part(Cylinder(10, 30), name="x")
-    cuts = (Part(Cylinder(2, 20), (0, 0, 10), name="y"), Part(Cylinder(12, 1), (0, 0, 0), name="z"))
+    cuts = (Part(Cylinder(2, 18), (0, 0, 11), name="y"), Part(Cylinder(12, 1), (0, 0, 0), name="z"))
     after = with_role_names(Assembly((body, *cuts), "difference"))
     assert [part.name for part in after.parts][:2] == ["base_cylinder", "blind_hole"]
+
+
+def test_a_hole_that_ends_in_a_pocket_goes_through_its_floor_and_the_pocket_does_not() -> None:
+    """But not one that ends at the pocket's rim, half in it."""
+    body = Part(Box((40, 20, 10)))
+    pocket = Part(Box((16, 12, 6)), (0, 0, 4))  # down to z = 1
+    holes = [Part(Cylinder(2, 8), (x, 0, -2)) for x in (0, 8)]  # up to z = 2
+    cuts = (pocket, *holes, Part(Cylinder(7, 2), (-12, 0, 4.5)))
+    after = with_role_names(Assembly((body, *cuts), "difference"))
+    assert [part.name for part in after.parts] == [
+        "base_block",
+        "pocket",
+        "hole",
+        "blind_hole",
+        "blind_hole_02",
+    ]
 
 
 def test_holes_are_called_after_how_they_are_made() -> None:
