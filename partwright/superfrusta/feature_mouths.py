@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from partwright.approximation.profile_parts import revolved_part
 from partwright.approximation.sketches.ends import BEYOND, STEPS
 from partwright.approximation.sketches.hole_mouths import Mouth
-from partwright.approximation.sketches.holes import is_one_radius
 from partwright.approximation.sketches.round_holes import RoundHole
 from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
@@ -28,6 +27,7 @@ Distance = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 _ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and numbers of copies differ
 _PARALLEL = 1e-6  # of a cosine
+_CHORDS = 0.01  # of a radius, by which that of a mesh's wall may differ, whose corners may lie on chords
 _AROUND = 8  # points around a mouth
 _WITHIN = 0.5, 0.8  # of a mouth's depth, at which it is looked at
 _ACROSS = 0.5, 0.95  # of a mouth's radius, at which what lies beyond is
@@ -85,7 +85,7 @@ class HoleMouths:
 
     def _cones(self, copy: Part) -> Cones:
         """At its lower and its upper end."""
-        axis, ends = rotation_matrix(copy.rotation)[:, 2], [_End(0.0, None), _End(0.0, None)]
+        axis, ends = rotation_matrix(copy.rotation)[:, 2], [_End(-np.inf, None), _End(-np.inf, None)]
         for hole in self.holes:
             if not _is_of(hole, copy, axis):
                 continue
@@ -103,6 +103,9 @@ class HoleMouths:
         radius, end = wall.mouth.radius, wall.height + wall.mouth.depth
         beyond = [(share * radius, end + step) for share in _ACROSS for step in STEPS]
         is_open = bool((self.empty(around(copy, side, beyond)) > 0).all())
+        assert isinstance(copy.field, Cylinder)
+        if not is_open and end < copy.field.height / 2 - _ASIDE:
+            return None  # the hole goes on, by its own wall
         return _Cone(wall.height, end, radius, BEYOND if is_open else 0.0)
 
     def _is_filled(self, copy: Part, cones: Cones) -> bool:
@@ -191,7 +194,7 @@ def _is_of(hole: RoundHole, copy: Part, axis: Floats) -> bool:
         abs(float(axis @ way)) > 1 - _PARALLEL
         and abs(height) < copy.field.height / 2
         and aside < _ASIDE
-        and is_one_radius(copy.field.radius, hole.radius)
+        and abs(copy.field.radius - hole.radius) < _CHORDS * copy.field.radius
     )
 
 
@@ -227,5 +230,7 @@ def _wall(cone: _Cone | None, radius: float, half: float) -> list[tuple[float, f
     """Distance from the axis and height of the wall's corners from the middle to an end."""
     if cone is None:
         return [(radius, half)]
-    top = [(cone.radius, max(half, cone.end + cone.over))] if cone.over else []
-    return [(radius, cone.start), (cone.radius, cone.end), *top]
+    top = cone.end + cone.over
+    beyond = [(cone.radius, top)] if cone.over else []
+    further = [(radius, top), (radius, half)] if top < half - _ASIDE else []  # as in a counterbore
+    return [(radius, cone.start), (cone.radius, cone.end), *beyond, *further]

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 from manifold3d import CrossSection, FillRule
@@ -21,17 +20,14 @@ from partwright.shapes.topology import components
 from partwright.superfrusta.feature_mouths import Distance, around
 
 Floats = NDArray[np.float64]
-Wall = list[
-    tuple[float, float]
-]  # distances from an axis and heights along it, from the lower end to the upper
+Wall = list[tuple[float, float]]
+"""Distances from an axis and heights along it, from the lower end to the upper."""
 
 _ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and numbers of copies differ
 _PARALLEL = 1e-6  # of a cosine
 _STEP = 2e-3  # unit lengths, by which radii differ where there is a step
 _WIDEST = 3.0  # times the narrower radius: a pocket with a hole in its floor is wider than a counterbore
-_INNER = (
-    0.1  # unit lengths: how far sections reach across the axis, so that they have no side in common there
-)
+_INNER = 0.1  # unit lengths: how far sections reach across the axis: no side of theirs is on it
 _OVER = Similarity(rotation=(0.0, 1.0, 0.0, 0.0))  # half a turn about x
 _EXACT = 1e-6  # unit lengths: what is nearer is the same
 _LEVELS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of what is looked at along an axis
@@ -57,8 +53,7 @@ class _Bore:
         if isinstance(field, Cylinder):
             return [(field.radius, -field.height / 2), (field.radius, field.height / 2)]
         assert isinstance(field, Revolution)
-        loop = [(x, y) for x, y, _ in field.profile.outline]
-        return _upwards([corner for corner in loop if corner[0] > _ASIDE])
+        return _upwards([(r, z) for r, z, _ in field.profile.outline])
 
     def seen_from(self, lead: _Bore) -> Wall:
         """The wall along the axis of another on it, from that one's origin."""
@@ -68,10 +63,9 @@ class _Bore:
         return [(r, offset - z) for r, z in reversed(self.wall)]
 
     def goes_on_in(self, other: _Bore) -> bool:
-        """Whether both lie on one axis and overlap, one wider than the other, as a counterbore may be."""
-        way = np.subtract(other.part.translation, self.part.translation)
-        aside = float(np.linalg.norm(way - (way @ self.axis) * self.axis))
-        if abs(float(self.axis @ other.axis)) < 1 - _PARALLEL or aside > _ASIDE:
+        """Whether another whose middle is on its axis overlaps it, one wider than the other, as a counterbore
+        may be."""
+        if abs(float(self.axis @ other.axis)) < 1 - _PARALLEL:
             return False
         (narrow, low, high), (wide, bottom, top) = sorted(_extent(b.seen_from(self)) for b in (self, other))
         return wide - narrow > _STEP and wide < _WIDEST * narrow and max(low, bottom) < min(high, top)
@@ -143,7 +137,14 @@ def with_stepped_holes(holes: Sequence[Part], empty: Distance) -> list[Part]:
 
 def _stacks(bores: Sequence[_Bore]) -> Iterator[list[_Bore]]:
     """Those that go on in one another, more than one."""
-    pairs = [(i, j) for i, j in combinations(range(len(bores)), 2) if bores[i].goes_on_in(bores[j])]
+    hole = np.array([bore.hole for bore in bores], int)
+    places = np.array([bore.part.translation for bore in bores]).reshape(-1, 3)
+    pairs: list[tuple[int, int]] = []
+    for i, bore in enumerate(bores):
+        ways = places - places[i]
+        aside = np.linalg.norm(ways - np.outer(ways @ bore.axis, bore.axis), axis=1)
+        near = np.flatnonzero((hole > bore.hole) & (aside < _ASIDE)).tolist()
+        pairs += [(i, j) for j in near if bore.goes_on_in(bores[j])]
     label = components(len(bores), *np.array(pairs, int).reshape(-1, 2).T)
     for k in dict.fromkeys(label.tolist()):
         stack = [bores[i] for i in np.flatnonzero(label == k).tolist()]

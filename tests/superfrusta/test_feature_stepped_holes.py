@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,10 +13,11 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.editing import with_numbers
 from partwright.assembly.numbers import numbers_of
 from partwright.cleaning import clean
-from partwright.fields import Box, Cylinder, Extrusion
+from partwright.fields import Box, Cylinder, Extrusion, Frustum
 from partwright.fields.profile import Profile, circle
 from partwright.meshing import mesh_assembly
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
+from partwright.superfrusta.feature_stepped_holes import with_stepped_holes
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
 
 PLATE = Part(Box((120.0, 80.0, 10.0)))
@@ -26,13 +28,16 @@ OVER = Similarity(rotation=(0.0, 1.0, 0.0, 0.0))
 TURN = Similarity(rotation=(0.9, 0.3, 0.1, 0.2), translation=(30.0, 20.0, 70.0))
 
 
-def made(*cuts: Part, body: Part = PLATE, turn: Similarity | None = None) -> tuple[Assembly, Assembly]:
-    """A body with cuts, as it was drawn, and what is made of the features that these are."""
+def made(
+    *cuts: Part, body: Part = PLATE, turn: Similarity | None = None, seen: Sequence[Part] = ()
+) -> tuple[Assembly, Assembly]:
+    """A body with cuts, as it was drawn, and what is made of the features that these are. seen: cuts that are
+    no features."""
     turn = turn or Similarity()
     parts = [part.transformed(turn) for part in (body, *cuts)]
-    drawn = Assembly(tuple(parts), operation="difference")
+    drawn = Assembly((*parts, *seen), operation="difference")
     shape = pw.load_shape(mesh_assembly(drawn), unit="mm")
-    own = in_unit_frame(shape, drawn).parts
+    own = in_unit_frame(shape, Assembly(tuple(parts))).parts
     features = [Feature(k == 0, part, np.zeros(0, bool), 4) for k, part in enumerate(own)]
     return drawn, FeatureAssembly(shape).named(FeatureTree(features))
 
@@ -78,6 +83,26 @@ def test_one_step_after_another_and_from_both_ends() -> None:
     assert counts(whole) == {"base_plate": 1, "counterbored_hole": 1}
     assert mesh_assembly(whole).volume == pytest.approx(mesh_assembly(drawn).volume, rel=1e-4)
     assert whole["counterbored_hole"].bounds()[1, 2] < 10, "what is narrower goes on in the open"
+
+
+def test_a_chamfer_of_either_cut_is_part_of_the_hole() -> None:
+    """That the mesh shows: one where the wide hole opens, and one below it in its floor, none is drawn."""
+    rim = Part(Frustum(5.5, 6.5, 1.0), (0.0, 0.0, 4.5))
+    floor = Part(Frustum(3.3, 4.3, 1.0), (0.0, 0.0, -0.5))
+    drawn = (Part(Cylinder(3.3, 12.0)), Part(Cylinder(5.5, 6.0), (0.0, 0.0, 3.0)))
+    cut, whole = made(*drawn, seen=(rim, floor))
+    (_, hole) = whole.parts
+    assert hole.name == "countersunk_hole"
+    assert np.unique(np.round(diameters(hole), 1)) == pytest.approx([6.6, 8.6, 11.0, 13.0], abs=0.15)
+    assert mesh_assembly(whole).volume == pytest.approx(mesh_assembly(cut).volume, rel=1e-4)
+
+
+def test_hundreds_of_holes_are_looked_at_in_no_time() -> None:
+    moves = tuple(Similarity(translation=(0.01 * (k % 40), 0.01 * (k // 40), 0.0)) for k in range(1, 800))
+    holes = [Part(Cylinder(r, 0.1), (0.5 * r, 0.0, 0.0), instances=moves) for r in (0.002, 0.0045)]
+    started = time.process_time()
+    assert with_stepped_holes(holes, lambda points: np.ones(len(points), np.float32)) == holes
+    assert time.process_time() - started < 2
 
 
 @pytest.mark.parametrize(
