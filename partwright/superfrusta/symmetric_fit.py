@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ from partwright.fields.columns import (
 )
 from partwright.fields.superfrustum import tightest_bulge
 from partwright.least_squares import Damping, minimise
-from partwright.rows import lengths
+from partwright.rows import lengths, units
 from partwright.superfrusta.limits import LIMITS
 from partwright.superfrusta.refining import Stages, freedom, penalties, sharpened, ties
 from partwright.superfrusta.samples import FitSamples, Rows
@@ -51,11 +52,6 @@ class RepeatedPart:
     isometries: tuple[Isometry, ...] = ()
 
     @property
-    def rows(self) -> Rows:
-        """(1 + copies, 17), the leaf itself first."""
-        return np.concatenate([self.row[None], images(self.row[None], self.isometries)[:, 0]])
-
-    @property
     def moves(self) -> tuple[Similarity, ...]:
         """The copies' rigid moves: what `Part.instances` holds."""
         return tuple(rigid(self.row, isometry) for isometry in self.isometries)
@@ -77,17 +73,41 @@ def rigid(row: NDArray[np.float32], isometry: Isometry) -> Similarity:
 
 def images(rows: Rows, isometries: Sequence[Isometry]) -> Rows:
     """Rows (K, M, 17) of the images of parts (M, 17) under isometries: each `rigid` move, all at once."""
-    found = np.repeat(rows[None].astype(np.float32), len(isometries), axis=0)
     if not len(isometries):
-        return found
-    linear = np.stack([one.linear for one in isometries])[:, None]
-    shift = np.stack([one.shift for one in isometries])[:, None]
-    flips = np.stack([_FLIP if one.improper else np.eye(3) for one in isometries])[:, None]
-    place = rows[:, TRANSLATION].astype(np.float64)
-    pose = rows[:, ROTATION].astype(np.float64)
-    pose /= lengths(pose)[:, None]
-    turns = Rotation.from_quat(pose, scalar_first=True).as_matrix()
-    moves = quaternions(linear @ turns @ flips @ turns.transpose(0, 2, 1))
+        return np.empty((0, *rows.shape), np.float32)
+    return _images(rows[None], _Isometries.of(isometries), (slice(None), None))
+
+
+@dataclass(frozen=True)
+class _Isometries:
+    """Several (C,) at once."""
+
+    linear: Floats
+    """(C, 3, 3)"""
+    shift: Floats
+    """(C, 3)"""
+    flips: Floats
+    """(C, 3, 3) what makes up for an improper one, in the frame of a part."""
+
+    @classmethod
+    def of(cls, isometries: Sequence[Isometry]) -> _Isometries:
+        return cls(
+            np.array([one.linear for one in isometries]).reshape(-1, 3, 3),
+            np.array([one.shift for one in isometries]).reshape(-1, 3),
+            np.array([_FLIP if one.improper else np.eye(3) for one in isometries]).reshape(-1, 3, 3),
+        )
+
+
+def _images(rows: Rows, by: _Isometries, each: Any = ...) -> Rows:
+    """Rows (..., 17) moved by isometries, of which `each` are those of the rows."""
+    linear, shift, flips = by.linear[each], by.shift[each], by.flips[each]
+    place, pose = rows[..., TRANSLATION].astype(np.float64), rows[..., ROTATION].astype(np.float64)
+    pose /= lengths(pose)[..., None]
+    turns = (
+        Rotation.from_quat(pose.reshape(-1, 4), scalar_first=True).as_matrix().reshape(*pose.shape[:-1], 3, 3)
+    )
+    moves = quaternions(linear @ turns @ flips @ turns.swapaxes(-1, -2))
+    found = np.array(np.broadcast_to(rows, (*moves.shape[:-1], rows.shape[-1])), np.float32)
     found[..., TRANSLATION] = (linear @ place[..., None])[..., 0] + shift
     found[..., ROTATION] = np.stack(quaternion_product(_components(moves), _components(pose)), axis=-1)
     return found
@@ -97,9 +117,50 @@ def _components(rotations: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return rotations[..., 0], rotations[..., 1], rotations[..., 2], rotations[..., 3]
 
 
+@dataclass(frozen=True)
+class _Copies:
+    """All copies (C,) of leaves (L,), leaf by leaf, each leaf itself first.
+
+    leaf: (C,) that each is of. moved: those that are not the leaf itself, and by what.
+    """
+
+    leaf: NDArray[np.int64]
+    moved: NDArray[np.int64]
+    by: _Isometries
+
+    @classmethod
+    def of(cls, leaves: Sequence[RepeatedPart]) -> _Copies:
+        counts = np.array([1 + len(leaf.isometries) for leaf in leaves])
+        firsts = np.cumsum(counts) - counts
+        moved = np.setdiff1d(np.arange(counts.sum()), firsts)
+        every = [isometry for leaf in leaves for isometry in leaf.isometries]
+        return cls(np.repeat(np.arange(len(leaves)), counts), moved, _Isometries.of(every))
+
+    def rows(self, firsts: Rows) -> Rows:
+        """(C, 17) of the leaves' rows (L, 17)."""
+        found = firsts[self.leaf]
+        if len(self.moved):
+            found[self.moved] = _images(found[self.moved], self.by)
+        return found
+
+    def lift(self, tied: NDArray[np.bool_]) -> Floats:
+        """(C * 15, L * 15) what takes steps of the leaves to steps of their copies: a copy's place moves in
+        the world, it turns about local axes."""
+        blocks = np.tile(np.eye(STEP_WIDTH), (len(self.leaf), 1, 1))
+        blocks[self.moved, TRANSLATION_STEP, TRANSLATION_STEP] = self.by.linear
+        improper = (self.by.flips != np.eye(3)).any(axis=(1, 2))
+        # exp(v) becomes F exp(v) F = exp(det(F) F v)
+        blocks[self.moved[improper], ROTATION_STEP, ROTATION_STEP] = -_FLIP
+        round_ = tied[self.leaf]
+        blocks[round_, Tangent.SY] = blocks[round_, Tangent.SX]
+        lift = np.zeros((len(self.leaf), STEP_WIDTH, len(tied), STEP_WIDTH))
+        lift[np.arange(len(self.leaf)), :, self.leaf] = blocks
+        return lift.reshape(len(self.leaf) * STEP_WIDTH, -1)
+
+
 def expanded(leaves: Sequence[RepeatedPart]) -> Rows:
-    """Rows of all copies, leaf by leaf."""
-    return np.concatenate([leaf.rows for leaf in leaves])
+    """Rows of all copies, leaf by leaf, each leaf itself first."""
+    return _Copies.of(leaves).rows(np.stack([leaf.row for leaf in leaves]))
 
 
 def refit(
@@ -110,83 +171,54 @@ def refit(
     The kernel's normal equations of all copies are projected onto the leaves' parameters; the damped steps
     are those of Levenberg and Marquardt. The first `locked` leaves stay.
     """
-    parts = list(leaves)
     target = samples.target(samples.optimised_indices)
-    moving = np.arange(len(leaves)) >= locked
-    firsts = np.stack([leaf.row for leaf in leaves])
-    tied = ties(firsts, settings)
-    free = freedom(firsts, moving, settings)
+    rows = np.stack([leaf.row for leaf in leaves])
+    tied = ties(rows, settings)
+    free = freedom(rows, np.arange(len(leaves)) >= locked, settings)
     free[tied, Tangent.SY] = False
     free_entries = np.flatnonzero(free)
+    copies = _Copies.of(leaves)
+    lift = copies.lift(tied)[:, free_entries]
     damping = _DAMPING
     for beta, iterations in sharpened(stages, samples.thickness):
         terms = (target, float(beta), penalties(settings), samples.threads)
 
-        def linearise(at: list[RepeatedPart], terms: Terms = terms) -> tuple[float, Floats, Floats]:
-            loss, gradient, matrix = samples.kernel.normal_equations(expanded(at), *terms)
-            gradient, matrix = _projected(at, tied, gradient, matrix)
-            return loss, gradient[free_entries], matrix[np.ix_(free_entries, free_entries)]
+        def linearise(at: Rows, terms: Terms = terms) -> tuple[float, Floats, Floats]:
+            loss, gradient, matrix = samples.kernel.normal_equations(copies.rows(at), *terms)
+            return loss, lift.T @ gradient, lift.T @ matrix @ lift
 
-        def loss(at: list[RepeatedPart], terms: Terms = terms) -> float:
-            return samples.kernel.loss(expanded(at), *terms)
+        def loss(at: Rows, terms: Terms = terms) -> float:
+            return samples.kernel.loss(copies.rows(at), *terms)
 
-        def move(at: list[RepeatedPart], entries: Floats) -> list[RepeatedPart]:
+        def move(at: Rows, entries: Floats) -> Rows:
             step = np.zeros(free.shape)
             step[free] = entries
-            return [
-                _moved(part, s, f, t) if moves else part
-                for part, s, f, t, moves in zip(at, step, free, tied, moving, strict=True)
-            ]
+            return np.concatenate([at[:locked], _moved(at, step, free, tied)[locked:]])
 
-        found = minimise(parts, linearise, loss, move, replace(damping, trials=int(iterations)))
-        parts, damping = found.state, replace(damping, start=found.damping)
-    return parts
+        found = minimise(rows, linearise, loss, move, replace(damping, trials=int(iterations)))
+        rows, damping = found.state, replace(damping, start=found.damping)
+    return [RepeatedPart(row, leaf.isometries) for row, leaf in zip(rows, leaves, strict=True)]
 
 
-def _projected(
-    leaves: Sequence[RepeatedPart], tied: NDArray[np.bool_], gradient: Floats, matrix: Floats
-) -> tuple[Floats, Floats]:
-    """P^T g and P^T H P, where P takes steps of the leaves to steps of their copies."""
-    count = sum(1 + len(leaf.isometries) for leaf in leaves)
-    lift = np.zeros((count, STEP_WIDTH, len(leaves), STEP_WIDTH))
-    at = 0
-    for i, leaf in enumerate(leaves):
-        for block in [np.eye(STEP_WIDTH), *(_lifted(isometry) for isometry in leaf.isometries)]:
-            if tied[i]:
-                block[Tangent.SY] = block[Tangent.SX]
-            lift[at, :, i] = block
-            at += 1
-    flat = lift.reshape(count * STEP_WIDTH, -1)
-    return flat.T @ gradient, flat.T @ matrix @ flat
-
-
-def _lifted(isometry: Isometry) -> Floats:
-    """(15, 15) a copy's step by the leaf's: the place moves in the world, the turn is about local axes."""
-    block = np.eye(STEP_WIDTH)
-    block[TRANSLATION_STEP, TRANSLATION_STEP] = isometry.linear
-    if isometry.improper:
-        block[ROTATION_STEP, ROTATION_STEP] = -_FLIP  # exp(v) becomes F exp(v) F = exp(det(F) F v)
-    return block
-
-
-def _moved(leaf: RepeatedPart, step: Floats, free: NDArray[np.bool_], tied: bool) -> RepeatedPart:
-    """The leaf after a step (15,), clipped, within bounds; what is not `free` (15,) keeps its bits."""
+def _moved(rows: Rows, step: Floats, free: NDArray[np.bool_], tied: NDArray[np.bool_]) -> Rows:
+    """Leaves (L, 17) after a step (L, 15), clipped, within bounds; what of their form is not `free` (L, 15)
+    keeps its bits."""
     lower, upper, longest = LIMITS.array().astype(np.float64)
     step = np.clip(step, -longest, longest)
-    row = leaf.row.astype(np.float64)
-    row[TRANSLATION] += step[TRANSLATION_STEP]
-    angle = float(np.linalg.norm(step[ROTATION_STEP]))
-    half = np.sinc(angle / (2 * math.pi)) / 2
-    turn = Similarity(1.0, (math.cos(angle / 2), *(half * step[ROTATION_STEP]).tolist()))
-    row[ROTATION] = (_pose(leaf.row) @ turn).rotation
-    shape = row[SHAPE]
-    moved = np.clip(shape + step[SHAPE_STEP], lower[SHAPE_STEP], upper[SHAPE_STEP])
-    row[SHAPE] = np.where(free[SHAPE_STEP], moved, shape)
-    if tied and free[Tangent.SX]:
-        row[Column.SY] = row[Column.SX]
-    if free[Tangent.BULGE]:
-        row[Column.BULGE] = min(row[Column.BULGE], tightest_bulge(row[Column.SX], row[Column.SZ]))
-    return RepeatedPart(row.astype(np.float32), leaf.isometries)
+    moved = rows.astype(np.float64)
+    moved[:, TRANSLATION] += step[:, TRANSLATION_STEP]
+    angle = lengths(step[:, ROTATION_STEP])[:, None]
+    turn = np.hstack([np.cos(angle / 2), np.sinc(angle / (2 * math.pi)) / 2 * step[:, ROTATION_STEP]])
+    pose = units(moved[:, ROTATION])
+    moved[:, ROTATION] = units(np.stack(quaternion_product(_components(pose), _components(turn)), axis=-1))
+    clipped = np.clip(moved[:, SHAPE] + step[:, SHAPE_STEP], lower[SHAPE_STEP], upper[SHAPE_STEP])
+    moved[:, SHAPE] = np.where(free[:, SHAPE_STEP], clipped, moved[:, SHAPE])
+    for row, loose, is_round in zip(moved, free, tied, strict=True):
+        if is_round and loose[Tangent.SX]:
+            row[Column.SY] = row[Column.SX]
+        if loose[Tangent.BULGE]:
+            row[Column.BULGE] = min(row[Column.BULGE], tightest_bulge(row[Column.SX], row[Column.SZ]))
+    return moved.astype(np.float32)
 
 
 def _pose(row: NDArray[np.float32]) -> Similarity:

@@ -54,7 +54,7 @@ def comb() -> trimesh.Trimesh:
 def test_tines_become_one_leaf_however_they_were_found(comb: trimesh.Trimesh, tines: list[Box]) -> None:
     samples, found = known(comb, [HANDLE, BACK, *tines])
     leaves = repeat(samples, found, (), DRAFT)
-    assert [len(leaf.rows) for leaf in leaves] == [1, 1, 4]
+    assert [1 + len(leaf.isometries) for leaf in leaves] == [1, 1, 4]
     assert score(samples, expanded(leaves)) > 0.99
     steps = [move.translation for move in leaves[2].moves]
     assert np.ptp(steps, axis=0)[1:] == pytest.approx([0, 0], abs=2e-3)  # they are shifted, not turned
@@ -64,7 +64,7 @@ def test_tines_become_one_leaf_however_they_were_found(comb: trimesh.Trimesh, ti
 def test_locked_parts_are_in_no_repeat(comb: trimesh.Trimesh) -> None:
     samples, found = known(comb, [*TINES, HANDLE, BACK])
     leaves = repeat(samples, found, (), DRAFT, locked=2)
-    assert [len(leaf.rows) for leaf in leaves] == [1, 1, 2, 1, 1]
+    assert [1 + len(leaf.isometries) for leaf in leaves] == [1, 1, 2, 1, 1]
     assert np.array_equal(expanded(leaves)[:2], found[:2])
 
 
@@ -74,7 +74,7 @@ def test_parts_alike_by_chance_stay_apart() -> None:
     bar: Box = ((1.6, 0.2, 0.3), (0.0, 0.0, 0.0))
     ball = trimesh.creation.icosphere(3, 0.31).apply_translation((0.8, 0, 0))
     samples, found = known(union(box(*ends[0]), box(*bar), ball), [*ends, bar])
-    assert [len(leaf.rows) for leaf in repeat(samples, found, (), DRAFT)] == [1, 1, 1]
+    assert [1 + len(leaf.isometries) for leaf in repeat(samples, found, (), DRAFT)] == [1, 1, 1]
 
 
 def test_arms_that_are_nearly_mirrored_become_one_though_one_is_raised() -> None:
@@ -86,7 +86,7 @@ def test_arms_that_are_nearly_mirrored_become_one_though_one_is_raised() -> None
     across = (Symmetry("mirror", 2, mirror(np.eye(3)[1], np.zeros(3)), 0.01),)
     assert len(repeat(samples, found, (), DRAFT)) == 4
     leaves = repeat(samples, found, (), DRAFT, nearly=across)
-    assert [len(leaf.rows) for leaf in leaves] == [1, 2, 2]
+    assert [1 + len(leaf.isometries) for leaf in leaves] == [1, 2, 2]
     assert score(samples, expanded(leaves)) > 0.98 > 0.9 > score(samples, found)
 
 

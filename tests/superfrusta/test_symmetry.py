@@ -128,7 +128,7 @@ def known_table() -> tuple[FitSamples, np.ndarray, tuple[Symmetry, ...]]:
 def test_legs_of_a_table_become_one_leaf() -> None:
     samples, exact, found = known_table()
     leaves = repeat(samples, exact, found, DRAFT)
-    assert [len(leaf.rows) for leaf in leaves] == [1, 4]
+    assert [1 + len(leaf.isometries) for leaf in leaves] == [1, 4]
     assert score(samples, expanded(leaves)) == pytest.approx(score(samples, exact), abs=1e-6)
 
 
@@ -173,10 +173,10 @@ def test_parts_of_one_side_stand_for_a_side(other_arm: list) -> None:
     samples, found = seat(BODY, POST, BAR, *other_arm)
     across = (Symmetry("mirror", 2, mirror(np.eye(3)[1], np.zeros(3)), 0.0),)
     leaves = repeat(samples, found, across, DRAFT)
-    assert [len(leaf.rows) for leaf in leaves] == [1, 2, 2]
+    assert [1 + len(leaf.isometries) for leaf in leaves] == [1, 2, 2]
     assert score(samples, expanded(leaves)) > 0.99 > 0.9 > score(samples, found)
     kept = repeat(samples, found, across, DRAFT, locked=2)
-    assert [len(leaf.rows) for leaf in kept[:2]] == [1, 1]
+    assert [1 + len(leaf.isometries) for leaf in kept[:2]] == [1, 1]
     assert np.array_equal(expanded(kept)[:2], found[:2])
 
 
