@@ -42,7 +42,6 @@ _AGAIN = 0.01  # of the objective: after so much progress what was given up is t
 _STAGES: Stages = ((40.0, 4), (100.0, 5))
 _HOPELESS = 0.02  # of the objective: what is so much worse after a refit goes no further
 _REFITTED = 2  # of the ways to change a part
-_LEAST_HALVED = 100  # voxels
 _ABOUT = 0.2  # unit lengths: how far from a point that is off a narrow hole may reach
 _HOLES = 2  # that are looked for there
 _AS_FAR = 0.6  # of the furthest: what is missing elsewhere beside the same part is tried together with it
@@ -273,8 +272,6 @@ class Mending:
             yield with_new(found[0])
         if len(found) > 1:
             yield with_new(np.concatenate(found))
-        if np.count_nonzero(mine) > _LEAST_HALVED:
-            yield instead(*(self.fitted(half, others, rows[part], cut) for half in _halves(samples, mine)))
 
     def carved(self, rows: Rows) -> Grown:
         """What could be subtracted anywhere: the same for every part that is tried in vain."""
@@ -357,14 +354,3 @@ def _with(rows: Rows, part: int, new: NDArray[np.float32]) -> Rows:
 
 def _emphasis(off: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.minimum((off / _TWICE) ** 2, _HEAVIEST)
-
-
-def _halves(samples: FitSamples, voxels: Mask) -> tuple[Mask, Mask]:
-    """Both halves of a region along its longest axis."""
-    local = samples.grid_points[voxels].astype(np.float64)
-    local -= local.mean(axis=0)
-    _, axes = np.linalg.eigh(np.einsum("ni,nj->ij", local, local))
-    side = local @ axes[:, 2] > 0
-    first, second = voxels.copy(), voxels.copy()
-    first[voxels], second[voxels] = side, ~side
-    return first, second
