@@ -15,8 +15,8 @@ from partwright.partsdf.targets import Target
 from partwright.partsdf.unknowns import Frame
 
 # Measured as by benchmarks/partsdf_familiarity.py: new shapes of a family come to 0.04 at most, real
-# ones of its kind to 0.38, and others to 0.5 at least, but for two vehicles of five by the model of chairs
-# (0.23 and 0.33).
+# ones of its kind to 0.38, but for one (0.46), and others to 0.47 at least, but for three of six by the model
+# of chairs (0.28 to 0.43).
 STRANGE = 0.45
 # Of points, which do not tell inside from outside, errors are far smaller: a new shape of each family
 # came to 0.02 at most from 2,048, a chair with noise of a half of 1 % of its length, found at an IoU of 0.90,
