@@ -24,7 +24,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="make new shapes of a learned family",
         description="Makes poses and forms of all parts out of noise. Writes an assembly a sample, a contact "
         "sheet (samples.png) and samples.json, which says how far each is from its nearest training shape, "
-        "how often it was made, and what of it is still broken.",
+        "how often it was made, and what of it is still at fault.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -41,8 +41,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         metavar="N",
         type=int,
         default=TRIES,
-        help="a shape whose parts come apart is made anew, up to N tries in all; 1 takes all as they come "
-        "(default: %(default)s)",
+        help="a shape whose parts come apart or are seen out of place is made anew, up to N tries in all; "
+        "1 takes all as they come (default: %(default)s)",
     )
     option("--keep", metavar="PARTS", help="these parts of --of stay: names, separated by commas")
     option("--of", metavar="SHAPE", type=shape_text, help="the shape whose parts are kept")

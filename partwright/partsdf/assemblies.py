@@ -9,12 +9,11 @@ import numpy as np
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.checks import Quaternion
 from partwright.assembly.metadata import GUESSED
-from partwright.assembly.similarity import quaternion_product
+from partwright.assembly.similarity import NO_ROTATION, quaternion_product
 from partwright.errors import SettingError
 from partwright.partsdf.field import NeuralField
 from partwright.partsdf.meshing import Surfaces
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.poses import UPRIGHT
 from partwright.shapes import UnitFrame
 
 UNIT_FRAME = UnitFrame((0.0, 0.0, 0.0), 1.0)
@@ -26,7 +25,7 @@ def to_assembly(
     unit: str | None = None,
     up: str | None = None,
     source: str = "",
-    turn: Quaternion = UPRIGHT,
+    turn: Quaternion = NO_ROTATION,
     guessed: Collection[str] = (),
 ) -> Assembly:
     """The parts that are there, as an assembly in the units and place of `frame`.

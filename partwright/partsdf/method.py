@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from partwright.assembly import Similarity
+from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import SettingError
 from partwright.methods import Ability, Checkpoint, FitRequest, Fitted, Method, Progress, preset, timed
 from partwright.partsdf.assemblies import remember_meshes, to_assembly
@@ -12,7 +13,6 @@ from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.familiarity import familiarity
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
-from partwright.partsdf.poses import UPRIGHT
 from partwright.partsdf.reconstruction import Step, mean_error, reconstruct_from
 from partwright.partsdf.settings import Settings
 from partwright.partsdf.starts import Start, find_starts, ways_to_stand
@@ -58,7 +58,7 @@ class LearnedParts(Method[Settings]):
             target = Target.seen_in(shape, run.seed)
             probe = Target.of_shape(shape, _PROBED, run.seed)
             inside = probe.sdf.numpy() < 0
-            turns = ways_to_stand(shape.up, model.up) if settings.turn else [UPRIGHT]
+            turns = ways_to_stand(shape.up, model.up) if settings.turn else [NO_ROTATION]
             checkpoint()
         history: list[dict[str, float | str]] = []
 

@@ -7,10 +7,7 @@ from typing import NamedTuple, Self
 import torch
 from torch import Tensor
 
-from partwright.assembly.checks import Quaternion
 from partwright.datasets.poses import Poses
-
-UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
 class PoseTensors(NamedTuple):

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from partwright.assembly.checks import Quaternion
+from partwright.assembly.similarity import NO_ROTATION
 from partwright.datasets.prepared import PreparedShape
 from partwright.errors import CancelledError, ModelError
 from partwright.methods import Cancellation, Checkpoint
@@ -26,7 +27,7 @@ from partwright.partsdf.model import Model
 from partwright.partsdf.needless import needed
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.pose_naming import named_like
-from partwright.partsdf.poses import UPRIGHT, PoseTensors
+from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.starts import (
     Start,
@@ -49,7 +50,7 @@ class Step(NamedTuple):
     loss: float
     shape: Callable[[], NeuralShape]
     """Makes the shape as it is now."""
-    turn: Quaternion = UPRIGHT
+    turn: Quaternion = NO_ROTATION
     """From how the shape's family stands to how the target does."""
 
 
@@ -114,7 +115,7 @@ def reconstruct_unknown(
 
     Once the checkpoint's cancellation is requested, it ends with what was found.
     """
-    return reconstruct_standing(model, target, [UPRIGHT], settings, seed, told, checkpoint)[0]
+    return reconstruct_standing(model, target, [NO_ROTATION], settings, seed, told, checkpoint)[0]
 
 
 @one_core_each()
@@ -197,7 +198,7 @@ def _found_by_part(
     bring closest."""
     model = start.model
     latents = latents_by_part(model, start.poses, target, min(settings.starts, _KNOWN))
-    starts = [Start(replace(start, latents=one), UPRIGHT, target) for one in latents]
+    starts = [Start(replace(start, latents=one), NO_ROTATION, target) for one in latents]
     rounds = [_Round(len(starts), _share(settings, _SCOUTED))] if len(starts) > 1 else []
     scouts = _Scouts(rounds, settings, seed, told, checkpoint)
     tried = [one.shape for one in scouts.sent(starts)]
@@ -205,7 +206,7 @@ def _found_by_part(
     found = torch.stack([one.latents for one in tried])
     best = errors_by_part(model, found, poses, target).argmin(dim=0), torch.arange(len(model.parts))
     start = replace(start, latents=found[best], poses=poses.map(lambda t: t[best]))
-    return start if scouts.stopped else scouts.followed(Start(start, UPRIGHT, target)).shape
+    return start if scouts.stopped else scouts.followed(Start(start, NO_ROTATION, target)).shape
 
 
 def _scouted(

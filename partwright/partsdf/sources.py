@@ -7,12 +7,12 @@ from pathlib import Path
 
 from partwright.assembly import Assembly, load_assembly
 from partwright.assembly.checks import Quaternion
+from partwright.assembly.similarity import NO_ROTATION
 from partwright.errors import SettingError
 from partwright.partsdf.assemblies import UNIT_FRAME, from_assembly, to_assembly
 from partwright.partsdf.familiarity import familiarity
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.poses import UPRIGHT
 from partwright.partsdf.reconstruction import reconstruct_standing
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.starts import ways_to_stand
@@ -29,7 +29,7 @@ class Source:
     unit: str | None = None
     up: str | None = None
     name: str = ""
-    turn: Quaternion = UPRIGHT
+    turn: Quaternion = NO_ROTATION
 
     def assembly(self, shape: NeuralShape) -> Assembly:
         """An edited shape as an assembly in the same units and place."""

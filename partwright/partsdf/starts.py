@@ -18,14 +18,14 @@ import torch
 from torch import Tensor
 
 from partwright.assembly.checks import Quaternion
-from partwright.assembly.similarity import quaternion_product
+from partwright.assembly.similarity import NO_ROTATION, quaternion_product
 from partwright.datasets.prepared import UP
 from partwright.errors import ModelError, SettingError
 from partwright.partsdf.encoder import Encoder, load_encoder
 from partwright.partsdf.losses import aggregate, clamped_error
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
-from partwright.partsdf.poses import UPRIGHT, PoseTensors, local_points
+from partwright.partsdf.poses import PoseTensors, local_points
 from partwright.partsdf.settings import ReconstructionSettings
 from partwright.partsdf.targets import Target
 from partwright.partsdf.unknowns import Frame
@@ -34,7 +34,7 @@ from partwright.shapes import LONGEST_SIDE
 _HALF = math.sqrt(0.5)
 # From z up to another axis up.
 _FROM_Z: dict[str, Quaternion] = {
-    "z": UPRIGHT,
+    "z": NO_ROTATION,
     "-z": (0.0, 1.0, 0.0, 0.0),
     "y": (_HALF, -_HALF, 0.0, 0.0),
     "-y": (_HALF, _HALF, 0.0, 0.0),

@@ -10,11 +10,10 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from partwright.assembly.checks import Quaternion
-from partwright.assembly.similarity import Similarity, quaternion_product, rotation_matrix
+from partwright.assembly.similarity import NO_ROTATION, Similarity, quaternion_product, rotation_matrix
 from partwright.errors import SettingError
 from partwright.partsdf.config import LossSettings
 from partwright.partsdf.losses import clamped_error
-from partwright.partsdf.poses import UPRIGHT
 from partwright.shapes import Shape
 
 SURFACE = 2048  # points on it
@@ -41,7 +40,7 @@ class Target:
     low: Tensor | None = None
     count: int = 0
     shape: Shape | None = None
-    turn: Quaternion = UPRIGHT
+    turn: Quaternion = NO_ROTATION
 
     @classmethod
     def of_shape(cls, shape: Shape, count: int = 40_000, seed: int = 0) -> Target:

@@ -25,8 +25,8 @@ from partwright.shapes import Shape, length_text
 Floats = NDArray[np.float64]
 Distance = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
-_ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and numbers of copies differ
-_PARALLEL = 1e-6  # of a cosine
+ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and numbers of copies differ
+PARALLEL = 1e-6  # of a cosine
 _CHORDS = 0.01  # of a radius, by which that of a mesh's wall may differ, whose corners may lie on chords
 _AROUND = 8  # points around a mouth
 _WITHIN = 0.5, 0.8  # of a mouth's depth, at which it is looked at
@@ -104,7 +104,7 @@ class HoleMouths:
         beyond = [(share * radius, end + step) for share in _ACROSS for step in STEPS]
         is_open = bool((self.empty(around(copy, side, beyond)) > 0).all())
         assert isinstance(copy.field, Cylinder)
-        if not is_open and end < copy.field.height / 2 - _ASIDE:
+        if not is_open and end < copy.field.height / 2 - ASIDE:
             return None  # the hole goes on, by its own wall
         return _Cone(wall.height, end, radius, BEYOND if is_open else 0.0)
 
@@ -191,9 +191,9 @@ def _is_of(hole: RoundHole, copy: Part, axis: Floats) -> bool:
     height = float(middle @ axis)
     aside = float(np.linalg.norm(middle - height * axis))
     return (
-        abs(float(axis @ way)) > 1 - _PARALLEL
+        abs(float(axis @ way)) > 1 - PARALLEL
         and abs(height) < copy.field.height / 2
-        and aside < _ASIDE
+        and aside < ASIDE
         and abs(copy.field.radius - hole.radius) < _CHORDS * copy.field.radius
     )
 
@@ -209,7 +209,7 @@ def around(copy: Part, side: float, rings: Sequence[tuple[float, float]]) -> NDA
 
 def _are_same(one: Cones, other: Cones) -> bool:
     return all(
-        a is b or (a is not None and b is not None and np.allclose(a, b, rtol=0, atol=_ASIDE))
+        a is b or (a is not None and b is not None and np.allclose(a, b, rtol=0, atol=ASIDE))
         for a, b in zip(one, other, strict=True)
     )
 
@@ -232,5 +232,5 @@ def _wall(cone: _Cone | None, radius: float, half: float) -> list[tuple[float, f
         return [(radius, half)]
     top = cone.end + cone.over
     beyond = [(cone.radius, top)] if cone.over else []
-    further = [(radius, top), (radius, half)] if top < half - _ASIDE else []  # as in a counterbore
+    further = [(radius, top), (radius, half)] if top < half - ASIDE else []  # as in a counterbore
     return [(radius, cone.start), (cone.radius, cone.end), *beyond, *further]

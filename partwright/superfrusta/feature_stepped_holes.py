@@ -17,14 +17,12 @@ from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Cylinder, Revolution
 from partwright.fields.profile import Profile
 from partwright.shapes.topology import components
-from partwright.superfrusta.feature_mouths import Distance, around
+from partwright.superfrusta.feature_mouths import ASIDE, PARALLEL, Distance, around
 
 Floats = NDArray[np.float64]
 Wall = list[tuple[float, float]]
 """Distances from an axis and heights along it, from the lower end to the upper."""
 
-_ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and numbers of copies differ
-_PARALLEL = 1e-6  # of a cosine
 _STEP = 2e-3  # unit lengths, by which radii differ where there is a step
 _WIDEST = 3.0  # times the narrower radius: a pocket with a hole in its floor is wider than a counterbore
 _INNER = 0.1  # unit lengths: how far sections reach across the axis: no side of theirs is on it
@@ -65,7 +63,7 @@ class _Bore:
     def goes_on_in(self, other: _Bore) -> bool:
         """Whether another whose middle is on its axis overlaps it, one wider than the other, as a counterbore
         may be."""
-        if abs(float(self.axis @ other.axis)) < 1 - _PARALLEL:
+        if abs(float(self.axis @ other.axis)) < 1 - PARALLEL:
             return False
         (narrow, low, high), (wide, bottom, top) = sorted(_extent(b.seen_from(self)) for b in (self, other))
         return wide - narrow > _STEP and wide < _WIDEST * narrow and max(low, bottom) < min(high, top)
@@ -89,7 +87,7 @@ class _Stepped:
         """Whether others are one more copy; then they are so from now on. wall: as their first sees it."""
         for seen, over in ((wall, False), (_flipped(wall), True)):
             alike = bores[0].hole == self.hole and len(seen) == len(self.wall)
-            if alike and np.allclose(seen, self.wall, rtol=0, atol=_ASIDE):
+            if alike and np.allclose(seen, self.wall, rtol=0, atol=ASIDE):
                 self.leads.append((bores[0], over))
                 self.bores += bores
                 return True
@@ -143,7 +141,7 @@ def _stacks(bores: Sequence[_Bore]) -> Iterator[list[_Bore]]:
     for i, bore in enumerate(bores):
         ways = places - places[i]
         aside = np.linalg.norm(ways - np.outer(ways @ bore.axis, bore.axis), axis=1)
-        near = np.flatnonzero((hole > bore.hole) & (aside < _ASIDE)).tolist()
+        near = np.flatnonzero((hole > bore.hole) & (aside < ASIDE)).tolist()
         pairs += [(i, j) for j in near if bore.goes_on_in(bores[j])]
     label = components(len(bores), *np.array(pairs, int).reshape(-1, 2).T)
     for k in dict.fromkeys(label.tolist()):
@@ -165,12 +163,12 @@ def _drilled(stack: Sequence[_Bore], empty: Distance) -> Wall | None:
     radii = np.array([r for r, _ in wall])
     narrowest = int(radii.argmin())
     down, up = np.diff(radii[: narrowest + 1]), np.diff(radii[narrowest:])
-    return wall if (down < _ASIDE).all() and (up > -_ASIDE).all() else None
+    return wall if (down < ASIDE).all() and (up > -ASIDE).all() else None
 
 
 def _without_open_end(copy: Part, side: float, wall: Wall, empty: Distance) -> Wall:
     """The wall as it is seen towards one side, without what goes on narrower there in the open."""
-    while len(wall) > 3 and wall[-1][0] < wall[-3][0] and wall[-2][1] - wall[-3][1] < _ASIDE:
+    while len(wall) > 3 and wall[-1][0] < wall[-3][0] and wall[-2][1] - wall[-3][1] < ASIDE:
         (wide, low), _, (narrow, high) = wall[-3:]
         rings = [
             (narrow + share * (wide - narrow), low + level * (high - low))
@@ -185,10 +183,10 @@ def _without_open_end(copy: Part, side: float, wall: Wall, empty: Distance) -> W
 
 def _upwards(loop: Wall) -> Wall:
     """The corners of a section that lie off the axis, from the lower end on."""
-    on_axis = [k for k, (r, _) in enumerate(loop) if r < _ASIDE]
+    on_axis = [k for k, (r, _) in enumerate(loop) if r < ASIDE]
     last = next(k for k in on_axis if (k + 1) % len(loop) not in on_axis)
     turned = [*loop[last + 1 :], *loop[: last + 1]]
-    wall = [corner for corner in turned if corner[0] >= _ASIDE]
+    wall = [corner for corner in turned if corner[0] >= ASIDE]
     return wall if wall[0][1] < wall[-1][1] else wall[::-1]
 
 

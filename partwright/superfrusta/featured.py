@@ -115,10 +115,10 @@ class FeaturedFit:
         """Solids that were found by the search, with freeform where they are far off, or only made anew of
         the same parts where these are not: cuts then belong to what they meet, and leave no chip of others.
         Themselves where nothing is off or nothing helps."""
-        tree = self._tree_of(whole)
-        if tree is None:
+        search, own = self._search, self._own(whole)
+        if own is None:
             return MendedSolids(whole, 0.0, 0.0)
-        search, own = self._search, in_unit_frame(self._request.shape, whole)
+        tree = search.scored(_tree_of(own))
         better = self._finished(tree)
         same = [f.part for f in better.features] == [f.part for f in tree.features]
         off = far_off(search, own) if same else math.inf
@@ -128,20 +128,15 @@ class FeaturedFit:
 
     def may_explain(self, whole: Assembly, least: float) -> bool:
         """Whether solids that were found by the search, mended, may explain as much: an R of `least`."""
-        tree = self._tree_of(whole)
-        if tree is None:
-            return False
-        covered = tree.at(self._search.points)
-        return most_explained(self._search, in_unit_frame(self._request.shape, whole), covered) >= least
+        search, own = self._search, self._own(whole)
+        return own is not None and most_explained(search, own, _tree_of(own).at(search.points)) >= least
 
-    def _tree_of(self, whole: Assembly) -> FeatureTree | None:
-        """Solids that were found by the search as features; None where they cannot be mended."""
+    def _own(self, whole: Assembly) -> Assembly | None:
+        """Solids that were found by the search in the unit frame; None where they cannot be mended."""
         search = self._search
         if not has_exact_mesh(whole) or search.body.is_empty() or search.volume <= 0:
             return None
-        none = np.zeros(0, bool)
-        own = in_unit_frame(self._request.shape, whole)
-        return search.scored(FeatureTree([Feature(added, part, none, 0) for part, added in flattened(own)]))
+        return in_unit_frame(self._request.shape, whole)
 
     @cached_property
     def _search(self) -> FeatureSearch:
@@ -186,6 +181,12 @@ class FeaturedFit:
         iou, count = volume_iou(tree, self._samples), len(tree.features)
         made = partial(self.assembly, tree)
         self._request.run.told(Progress("features", count, count, count, iou, share, made))
+
+
+def _tree_of(own: Assembly) -> FeatureTree:
+    """The parts of an assembly in the unit frame, each a feature."""
+    none = np.zeros(0, bool)
+    return FeatureTree([Feature(added, part, none, 0) for part, added in flattened(own)])
 
 
 def freeform_warnings(shape: Shape, whole: Assembly) -> tuple[str, ...]:

@@ -240,13 +240,6 @@ class Mending:
         worst = off.worst(part)
         others, still = np.delete(rows, part, axis=0), np.delete(moving, part)
 
-        # In the part's own place, what is new is cut by what cuts the part.
-        cut = _cut(rows, part)
-
-        def instead(*new: Rows) -> tuple[Rows, Mask]:
-            places = [part if cut else len(others)] * len(new)
-            return np.insert(others, places, np.concatenate(new), axis=0), np.insert(still, places, True)
-
         def with_new(new: Rows) -> tuple[Rows, Mask]:
             return np.concatenate([rows, new]), np.append(moving, _all(new))
 
@@ -254,7 +247,11 @@ class Mending:
             yield others, still
         mine = owners(samples, rows) == part
         if mine.any():
-            yield instead(self.fitted(mine, others, rows[part], cut))
+            # In the part's own place, what is new is cut by what cuts the part.
+            cut = _cut(rows, part)
+            place = [part if cut else len(others)]
+            new = self.fitted(mine, others, rows[part], cut)
+            yield np.insert(others, place, new, axis=0), np.insert(still, place, True)
         if off.off[worst] > _FAR:
             grown = grow(samples, others, self.settings, _REGROWN)
             if len(grown):

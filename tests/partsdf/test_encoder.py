@@ -10,6 +10,7 @@ import pytest
 import torch
 from scipy.spatial import cKDTree
 
+from partwright.assembly.similarity import NO_ROTATION
 from partwright.datasets.prepared import PreparedFamily
 from partwright.errors import EmptyShapeError, FamilyError, ModelError, ParameterError, SettingError
 from partwright.partsdf.clouds import PartClouds, draw
@@ -18,7 +19,7 @@ from partwright.partsdf.encoder import KIND, Encoder, EncoderSettings, load_enco
 from partwright.partsdf.encoder_training import train_encoder
 from partwright.partsdf.model import Model, load_model
 from partwright.partsdf.part_vectors import PartVectors, quaternions
-from partwright.partsdf.poses import UPRIGHT, rotation_matrices
+from partwright.partsdf.poses import rotation_matrices
 from partwright.partsdf.reconstruction import ReconstructionSettings, Step, mean_error, reconstruct_unknown
 from partwright.partsdf.starts import find_starts
 from partwright.partsdf.targets import Target
@@ -115,7 +116,7 @@ def test_it_tells_poses_and_presence_of_a_held_out_shape(encoder: Encoder, lamps
 
 def test_reconstruction_begins_with_what_it_sees(encoder: Encoder, lamps: PreparedFamily) -> None:
     model, target = encoder.model, target_of(lamps, lamps.split("test")[0])
-    (start,) = find_starts(model, target, [UPRIGHT], ReconstructionSettings(start="encoder"))
+    (start,) = find_starts(model, target, [NO_ROTATION], ReconstructionSettings(start="encoder"))
     assert start.encoded
     as_seen = reconstruct_unknown(model, target, ReconstructionSettings(start="encoder", iterations=0))
     refined = reconstruct_unknown(
@@ -129,7 +130,7 @@ def test_reconstruction_begins_with_what_it_sees(encoder: Encoder, lamps: Prepar
     assert mean_error(exchanged, target) < 0.9 * mean_error(as_seen, target)
     assert [(step.number, step.of) for step in steps] == [(1, 2), (2, 2)]
     # By itself it is one of the starts, of which a few iterations choose.
-    starts = find_starts(model, target, [UPRIGHT], ReconstructionSettings(starts=3))
+    starts = find_starts(model, target, [NO_ROTATION], ReconstructionSettings(starts=3))
     assert [one.encoded for one in starts] == [True, False, False]
     quick = ReconstructionSettings(iterations=40, points=512, starts=3)
     assert mean_error(reconstruct_unknown(model, target, quick), target) < mean_error(as_seen, target)
@@ -174,7 +175,7 @@ def test_bad_points_and_families_are_told(
         train_encoder(saved, lamps, steps=0)
     plain = Target(torch.rand(100, 3), torch.rand(100) - 0.5)
     with pytest.raises(SettingError, match="points on the surface are needed"):
-        find_starts(saved, plain, [UPRIGHT], ReconstructionSettings(start="encoder"))
+        find_starts(saved, plain, [NO_ROTATION], ReconstructionSettings(start="encoder"))
     lonely = replace(model, hash="2" * 64)
     with pytest.raises(ModelError, match="lamps has no encoder"):
-        find_starts(lonely, plain, [UPRIGHT], ReconstructionSettings(start="encoder"))
+        find_starts(lonely, plain, [NO_ROTATION], ReconstructionSettings(start="encoder"))

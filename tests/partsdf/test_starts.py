@@ -13,13 +13,13 @@ import trimesh
 
 import partwright as pw
 from partwright.assembly import Similarity
+from partwright.assembly.checks import Quaternion
+from partwright.assembly.similarity import NO_ROTATION
 from partwright.partsdf.familiarity import ODD, STRANGE, Familiarity, familiarity, oddness
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
 from partwright.partsdf.starts import (
-    UPRIGHT,
-    Quaternion,
     best_starts,
     errors_by_part,
     errors_of,
@@ -38,7 +38,7 @@ def target_of(shape: NeuralShape, count: int = 4000) -> Target:
 
 
 def test_ways_to_stand_are_turns_about_the_up_axis_and_all_axes_where_it_is_unknown() -> None:
-    assert ways_to_stand("z")[0] == pytest.approx(UPRIGHT)
+    assert ways_to_stand("z")[0] == pytest.approx(NO_ROTATION)
     up = {
         "x": (1, 0, 0),
         "-x": (-1, 0, 0),
@@ -49,7 +49,7 @@ def test_ways_to_stand_are_turns_about_the_up_axis_and_all_axes_where_it_is_unkn
     }
     for axis, expected in up.items():
         ways = ways_to_stand(axis)
-        assert ways[0] == pytest.approx(UPRIGHT)
+        assert ways[0] == pytest.approx(NO_ROTATION)
         for rows in (Similarity(1.0, turn)(np.eye(3)) for turn in ways[-4:]):
             np.testing.assert_allclose(rows[2], expected, atol=1e-12)  # z is up there
         for turn in ways[:-4]:
@@ -66,9 +66,9 @@ def test_ways_to_stand_of_a_family_that_has_another_axis_up() -> None:
     def matrices(turns: list[Quaternion]) -> set[tuple[float, ...]]:
         return {tuple(np.round(Similarity(1.0, t)(np.eye(3)), 6).flatten() + 0.0) for t in turns}
 
-    assert ways_to_stand("y", "y")[0] == pytest.approx(UPRIGHT)
+    assert ways_to_stand("y", "y")[0] == pytest.approx(NO_ROTATION)
     assert matrices(ways_to_stand("y", "y")) == matrices(ways_to_stand("y")[:4])
-    assert ways_to_stand(None, "y")[0] == pytest.approx(UPRIGHT)
+    assert ways_to_stand(None, "y")[0] == pytest.approx(NO_ROTATION)
     assert matrices(ways_to_stand(None, "y")) == matrices(ways_to_stand(None))
     for turn in ways_to_stand("z", "y")[4:]:  # after those of a family that stands as the shape, by mistake
         np.testing.assert_allclose(Similarity(1.0, turn)(np.array([[0, 1, 0]]))[0], (0, 0, 1), atol=1e-12)
@@ -84,7 +84,7 @@ def test_a_scan_of_a_piece_is_not_taken_for_all_of_its_shape(model: Model) -> No
         low, high = points.min(axis=0), points.max(axis=0)
         piece = points[points[:, 2] < low[2] + 0.6 * (high - low)[2]]
         frame = pw.load_shape(piece).frame
-        (start,) = best_starts(model, Target.of_points(frame.to_unit(piece), 2000), 1, [UPRIGHT])
+        (start,) = best_starts(model, Target.of_points(frame.to_unit(piece), 2000), 1, [NO_ROTATION])
         places = np.random.default_rng(0).uniform(low, high, (4000, 3))
         true = whole.distances(places.astype(np.float32)) < 0
         found = start.shape.distances(frame.to_unit(places).astype(np.float32)) < 0
@@ -103,7 +103,7 @@ def test_a_turned_shape_is_found_as_it_stands(model: Model, up: str | None) -> N
         np.testing.assert_allclose(np.abs(np.dot(first.turn, turn)), 1.0, atol=1e-9)
         assert first.shape.latents.equal(NeuralShape.trained(model, "lamp3").latents)
         torch.testing.assert_close(first.target.points, target.points, atol=1e-5, rtol=0)
-    assert all(s.turn == UPRIGHT for s in best_starts(model, target, 3, ways_to_stand("z")))
+    assert all(s.turn == NO_ROTATION for s in best_starts(model, target, 3, ways_to_stand("z")))
 
 
 def test_parts_are_exchanged_one_by_one(model: Model) -> None:

@@ -72,11 +72,6 @@ def _near(radius: float) -> float:
     return max(_SAME * radius, _PLAIN)
 
 
-def is_one_radius(one: float, other: float) -> bool:
-    """Whether two holes are of one size, unit lengths."""
-    return abs(one - other) < _near(max(one, other))
-
-
 def _middle(loop: Loop) -> np.ndarray:
     """(2,) of its box."""
     lower, upper = Profile(loop).bounds()
