@@ -1,4 +1,5 @@
-"""A search beside the patterns of holes of its shape: it sees them filled, where they would hide walls."""
+"""A search beside the holes of its shape: it sees patterns of them filled, where they would hide walls, and
+what it closes is cut in the end."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ from partwright.superfrusta.filling import filled
 from partwright.superfrusta.hole_cutting import with_holes
 from partwright.superfrusta.hole_patterns import HolePattern, hole_patterns
 from partwright.superfrusta.resfit import ResidualFit
+from partwright.superfrusta.round_hole_cutting import with_round_holes
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.symmetric_fit import expanded
 
@@ -22,10 +24,12 @@ _MOST = 0.15  # of it: a pattern that holds more hides walls however large its h
 
 @dataclass
 class HoleSearch:
-    """patterns: that are to be cut out of what the search finds. samples: of the shape as it is. max_parts:
-    that the search may have in all."""
+    """shape: whose round holes are to be cut out of what the search finds; none where nothing is to be cut.
+    patterns: of holes of other forms, or hidden from it. samples: of the shape as it is. max_parts: that the
+    search may have in all."""
 
     search: ResidualFit
+    shape: Shape | None
     patterns: Sequence[HolePattern]
     samples: FitSamples
     max_parts: int | None
@@ -38,7 +42,7 @@ class HoleSearch:
         most = settings.max_parts
         wanted = settings.symmetry and settings.carving and settings.family != "solid" and not len(start)
         if not wanted or settings.curve or settings.min_iou is not None:
-            return cls(search, (), samples, most)
+            return cls(search, None, (), samples, most)
         with search.timed("holes"):
             patterns = hole_patterns(shape, samples)
             if most is not None:
@@ -47,21 +51,23 @@ class HoleSearch:
             hiding = [one.filling for one in patterns if hides(one, samples.inside_voxels)]
             if hiding:
                 search.samples = filled(samples, np.any(hiding, axis=0))
-        return cls(search, patterns, samples, most)
+        return cls(search, shape, patterns, samples, most)
 
     def cut(self) -> None:
         """The holes, out of the leaves that the search found, which sees the shape as it is from then on."""
         search = self.search
         search.settings = replace(search.settings, max_parts=self.max_parts)
-        if not self.patterns:
+        if self.shape is None:
             return
+        found = search.leaves
         with search.timed("holes"):
-            search.take_samples(self.unfilled(search.samples))
-            search.leaves = with_holes(
-                search.samples, search.leaves, self.patterns, search.settings, search.locked
-            )
-            rows = expanded(search.leaves)
-        search.report_progress("holes", search.settings.rounds, rows, 1.0, len(search.leaves))
+            if self.patterns:
+                search.take_samples(self.unfilled(search.samples))
+                found = with_holes(search.samples, found, self.patterns, search.settings, search.locked)
+            found = with_round_holes(self.shape, search.samples, found, search.settings)
+        if found is not search.leaves:
+            search.leaves, rows = found, expanded(found)
+            search.report_progress("holes", search.settings.rounds, rows, 1.0, len(found))
 
     def unfilled(self, samples: FitSamples) -> FitSamples:
         """Samples of the shape as it is, at the points of others: where something was astray, they are more

@@ -88,7 +88,7 @@ def round_holes(vertices: Floats, faces: NDArray[np.int64]) -> list[RoundHole]:
 
 
 def _axes(along: Floats, length: Floats) -> Iterator[Floats]:
-    """Unit vectors (3,) that edges (E, 3) run along, those of the most length first."""
+    """Unit vectors (3,) that as many edges (E, 3) run along as a hole has, those of the most length first."""
     left = np.arange(len(along))
     for _ in range(_AXES):
         if not len(left):
@@ -96,8 +96,9 @@ def _axes(along: Floats, length: Floats) -> Iterator[Floats]:
         first = along[left[length[left].argmax()]]
         near = np.abs(along[left] @ first) > _PARALLEL
         own = along[left[near]] * np.sign(along[left[near]] @ first)[:, None]
-        mean = (own * length[left[near], None]).sum(axis=0)
-        yield snapped(mean / np.linalg.norm(mean))
+        if len(own) >= _FEWEST:
+            mean = (own * length[left[near], None]).sum(axis=0)
+            yield snapped(mean / np.linalg.norm(mean))
         left = left[~near]
 
 
