@@ -21,6 +21,7 @@ from partwright.superfrusta.featured import SURE, FeaturedFit, freeform_warnings
 from partwright.superfrusta.hole_search import HoleSearch
 from partwright.superfrusta.left_out import left_out, left_out_warnings
 from partwright.superfrusta.outcome import assembly_of
+from partwright.superfrusta.rejoining import rejoined
 from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
@@ -79,6 +80,9 @@ def fit(request: FitRequest[Settings]) -> Fitted:
             f"can see. Check its thickness{advice}"
         )
     search.leaves = search.leaves or [RepeatedPart(row) for row in search.best]
+    if outcome != "interrupted" and not settings.curve:
+        with search.timed("rejoin"):
+            search.leaves = rejoined(search.samples, search.leaves, settings)
     holes.cut()
     leaves = search.leaves
     whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
