@@ -136,7 +136,7 @@ def main() -> int:
     TARGET.mkdir(parents=True, exist_ok=True)
     if arguments.seen:
         family = PreparedFamily(arguments.families / arguments.seen)
-        write_png(TARGET / "seen.png", seen(arguments.seen, family))
+        write_png(TARGET / f"seen_{arguments.seen}.png", seen(arguments.seen, family))
         return 0
     for name in arguments.only.split(","):
         write_png(TARGET / f"{name}.png", page(name, PreparedFamily(arguments.families / name)))
