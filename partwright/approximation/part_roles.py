@@ -9,12 +9,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from partwright.approximation.round_roles import is_walled, round_role, round_size
 from partwright.approximation.tooth_roles import GAP, is_fin, tooth_role
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.group_copies import in_runs, numbered_names
 from partwright.assembly.names import unique_names
 from partwright.assembly.similarity import rotation_matrix
-from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Frustum, Profile, Revolution, Sphere
+from partwright.fields import (
+    Box,
+    Cone,
+    Cylinder,
+    Extrusion,
+    Field,
+    Frustum,
+    Profile,
+    Revolution,
+    Sphere,
+    Swept,
+    Tube,
+)
 
 FREEFORM = "freeform"
 """What names of parts begin with that are no feature, and keep them."""
@@ -34,7 +47,7 @@ def with_role_names(assembly: Assembly) -> Assembly:
     added = [part for part in ordered.parts if roles.get(part.name) not in (None, *_CUTS)]
     if added:
         base = max(added, key=_bulk)
-        noun = "cylinder" if isinstance(base.field, Cylinder) else roles[base.name]
+        noun = roles[base.name] if round_size(base.field) is None else "cylinder"
         roles[base.name] = f"base_{noun}"
         for part in added:
             if roles[part.name] == "plate" and is_fin(part, [other for other in added if other is not part]):
@@ -121,8 +134,8 @@ def _added(field: Field) -> str:
         return "ball"
     if isinstance(field, Cone | Frustum):
         return "cone"
-    if isinstance(field, Cylinder):
-        return "disc" if field.height < _FLAT * 2 * field.radius else _upright(field)
+    if (size := round_size(field)) is not None:
+        return round_role(*size)
     if isinstance(field, Revolution):
         return "turned"
     if short < _FLAT * middle:
@@ -130,30 +143,37 @@ def _added(field: Field) -> str:
     return "bar" if long > _LONG * middle else "block"
 
 
-def _upright(field: Cylinder) -> str:
-    return "shaft" if field.height > _LONG * 2 * field.radius else "boss"
-
-
 def _cut(part: Part, cut_from: Node, beside: Sequence[Node]) -> str:
     field = part.field
-    if isinstance(field, Cone | Frustum):
-        return "countersink"
     if isinstance(field, Sphere):
         return "dimple"
-    if isinstance(field, Revolution):
-        return _turned_cut(field.profile)
     if isinstance(field, Extrusion) and _is_slot(field.profile):
         return "slot"
+    turned = _turned_cut(field.profile) if isinstance(field, Revolution) else None
+    if turned == "groove":
+        return turned
     through = _goes_through(part, cut_from, beside)
-    if not isinstance(field, Cylinder):
-        return "opening" if through and isinstance(field, Box | Extrusion) else "pocket"
-    axis = rotation_matrix(part.rotation)[:, 2]
+    round_ = None if _has_core(field) else round_size(field)
+    tapers = isinstance(field, Cone | Frustum)
+    if (turned or tapers or round_) and is_walled(part, cut_from):
+        return "countersink" if tapers else turned or _hole(part, cut_from, through)
+    return "opening" if through and isinstance(field, Box | Cylinder | Swept) else "pocket"
+
+
+def _has_core(field: Field) -> bool:
+    """Whether a cut leaves something standing about its axis."""
+    return isinstance(field, Tube) or (isinstance(field, Extrusion) and bool(field.profile.holes))
+
+
+def _hole(part: Part, cut_from: Node, through: bool) -> str:
+    """What a round hole of one width is called."""
+    if not through:
+        return "blind_hole"
+    axis, width = rotation_matrix(part.rotation)[:, 2], float(np.ptp(part.field.bounds(), axis=0)[0])
     sides = np.ptp(cut_from.bounds(), axis=0)[np.abs(axis) < math.sqrt(0.5)]
-    if through and len(sides) and 2 * field.radius > _BORE * float(sides.min()):
+    if len(sides) and width > _BORE * float(sides.min()):
         return "bore"
-    if through:
-        return "bolt_hole" if len(part.copies) > 1 else "hole"
-    return "blind_hole"
+    return "bolt_hole" if len(part.copies) > 1 else "hole"
 
 
 def _turned_cut(profile: Profile) -> str:

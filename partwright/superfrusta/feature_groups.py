@@ -105,7 +105,9 @@ def _copy(first: Sequence[_Leaf], other: Sequence[_Leaf]) -> GroupCopy | None:
             left = list(other)
             for leaf, image in zip(first, images, strict=True):
                 moved = image.transformed(move)
-                same = next((o for o in left if o.feature == leaf.feature and _same(moved, o.part)), None)
+                same = next(
+                    (o for o in left if o.feature == leaf.feature and same_solid(moved, o.part)), None
+                )
                 if same is None:
                     break
                 left.remove(same)
@@ -130,14 +132,14 @@ def _moves(first: Sequence[_Leaf], images: Sequence[Part], other: Sequence[_Leaf
                 yield from (target.part.pose @ turn @ back for turn in _HALF_TURNS)
 
 
-def _same(one: Part, other: Part) -> bool:
-    """Whether two parts are the same solid, in whatever pose."""
+def same_solid(one: Part, other: Part, within: float = _SAME) -> bool:
+    """Whether two parts are the same solid, in whatever pose, within unit lengths."""
     box, own = one.bounds(), other.bounds()
-    if not np.isfinite([box, own]).all() or np.abs(box - own).max() > 2 * _SAME:
+    if not np.isfinite([box, own]).all() or np.abs(box - own).max() > 2 * within:
         return False
     room = 0.1 * np.ptp(box, axis=0)
     points = np.random.default_rng(0).uniform(box[0] - room, box[1] + room, (_POINTS, 3))
-    return bool(np.abs(one.distance(points) - other.distance(points)).max() < _SAME)
+    return bool(np.abs(one.distance(points) - other.distance(points)).max() < within)
 
 
 def _with_copies(parts: Sequence[Part], labels: Sequence[int] | None = None) -> list[tuple[int, Part]]:

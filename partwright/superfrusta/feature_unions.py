@@ -3,7 +3,7 @@ two plates that make an angle, a slot and the pocket beside it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Masks = list[NDArray[np.bool_]]
+Joined = Callable[[Feature, Feature], Iterator[Feature]]
+"""Of two features, both added or both cut: what may stand for both."""
 
 _CHORD = 1e-4  # unit lengths: how far chords of an outline may be off
 _NEAR = 2 * FINE  # unit lengths, by which walls that are one may be apart
@@ -41,12 +43,18 @@ _FURTHER = 1e-3  # unit lengths, by which a corner may be further off
 def with_common_outlines(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
     """The tree with one extrusion for two features, with all their copies, where that is plainer, explains
     the shape no worse, and is no further off."""
+    return with_plainest(search, tree, _common, _LOSS)
+
+
+def with_plainest(search: FeatureSearch, tree: FeatureTree, joined: Joined, loss: float) -> FeatureTree:
+    """The tree with one feature for two, the plainest first, where that is plainer, explains the shape no
+    worse, and is no further off. loss: of R, that all such may cost together."""
     tree = search.scored(tree)
-    least, limit = tree.score - _LOSS, -1.0
+    least, limit = tree.score - loss, -1.0
     while True:
         plainer = [
             other
-            for other in _rewritten(search, tree)
+            for other in _rewritten(search, tree, joined)
             if other.score >= least and other.objective > tree.objective
         ]
         if plainer and limit < 0:  # as much time as all else here
@@ -58,13 +66,13 @@ def with_common_outlines(search: FeatureSearch, tree: FeatureTree) -> FeatureTre
         tree = found
 
 
-def _rewritten(search: FeatureSearch, tree: FeatureTree) -> Iterator[FeatureTree]:
+def _rewritten(search: FeatureSearch, tree: FeatureTree, joined: Joined) -> Iterator[FeatureTree]:
     """With one feature in the place of either of two."""
     features = tree.features
     masks = [mask_of(feature, search.points) for feature in features]
     for i, j in combinations(range(len(features)), 2):
         if features[i].added is features[j].added:
-            for whole in _common(features[i], features[j]):
+            for whole in joined(features[i], features[j]):
                 whole = replace(whole, covers=mask_of(whole, search.points))
                 yield from (_with(search, tree, masks, whole, *places) for places in ((i, j), (j, i)))
 

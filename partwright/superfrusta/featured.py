@@ -25,6 +25,7 @@ from partwright.superfrusta.feature_mouths import LeftOut, mouths_left_out
 from partwright.superfrusta.feature_outlines import with_plain_outlines
 from partwright.superfrusta.feature_pockets import with_pockets
 from partwright.superfrusta.feature_pruning import pruned
+from partwright.superfrusta.feature_repeats import with_repeats
 from partwright.superfrusta.feature_rings import with_shared_bores
 from partwright.superfrusta.feature_search import FeatureSearch
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
@@ -97,7 +98,7 @@ class FeaturedFit:
             tree = with_pockets(with_shared_bores(tree, points), points)
             toothed = with_teeth_apart(search, tree)
             united = with_common_outlines(search, with_whole_boxes(toothed, points))
-            return with_plain_outlines(search, united), False
+            return with_repeats(search, with_plain_outlines(search, united)), False
         for count in range(1, len(tree.features) + 1):
             shorter = tree.first(count)
             if volume_iou(shorter, self._samples) >= settings.min_iou:

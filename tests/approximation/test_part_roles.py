@@ -8,7 +8,7 @@ import numpy as np
 
 from partwright.approximation.part_roles import with_role_names
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.fields import Box, Cone, Cylinder, Extrusion, Profile, Quadric, Revolution, Sphere
+from partwright.fields import Box, Cone, Cylinder, Extrusion, Profile, Quadric, Revolution, Sphere, Tube
 
 
 def test_a_flanged_plate_reads_as_one() -> None:
@@ -90,6 +90,36 @@ def test_holes_are_called_after_how_they_are_made() -> None:
     assert [part.name for part in after.parts] == ["base_plate", *names]
 
 
+def test_what_is_round_is_called_so_whatever_it_is_drawn_as() -> None:
+    """A ring, a shaft with chamfers, a pin with a hole of six sides, a chamfered hole."""
+    round_ = [(-4, 0, 1), (4, 0, 1)]
+    nut = Profile(round_, [Profile.regular(6, 2).outline])
+    added = (
+        Part(Box((90, 90, 4)), name="a"),
+        Part(Tube(8, 2, 20), (0, 0, 10), name="b"),
+        Part(Tube(8, 2, 3), (25, 0, 3), name="c"),
+        Part(Extrusion(nut, 10), (-25, 0, 5), name="d"),
+        Part(Extrusion(Profile(round_), 30, bottom_chamfer=0.5, top_chamfer=0.5), (0, 25, 15), name="e"),
+    )
+    hole = Part(Extrusion(Profile(round_), 9, top_chamfer=0.5), (-25, -25, 0), name="f")
+    after = with_role_names(Assembly((Assembly(added), hole), "difference"))
+    names = {before: now.name for before, now in zip("abecdf", after.parts, strict=True)}
+    assert names == {"a": "base_plate", "b": "boss", "c": "disc", "d": "boss_02", "e": "shaft", "f": "hole"}
+
+
+def test_an_arch_along_an_edge_is_no_hole_until_it_goes_half_around() -> None:
+    body = Part(Box((40, 40, 6)), name="x")
+    profile = Profile([(0, -5), (2, -5), (2, 1), (4, 1), (4, 8), (0, 8)])
+    sunk = Profile([(0, -5), (2, -5), (2, 1), (4, 3), (4, 8), (0, 8)])
+    for field in (Cylinder(4, 20), Revolution(profile), Revolution(sunk)):
+        near, far = (Part(field, (x, 0, 0), name="y") for x in (18, 22))
+        (_, hole), (_, arch) = (with_role_names(Assembly((body, p), "difference")).parts for p in (near, far))
+        assert hole.name.endswith("hole")
+        assert arch.name == "opening"
+    cone = Part(Cone(4, 4), (22, 0, 2), (0, 1, 0, 0), name="z")
+    assert with_role_names(Assembly((body, cone), "difference")).parts[1].name == "pocket"
+
+
 def test_what_stands_around_an_axis_is_teeth_and_holes_in_it_are_not() -> None:
     def ring(part: Part, count: int) -> Part:
         turns = (Similarity.turn((0, 0, 1), 2 * np.pi * k / count) for k in range(1, count))
@@ -145,7 +175,7 @@ def test_boards_slats_and_washers_in_a_row_are_no_fins() -> None:
     assert names(rail, row(Part(Box((20, 80, 2)), name="e"), 30, 0, 0)) == ["base_bar", "plate"]
     ring = Profile([(-8, 0, 1), (8, 0, 1)], [[(-3, 0, 1), (3, 0, 1)]])
     washers = row(Part(Extrusion(ring, 2), name="f"), 0, 0, 4)
-    assert names(washers, Part(Cylinder(3.01, 60), name="g")) == ["base_cylinder", "plate"]
-    assert names(washers, Part(Box((6, 16, 60)), (10, 0, 0), name="h")) == ["base_bar", "plate"]
+    assert names(washers, Part(Cylinder(3.01, 60), name="g")) == ["base_cylinder", "disc"]
+    assert names(washers, Part(Box((6, 16, 60)), (10, 0, 0), name="h")) == ["base_bar", "disc"]
     bulkiest = row(Part(Box((80, 100, 8)), (42, -35, -80), name="b"), 0, 0, 30)
     assert names(bulkiest, back) == ["base_plate", "plate"]
