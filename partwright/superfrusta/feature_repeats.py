@@ -41,7 +41,7 @@ _TURNS = [
 
 def with_repeats(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
     """The tree with one feature, and further copies of it, for two that are the same solid elsewhere, where
-    that explains the shape no worse and is no further off."""
+    that hardly explains the shape worse and is no further off."""
     return with_plainest(search, tree, _repeated, _LOSS)
 
 
