@@ -125,7 +125,7 @@ def with_copies(
         found = ((move, part.transformed(move)) for move in moves)
         near = ((move, copy) for move, copy in found if within_box(few, *copy.bounds()).sum() > hits)
         may_pay = {move: (copy, hit) for move, copy in near if (hit := covers(copy, few)).sum() > hits}
-        ordered = _nearest_first(search, part, list(may_pay), flips if chosen.beyond else {})
+        ordered = nearest_first(search, part, list(may_pay), flips if chosen.beyond else {})
         kept = [move for move in ordered if joined(*may_pay[move])]
         rest = few[left]
         ways = _lattice(part, kept) if len(rest) > hits else ()
@@ -175,7 +175,7 @@ def _shifts(part: Part, turns: Sequence[Similarity], mirrors: Sequence[Similarit
     ]
 
 
-def _nearest_first(
+def nearest_first(
     search: FeatureSearch, part: Part, moves: Sequence[Similarity], flips: Mapping[Similarity, Motion]
 ) -> list[Similarity]:
     """Those first that take the surface around the part to the surface most exactly; symmetries of a whole

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import permutations, product
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from partwright.assembly import Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
+from partwright.superfrusta.feature_copying import nearest_first
 from partwright.superfrusta.feature_groups import same_solid
 from partwright.superfrusta.feature_steps import Feature, FeatureTree
 from partwright.superfrusta.feature_unions import with_plainest
@@ -42,25 +44,27 @@ _TURNS = [
 def with_repeats(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:
     """The tree with one feature, and further copies of it, for two that are the same solid elsewhere, where
     that hardly explains the shape worse and is no further off."""
-    return with_plainest(search, tree, _repeated, _LOSS)
+    return with_plainest(search, tree, partial(_repeated, search), _LOSS)
 
 
-def _repeated(one: Feature, other: Feature) -> Iterator[Feature]:
+def _repeated(search: FeatureSearch, one: Feature, other: Feature) -> Iterator[Feature]:
     """Each of the two with copies in the places of the other's."""
     for first, second in ((one, other), (other, one)):
         if first.freeform or second.freeform or first.image is not None:
             continue
         copies = [copy for part in second.parts for copy in part.copies]
-        moves = [move for copy in copies if (move := _move(first.part, copy)) is not None]
-        if len(moves) == len(copies):
+        ways = [list(_moves(first.part, copy)) for copy in copies]
+        if all(ways):
+            # What is as well turned over may have its open end on the other side then.
+            moves = (nearest_first(search, replace(first.part, instances=()), own, {})[0] for own in ways)
             part = replace(first.part, instances=(*first.part.instances, *moves))
             yield replace(first, part=part)
 
 
-def _move(part: Part, copy: Part) -> Similarity | None:
-    """What takes the first of a part's copies to a solid, the least turn that does; None where none does."""
+def _moves(part: Part, copy: Part) -> Iterator[Similarity]:
+    """That take the first of a part's copies to a solid, those of the least turn first."""
     if part.field.kind != copy.field.kind:
-        return None
+        return
     part = replace(part, instances=())
     frame, its = rotation_matrix(part.rotation), rotation_matrix(copy.rotation)
     (low, high), (its_low, its_high) = part.field.bounds(), copy.field.bounds()
@@ -70,8 +74,7 @@ def _move(part: Part, copy: Part) -> Similarity | None:
     for turn in sorted((its @ t @ frame.T for t in fitting), key=lambda turn: -float(np.trace(turn))):
         move = _about(turn, middle, target)
         if same_solid(part.transformed(move), copy, _SAME):
-            return move
-    return None
+            yield move
 
 
 def _about(turn: Floats, start: Floats, end: Floats) -> Similarity:

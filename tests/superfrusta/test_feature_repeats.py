@@ -50,3 +50,16 @@ def test_windows_around_a_middle_are_one_with_turned_copies() -> None:
     found, off = repeated((True, plate), *cuts)
     assert found == [(True, "box", 1), (False, "box", 4), (False, "cylinder", 1)]
     assert off == 0.0
+
+
+def test_a_peg_turned_over_keeps_its_free_end_outside() -> None:
+    """It is the same peg either way; but where one of its ends is open, so is that of its copy."""
+    up, aside = (0.7071067811865476, 0, 0.7071067811865476, 0), (0.7071067811865476, 0.7071067811865476, 0, 0)
+    pegs = Part(Cylinder(3, 12), (24, 0, 0), up), Part(Cylinder(3, 12), (0, 19, 0), aside)
+    search, tree, _ = drawn((True, _BLOCK), *((True, peg) for peg in pegs), sides=4)
+    peg = with_repeats(search, tree).features[1].part
+    (move,) = peg.instances
+    low, high = peg.copies[0].bounds()
+    free = np.where(np.abs(low) > np.abs(high), low, high) * (np.abs(low + high) > 1e-6)
+    assert np.abs(move(free[None])).max() == pytest.approx(np.abs(peg.copies[1].bounds()).max())
+    assert len(with_repeats(search, tree).features) == 2
