@@ -172,20 +172,30 @@ def _exchange(
     return best, move
 
 
-def grown(problem: Problem, outside: Matrix, reduction: Matrix, allowed: NDArray[np.bool_]) -> Convex:
-    """A convex grown from all of space: the allowed quadrics (K,) join, best first, while that pays."""
+def grown(
+    problem: Problem,
+    outside: Matrix,
+    reduction: Matrix,
+    allowed: NDArray[np.bool_],
+    known: dict[Convex, Matrix],
+) -> Convex:
+    """A convex grown from all of space: the allowed quadrics (K,) join, best first, while that pays.
+
+    known: what each quadric (K,) would take from a convex of those that joined, in their order. Many seeds pass
+    through the same ones, so they share it.
+    """
     problem.step()
-    chosen: list[int] = []
+    chosen: Convex = ()
     while True:
-        gain = np.where(allowed, -(reduction @ outside) - problem.price, -np.inf)
-        if chosen:
-            gain[chosen] = -np.inf
+        if chosen not in known:
+            covered = ~outside[:, list(chosen)].any(axis=1)
+            known[chosen] = _sums(outside, reduction, covered)
+        gain = np.where(allowed, -known[chosen] - problem.price, -np.inf)
+        gain[list(chosen)] = -np.inf
         add = int(np.argmax(gain))
         if gain[add] <= _MIN_GAIN:
-            return tuple(chosen)
-        keep = outside[:, add] == 0
-        outside, reduction = outside[keep], reduction[keep]
-        chosen.append(add)
+            return chosen
+        chosen = (*chosen, add)
 
 
 def best_convex(problem: Problem, reduction: NDArray[np.float32]) -> tuple[Convex, float]:
@@ -201,8 +211,9 @@ def best_convex(problem: Problem, reduction: NDArray[np.float32]) -> tuple[Conve
     share = reduction[wanted].astype(np.float64)
     seeds = rng.choice(wanted, min(_SEED_SAMPLES, len(wanted)), replace=False, p=share / share.sum())
     tried: dict[Convex, float] = {}
+    known: dict[Convex, Matrix] = {}
     for seed in seeds:
-        convex = tuple(sorted(grown(problem, outside, value, problem.outside[seed] == 0)))
+        convex = tuple(sorted(grown(problem, outside, value, problem.outside[seed] == 0, known)))
         if convex not in tried:
             cover = ~outside[:, list(convex)].any(axis=1)
             tried[convex] = float(value[cover].sum()) - problem.length(convex)

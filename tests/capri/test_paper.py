@@ -31,6 +31,8 @@ from partwright.methods import Cancellation, FitRequest, Progress, Run
 from partwright.shapes import Shape, load_shape
 from tests.capri.meshes import drilled_plate
 
+pytestmark = pytest.mark.usefixtures("detected_once")
+
 PAPER = {"schedule": "paper", "iterations": 3, "surface": 6000, "near": 6000, "uniform": 5000, "tries": 0}
 
 
@@ -172,7 +174,7 @@ def test_too_few_iterations_are_named(plate: Shape) -> None:
 
 
 def test_searching_among_the_shipped_network_s_quadrics(plate: Shape) -> None:
-    fitted = fit(plate, Settings(start="weights", surface=3000, near=3000, uniform=2500, tries=0))
+    fitted = fit(plate, Settings(start="weights", surface=1500, near=1500, uniform=1200, tries=0))
     assert fitted.details["start"] == "pre-trained network"
     assert mesh_csg(fitted.assembly).is_watertight
     assert fitted.details["costs"]["pre-trained network"] < 0.7
