@@ -181,8 +181,8 @@ def grown(
 ) -> Convex:
     """A convex grown from all of space: the allowed quadrics (K,) join, best first, while that pays.
 
-    known: what each quadric (K,) would take from a convex of those that joined, in their order. Many seeds pass
-    through the same ones, so they share it.
+    known: what each quadric (K,) would take from a convex of those that joined, in their order; added to.
+    Many seeds pass through the same convexes.
     """
     problem.step()
     chosen: Convex = ()

@@ -175,7 +175,11 @@ def test_hostile_data_is_refused(data: Any, message: str) -> None:
         fields.from_dict(data)
 
 
-@given(st.recursive(st.none() | st.booleans() | st.floats() | st.text(), st.lists, max_leaves=5))
+# All that text can hold; Hypothesis takes seconds to find the same by its default, what UTF-8 can hold.
+TEXT = st.text(st.characters(exclude_categories=["Cs"]))
+
+
+@given(st.recursive(st.none() | st.booleans() | st.floats() | TEXT, st.lists, max_leaves=5))
 def test_any_value_is_accepted_or_refused_by_name(value: Any) -> None:
     try:
         found = fields.from_dict({"kind": "cone", "radius": value, "height": 1})

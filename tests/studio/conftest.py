@@ -16,14 +16,28 @@ from typing import Any, ClassVar
 
 import pytest
 
-from partwright.assembly import Assembly
+from partwright.assembly import Assembly, Part
+from partwright.assembly.file_text import to_text
 from partwright.cli.main import parser
 from partwright.export import export
+from partwright.fields import Sphere
 from tests.browsers import PATIENCE
 
 # Once at rest, a picture is drawn four times and smoothed: seconds of a processor, after every change.
 UNSMOOTHED = """() => {
     Object.defineProperty(partwright.viewport.renderer, "passes", { get: () => 1 });
+}"""
+
+# As a page that has just been opened, but for its undo steps.
+SHOW = """async (text) => {
+    const { viewport } = partwright;
+    viewport.forgetClick();
+    viewport.setTool("select");
+    viewport.clearMeasurements();
+    Object.assign(viewport.camera, { azimuth: 32, elevation: 24 });
+    document.activeElement.blur();
+    for (const one of document.querySelectorAll(".toast, dialog")) one.remove();
+    await partwright.openFile(new File([text], "shown.json"));
 }"""
 
 
@@ -98,6 +112,27 @@ def shared(new_page: Callable[..., Page], tmp_path: Path) -> Callable[..., Page]
         path = tmp_path / "shared.html"
         export(assembly, path)
         return new_page(**options).open(path.as_uri())
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def page_of_a_file(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    path = tmp_path_factory.mktemp("page") / "page.html"
+    export(Assembly((Part(Sphere(1.0)),)), path)
+    with browser.new_context(viewport={"width": 900, "height": 400}, device_scale_factor=0.25) as context:
+        yield Page(context.new_page(), smooth=False).open(path.as_uri())
+
+
+@pytest.fixture
+def shown(page_of_a_file: Page) -> Callable[[Assembly], Page]:
+    """Shows an assembly in a page that others had before: a new one compiles its shaders, for seconds."""
+
+    def make(assembly: Assembly) -> Page:
+        page_of_a_file.errors.clear()
+        page_of_a_file.requests.clear()
+        page_of_a_file.ask(SHOW, to_text(assembly))
+        return page_of_a_file
 
     return make
 

@@ -172,10 +172,10 @@ def test_the_shader_bends_normals_as_the_package_does(shared: Callable[..., Page
     assert not page.errors
 
 
-def test_what_is_no_image_is_no_harm(shared: Callable[..., Page]) -> None:
+def test_what_is_no_image_is_no_harm(shown: Callable[[Assembly], Page]) -> None:
     bad = Part(Box((1, 1, 1)), name="bad", metadata={"texture": "data:image/png;base64,AAAA"})
     other = Part(Box((1, 1, 1)), (2, 0, 0), name="other", metadata={"texture": "https://example.com/a.png"})
-    page = shared(Assembly((bad, other)))
+    page = shown(Assembly((bad, other)))
     page.settle()
     assert page.ask("() => partwright.viewport.maps.maps") is None
     assert not page.errors

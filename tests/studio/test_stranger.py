@@ -23,8 +23,8 @@ STOOL = Assembly(
 )
 
 
-def test_one_of_four_legs_that_are_copies_is_removed(shared: Callable[..., Page]) -> None:
-    page = shared(STOOL)
+def test_one_of_four_legs_that_are_copies_is_removed(shown: Callable[[Assembly], Page]) -> None:
+    page = shown(STOOL)
     page.page.locator(".row[data-name=leg]").click()
     page.page.keyboard.press("Delete")
     assert len(from_text(page.assembly())) == 1
@@ -44,11 +44,11 @@ def test_one_of_four_legs_that_are_copies_is_removed(shared: Callable[..., Page]
     assert not page.errors
 
 
-def test_a_hole_is_drilled_where_the_surface_is_clicked(shared: Callable[..., Page]) -> None:
+def test_a_hole_is_drilled_where_the_surface_is_clicked(shown: Callable[[Assembly], Page]) -> None:
     mug = Assembly(
         (Part(Tube(30, 4, 80), name="wall"), Part(Box((10, 10, 10)), (0, 0, -36))), unit="mm", up="z"
     )
-    page = shared(mug, width=1000, height=500)
+    page = shown(mug)
     page.page.keyboard.press("1")  # from the front: the wall at y = -30
     page.settle()
     page.page.get_by_role("button", name="Add", exact=True).click()
@@ -69,8 +69,8 @@ def test_a_hole_is_drilled_where_the_surface_is_clicked(shared: Callable[..., Pa
     assert not page.errors
 
 
-def test_what_is_added_is_seen_at_once(shared: Callable[..., Page]) -> None:
-    page = shared(STOOL, width=1000, height=500)
+def test_what_is_added_is_seen_at_once(shown: Callable[[Assembly], Page]) -> None:
+    page = shown(STOOL)
     page.page.get_by_role("button", name="Add", exact=True).click()
     page.page.get_by_role("menuitem", name="sphere").click()
     page.settle()
@@ -85,7 +85,7 @@ def test_what_is_added_is_seen_at_once(shared: Callable[..., Page]) -> None:
     assert seen == "sphere"
 
 
-def test_copies_in_a_difference_stay_what_they_are(shared: Callable[..., Page]) -> None:
+def test_copies_in_a_difference_stay_what_they_are(shown: Callable[[Assembly], Page]) -> None:
     holes = Part(Cylinder(3, 30), (10, 10, 50), name="hole", instances=(Similarity(translation=(30, 30, 0)),))
     plate = Assembly((STOOL["seat"], holes), "difference", unit="mm")
     cut_first = Assembly(
@@ -93,7 +93,7 @@ def test_copies_in_a_difference_stay_what_they_are(shared: Callable[..., Page]) 
     )
     points = np.random.default_rng(0).uniform(-20, 90, (400, 3))
     for assembly, name in ((plate, "hole"), (cut_first, "legs")):
-        page = shared(assembly)
+        page = shown(assembly)
         page.page.locator(f".row[data-name={name}]").click()
         page.page.get_by_role("button", name="Repeat").click()
         page.page.get_by_role("menuitem", name="Each a part of its own").click()
