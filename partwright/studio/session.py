@@ -16,7 +16,7 @@ from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError, OutputError, PartwrightError, SettingError
 from partwright.export.formats import FORMATS
 from partwright.methods import METHODS, Cancellation, Progress
-from partwright.metrics import evaluate
+from partwright.metrics import Scores, evaluate
 from partwright.shapes import Shape
 from partwright.studio import fits, improving, learned, messages
 from partwright.studio.journal import Journal
@@ -40,6 +40,7 @@ class Session:
         self._cancel: Cancellation | None = None
         self._scoring: asyncio.Task[None] | None = None
         self._busy = threading.Lock()
+        self._scored: tuple[str, Shape, Scores] | None = None  # the last, which a page that joins asks again
 
     # Pages
 
@@ -231,14 +232,18 @@ class Session:
         await asyncio.sleep(_QUIET)
         revision, text, shape = self.journal.revision, self.journal.text, self.shape
         assert shape is not None
+        outdated = threading.Event()
         try:
-            scores = await asyncio.to_thread(self._work_scores, text, shape)
+            scores = await asyncio.to_thread(self._work_scores, text, shape, outdated)
+        except asyncio.CancelledError:
+            outdated.set()
+            raise
         except NoSurfaceError:
             return
         except PartwrightError as error:
             self.tell(messages.Failed(f"no scores: {error}"))
             return
-        if revision == self.journal.revision:
+        if scores is not None and revision == self.journal.revision:
             told = messages.Scored(
                 revision,
                 scores.iou,
@@ -249,9 +254,14 @@ class Session:
             )
             self.tell(told)
 
-    def _work_scores(self, text: str, shape: Shape) -> Any:
-        with self._busy:  # one at a time; what was cancelled while it waited is not missed
-            return evaluate(from_text(text), shape, emd=False)
+    def _work_scores(self, text: str, shape: Shape, outdated: threading.Event) -> Scores | None:
+        """None of an assembly that was edited, or a server that was stopped, while others were scored."""
+        with self._busy:  # one at a time
+            if outdated.is_set():
+                return None
+            if self._scored is None or self._scored[0] != text or self._scored[1] is not shape:
+                self._scored = text, shape, evaluate(from_text(text), shape, emd=False)
+            return self._scored[2]
 
     def _on_loop(self, function: Callable[..., None], *arguments: Any) -> None:
         if self._loop is not None and not self._loop.is_closed():

@@ -63,12 +63,14 @@ class Page:
         return self.page.evaluate(script, argument)
 
     def wait(self, script: str, argument: Any = None) -> None:
-        """Until the script gives true. The page allows no code from strings, so this asks from outside."""
-        end = time.monotonic() + PATIENCE
+        """Until the script gives true. The page allows no code from strings, so this asks from outside, less
+        often as it takes longer: to ask costs three processes some milliseconds."""
+        end, pause = time.monotonic() + PATIENCE, 0.02
         while not self.page.evaluate(script, argument):
             assert not self.errors, self.errors
             assert time.monotonic() < end, f"the page never said yes to {script}"
-            time.sleep(0.02)
+            time.sleep(pause)
+            pause = min(1.3 * pause, 0.3)
 
     def settle(self) -> None:
         self.wait("() => partwright.viewport.renderer.settled")
@@ -173,7 +175,7 @@ class Server:
 
 @pytest.fixture
 def serve(
-    tmp_path: Path, browser: object, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, browser: object, coarse_scores: None, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Callable[..., Server]]:
     import uvicorn
 

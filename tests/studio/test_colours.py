@@ -211,10 +211,14 @@ def test_a_lost_context_comes_back_with_all_that_it_showed(shared: Callable[...,
 
 
 def test_colours_are_baked_from_the_page_and_kept_once(
-    tmp_path: Path, serve: Callable[..., Server], new_page: Callable[..., Page]
+    tmp_path: Path,
+    serve: Callable[..., Server],
+    new_page: Callable[..., Page],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pytest.importorskip("uvicorn", reason="the studio's server needs uvicorn")
-    mesh = mesh_assembly(MUG, 64).subdivide()
+    monkeypatch.setattr("partwright.textures.sightings._SIDE", 128)  # pixels of 384, as in tests/textures
+    mesh = mesh_assembly(MUG, 64)
     red = mesh.vertices[:, 2] > 40
     mesh.visual.vertex_colors = np.where(red[:, None], [200, 40, 30, 255], [30, 60, 200, 255]).astype(
         np.uint8
