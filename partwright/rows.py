@@ -44,6 +44,11 @@ def units(rows: Floats) -> Floats:
     return rows / np.maximum(lengths(rows), np.finfo(rows.dtype).tiny)[..., None]
 
 
+def following(rows: NDArray[Number]) -> NDArray[Number]:
+    """Rows (N, ...), N at least 1, from the second on, then the first: `np.roll(rows, -1, axis=0)`."""
+    return np.concatenate([rows[1:], rows[:1]])
+
+
 def crosses(one: Floats, other: Floats) -> Floats:
     """(..., 3) cross products of rows (..., 3): `np.cross(one, other)`."""
     a, b, c = one[..., 0], one[..., 1], one[..., 2]

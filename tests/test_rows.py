@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from partwright.rows import corners, crosses, dots, lengths, sums, units
+from partwright.rows import corners, crosses, dots, following, lengths, sums, units
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -18,6 +18,8 @@ def test_the_bits_are_those_of_numpy(shape: tuple[int, ...], dtype: type) -> Non
     for found, want in zip((sums(one), dots(one, other), lengths(one)), wanted, strict=True):
         assert found.dtype == want.dtype
         np.testing.assert_array_equal(found, want)
+    if shape[0]:
+        np.testing.assert_array_equal(following(one), np.roll(one, -1, axis=0))
     if shape[-1] == 3:
         np.testing.assert_array_equal(crosses(one, other), np.cross(one, other))
 

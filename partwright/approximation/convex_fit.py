@@ -23,6 +23,7 @@ from partwright.approximation.smallest_ball import smallest_ball
 from partwright.assembly import Part, Similarity
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 from partwright.meshing.manifolds import surface_of
+from partwright.rows import crosses, following
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -90,8 +91,11 @@ class _Body:
         found = [np.eye(3), np.linalg.eigh(self.spread)[1], _smallest_box(self)]
         return [frame * [1, 1, np.sign(np.linalg.det(frame))] for frame in found]
 
-    def support(self, directions: np.ndarray) -> np.ndarray:
-        return np.asarray((directions @ self.corners.T).max(axis=1))
+    @cached_property
+    def supports(self) -> tuple[np.ndarray, np.ndarray]:
+        """Directions (N, 3) all around and along the faces' normals, and how far (N,) it reaches in each."""
+        directions = np.concatenate([_directions(), self.normals])
+        return directions, (directions @ self.corners.T).max(axis=1)
 
 
 def convex_fits(
@@ -110,11 +114,14 @@ def convex_fits(
     body = _Body.of(hull)
     best = []
     for kind in kinds:
-        placed = _candidates(body, kind, mode)
-        tried = (_measured(body, field, pose, mode, deviation, error) for field, pose in placed)
-        fits = [fit for fit in tried if fit is not None]
-        if fits:
-            best.append(min(fits, key=lambda fit: fit.volume_error_ratio))
+        nearest: ConvexFit | None = None
+        for field, pose in _candidates(body, kind, mode):
+            worst = error if nearest is None else nearest.volume_error_ratio
+            fit = _measured(body, field, pose, mode, deviation, worst)
+            if fit is not None and (nearest is None or fit.volume_error_ratio < worst):
+                nearest = fit
+        if nearest is not None:
+            best.append(nearest)
     return sorted(best, key=lambda fit: fit.volume_error_ratio)
 
 
@@ -165,9 +172,9 @@ def _measured(
     error = abs(volume(field) / body.volume - 1)  # all that it is off by where one contains the other
     if error > worst:
         return None
-    directions = np.concatenate([_directions(), body.normals])
+    directions, reach = body.supports
     own = support(field, directions @ turn) + directions @ np.array(pose.translation)
-    deviation = float(np.abs(own - body.support(directions)).max())
+    deviation = float(np.abs(own - reach).max())
     if deviation > most:
         return None
     if mode == "nearest" and (error := _volume_error(body, field, pose)) > worst:
@@ -212,16 +219,14 @@ def _smallest_box(body: _Body) -> np.ndarray:
     normals = body.normals
     if len(normals) > _TRIED:
         normals = normals[np.linspace(0, len(normals) - 1, _TRIED).astype(int)]
-    for normal in normals:
-        aside = np.eye(3)[np.abs(normal).argmin()]
-        u = np.cross(normal, aside)
-        u /= np.linalg.norm(u)
-        flat = body.corners @ np.column_stack([u, np.cross(normal, u)])
-        turn, area = _smallest_rectangle(flat)
+    across = crosses(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    across = np.array([u / np.linalg.norm(u) for u in across])
+    for normal, u, v in zip(normals, across, crosses(normals, across), strict=True):
+        turn, area = _smallest_rectangle(body.corners @ np.column_stack([u, v]))
         height = float(np.ptp(body.corners @ normal))
         if area * height < best:
             best = area * height
-            first = np.cos(turn) * u + np.sin(turn) * np.cross(normal, u)
+            first = np.cos(turn) * u + np.sin(turn) * v
             chosen = np.column_stack([first, np.cross(normal, first), normal])
     return chosen
 
@@ -235,7 +240,7 @@ def _smallest_rectangle(points: np.ndarray) -> tuple[float, float]:
         ring = points[ConvexHull(points).vertices]
     except QhullError:
         return 0.0, float(np.prod(np.ptp(points, axis=0)))
-    edges = np.roll(ring, -1, axis=0) - ring
+    edges = following(ring) - ring
     turns = np.arctan2(edges[:, 1], edges[:, 0])
     cosine, sine = np.cos(turns)[:, None], np.sin(turns)[:, None]
     x, y = ring[:, 0], ring[:, 1]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly.enclosure import enclosing_box
-from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.similarity import Similarity, rotation_matrix
 
 if TYPE_CHECKING:
     from partwright.assembly.tree import Node, Part
@@ -112,12 +112,16 @@ def _boxes(part: Part, level: float) -> np.ndarray:
     """(N, 2, 3) of the part and of its copies, whose fields are one: they are asked together."""
     if level and part.field.quadric() is not None:
         return np.stack([_box_of_part(copy, level) for copy in part.copies])
-    turns = np.stack([np.eye(3), *(rotation_matrix(move.rotation) for move in part.instances)])
-    moves = np.array([(0.0, 0.0, 0.0), *(move.translation for move in part.instances)])
+    return moved_boxes(part, (Similarity(), *part.instances), level)
+
+
+def moved_boxes(part: Part, moves: Sequence[Similarity], level: float = 0.0) -> np.ndarray:
+    """(N, 2, 3) of where a part, without its copies, is after each of N >= 1 moves that scale nothing."""
+    turns = np.stack([rotation_matrix(move.rotation) for move in moves])
     axes = (_AXES @ turns) @ rotation_matrix(part.rotation)
     chunks = np.array_split(axes, -(-len(axes) // _AT_ONCE))
     reach = np.concatenate([part.field.support(chunk.reshape(-1, 3), level) for chunk in chunks])
-    places = turns @ np.array(part.translation) + moves
+    places = turns @ np.array(part.translation) + np.array([move.translation for move in moves])
     return _around(places, reach.reshape(-1, 2, 3))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from partwright.errors import ParameterError
 from partwright.fields.base import LARGEST, checked
 from partwright.fields.profile_crossings import first_crossing, nested
+from partwright.rows import lengths
 
 Corner = tuple[float, float, float]
 Loop = tuple[Corner, ...]
@@ -164,7 +165,7 @@ class Profile:
         directions = np.asarray(directions, dtype=np.float64)
         outline = np.array(self.outline)
         reach = (directions @ outline[:, :2].T).max(axis=1)
-        length = np.linalg.norm(directions, axis=1)
+        length = lengths(directions)
         for side in self._outer_arcs:
             assert side.centre is not None
             towards = np.subtract(side.middle, side.centre) / side.radius

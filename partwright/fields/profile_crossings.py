@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from partwright.rows import following, lengths
+
 _TOUCHING = 1e-9  # of the segments' lengths: what crosses by less touches
 _PAIRS = 1 << 18  # of segments that are looked at at once
 
@@ -13,10 +15,10 @@ _PAIRS = 1 << 18  # of segments that are looked at at once
 def first_crossing(loops: Sequence[np.ndarray]) -> np.ndarray | None:
     """A place (2,) where two of the closed polylines' (K, 2) segments cross; None where none do."""
     start = np.concatenate(loops)
-    end = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
+    end = np.concatenate([following(loop) for loop in loops])
     low, high = np.minimum(start, end), np.maximum(start, end)
     way = end - start
-    length = np.linalg.norm(way, axis=1)
+    length = lengths(way)
     rows = max(1, _PAIRS // len(start))
     for first in range(0, len(start), rows):
         some = slice(first, first + rows)
@@ -52,8 +54,8 @@ def nested(loops: Sequence[np.ndarray]) -> bool:
 
 def _around(loop: np.ndarray, other: np.ndarray) -> bool:
     """Whether the loop holds most middles of the other's segments: a few may lie on it."""
-    points = (other + np.roll(other, -1, axis=0)) / 2
-    a, b = loop, np.roll(loop, -1, axis=0)
+    points = (other + following(other)) / 2
+    a, b = loop, following(loop)
     x, y = points[:, :1], points[:, 1:]
     crosses = (a[:, 1] <= y) != (b[:, 1] <= y)
     rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])

@@ -17,6 +17,7 @@ from partwright.approximation.sketches.open_sides import with_open_sides
 from partwright.approximation.sketches.repeats import moves_between, planes_between, shifts_between
 from partwright.approximation.sketches.teeth import drawn_corners
 from partwright.assembly import Part, Similarity
+from partwright.assembly.bounding_box import moved_boxes
 from partwright.assembly.motion import Motion
 from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Extrusion
@@ -49,6 +50,7 @@ _DIGITS = 9  # of shifts that are told apart
 _APART = 8e-3  # unit lengths: shifts that differ by less lead to the same place
 _WAYS = 500  # that a part is tried at beyond where it is seen
 _SHARED = 0.5  # of the samples in a mirror image, that its part or another copy may hold already
+_ROUNDING = 1e-9  # unit lengths, of boxes: what they may hold is looked at again
 _CHORD = 1e-3  # unit lengths: how far chords of a cut with moved sides may be off
 
 
@@ -122,22 +124,30 @@ def with_copies(
         moves += moves_between(inner, pieces, search.frames, search.body)
         moves += shifts_between(chosen, others)
         moves += _shifts(part, search.turns, search.mirrors)
-        found = ((move, part.transformed(move)) for move in moves)
-        near = ((move, copy) for move, copy in found if within_box(few, *copy.bounds()).sum() > hits)
+        near = ((move, part.transformed(move)) for move in _reaching(part, moves, few, hits))
         may_pay = {move: (copy, hit) for move, copy in near if (hit := covers(copy, few)).sum() > hits}
         ordered = nearest_first(search, part, list(may_pay), flips if chosen.beyond else {})
         kept = [move for move in ordered if joined(*may_pay[move])]
         rest = few[left]
         ways = _lattice(part, kept) if len(rest) > hits else ()
-        corners = ((move, part.transformed(move)) for move in ways)
-        near = ((move, copy) for move, copy in corners if within_box(rest, *copy.bounds()).sum() > hits)
-        kept += [move for move, copy in near if joined(copy, covers(copy, few))]
+        corners = ((move, part.transformed(move)) for move in _reaching(part, ways, rest, hits))
+        kept += [move for move, copy in corners if joined(copy, covers(copy, few))]
         part = replace(part, instances=tuple(kept))
         flipped = image_of(part, Similarity()) if kept else flipped
         wholes = ((plane, flipped.transformed(plane)) for plane in planes)
         image = next((plane for plane, one in wholes if is_image(one)), None)
     objective = reached - tree.price - search.price(chosen.sides)
     return Step(chosen, added, part, covered, within, opened, reached, objective, image)
+
+
+def _reaching(
+    part: Part, moves: Sequence[Similarity], points: NDArray[np.float32], most: float
+) -> list[Similarity]:
+    """Those that take the part to where its box holds more than so many points (N, 3)."""
+    if not len(moves):
+        return []
+    boxes = moved_boxes(part, moves) + np.array([[-_ROUNDING], [_ROUNDING]])
+    return [m for m, box in zip(moves, boxes, strict=True) if within_box(points, *box).sum() > most]
 
 
 def _turned(mirrors: Sequence[Similarity], turns: Sequence[Similarity]) -> list[Similarity]:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 
 from partwright.assembly import Assembly, Part, Similarity
-from partwright.assembly.bounding_box import bounding_box
+from partwright.assembly.bounding_box import bounding_box, moved_boxes
 from partwright.fields import Box, Cone, Cylinder, Sphere, SuperFrustum, Torus
 from tests.assembly.strategies import ASSEMBLIES, PARTS, SWEPT
 
@@ -47,6 +47,13 @@ def test_copies_are_bounded_as_parts_of_their_own() -> None:
         apart = Assembly(tuple(copy for part in assembly.parts for copy in part.copies))
         assert np.allclose(assembly.bounds(), apart.bounds(), atol=1e-12)
     assert np.allclose(leg.bounds(), Assembly(leg.copies).bounds(), atol=1e-12)
+
+
+def test_boxes_after_moves_are_those_of_the_moved_part() -> None:
+    part = Part(SuperFrustum((3, 2, 4), 0.3, 0.1, taper=0.6), (1, 2, 3), (0.9, 0.1, -0.3, 0.2))
+    moves = [Similarity(1.0, (1, 0, 0.5 * i, i), (i, -2 * i, 0.5)) for i in range(4)]
+    wanted = [part.transformed(move).bounds() for move in moves]
+    np.testing.assert_allclose(moved_boxes(part, moves), wanted, atol=1e-12)
 
 
 def test_a_hundred_thousand_copies_are_bounded_at_once() -> None:

@@ -24,6 +24,7 @@ from partwright.fields import Extrusion
 from partwright.fields.profile import Profile
 from partwright.fields.profile_growth import grown_profile
 from partwright.meshing.csg import solid_of
+from partwright.rows import following, lengths
 
 _ENDS = (0.03, 0.97)  # of a slab, where its sections are compared
 _LEAST = 1.5e-3  # unit lengths: walls that lean by less in all are upright
@@ -148,7 +149,7 @@ def _depth(section: CrossSection, area: float) -> float:
 
 
 def _around(polygon: np.ndarray) -> float:
-    return float(np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1).sum())
+    return float(lengths(following(polygon) - polygon).sum())
 
 
 def _within(section: CrossSection, depth: float) -> CrossSection:

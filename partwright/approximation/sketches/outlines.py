@@ -17,6 +17,7 @@ import numpy as np
 
 from partwright.approximation.sketches.chains import circle_through, open_line
 from partwright.fields.profile import Corner, Loop, circle
+from partwright.rows import following, lengths
 
 _TURN = math.radians(37)
 _STEEP = math.radians(50)
@@ -92,7 +93,7 @@ def _whole_circle(points: np.ndarray, tolerance: float) -> Loop | None:
 def _straightened(points: np.ndarray, tolerance: float) -> np.ndarray:
     """Indices of the corners that stay: the farthest from chords, until all others lie on them."""
     count = len(points)
-    first = int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))
+    first = int(np.argmax(lengths(points - points.mean(axis=0))))
     order = (np.arange(count + 1) + first) % count
     return np.sort(order[open_line(points[order], tolerance)[:-1]])
 
@@ -100,7 +101,7 @@ def _straightened(points: np.ndarray, tolerance: float) -> np.ndarray:
 def _arcs(points: np.ndarray, tolerance: float) -> list[tuple[int, int]]:
     """(start, chords) of the chains that are arcs; they share corners at most."""
     count = len(points)
-    way = np.roll(points, -1, axis=0) - points
+    way = following(points) - points
     heading = np.arctan2(way[:, 1], way[:, 0])
     turn = (heading - np.roll(heading, 1) + math.pi) % (2 * math.pi) - math.pi  # at each corner
     # A chain passes a corner that turns a little, and to the same side as the one before.
@@ -156,7 +157,7 @@ def _is_arc(points: np.ndarray, turn: np.ndarray, tolerance: float) -> bool:
     if len(inner) + 1 < _FEWEST or inner.max() > _TURN:
         return tangent and inner.max() - inner.min() < 0.2 * inner.max()
     # A long chord among short ones is a line between two arcs, though a circle may pass through its ends.
-    chord = np.sort(np.linalg.norm(np.diff(points, axis=0), axis=1))
+    chord = np.sort(lengths(points[1:] - points[:-1]))
     return bool(chord[-1] <= _EVEN * chord[-2] and 2 * math.asin(min(1.0, chord[-1] / (2 * radius))) <= _TURN)
 
 

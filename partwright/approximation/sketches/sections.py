@@ -17,6 +17,7 @@ from partwright.approximation.sketches.slits import TOUCHING, touches_itself, wi
 from partwright.approximation.sketches.tangents import with_tangents
 from partwright.errors import ParameterError
 from partwright.fields.profile import Loop, Profile
+from partwright.rows import following
 from partwright.shapes.topology import area_vectors
 
 FINE, COARSE = 4e-4, 4e-3  # unit lengths: how far outlines may lie from sections
@@ -209,12 +210,12 @@ def _valid(outline: Loop, holes: Sequence[Loop]) -> Profile | None:
 
 def _loop_area(polygon: np.ndarray) -> float:
     x, y = np.asarray(polygon, dtype=np.float64).T
-    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2)
+    return float((x * following(y) - following(x) * y).sum() / 2)
 
 
 def area_centre(polygons: Sequence[np.ndarray]) -> np.ndarray:
     """(2,) of the area within closed polygons (K, 2), holes the other way round."""
     a = np.concatenate([np.asarray(polygon, dtype=np.float64) for polygon in polygons])
-    b = np.concatenate([np.roll(np.asarray(polygon, dtype=np.float64), -1, axis=0) for polygon in polygons])
+    b = np.concatenate([following(np.asarray(polygon, dtype=np.float64)) for polygon in polygons])
     cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return np.asarray(((a + b) * cross[:, None]).sum(axis=0) / (3 * cross.sum()))

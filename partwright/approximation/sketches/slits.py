@@ -8,6 +8,7 @@ import numpy as np
 from manifold3d import CrossSection, JoinType
 
 from partwright.fields.profile import Loop, Profile
+from partwright.rows import lengths
 
 TOUCHING = 2e-5
 """Unit lengths: what is nearer touches."""
@@ -37,12 +38,12 @@ def _nearest(start: np.ndarray, end: np.ndarray, bulge: float, points: np.ndarra
         radius = float(np.linalg.norm(start - centre))
         middle = (start + end) / 2 + bulge * np.array([half[1], -half[0]]) - centre
         off = points - centre
-        reach = np.linalg.norm(off, axis=1)
+        reach = lengths(off)
         within = off @ middle >= reach * radius * np.cos(2 * np.arctan(abs(bulge)))
         return float(np.abs(reach - radius)[within].min(initial=np.inf))
     way = end - start
     share = np.clip((points - start) @ way / (way @ way), 0, 1)
-    return float(np.linalg.norm(points - start - share[:, None] * way, axis=1).min())
+    return float(lengths(points - start - share[:, None] * way).min())
 
 
 def without_slits(section: CrossSection, width: float) -> Iterator[CrossSection]:
