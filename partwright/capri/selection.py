@@ -188,7 +188,7 @@ def grown(
     chosen: Convex = ()
     while True:
         if chosen not in known:
-            covered = ~outside[:, list(chosen)].any(axis=1)
+            covered = np.asarray(~outside[:, list(chosen)].any(axis=1))
             known[chosen] = _sums(outside, reduction, covered)
         gain = np.where(allowed, -known[chosen] - problem.price, -np.inf)
         gain[list(chosen)] = -np.inf
