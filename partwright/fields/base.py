@@ -152,10 +152,11 @@ def scale_lengths(field: Any, factor: float, names: tuple[str, ...]) -> Any:
 
 def checked(what: str, given: Any, low: float, high: float, above: bool = False) -> float:
     """`given` as a float in [low, high], or in (low, high] with `above`; raises ParameterError otherwise."""
-    allowed = f"{low:g} < value <= {high:g}" if above else f"{low:g} <= value <= {high:g}"
-    if isinstance(given, bool) or not isinstance(given, NUMBERS):
-        raise ParameterError(f"{what} is {brief(given)}, which is no number; expected {allowed}")
+    is_number = not isinstance(given, bool) and isinstance(given, NUMBERS)
     # Compared before the conversion: an integer of a file may be too large for a float. NaN fails, too.
-    if not low <= given <= high or (above and given == low):
-        raise ParameterError(f"{what} is {brief(given)}; expected {allowed}")
+    if not is_number or not low <= given <= high or (above and given == low):
+        none = "" if is_number else ", which is no number"
+        raise ParameterError(
+            f"{what} is {brief(given)}{none}; expected {low:g} <{'' if above else '='} value <= {high:g}"
+        )
     return float(given)

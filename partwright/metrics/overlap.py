@@ -23,7 +23,10 @@ def overlap(assembly: Assembly, resolution: int = RESOLUTION) -> float:
     overlap). Volumes are counted at the centres of 128 cells along the longest side of the added parts'
     bounds; 0 where they hold no cell.
     """
-    added = in_own_frame(Assembly(tuple(added_parts(assembly))))
+    pieces = tuple(added_parts(assembly))
+    if len(pieces) < 2:
+        return 0.0
+    added = in_own_frame(Assembly(pieces))
 
     def count(points: np.ndarray) -> np.ndarray:
         """(N,) in how many pieces points (N, 3) lie."""
