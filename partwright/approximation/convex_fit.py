@@ -195,9 +195,11 @@ def _volume_error(body: _Body, field: Field, pose: Similarity) -> float:
     """Volume in one of the two only over the hull's: both volumes are known, what they share is measured on a
     lattice whose cells count by how much of them is inside."""
     points, cell, first = body.lattice
-    own = field(pose.inverse()(points).astype(np.float32)).astype(np.float64)
-    shared = float(np.minimum(first, np.clip(0.5 - own / cell, 0, 1)).sum() / first.sum())
-    return max(1 + volume(field) / body.volume - 2 * shared, 0.0)
+    held = np.flatnonzero(first)  # others share nothing
+    own = field(pose.inverse()(points[held]).astype(np.float32)).astype(np.float64)
+    shared = np.zeros(len(first))
+    shared[held] = np.minimum(first[held], np.clip(0.5 - own / cell, 0, 1))
+    return max(1 + volume(field) / body.volume - 2 * float(shared.sum() / first.sum()), 0.0)
 
 
 def _candidates(body: _Body, kind: type[Field], mode: Mode) -> Iterator[tuple[Field, Similarity]]:
