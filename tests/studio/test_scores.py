@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -58,5 +59,6 @@ def test_only_the_last_of_many_edits_is_scored_and_a_page_that_joins_gets_the_sa
     mesh_assembly(STOOL, 16).export(tmp_path / "stool.stl")
     STOOL.save(tmp_path / "stool.json")
     studio = opened(tmp_path / "stool.json", tmp_path / "stool.stl", tmp_path / "state")
-    asyncio.run(edited())
+    with ThreadPoolExecutor(1) as apart:  # from Playwright's loop, which other tests leave running here
+        apart.submit(asyncio.run, edited()).result()
     assert scored == ["leg", "three"]
