@@ -97,6 +97,17 @@ def _block(x: float) -> trimesh.Trimesh:
     return trimesh.creation.box((1.0, 1.0, 1.0)).apply_translation((x, 0.0, 0.0))
 
 
+Measured = tuple[trimesh.Trimesh, Assembly, Scores]
+
+
+@pytest.fixture(scope="module")
+def measured() -> Measured:
+    mesh = trimesh.creation.box((2.0, 1.0, 1.2))
+    block, ball = Part(Box((1.0, 1.0, 1.1)), (-0.5, 0.0, 0.0)), Part(Sphere(0.55), (0.4, 0.0, 0.0), blend=0.1)
+    assembly = Assembly((block, ball))
+    return mesh, assembly, evaluate(assembly, load_shape(mesh), emd=False)
+
+
 @pytest.mark.parametrize(
     "similarity",
     [
@@ -104,13 +115,10 @@ def _block(x: float) -> trimesh.Trimesh:
         Similarity(2500.0, rotation=(0.0, 0.0, 0.0, 1.0), translation=(1e4, 2e4, -3e4)),
     ],
 )
-def test_scores_do_not_change_under_similarities(similarity: Similarity) -> None:
-    mesh = trimesh.creation.box((2.0, 1.0, 1.2))
-    block, ball = Part(Box((1.0, 1.0, 1.1)), (-0.5, 0.0, 0.0)), Part(Sphere(0.55), (0.4, 0.0, 0.0), blend=0.1)
-    assembly = Assembly((block, ball))
+def test_scores_do_not_change_under_similarities(measured: Measured, similarity: Similarity) -> None:
+    mesh, assembly, before = measured
     moved = mesh.copy()
     moved.vertices = similarity(mesh.vertices)
-    before = evaluate(assembly, load_shape(mesh), emd=False)
     after = evaluate(assembly.transformed(similarity), load_shape(moved), emd=False)
     for name in ("iou", "bi_surface_iou", "overlap"):
         assert getattr(after, name) == pytest.approx(getattr(before, name), abs=0.01)

@@ -50,7 +50,7 @@ def found(drawn: Assembly | trimesh.Trimesh, quality: str = "draft") -> tuple[Fe
     return tree, search
 
 
-@pytest.mark.parametrize("count", [3, 8, 16])
+@pytest.mark.parametrize("count", [3, 8, pytest.param(16, marks=pytest.mark.heavy)])
 def test_a_flange_is_turned_and_drilled(count: int) -> None:
     """With eight holes, too, through which all of eight half sections go that are as far apart."""
     section = [(10, 0), (40, 0), (40, 8), (15, 8), (15, 30), (10, 30)]
