@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import permutations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Part, Similarity
+from partwright.assembly.motion import signed_permutations
 from partwright.assembly.similarity import rotation_matrix
 from partwright.superfrusta.feature_copying import nearest_first
 from partwright.superfrusta.feature_groups import same_solid
@@ -32,13 +32,7 @@ _SAME = 3e-3  # unit lengths: how far solids may differ that were drawn as one
 _LOSS = 1e-3  # of R, that copies may cost, all together
 _UNTURNED = 1e-9  # of a rotation's entries
 
-_TURNS = [
-    turn
-    for order in permutations(range(3))
-    for signs in product((1.0, -1.0), repeat=3)
-    if np.linalg.det(turn := np.eye(3)[list(order)] * signs) > 0
-]
-"""That take the axes to one another."""
+_TURNS = [turn for turn in signed_permutations() if np.linalg.det(turn) > 0]
 
 
 def with_repeats(search: FeatureSearch, tree: FeatureTree) -> FeatureTree:

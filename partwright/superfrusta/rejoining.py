@@ -21,6 +21,7 @@ from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded
 
 _TOUCHING = 0.6  # voxels: parts as near as that to one of the grid's points may meet beside it
 _FINE = 9  # points along two voxels
+_AT_ONCE = 100  # voxels that are looked at so
 _MARGIN, _ELSEWHERE = 0.2, 0.3  # of a region that one part is fitted to
 _ALL_AROUND = np.ones((3, 3, 3), bool)
 
@@ -57,12 +58,14 @@ class Pieces:
         """Whether new rows (K, 17) join all pieces, by overlaps near points (N, 3)."""
         steps = samples.grid.spacing * np.linspace(-1, 1, _FINE)
         around = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3).astype(np.float32)
-        points = (about[:, None] + around).reshape(-1, 3)
-        within = samples.parts_of(np.concatenate([_added(rows), new]), points) < 0
         piece = np.append(self.of_part, self.count + np.arange(len(new)))
-        filled = np.stack([within[piece == k].any(axis=0) for k in range(piece.max() + 1)])
-        shared = filled.astype(np.float32)
-        return bool(connected_components(shared @ shared.T > 0, directed=False)[0] == 1)
+        meet = np.zeros((piece.max() + 1,) * 2, bool)
+        for some in np.array_split(about, -(-len(about) // _AT_ONCE)):
+            points = (some[:, None] + around).reshape(-1, 3)
+            within = samples.parts_of(np.concatenate([_added(rows), new]), points) < 0
+            filled = np.stack([within[piece == k].any(axis=0) for k in range(len(meet))]).astype(np.float32)
+            meet |= filled @ filled.T > 0
+        return bool(connected_components(meet, directed=False)[0] == 1)
 
 
 def rejoined(samples: FitSamples, leaves: list[RepeatedPart], settings: Settings) -> list[RepeatedPart]:
