@@ -21,14 +21,8 @@ from partwright.methods import Cancellation
 from partwright.partsdf.companions import beside, save_companion
 from partwright.partsdf.encoder import EncoderSettings, load_encoder
 from partwright.partsdf.from_photo import FILES, reconstruct_photo
-from partwright.partsdf.image_encoder import (
-    KIND,
-    ImageEncoder,
-    ImageNetwork,
-    ImageSettings,
-    load_image_encoder,
-)
-from partwright.partsdf.image_encoder_training import ImageStep, picture_losses, train_image_encoder
+from partwright.partsdf.image_encoder import KIND, ImageEncoder, ImageSettings, load_image_encoder
+from partwright.partsdf.image_encoder_training import ImageStep, train_image_encoder
 from partwright.partsdf.latent_metric import felt
 from partwright.partsdf.lighting import lit
 from partwright.partsdf.meshing import mesh_shape
@@ -158,22 +152,6 @@ def test_errors_weigh_as_the_decoder_feels_them(model: Model) -> None:
             measured = torch.stack(changes)
             told = metric[p, : len(changes)].square().sum(-1)
             assert float(torch.corrcoef(torch.stack([measured, told]))[0, 1]) > 0.9
-
-
-def test_a_processor_learns_in_single_precision(saved: Model, lamps: PreparedFamily) -> None:
-    """Of what it has no instructions for, as half precision, a step takes ten times as long."""
-    vectors = PartVectors.of(saved)
-    network = ImageNetwork(len(saved.parts), vectors.width, SMALL)
-    seen = draw_views(PartMeshes.of(lamps, saved), saved, 2, torch.Generator().manual_seed(1))
-    types: set[torch.dtype] = set()
-    for module in network.modules():
-        if isinstance(module, torch.nn.Conv2d | torch.nn.Linear):
-            module.register_forward_hook(lambda _, __, out: types.add(out.dtype))
-    losses = picture_losses(
-        network, vectors, felt(saved, vectors), saved, seen, torch.arange(2), torch.Generator().manual_seed(2)
-    )
-    assert types == {torch.float32}
-    assert losses.isfinite().all()
 
 
 def test_it_learns(trained: Learnt) -> None:
