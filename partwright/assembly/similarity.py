@@ -89,6 +89,17 @@ class Similarity:
             raise ParameterError("the matrix shears, mirrors or scales unevenly; expected a similarity")
         return cls(scale, _quaternion(linear / scale), tuple(matrix[:3, 3]))
 
+    @classmethod
+    def from_linear(cls, linear: np.ndarray, shift: np.ndarray) -> Similarity:
+        """The map p -> linear @ p + shift, of (3, 3) and (3,).
+
+        Raises:
+            ParameterError: as of `from_matrix`.
+        """
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = linear, shift
+        return cls.from_matrix(matrix)
+
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """Map points (N, 3) or one point (3,), in float64."""
         result = np.asarray(points, dtype=np.float64)

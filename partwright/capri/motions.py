@@ -82,11 +82,9 @@ def moved(motion: Motion, table: Array) -> Array:
 def motion_of(linear: Array, offset: Array) -> Motion:
     """Of an orthogonal (3, 3), which may mirror, and an offset (3,)."""
     mirror = bool(np.linalg.det(linear) < 0)
-    matrix = np.eye(4)
-    matrix[:3, :3] = linear * [-1.0, 1.0, 1.0] if mirror else linear
-    matrix[:3, 3] = offset
+    move = Similarity.from_linear(linear * [-1.0, 1.0, 1.0] if mirror else linear, offset)
     # Of the scale exactly 1: quadrics that are scaled by as little as rounding are no copies any more.
-    return Motion(replace(Similarity.from_matrix(matrix), scale=1.0), mirror)
+    return Motion(replace(move, scale=1.0), mirror)
 
 
 def axes_of(table: Array) -> list[Line]:

@@ -75,6 +75,4 @@ def _about(turn: Floats, start: Floats, end: Floats) -> Similarity:
     """The rigid move of a rotation (3, 3) that takes one point (3,) to another; a shift where it is none."""
     if np.abs(turn - np.eye(3)).max() < _UNTURNED:
         turn = np.eye(3)
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = turn, end - turn @ start
-    return Similarity.from_matrix(matrix)
+    return Similarity.from_linear(turn, end - turn @ start)

@@ -41,10 +41,8 @@ def centre_of_volume(body: Manifold) -> Floats:
 def reflection(normal: Floats, point: Floats) -> Similarity:
     """What comes after mirroring in the plane x = 0, so that both are the mirror image in the plane through
     `point` (3,) with a unit normal (3,)."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = (np.eye(3) - 2 * np.outer(normal, normal)) @ np.diag([-1.0, 1.0, 1.0])
-    matrix[:3, 3] = 2 * normal * (normal @ point)
-    return Similarity.from_matrix(matrix)
+    linear = (np.eye(3) - 2 * np.outer(normal, normal)) @ np.diag([-1.0, 1.0, 1.0])
+    return Similarity.from_linear(linear, 2 * normal * (normal @ point))
 
 
 def reflected(move: Similarity, points: Floats) -> Floats:

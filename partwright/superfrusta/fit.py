@@ -82,7 +82,7 @@ def fit(request: FitRequest[Settings]) -> Fitted:
     search.leaves = search.leaves or [RepeatedPart(row) for row in search.best]
     if outcome != "interrupted" and not settings.curve:
         with search.timed("rejoin"):
-            search.leaves = rejoined(search.samples, search.leaves, settings)
+            search.leaves = rejoined(search.samples, search.leaves, search.settings)  # less what holes take
     holes.cut()
     leaves = search.leaves
     whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])

@@ -111,9 +111,8 @@ class _Bore:
         longer = with_open_ends(self.hole, False, self.measure)
         more = longer.field.bounds()[1][2] - self.half
         shift = (np.array(longer.translation) - self.hole.translation) @ self.axis
-        near = np.array(
-            [self.half, self.half + STEPS[0]]
-        )  # where the former does not look: a floor may be thin
+        # Where the former does not look: a floor may be thin.
+        near = np.array([self.half, self.half + STEPS[0]])
         low, high = (
             more + side * shift > BEYOND / 2
             and not any(len(self.filled(copy, np.sort(side * near), self.measure)) for copy in self.copies)

@@ -66,9 +66,7 @@ def rigid(row: NDArray[np.float32], isometry: Isometry) -> Similarity:
         linear = linear @ turn @ _FLIP @ turn.T
     place = np.array(pose.translation)
     moved = isometry(place[None])[0]
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = linear, moved - linear @ place
-    return Similarity.from_matrix(matrix)
+    return Similarity.from_linear(linear, moved - linear @ place)
 
 
 def images(rows: Rows, isometries: Sequence[Isometry]) -> Rows:
