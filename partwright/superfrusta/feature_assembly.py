@@ -10,6 +10,7 @@ import numpy as np
 
 from partwright.approximation.part_roles import FREEFORM, with_role_names
 from partwright.approximation.plain_numbers import plain_move, with_plain_numbers
+from partwright.approximation.sketches.ends import typed_reach
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.approximation.sketches.round_holes import RoundHole
 from partwright.assembly import Assembly, Node, Part
@@ -32,6 +33,7 @@ class FeatureAssembly:
 
     def __init__(self, shape: Shape) -> None:
         self.shape, self.distance = shape, shape.unit_distance
+        self.reach = typed_reach(shape.frame.scale)
         self._meetings = Meetings()
         self._known: dict[tuple[int, bool], tuple[Feature, list[tuple[Feature, bool]]]] = {}
 
@@ -65,7 +67,8 @@ class FeatureAssembly:
                 else:
                     result.append(own)
         none = np.zeros(0, bool)
-        mouths = HoleMouths(self.round_holes, self.distance, FeatureTree(list(result)).distance)
+        fold = FeatureTree(list(result)).distance
+        mouths = HoleMouths(self.round_holes, self.distance, fold, self.reach)
         holes = [one for hole in merged_holes(drilled, self.distance) for one in mouths.of(hole)]
         result += [Feature(False, hole, none, 0) for hole in with_stepped_holes(holes, self.distance)]
         stems = {True: "part", False: "cut"}
@@ -96,7 +99,7 @@ class FeatureAssembly:
         for k, (one, added) in enumerate(parts):
             own = dataclasses.replace(feature, part=one, added=added)
             if not (is_base and k == 0):
-                own = with_open_ends_everywhere(own, self.distance)
+                own = with_open_ends_everywhere(own, self.distance, self.reach)
             drilled = not added and isinstance(own.part.field, Cylinder)
             yield own, drilled and is_empty(own.part, self.distance)
 

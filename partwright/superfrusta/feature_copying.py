@@ -225,7 +225,7 @@ class StepBodies:
 
     def _made(self, step: Step) -> tuple[Part, Manifold, Manifold]:
         search, chosen, image = self._search, step.chosen, step.image
-        part = step.part if step.added else with_open_sides(step.part, search.samples.measure)
+        part = step.part if step.added else with_open_sides(step.part, search.samples.measure, search.reach)
         inner, outer = chosen.bodies
         moves = [_matrix(move) for move in step.part.instances]
         if part is not step.part:

@@ -66,7 +66,7 @@ def _farthest(search: FeatureSearch, tree: FeatureTree, reaches: Sequence[float]
     holes none is left, as those go on where they end in the open.
     """
     measure = search.samples.measure
-    features = [f if f.added else with_open_ends_everywhere(f, measure) for f in tree.features]
+    features = [f if f.added else with_open_ends_everywhere(f, measure, search.reach) for f in tree.features]
     corners = surface_of(FeatureTree(features).body())[0].astype(np.float32)
     skins = float(measure(corners).max()) if len(corners) else 0.0
     return max([*reaches, *([skins] if skins > FAR else [])], default=0.0)

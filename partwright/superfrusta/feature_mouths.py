@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.approximation.profile_parts import revolved_part
-from partwright.approximation.sketches.ends import BEYOND, STEPS
+from partwright.approximation.sketches.ends import STEPS
 from partwright.approximation.sketches.hole_mouths import Mouth
 from partwright.approximation.sketches.round_holes import RoundHole
 from partwright.assembly import Part, Similarity
@@ -58,11 +58,12 @@ _NONE: Cones = None, None
 @dataclass(frozen=True)
 class HoleMouths:
     """holes: of a shape; empty, fold: distance (N,) at points (N, 3), unit lengths, of the shape and of what
-    the holes are cut from."""
+    the holes are cut from. reach: unit lengths that a mouth goes on in the open."""
 
     holes: Sequence[RoundHole]
     empty: Distance
     fold: Distance
+    reach: float
 
     def of(self, hole: Part) -> Iterator[Part]:
         """A drilled hole with the mouths that the shape has, where the fold fills one of its copies'; copies
@@ -106,7 +107,7 @@ class HoleMouths:
         assert isinstance(copy.field, Cylinder)
         if not is_open and end < copy.field.height / 2 - ASIDE:
             return None  # the hole goes on, by its own wall
-        return _Cone(wall.height, end, radius, BEYOND if is_open else 0.0)
+        return _Cone(wall.height, end, radius, self.reach if is_open else 0.0)
 
     def _is_filled(self, copy: Part, cones: Cones) -> bool:
         """Whether the fold is where one of the cones would be."""
@@ -134,8 +135,8 @@ class LeftOut:
 
 
 def mouths_left_out(holes: Sequence[RoundHole], distance: Distance) -> list[LeftOut]:
-    """Those of holes of a shape that a solid fills, the widest first; distance: (N,) of that at points
-    (N, 3), unit lengths."""
+    """Those of holes of a shape that a solid fills, the widest first, those alike by their place; distance:
+    (N,) of that at points (N, 3), unit lengths."""
     found: list[LeftOut] = []
     for hole in holes:
         part, half = hole.part(), float(np.linalg.norm(hole.end - hole.start)) / 2
@@ -146,7 +147,7 @@ def mouths_left_out(holes: Sequence[RoundHole], distance: Distance) -> list[Left
             top = half + mouth.depth
             if _is_filled(distance, part, side, _within(hole.radius, mouth.radius, half, top)):
                 found.append(LeftOut(hole.middle + side * top * axis, mouth.radius))
-    return sorted(found, key=lambda mouth: -mouth.radius)
+    return sorted(found, key=lambda mouth: (-round(mouth.radius, 4), *mouth.place.round(3)))
 
 
 def mouth_warnings(shape: Shape, mouths: Sequence[LeftOut]) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ from partwright.approximation.sketches.candidate import AskedOnce, Candidate
 from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames
 from partwright.approximation.sketches.drafts import leans
+from partwright.approximation.sketches.ends import typed_reach
 from partwright.approximation.sketches.teeth import FEATURE
 from partwright.fields import Swept
 from partwright.meshing.manifolds import simplified
@@ -85,6 +86,7 @@ class FeatureSearch:
         self.most = min(most or _MOST, _MOST)
         self.tie = _TIE[0] * math.sqrt(_TIE[1] / max(1, samples.near))
         self.limit = most or _MOST + _FOR_MENDING
+        self.reach = typed_reach(shape.frame.scale)
         vertices, faces = shape.unit_mesh
         self.body = Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
         self.frames = frames(vertices, faces)

@@ -141,11 +141,13 @@ def image_of(part: Part, move: Similarity) -> Part:
     return Motion(move, True).of(part)
 
 
-def with_open_ends_everywhere(feature: Feature, distance: Callable[[np.ndarray], np.ndarray]) -> Feature:
+def with_open_ends_everywhere(
+    feature: Feature, distance: Callable[[np.ndarray], np.ndarray], reach: float
+) -> Feature:
     """The feature, longer where its ends are open, as `with_open_ends`: in its mirror image, too."""
-    longer = with_open_ends(feature.part, feature.added, distance)
+    longer = with_open_ends(feature.part, feature.added, distance, reach)
     if feature.image is not None and longer is not feature.part:
-        image = with_open_ends(image_of(feature.part, feature.image), feature.added, distance)
+        image = with_open_ends(image_of(feature.part, feature.image), feature.added, distance, reach)
         if image.field.bounds()[1][2] != longer.field.bounds()[1][2]:
             return feature  # it goes on in but one of both places
     return replace(feature, part=longer)

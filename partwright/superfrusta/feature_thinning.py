@@ -104,7 +104,7 @@ class _Bodies:
 
     def __init__(self, search: FeatureSearch, features: Sequence[Feature]) -> None:
         measure = search.samples.measure
-        rest = [with_open_ends_everywhere(feature, measure) for feature in features[1:]]
+        rest = [with_open_ends_everywhere(feature, measure, search.reach) for feature in features[1:]]
         self._search, self._features = search, [*features[:1], *rest]
         self._wholes = [[solid_of(part, CHORD) for part in feature.parts] for feature in self._features]
 

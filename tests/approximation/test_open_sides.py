@@ -6,8 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from partwright.approximation.sketches.ends import BEYOND, with_open_ends
+from partwright.approximation.sketches.ends import BEYOND, typed_reach, with_open_ends
 from partwright.approximation.sketches.open_sides import with_open_sides
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.fields import Box, Cylinder, Extrusion, Revolution, Sphere, Tube
@@ -116,3 +118,17 @@ def test_an_arc_that_meets_a_wall_moves_out_by_as_little_as_leaves_the_wall() ->
     assert 1e-3 < cut.bounds()[1][1] - 0.12 < BEYOND / 4
     edge = np.array([[-0.12, y, 0.0] for y in np.linspace(-0.115, -0.035, 9)])
     np.testing.assert_allclose(cut.distance(edge), 0.0, atol=2e-4)  # it stays where it was
+
+
+@given(st.floats(1e-4, 1e4))
+def test_open_ends_go_on_by_a_number_of_one_digit_in_the_shapes_own_units(scale: float) -> None:
+    reach = typed_reach(scale)
+    assert BEYOND / 2 < reach <= BEYOND * (1 + 1e-9)
+    assert float(f"{reach / scale:.0e}") == pytest.approx(reach / scale, rel=1e-9)
+
+
+def test_a_cut_through_a_plate_is_as_long_as_a_person_would_type() -> None:
+    longest = 119.0  # mm, of which half is a unit length
+    plate, through = Part(Box((1, 1, 5 * 2 / longest))), Part(Cylinder(0.1, 5 * 2 / longest))
+    longer = with_open_ends(through, False, plate.distance, typed_reach(2 / longest))
+    assert longer.field.height * longest / 2 == pytest.approx(5 + 2 * 1)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from partwright.approximation.profile_parts import with_profile
+from partwright.approximation.sketches.ends import BEYOND
 from partwright.approximation.sketches.holes import is_empty
 from partwright.approximation.sketches.open_turns import (
     beside,
@@ -26,17 +27,18 @@ _UP = 5  # levels that are looked at
 _SLANT = 0.4  # sine of the least angle between a side and one that it is moved along
 
 
-def with_open_sides(part: Part, distance: Callable[[np.ndarray], np.ndarray]) -> Part:
+def with_open_sides(part: Part, distance: Callable[[np.ndarray], np.ndarray], reach: float = BEYOND) -> Part:
     """The cut with sides of its outline moved out where there is nothing behind them, for any copy, and
     without holes that would leave nothing of the shape.
 
-    distance: (N,) of the shape at points (N, 3), unit lengths like the part, negative inside. A box, an
-    extrusion without taper, or a revolution; others stay as they are.
+    distance: (N,) of the shape at points (N, 3), unit lengths like the part, negative inside. reach: how far
+    a side goes out, or a quarter of that where there is no more room. A box, an extrusion without taper, or
+    a revolution; others stay as they are.
     """
     part = _without_islands(part, distance)
     field = part.field
     if isinstance(field, Revolution):
-        return with_open_turns(part, field, distance)
+        return with_open_turns(part, field, distance, reach)
     if isinstance(field, Box):
         x, y, height = field.size
         profile = Profile.rectangle(x, y)
@@ -46,20 +48,20 @@ def with_open_sides(part: Part, distance: Callable[[np.ndarray], np.ndarray]) ->
         return part
     levels = np.linspace(-0.48, 0.48, _UP) * height
 
-    def is_open(side: Side, reach: float) -> bool:
-        flat = beside(side, reach)
+    def is_open(side: Side, by: float) -> bool:
+        flat = beside(side, by)
         local = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in levels])
         return in_the_air(local, part, distance)
 
     sides = profile.sides[0]
-    reach = {side: room(side, is_open) for side in sides}
-    if not any(reach.values()):
+    out = {side: room(side, is_open, reach) for side in sides}
+    if not any(out.values()):
         return part
-    if isinstance(field, Extrusion) and any(reach[side] for side in sides if side.bulge):
-        grown = with_grown_sides(part, field, lambda side: reach.get(side, 0.0), distance)
+    if isinstance(field, Extrusion) and any(out[side] for side in sides if side.bulge):
+        grown = with_grown_sides(part, field, lambda side: out.get(side, 0.0), distance)
         if grown is not part:
             return centred(grown)
-    by = [0.0 if side.bulge else reach[side] for side in sides]
+    by = [0.0 if side.bulge else out[side] for side in sides]
     if not any(by):
         return part
     corners = [np.array(corner) for corner in profile.outline]

@@ -20,33 +20,36 @@ from partwright.fields.profile_growth import with_moved_sides
 _ALONG, _AROUND = 9, 12  # points along a side, and angles, that are looked at
 _INSET = 0.04  # of a side's length, and of the angle, at their ends
 _POINTS = 4000  # in what the cut takes more, which have to be air
-_REACHES = (BEYOND, BEYOND / 4)  # how far a side goes out: as far as there is room
+_REACHES = (1.0, 1 / 4)  # of how far a side may go out: as far as there is room
 _SHARES = (1.0, 1 / 4, 1 / 16)  # of that, where all of it would make a side vanish or cross others
 _BURR = 1e-3  # unit lengths: how deep within the shape these may seem to lie
 
 
-def with_open_turns(part: Part, field: Revolution, distance: Callable[[np.ndarray], np.ndarray]) -> Part:
+def with_open_turns(
+    part: Part, field: Revolution, distance: Callable[[np.ndarray], np.ndarray], reach: float
+) -> Part:
     """The cut with those sides of its profile further out that have nothing behind them, for any copy.
 
-    distance: (N,) of the shape at points (N, 3), unit lengths like the part, negative inside.
+    distance: (N,) of the shape at points (N, 3), unit lengths like the part, negative inside. reach: how far,
+    or a quarter of that.
     """
     share = np.linspace(_INSET, 1 - _INSET, _AROUND)
     turns = math.radians(field.angle) * share[:, None]
 
-    def is_open(side: Side, reach: float) -> bool:
+    def is_open(side: Side, by: float) -> bool:
         if side.centre is None and side.start[0] == side.end[0] == 0:  # the axis
             return False
-        x, z = beside(side, reach).T
+        x, z = beside(side, by).T
         around = [np.cos(turns) * x, np.sin(turns) * x, np.broadcast_to(z, (_AROUND, len(z)))]
         return in_the_air(np.stack(around, axis=-1).reshape(-1, 3), part, distance)
 
-    return with_grown_sides(part, field, lambda side: room(side, is_open), distance)
+    return with_grown_sides(part, field, lambda side: room(side, is_open, reach), distance)
 
 
-def room(side: Side, is_open: Callable[[Side, float], bool]) -> float:
+def room(side: Side, is_open: Callable[[Side, float], bool], most: float) -> float:
     """How far a side may go out, unit lengths; 0 where it may not. is_open: whether there is nothing behind
     it up to a length."""
-    return next((reach for reach in _REACHES if is_open(side, reach)), 0.0)
+    return next((share * most for share in _REACHES if is_open(side, share * most)), 0.0)
 
 
 def with_grown_sides(
