@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
 
 from partwright.assembly import Part, Similarity
 from partwright.assembly.checks import Vector
+from partwright.assembly.euler_angles import typed_turn
 from partwright.assembly.instance_patterns import (
     Circle,
     Grid,
@@ -47,19 +50,22 @@ def plain(value: float, within: float) -> float:
 
 
 def with_plain_numbers(part: Part, within: float) -> Part:
-    """With lengths, corners and places made plain, each by at most `within` (own units); turns stay.
+    """With lengths, corners and places made plain, each by at most `within` (own units). Turns lose their
+    dust alone, and copies that are turned, in no pattern, are at plain places.
 
     A field that does not allow its plain numbers stays as it is.
     """
+    part = dataclasses.replace(part, rotation=typed_turn(part.rotation))
     try:
         field = _plain_field(part.field, within)
     except ParameterError:
         field = part.field
     copies = _plain_copies(part, within)
     if copies is None:
-        moves = tuple(plain_move(move, within) for move in part.instances)
-        place = _plain_place(part.translation, within)
-        copies = dataclasses.replace(part, translation=place, instances=moves)
+        own = Similarity(1.0, part.rotation, part.translation)
+        plain_own = Similarity(1.0, part.rotation, _plain_place(part.translation, within))
+        moves = tuple(_plain_copy(move, own, plain_own, within) for move in part.instances)
+        copies = dataclasses.replace(part, translation=plain_own.translation, instances=moves)
     return _between_plain_ends(part, dataclasses.replace(copies, field=field), within)
 
 
@@ -199,8 +205,26 @@ def _plain_profile(profile: Profile, within: float) -> Profile:
     return Profile(loop(profile.outline), tuple(loop(hole) for hole in profile.holes))
 
 
-def plain_move(move: Similarity, within: float) -> Similarity:
-    """A shift alone; the foot of a turn stays where the turn needs it."""
-    if abs(move.rotation[0]) != 1.0:
+def plain_move(move: Similarity, number: Callable[[float], float]) -> Similarity:
+    """A shift, also after quarter turns, by plain lengths, as `number` makes them; the foot of another turn
+    stays where the turn needs it."""
+    rotation = typed_turn(move.rotation)
+    if not set(np.abs(rotation_matrix(rotation)).round(12).ravel()) <= {0.0, 1.0}:
         return move
-    return dataclasses.replace(move, translation=_plain_place(move.translation, within))
+    x, y, z = map(number, move.translation)
+    return Similarity(move.scale, rotation, (x, y, z))
+
+
+def _plain_copy(move: Similarity, own: Similarity, plain_own: Similarity, within: float) -> Similarity:
+    """What takes a part's place to a plain one, where the move itself has no plain numbers.
+
+    own: the part's place and turn before, plain_own: after.
+    """
+    moved = plain_move(move, partial(plain, within=within))
+    if moved is not move or np.allclose(
+        move.translation, _plain_place(move.translation, within), rtol=_ALONG, atol=0
+    ):
+        return moved
+    pose = move @ own
+    copy = Similarity(1.0, typed_turn(pose.rotation), _plain_place(pose.translation, within))
+    return copy @ plain_own.inverse()

@@ -15,8 +15,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.approximation.plain_numbers import plain_move
 from partwright.assembly import Assembly, Part
-from partwright.assembly.similarity import rotation_matrix
 from partwright.cleaning.dimensions import dimensions, reaches, values, with_values
 from partwright.cleaning.feature_levels import Key, Level, Lying, levels, lying, sides_of, sizes, with_place
 from partwright.cleaning.grid import Grid
@@ -322,11 +322,9 @@ def _tidied(profile: Profile) -> Profile:
 
 
 def _with_plain_moves(part: Part, tolerance: float, grid: Grid) -> Part:
-    """Copies that are shifted alone go by plain lengths."""
-    moves = []
-    for move in part.instances:
-        if np.allclose(rotation_matrix(move.rotation), np.eye(3), atol=1e-12) and move.scale == 1:
-            x, y, z = (_plain([v], tolerance, grid) if v else 0.0 for v in move.translation)
-            move = dataclasses.replace(move, translation=(x, y, z))
-        moves.append(move)
-    return dataclasses.replace(part, instances=tuple(moves))
+    """Copies that are shifted, also after quarter turns, go by plain lengths."""
+
+    def number(value: float) -> float:
+        return _plain([value], tolerance, grid) if value else 0.0
+
+    return dataclasses.replace(part, instances=tuple(plain_move(move, number) for move in part.instances))

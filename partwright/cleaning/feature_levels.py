@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Part
+from partwright.assembly.euler_angles import typed_turn
 from partwright.assembly.similarity import rotation_matrix
 from partwright.cleaning.dimensions import dimensions, flat, reaches, turned_freely, values
 from partwright.cleaning.orientations import CUBE, along
@@ -91,6 +92,7 @@ def lying(part: Part, frames: list[Floats], tolerance: float) -> Lying:
             near = float(np.linalg.norm(local - turn, axis=0).max()) <= most
         if near:
             return Lying(part, frame, np.asarray(turn), frame.T @ np.array(part.translation))
+    rotation = rotation_matrix(typed_turn(part.rotation))
     frames.append(rotation)
     return Lying(part, rotation, np.eye(3), rotation.T @ np.array(part.translation))
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.assembly.euler_angles import fixed_axes_angles
+from partwright.assembly.euler_angles import fixed_axes_angles, rotation_of
 
 _FINEST = 1e-4  # of the longest side: lengths are typed to this
 _RATIO = 1e-3
@@ -65,21 +65,6 @@ def rounded_rotations(rotation: NDArray[np.float64], limit: float) -> Iterator[N
         rounded = np.rint(angles / step) * step
         if np.abs(rounded - angles).max() <= limit + 1e-9:
             yield rotation_of(*rounded.tolist())
-
-
-def rotation_of(x: float, y: float, z: float) -> NDArray[np.float64]:
-    """(3, 3) of degrees about the fixed axes x, then y, then z; quarter turns are exact."""
-    (cx, sx), (cy, sy), (cz, sz) = (_cos_sin(angle) for angle in (x, y, z))
-    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    return np.asarray(about_z @ about_y @ about_x, dtype=np.float64)
-
-
-def _cos_sin(degrees: float) -> tuple[float, float]:
-    if degrees % 90 == 0:
-        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(degrees // 90) % 4]
-    return math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
 
 
 def _steps(largest: float, finest: float) -> Iterator[float]:

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Part
+from partwright.assembly.euler_angles import rotation_of
 from partwright.assembly.motion import signed_permutations
 from partwright.assembly.similarity import rotation_matrix
 from partwright.cleaning.acceptance import AcceptanceTest
 from partwright.cleaning.deviation_samples import State
 from partwright.cleaning.dimensions import turned_freely
-from partwright.cleaning.grid import plain_rotation, rotation_of, rounded_rotations
+from partwright.cleaning.grid import plain_rotation, rounded_rotations
 from partwright.cleaning.model import Model, quaternion_of, size_of
 from partwright.fields import Box, Field
 

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.assembly import Part
+from partwright.assembly.euler_angles import rotation_of
 from partwright.cleaning.dimensions import values
 from partwright.cleaning.features import Feature
 from partwright.cleaning.model import Model
-from partwright.cleaning.orientations import Frames, aligned, angle, rotation_of
+from partwright.cleaning.orientations import Frames, aligned, angle
 
 Floats = NDArray[np.float64]
 

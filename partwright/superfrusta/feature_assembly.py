@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from partwright.approximation.part_roles import FREEFORM, with_role_names
-from partwright.approximation.plain_numbers import plain_move, with_plain_numbers
+from partwright.approximation.plain_numbers import plain, plain_move, with_plain_numbers
 from partwright.approximation.sketches.ends import typed_reach
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.approximation.sketches.round_holes import RoundHole
@@ -115,9 +115,9 @@ def _with_plain_numbers(node: Assembly, within: float) -> Assembly:
         if isinstance(child, Part):
             children.append(with_plain_numbers(child, within))
             continue
-        plain = _with_plain_numbers(child, within)
-        children.append(plain)
+        first = _with_plain_numbers(child, within)
+        children.append(first)
         for k, copy in enumerate(copies, start=2):  # exactly what the first is
-            move = plain_move(copy.move, within)
-            children.append(dataclasses.replace(copy, move=move).of(plain, k))
+            move = plain_move(copy.move, partial(plain, within=within))
+            children.append(dataclasses.replace(copy, move=move).of(first, k))
     return dataclasses.replace(node, children=tuple(children))

@@ -10,7 +10,9 @@ import pytest
 
 from partwright.approximation.plain_numbers import plain, with_plain_numbers
 from partwright.assembly import Part, Similarity
+from partwright.assembly.euler_angles import fixed_axes_angles
 from partwright.assembly.instance_patterns import Circle, Grid, Ring, Row, pattern, with_pattern
+from partwright.assembly.similarity import rotation_matrix
 from partwright.fields import Box, Cone, Cylinder, Extrusion, Field, Revolution
 from partwright.fields.profile import Profile, circle
 
@@ -33,6 +35,19 @@ def test_the_fewest_digits_win(value: float, within: float, expected: float) -> 
     assert plain(value, within) == expected
 
 
+def test_what_is_turned_loses_its_dust() -> None:
+    """45 degrees but for a millionth are 45, which other angles stay; quarter turns go by plain lengths."""
+    lug = Box((3.0, 1.0, 2.0))
+    askew, odd = (Similarity.turn((1, 0, 0), math.radians(angle)).rotation for angle in (44.999999, 44.98))
+    quarter = dataclasses.replace(about(90 - 4e-6), translation=(3.2000427, 1.0, 0.0))
+    part = with_plain_numbers(Part(lug, (5.0, 0.0, 0.0), askew, instances=(quarter,)), 1e-3)
+    turned = [fixed_axes_angles(rotation_matrix(copy.rotation)) for copy in part.copies]
+    assert turned == [(45.0, 0.0, 0.0), (45.0, 0.0, 90.0)]
+    assert part.instances[0].translation == (3.2, 1.0, 0.0)
+    assert with_plain_numbers(Part(lug, rotation=odd), 1e-3).rotation == odd
+    assert with_plain_numbers(part, 1e-3) == part
+
+
 def test_lengths_corners_and_places_are_plain_and_turns_stay() -> None:
     turn = (math.cos(0.2), 0.0, 0.0, math.sin(0.2))
     outline = [(-10.0002, -5.0001, 0.0), (9.9999, -5, 0.4142), (10.0001, 5.0002, 0.0), (-10, 4.9998, 0.0)]
@@ -44,7 +59,12 @@ def test_lengths_corners_and_places_are_plain_and_turns_stay() -> None:
     assert part.field.profile.outline[1][2] == 0.4142
     assert part.field.height == 3.0
     assert (part.translation, part.rotation) == ((1.0, 2.0, 0.0), turn)
-    assert part.instances == (Similarity(translation=(20, 0, 0)), moves[1])
+    assert part.instances[0] == Similarity(translation=(20, 0, 0))
+    assert part.instances[1].rotation == pytest.approx(turn, abs=1e-12)
+    place = moves[1](np.array([0.99995, 2.00002, 0]))
+    there = np.array(part.copies[2].translation)
+    assert there == pytest.approx(there.round(4), abs=1e-12), "a place of few digits"
+    assert np.abs(there - place).max() < 1e-3
     assert with_plain_numbers(Part(Box((1.0001, 2, 3))), 1e-3).field == Box((1, 2, 3))
 
 
