@@ -24,6 +24,8 @@ _OFF = 1e-6  # of the depth, that a parallel curve may be off
 
 Own = tuple[int, int, int]
 """A mover between the one before and the one after it."""
+Going = tuple[float, float, int, Own]
+"""At which depth a mover vanishes, how long it is right before, its loop, and which of that it is."""
 
 
 class Stage(NamedTuple):
@@ -42,12 +44,13 @@ def stages(profile: Profile, deepest: float) -> list[Stage]:
     found = [_outermost(profile)]
     while going := _going(found[-1], deepest):
         first = (1 + _AT_ONCE) * min(one[0] for one in going)
-        depth, _, loop, own = min((one for one in going if one[0] <= first), key=lambda one: one[1])
+        now = [one for one in going if one[0] <= first]
+        shortest = min(one[1] for one in now)
+        depth, _, loop, own = _best([one for one in now if one[1] == shortest], found[-1])
         fronts = found[-1].fronts
         if len(fronts[loop].left) < 3:
             raise ParameterError(f"profile: nothing is left of a loop {deepest:.6g} further inside")
-        changed = _without(fronts[loop], own)
-        found.append(Stage(depth, (*fronts[:loop], changed, *fronts[loop + 1 :])))
+        found.append(_stage_without(found[-1], depth, loop, own))
     return found
 
 
@@ -80,9 +83,8 @@ def _outermost(profile: Profile) -> Stage:
     return Stage(0.0, tuple(front_of(sides) for sides in profile.sides))
 
 
-def _going(stage: Stage, deepest: float) -> list[tuple[float, float, int, Own]]:
-    """What vanishes of a stage before the deepest: at which depth, how long it is right before, its loop, and
-    which mover of that it is."""
+def _going(stage: Stage, deepest: float) -> list[Going]:
+    """What vanishes of a stage before the deepest."""
     return [
         (*_vanishing(front, own, stage.depth, deepest), k, own)
         for k, front in enumerate(stage.fronts)
@@ -114,6 +116,24 @@ def _vanishing(front: Front, own: Own, since: float, deepest: float) -> tuple[fl
         middle = (low + high) / 2
         low, high = (low, middle) if _length(front, own, middle) is None else (middle, high)
     return low, _length(front, own, low) or 0.0
+
+
+def _best(going: Sequence[Going], stage: Stage) -> Going:
+    """Of movers that vanish at once the one without which most others are left right after: of two parallel
+    ones that meet neither has a length any more, but only one of them goes."""
+    if len(going) == 1:
+        return going[0]
+
+    def gone(one: Going) -> int:
+        depth, _, loop, own = one
+        return len(_going(_stage_without(stage, depth, loop, own), (1 + _AT_ONCE) * depth))
+
+    return min(going, key=gone)
+
+
+def _stage_without(stage: Stage, depth: float, loop: int, own: Own) -> Stage:
+    fronts = stage.fronts
+    return Stage(depth, (*fronts[:loop], _without(fronts[loop], own), *fronts[loop + 1 :]))
 
 
 def _without(front: Front, own: Own) -> Front:

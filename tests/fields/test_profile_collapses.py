@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from manifold3d import CrossSection, JoinType
+from trimesh import Trimesh
 from trimesh.sample import sample_surface
 
 from partwright.errors import ParameterError
@@ -81,14 +82,39 @@ def test_what_falls_apart_or_leaves_nothing_is_refused() -> None:
         Extrusion(Profile.rectangle(20, 12, 1), 8, top_fillet=6.5)
 
 
+def neck(*right: tuple[float, float]) -> Profile:
+    """A shaft with a thinner neck below its end, of which these are the corners to the right."""
+    left = [(-10, 60), (-10, 56), (-8, 56), (-8, 40), (-10, 40)]
+    return Profile([(-10, 0), (10, 0), (10, 40), *right, (10, 56), (10, 60), *left])
+
+
 def test_what_falls_apart_on_the_way_is_refused_though_it_is_whole_further_inside() -> None:
-    """A neck whose walls, a little out of line, meet before either is gone: no mesh leads past that."""
-    left, right = (
-        [(-10, 60), (-10, 56), (-8, 56), (-8, 40), (-10, 40)],
-        [(10, 40), (8.01, 40), (8.01, 56), (10, 56)],
-    )
-    shaft = Profile([(-10, 0), (10, 0), *right, (10, 60), *left])
+    """A neck that is thinner in its middle, where its walls meet before either is gone: no mesh leads past
+    that."""
+    waisted = neck((8, 40), (7.99, 48), (8, 56))
     with pytest.raises(ParameterError, match="falls apart"):
-        Extrusion(shaft, 40, bottom_fillet=9)
-    shallow = Extrusion(shaft, 40, bottom_fillet=1.5)
+        Extrusion(waisted, 40, bottom_fillet=9)
+    shallow = Extrusion(waisted, 40, bottom_fillet=1.5)
     assert extruded(shallow, 1e-2).genus() == 0
+
+
+def test_a_neck_that_vanishes_all_at_once_does_not_fall_apart() -> None:
+    """Its walls are parallel, if a little out of line with those on the other side."""
+    solid = Extrusion(neck((8.01, 40), (8.01, 56)), 40, bottom_fillet=9)
+    mesh = extruded(solid, 1e-3)
+    assert mesh.genus() == 0
+    surface = as_mesh(mesh)
+    points, _ = sample_surface(Trimesh(surface.vertices, surface.faces, process=False), 4000, seed=0)
+    assert np.abs(solid(points)).max() < 0.03
+
+
+@pytest.mark.parametrize("mirror", [(1, 1), (-1, 1), (1, -1)])
+def test_a_slanting_bar_that_vanishes_all_at_once_does_so_in_its_mirror_image(
+    mirror: tuple[int, int],
+) -> None:
+    """Of its two sides, which are parallel, one alone is gone where the corners beside it meet."""
+    outline = [(-88, -10), (-40, -10), (-40, 7.8), (-63.3, 7.8), (-67.5, 12), (-67.5, 18.8), (-63.3, 23)]
+    outline += [(-65.9, 23), (-69.2, 19.7), (-85.2, 23), (-88, 23)]
+    corners = [(x * mirror[0], y * mirror[1], 0.0) for x, y in outline[:: mirror[0] * mirror[1]]]
+    inner = Extrusion(Profile(corners), 5.0, bottom_chamfer=1.1).within(1.1)[0]
+    assert inner.area == pytest.approx(975.7105148578, rel=1e-12)
