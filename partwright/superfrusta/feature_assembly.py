@@ -20,6 +20,7 @@ from partwright.shapes import Shape
 from partwright.superfrusta.feature_drilling import empty_round_holes
 from partwright.superfrusta.feature_groups import grouped
 from partwright.superfrusta.feature_mouths import HoleMouths
+from partwright.superfrusta.feature_stacked_cuts import with_cuts_once
 from partwright.superfrusta.feature_stepped_holes import with_stepped_holes
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, with_open_ends_everywhere
 from partwright.superfrusta.flat_tree import Meetings
@@ -66,6 +67,7 @@ class FeatureAssembly:
                     drilled += own.parts
                 else:
                     result.append(own)
+        result = with_cuts_once(result, self.distance)
         none = np.zeros(0, bool)
         fold = FeatureTree(list(result)).distance
         mouths = HoleMouths(self.round_holes, self.distance, fold, self.reach)
