@@ -30,6 +30,7 @@ from partwright.superfrusta.sharp_edges import sharp_edge_warnings
 from partwright.superfrusta.starting import starting_rows
 from partwright.superfrusta.symmetric_fit import RepeatedPart
 
+_FAR_FEWER = 0.75  # of the parts
 _DEARER = 2.0  # times the price of a feature, that a part of the search has beside it
 
 
@@ -145,8 +146,8 @@ def _mended(
 
     rival: the search's objective. The one that explains more is mended first, the other only where that does
     not bring it near, or with freeform and more parts: nothing may be far off that need not be. Where both
-    stay far off, how far counts with each. Where the features need freeform, so that they do not say either
-    how all of it would be drawn, fewer parts of the search that explain no less, and are near, are preferred.
+    stay far off, how far counts with each. A plainer assembly of the search that explains no less, and is
+    near, is preferred.
     """
 
     def drawn_features() -> tuple[FeatureTree, Assembly]:
@@ -156,7 +157,7 @@ def _mended(
     features_first = features.objective >= rival
     if features_first:
         mended, drawn = drawn_features()
-        has_rival = mended.freeform > 0 and len(whole.parts) < len(drawn.parts)
+        has_rival = _is_plainer(whole, drawn, mended)
         ahead = mended.objective - mended.off >= rival
         if ahead and not (has_rival and featured.may_explain(whole, mended.score)):
             return drawn, True
@@ -165,14 +166,21 @@ def _mended(
         if not other.off:
             return other.assembly, False
         mended, drawn = drawn_features()
-    explains = mended.freeform and not other.off and other.score >= mended.score
-    if explains and len(other.assembly.parts) < len(drawn.parts):
+    explains = not other.off and other.score >= mended.score
+    if explains and _is_plainer(other.assembly, drawn, mended):
         preferred = False
     elif mended.off:
         preferred = mended.objective - mended.off >= rival - other.off
     else:
         preferred = other.off > 0 or mended.objective >= rival
     return (drawn if preferred else other.assembly), preferred
+
+
+def _is_plainer(whole: Assembly, drawn: Assembly, features: FeatureTree) -> bool:
+    """Whether what the search found has fewer parts than features that need freeform, or far fewer than those
+    that do not: either then do not say how the shape would be drawn."""
+    share = 1.0 if features.freeform else _FAR_FEWER
+    return len(whole.parts) < share * len(drawn.parts)
 
 
 def _with_locked(whole: Assembly, request: FitRequest[Settings]) -> Assembly:

@@ -207,6 +207,8 @@ def test_solids_that_are_right_keep_their_own_deviation() -> None:
         (2, 0.0, 0.89, 3, True),  # explains less
         (2, 0.1, 0.90, 3, True),  # is far off
         (0, 0.0, 0.95, 3, True),  # the features are all drawn
+        (0, 0.0, 0.95, 2, False),  # but are twice as many
+        (0, 0.0, 0.89, 2, True),
     ],
 )
 def test_fewer_solids_that_explain_as_much_are_preferred_to_freeform(
