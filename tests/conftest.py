@@ -50,7 +50,10 @@ def pytest_collection() -> Generator[None, object, object]:
 
 @pytest.fixture
 def coarse_scores(monkeypatch: pytest.MonkeyPatch) -> None:
-    """IoU and overlap of an eighth of the cells: networks take seconds for all of them."""
+    """IoU and overlap of an eighth of the cells, and as much less of the points: networks take seconds for
+    all of them, and what a fit writes beside its assembly is as well told by few."""
     monkeypatch.setattr(importlib.import_module("partwright.metrics.iou"), "RESOLUTION", 64)
     overlap = importlib.import_module("partwright.metrics.overlap")
     monkeypatch.setattr(overlap, "overlap", partial(overlap.overlap, resolution=64))
+    for name in ("bi_surface", "chamfer", "comparison"):
+        monkeypatch.setattr(importlib.import_module(f"partwright.metrics.{name}"), "COUNT", 4_000)

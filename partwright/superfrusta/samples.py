@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -360,12 +360,18 @@ def padding(grid: DistanceGrid, uniform: int, seed: int) -> tuple[NDArray[np.flo
 
 def _probes(grid: DistanceGrid) -> NDArray[np.float32]:
     """Lattice points (n, 3), each moved within its cell, that may lie well outside the shape."""
+    points = _all_probes()
+    voxel = voxel_of(grid, points)
+    values, nearest = grid.values.ravel()[voxel], grid.points_of(voxel).astype(np.float32)
+    return points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]
+
+
+@cache
+def _all_probes() -> NDArray[np.float32]:
+    """Of an empty space (ALONG ** 3, 3), in the order in which the kernel is quickest."""
     corner = grid_indices((ALONG,) * 3)
     within = np.random.default_rng(0).uniform(0.1, 0.9, corner.shape)
     points = (CELL * (corner + within) - HALF_SIDE).astype(np.float32)
-    voxel = voxel_of(grid, points)
-    values, nearest = grid.values.ravel()[voxel], grid.points_of(voxel).astype(np.float32)
-    points = points[values + np.linalg.norm(points - nearest, axis=1) > _STRAY]
     return points[morton_order(points)]
 
 

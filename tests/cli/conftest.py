@@ -59,6 +59,11 @@ class BoxMethod(Method[Settings]):
         return Fitted(assembly, outcome, {"seeding": 0.25})
 
 
+@pytest.fixture(autouse=True)
+def coarse(coarse_scores: None) -> None:
+    """Commands are told by what they write and say: how exact scores are is tried in tests/metrics."""
+
+
 @pytest.fixture
 def method(monkeypatch: pytest.MonkeyPatch) -> BoxMethod:
     made = BoxMethod()

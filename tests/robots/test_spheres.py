@@ -153,7 +153,7 @@ def test_native_solids_get_spheres_with_and_without_meshes(tmp_path: Path) -> No
     assert outside_of_balls(np.array([[0, 0, 0.1], [0, 0, 0.5], [0.15, 0, 1]]), post.balls).max() < 0
     save(result, tmp_path / "out")
     assert (tmp_path / "out" / "native.urdf").read_text().count("<cylinder") == 1
-    assert Image.open(tmp_path / "out" / "native.urdf.png").width == 3 * 560
+    assert Image.open(tmp_path / "out" / "native.urdf.png").width == 3 * 140  # see conftest.py
     with pytest.raises(RobotError, match="mesh to replace; 2 collide by native solids"):
         collide(path)
 
