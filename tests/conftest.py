@@ -57,3 +57,13 @@ def coarse_scores(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(overlap, "overlap", partial(overlap.overlap, resolution=64))
     for name in ("bi_surface", "chamfer", "comparison"):
         monkeypatch.setattr(importlib.import_module(f"partwright.metrics.{name}"), "COUNT", 4_000)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_previews() -> Generator[None]:
+    """Of the picture that every result is saved with a sixth; who tells of it has another such fixture."""
+    preview = importlib.import_module("partwright.render.preview")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(preview, "_SIDE", 160)  # pixels, of 400
+        patch.setattr(preview, "_LEAST_SIDE", 124)
+        yield

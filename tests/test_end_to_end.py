@@ -25,6 +25,11 @@ def table() -> trimesh.Trimesh:
     return trimesh.boolean.union(boxes, engine="manifold").apply_translation(CENTRE)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def small_previews() -> None:
+    """As large as a user's."""
+
+
 @pytest.fixture(scope="module")
 def shape(tmp_path_factory: pytest.TempPathFactory) -> pw.Shape:
     path = tmp_path_factory.mktemp("input") / "table.stl"

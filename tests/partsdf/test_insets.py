@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -92,8 +93,12 @@ def test_what_is_covered_is_told_and_where_it_should_show() -> None:
 
 
 @pytest.fixture(scope="module")
-def judge() -> Judge:
-    return Judge(load_model("vehicles"))
+def judge() -> Iterator[Judge]:
+    """Who has looked at three training shapes, and at the walls of eight."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("partwright.partsdf.soundness._JUDGES", 3)
+        patch.setattr("partwright.partsdf.soundness._WALLS", 8)
+        yield Judge(load_model("vehicles"))
 
 
 @pytest.fixture
