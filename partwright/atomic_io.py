@@ -305,6 +305,9 @@ def _host() -> str:
 
 
 def _remove(path: Path) -> None:
-    with suppress(OSError):
+    try:
         path.unlink()
-    shutil.rmtree(path, ignore_errors=True)
+    except FileNotFoundError:  # as of every file that was moved: to walk it as a folder takes a millisecond
+        pass
+    except OSError:
+        shutil.rmtree(path, ignore_errors=True)
