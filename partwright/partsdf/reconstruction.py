@@ -166,7 +166,7 @@ def _of_needed(
         settings, iterations=half, decay=1.0, rate=decay * settings.rate, pose_rate=decay * settings.pose_rate
     )
     while not torch.equal(present := needed(shape, target), shape.present):
-        if familiarity(shape, target).warnings():
+        if familiarity(shape, target).odd:
             break
         fewer, posed = replace(shape, present=present), _posed(shape.model, settings)
         shape, _ = _optimised(fewer, target, again, seed, None, checkpoint, posed)
