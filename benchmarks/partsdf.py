@@ -4,7 +4,8 @@
     python benchmarks/partsdf.py reconstruct --family FOLDER --model MODEL [--config CONFIG] [--shapes N]
     python benchmarks/partsdf.py encode --family FOLDER --model MODEL [--shapes N]
     python benchmarks/partsdf.py images --family FOLDER --model MODEL [--shapes N] [--views N]
-    python benchmarks/partsdf.py nothing [--model MODEL]
+    python benchmarks/partsdf.py likeness [--names A,B]
+    python benchmarks/partsdf.py nothing --shapes-from FOLDER [--names A,B]
     python benchmarks/partsdf.py scans --family FOLDER --model MODEL [--shapes N] [--surface]
     python benchmarks/partsdf.py unseen [--models A:N,B:N]
     python benchmarks/partsdf.py familiarity --shapes-from FOLDER [--names A,B] [--shapes N] [--others N]
@@ -21,8 +22,9 @@
 `reconstruct` with CONFIG also trains the same on all parts as one ("1P"), in --work, for a row of its own.
 `encode` has held-out shapes from points by the model's encoder, `images` from one render each by its image
 encoder, `scans` from few points, noise and missing halves, `generate` new ones against held-out ones.
-`nothing` says who is told that a picture shows no shape, `unseen` which parts come back that half a scan does
-not show; both take minutes, and need but the models that ship.
+`nothing` says of which pictures it is told that they show no shape of the family; `likeness` makes the image
+encoders that ship learn anew what tells them. `unseen` says which parts come back that half a scan does
+not show. All three take minutes, and need no family.
 `layouts` says what these are told by, `soundness` how many of them come apart, and what it costs to make
 them anew.
 `real` finds real chairs and vehicles by models of made ones. `familiarity` shows every model that ships
@@ -49,8 +51,9 @@ from partsdf_decoders import decoders
 from partsdf_encoder import encoding
 from partsdf_familiarity import strangers
 from partsdf_generation import generation
-from partsdf_images import imaging, pictures_of_nothing
+from partsdf_images import imaging
 from partsdf_layouts import layouts_or_forms
+from partsdf_likeness import learn, pictures_of_nothing
 from partsdf_real import reality
 from partsdf_reconstruct import reconstruction, robots
 from partsdf_scans import halving, scanning
@@ -107,7 +110,10 @@ def main() -> None:
     one.add_argument("--family", required=True, help="beside those whose pictures are of something else")
     one.add_argument("--model", required=True)
     one.add_argument("--views", type=int, default=3, help="pictures of each shape")
-    command("nothing", pictures_of_nothing).add_argument("--model", default="chairs")
+    command("likeness", learn).add_argument("--names", default="cars,chairs,mixers,vehicles")
+    one = command("nothing", pictures_of_nothing)
+    one.add_argument("--names", default="cars,chairs,mixers,vehicles")
+    one.add_argument("--shapes-from", type=Path, required=True, help="folder of toys/ and parts/")
     one = command("unseen", halving)
     one.add_argument("--models", default="chairs:40,vehicles:12", help="and how many shapes of each")
     one = measuring("scans", scanning)

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 import trimesh
 from partsdf_generation import POINTS, points_on
-from partsdf_images import new_meshes
+from partsdf_likeness import new_meshes
 from partsdf_scores import command_line, write
 
 from partwright.errors import NoSurfaceError

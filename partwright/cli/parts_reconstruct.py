@@ -33,8 +33,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "Writes assembly.json, parts.glb, surface.ply, report.json and preview.png. The shape may be turned "
         "about its up axis, and lie on any side if that is unknown. A shape that is none of the model's "
         "family is told so. In a picture the parts are those that the model's image encoder sees, as its "
-        "family stands; nothing is optimised. Where they do not cover the silhouette, a warning says that it "
-        "may be none of the family: a hint, as many such pictures pass.",
+        "family stands, moved until their outline is the picture's. A picture that looks unlike the family's "
+        "is told so: a hint, as some of these are, and some others pass.",
     )
     option = command.add_argument
     option(

@@ -133,6 +133,7 @@ def reconstruct_seen(
         "certainty": round(sight.certainty, 4),
         "oddness": round(sight.oddness, 4),
         "doubt": round(sight.doubt, 4),
+        "likeness": round(sight.likeness - encoder.usual, 4),
         "mirrored_iou": round(looked.mirrored, 4),
         "resolution": meshed.resolution,
         "seconds": {
@@ -140,7 +141,7 @@ def reconstruct_seen(
             "fit": round(moved - seen, 3),
             "mesh": round(time.perf_counter() - moved, 3),
         },
-        "warnings": warnings_of(encoder, looked, standpoint),
+        "warnings": warnings_of(encoder, looked, fit.iou),
     }
     assembly = to_assembly(shape, up=model.up, source=name)
     return PhotoParts(shape, assembly, surface, looked, camera, report)

@@ -87,33 +87,30 @@ class ImageNetwork(PartQueries):
         self.token_middle, self.token_far = nn.Conv2d(middle, width, 1), nn.Conv2d(far, width, 1)
         self.place = nn.Parameter(0.1 * torch.randn(sum(c * c for c in cells), width))
         self.camera = nn.Sequential(nn.LayerNorm(width), nn.Linear(width, CAMERA))
+        self.known = nn.Linear(2 * far, 1)  # learned at last, by itself (`likeness`)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        return self.told_of(*self.scales(pictures))
+
+    def scales(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """What convolutions see at a quarter, an eighth and a sixteenth of the pictures' side."""
         near = self.near(self.stem((pictures - MIDDLE) / SPREAD))
         middle = self.middle(near)
-        far = self.far(middle)
+        return near, middle, self.far(middle)
+
+    def features(self, far: Tensor) -> Tensor:
+        """(B, 2 far) by which the family's pictures are known, of what is seen at a sixteenth: how much there
+        is of each thing, and how clear it is where it is clearest."""
+        return torch.cat([far.mean(dim=(2, 3)), far.amax(dim=(2, 3))], dim=1)
+
+    def told_of(self, near: Tensor, middle: Tensor, far: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """As `forward`, of the scales."""
         larger = nn.functional.interpolate
         up = middle + larger(self.up_far(far), scale_factor=2)
         silhouette = self.silhouette(near + larger(self.up_middle(up), scale_factor=2)).squeeze(1)
         tokens = [self.token_middle(up).flatten(2), self.token_far(far).flatten(2)]
         queries = self.asked(torch.cat(tokens, dim=2).transpose(1, 2) + self.place)
         return self.told(queries), silhouette, self.camera(queries[:, self.parts])
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Beyond which a picture may show no shape of the family (`strangers`): the IoU of outlines and the
-    certainty of the side at least, the oddness of poses and the doubt which parts there are at most."""
-
-    covered: float
-    certain: float
-    odd: float
-    doubt: float
-
-    def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if not (isinstance(value, float) and math.isfinite(value)):
-                raise SettingError(f"limit {name} is {value}; expected a finite number")
 
 
 @dataclass(frozen=True)
@@ -132,17 +129,26 @@ class Sight:
     doubt: float
     """Mean entropy, in bits, of whether each part is there: about 0 where the network is sure, 1 where it
     knows nothing."""
+    likeness: float
+    """Logit of whether it is a shape of the family at all."""
 
 
 @dataclass(frozen=True)
 class ImageEncoder:
-    """A trained network, with the model whose latents and poses it predicts."""
+    """A trained network, with the model whose latents and poses it predicts.
+
+    usual: the likeness below which a picture may show no shape of the family (`strangers`).
+    """
 
     model: Model
     settings: ImageSettings
     network: ImageNetwork
     vectors: PartVectors
-    limits: Limits
+    usual: float
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.usual, float) and math.isfinite(self.usual)):
+            raise SettingError(f"usual is {self.usual}; expected a finite number")
 
     @torch.no_grad()
     def see(self, pictures: Tensor) -> list[Sight]:
@@ -151,7 +157,8 @@ class ImageEncoder:
         The form of each part is that of the training shapes' which is most like what is seen. Of forms that
         come into question the network tells the mean, which may be none: an arm in three crumbs.
         """
-        found, silhouette, camera = self.network(pictures)
+        near, middle, far = self.network.scales(pictures)
+        found, silhouette, camera = self.network.told_of(near, middle, far)
         forms, poses, logits = self.vectors.split(found)
         shapes = shapes_of(self.model, self.vectors.nearest_trained(self.model, forms), poses, logits)
         places = found[..., self.vectors.width : -1]
@@ -161,13 +168,14 @@ class ImageEncoder:
             camera[:, :2].norm(dim=1),  # the mean of unit vectors is shorter, the more they differ
             places.square().mean(dim=(1, 2)).sqrt(),
             torch.distributions.Bernoulli(logits=logits).entropy().mean(dim=1) / math.log(2),
+            self.network.known(self.network.features(far))[:, 0],
         )
         rows = zip(shapes, silhouette.sigmoid(), *(n.tolist() for n in numbers), strict=True)
         return [Sight(*row) for row in rows]
 
     def save(self, path: str | Path) -> None:
         """Write it; raises OutputError."""
-        about = {**asdict(self.settings), "limits": asdict(self.limits)}
+        about = {**asdict(self.settings), "usual": self.usual}
         save_companion(path, KIND, self.model, about, self.network.state_dict())
 
 
@@ -182,11 +190,11 @@ def load_image_encoder(model: Model, path: str | Path | None = None) -> ImageEnc
         return None
 
     def made(settings: dict[str, Any], tensors: dict[str, Tensor]) -> ImageEncoder:
-        if "limits" not in settings:
+        if "usual" not in settings:
             raise ValueError("it does not say what is usual in pictures, as older ones: train it again")
         known = ImageSettings(tuple(settings["channels"]), EncoderSettings(**settings["queries"]))
         vectors = PartVectors.of(model)
         network = with_weights(lambda: ImageNetwork(len(model.parts), vectors.width, known), tensors)
-        return ImageEncoder(model, known, network, vectors, Limits(**settings["limits"]))
+        return ImageEncoder(model, known, network, vectors, settings["usual"])
 
     return load_companion(source, KIND, model, made)

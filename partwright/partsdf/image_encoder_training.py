@@ -18,9 +18,10 @@ from partwright.partsdf.encoder_training import losses
 from partwright.partsdf.image_encoder import ImageEncoder, ImageNetwork, ImageSettings
 from partwright.partsdf.latent_metric import felt
 from partwright.partsdf.lighting import lit
+from partwright.partsdf.likeness import learn_likeness
 from partwright.partsdf.model import Model
 from partwright.partsdf.part_vectors import PartVectors
-from partwright.partsdf.strangers import SURE, usual_limits
+from partwright.partsdf.strangers import NO_LIMIT, held_out, usual_likeness
 from partwright.partsdf.views import PartMeshes, Views, draw_views
 
 VIEWS = 16_000
@@ -102,8 +103,9 @@ def train_image_encoder(
         network.parameters(), terms, steps=steps, rate=rate, told=heard, every=_TOLD, cancel=cancel,
         steepest=_STEEPEST, after=lambda step: follow(kept, network, step, _AVERAGE),
     )  # fmt: skip
-    encoder = ImageEncoder(model, settings, kept.cpu().eval(), vectors, SURE)
-    return replace(encoder, limits=usual_limits(encoder, family))
+    encoder = ImageEncoder(model, settings, kept.cpu().eval(), vectors, NO_LIMIT)
+    learn_likeness(encoder.network, seen.to(torch.device("cpu")), model.up, random, workers)
+    return replace(encoder, usual=usual_likeness(encoder, held_out(family)))
 
 
 def picture_losses(

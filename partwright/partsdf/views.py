@@ -31,7 +31,7 @@ from partwright.shapes import LONGEST_SIDE
 
 SIDE = 64  # pixels
 SHADED = 128  # added to a pixel's label where the light does not reach it
-_EACH = 4  # views of a shape once it is put together
+EACH = 4  # views of a shape once it is put together
 _WORTH = 64  # shapes, whose views take as long as a process needs to start
 _ELEVATION, _FIELD = (-8.0, 50.0), (8.0, 50.0)  # degrees
 _ROLL = math.radians(2.5)
@@ -99,28 +99,44 @@ def draw_views(
     cancel: Cancellation | None = None,
     workers: int = 1,
 ) -> Views:
-    """`count` views, or those that there are once it is cancelled, but `_EACH` at least.
+    """`count` views, or those that there are once it is cancelled, but `EACH` at least.
 
     workers: processes, as of `carried_out`; the views are the same by however many.
     """
-    shapes = torch.randint(len(model.shapes), (-(-count // _EACH),), generator=generator)
+    shapes = torch.randint(len(model.shapes), (-(-count // EACH),), generator=generator)
     donors = donors_of(model, shapes, meshes.seen(), generator)
     poses = _stretched(model.poses.map(lambda t: t[shapes]), generator)
+    present = model.present[shapes]
+    return views_of(meshes, model.up, donors, poses, present, count, generator, told, cancel, workers)
+
+
+def views_of(
+    meshes: PartMeshes,
+    up: str,
+    donors: Tensor,
+    poses: PoseTensors,
+    present: Tensor,
+    count: int,
+    generator: torch.Generator,
+    told: Callable[[int], None] | None = None,
+    cancel: Cancellation | None = None,
+    workers: int = 1,
+) -> Views:
+    """As `draw_views`, of parts that come from these donors (S, P), in these poses (S, P, ...), of shapes
+    that have them (S, P) and stand with the axis `up`; each is seen from `EACH` sides."""
     seed = int(torch.randint(1 << 40, (), generator=generator))
     orders = [
-        _Order(
-            donors[i].tolist(), model.present[s].tolist(), poses.map(lambda t, i=i: t[i]).numpy(), (seed, i)
-        )
-        for i, s in enumerate(shapes)
+        _Order(donors[i].tolist(), present[i].tolist(), poses.map(lambda t, i=i: t[i]).numpy(), (seed, i))
+        for i in range(len(donors))
     ]
-    label = np.zeros((_EACH * len(orders), SIDE, SIDE), np.uint8)
+    label = np.zeros((EACH * len(orders), SIDE, SIDE), np.uint8)
     normal = np.zeros((*label.shape, 3), np.int8)
     light, back, camera = np.zeros((3, len(label), 3), np.float32)
     framed: list[PoseTensors] = []
-    draw = partial(_drawn, meshes, model.up)
+    draw = partial(_drawn, meshes, up)
     with closing(carried_out(draw, orders, min(workers, len(orders) // _WORTH), 8)) as drawn:
         for one in drawn:
-            rows = slice(_EACH * len(framed), _EACH * (len(framed) + 1))
+            rows = slice(EACH * len(framed), EACH * (len(framed) + 1))
             label[rows], normal[rows] = one.label, one.normal
             light[rows], back[rows], camera[rows] = one.light, one.back, one.camera
             framed.append(PoseTensors.of(one.poses))
@@ -128,13 +144,13 @@ def draw_views(
                 told(min(count, rows.stop))
             if cancel is not None and cancel.requested:
                 break
-    made = _EACH * len(framed)
-    each = torch.arange(made) // _EACH
+    made = EACH * len(framed)
+    each = torch.arange(made) // EACH
     placed = PoseTensors(*(torch.stack(t) for t in zip(*framed, strict=True)))
     pixels = torch.from_numpy(normal[:made]), torch.from_numpy(label[:made])
     ways = torch.from_numpy(light[:made]), torch.from_numpy(back[:made]), torch.from_numpy(camera[:made])
     return Views(
-        *pixels, *ways, donors[each], placed.map(lambda t: t[each]), model.present[shapes][each],
+        *pixels, *ways, donors[each], placed.map(lambda t: t[each]), present[each],
     )  # fmt: skip
 
 
@@ -159,13 +175,13 @@ class _Made(NamedTuple):
 
 
 def _drawn(meshes: PartMeshes, up: str, order: _Order) -> _Made:
-    """A shape, put together and seen from `_EACH` sides."""
+    """A shape, put together and seen from `EACH` sides."""
     corners, faces, labels, poses = _put_together(meshes, order)
     rng, scene = np.random.default_rng(order.seed), Scene(corners, faces)
-    label = np.zeros((_EACH, SIDE, SIDE), np.uint8)
+    label = np.zeros((EACH, SIDE, SIDE), np.uint8)
     normal = np.zeros((*label.shape, 3), np.int8)
     rows = [
-        _seen(scene, labels, up, rng, normal[j].reshape(-1, 3), label[j].reshape(-1)) for j in range(_EACH)
+        _seen(scene, labels, up, rng, normal[j].reshape(-1, 3), label[j].reshape(-1)) for j in range(EACH)
     ]
     light, back, camera = (np.array(a, dtype=np.float32) for a in zip(*rows, strict=True))
     return _Made(normal, label, light, back, camera, poses)

@@ -17,11 +17,11 @@ from partwright.errors import EmptyShapeError, ModelError, SettingError, Unreada
 from partwright.partsdf.companions import load_companion, save_companion
 from partwright.partsdf.encoder import EncoderSettings
 from partwright.partsdf.generator import GeneratorSettings
-from partwright.partsdf.image_encoder import ImageSettings, Limits
+from partwright.partsdf.image_encoder import ImageSettings
 from partwright.partsdf.photos import _cut_out, look_at, read_photo
 from partwright.partsdf.settings import Settings
-from partwright.partsdf.standpoint import _HIGHEST, Standpoint, boxed, find_standpoint, outline
-from partwright.partsdf.strangers import MIRRORED, warnings_of
+from partwright.partsdf.standpoint import _HIGHEST, boxed, find_standpoint, outline
+from partwright.partsdf.strangers import COVERED, MIRRORED, warnings_of
 from partwright.partsdf.views import SIDE
 from partwright.render import Camera
 from partwright.render.raycast import Scene
@@ -93,18 +93,14 @@ def test_what_is_not_seen_in_the_mirror_image_is_told(tmp_path: Path) -> None:
     assert told(mirrored=0.0) == "something else is seen in its mirror image"
 
 
-LIMITS = Limits(covered=0.8, certain=0.6, odd=1.2, doubt=0.1)
+USUAL = 0.3
 
 
-def told(
-    iou: float = 0.8, certainty: float = 0.6, oddness: float = 1.2, doubt: float = 0.1,
-    mirrored: float = MIRRORED,
-) -> str:  # fmt: skip
+def told(likeness: float = USUAL, mirrored: float = MIRRORED, covered: float = COVERED) -> str:
     """What is said of a picture whose signs are these, if anything: by default all are at their limits."""
-    encoder: Any = SimpleNamespace(limits=LIMITS, model=SimpleNamespace(name="lamps"))
-    sight = SimpleNamespace(certainty=certainty, oddness=oddness, doubt=doubt)
-    seen: Any = SimpleNamespace(sight=sight, mirrored=mirrored)
-    lines = warnings_of(encoder, seen, Standpoint(Camera(0, 0), iou))
+    encoder: Any = SimpleNamespace(usual=USUAL, model=SimpleNamespace(name="lamps"))
+    seen: Any = SimpleNamespace(sight=SimpleNamespace(likeness=likeness), mirrored=mirrored)
+    lines = warnings_of(encoder, seen, covered)
     if not lines:
         return ""
     (line,) = lines
@@ -113,14 +109,12 @@ def told(
     return line[len(start) :].split("; ")[0]
 
 
-def test_what_is_beyond_the_family_s_limits_is_told() -> None:
+def test_what_looks_unlike_the_family_s_pictures_is_told() -> None:
     assert told() == ""
-    assert told(iou=0.7) == (
-        "the outline of what was found agrees with the silhouette to 70 %, less than the 80 that are usual"
-    )
-    assert told(certainty=0.5) == "it is not clear from which side it is seen"
-    assert told(oddness=1.3, doubt=0.2) == (
-        "it is not clear which parts there are, and its parts are placed unlike those of the family"
+    assert told(covered=0.4) == ("however parts are moved, their outline agrees with the silhouette to 40 %")
+    assert told(likeness=0.2) == "it looks unlike nearly all pictures of these"
+    assert told(likeness=-1.0, mirrored=0.5) == (
+        "it looks unlike nearly all pictures of these, and something else is seen in its mirror image"
     )
 
 
