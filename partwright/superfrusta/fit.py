@@ -157,7 +157,7 @@ def _mended(
     features_first = features.objective >= rival
     if features_first:
         mended, drawn = drawn_features()
-        has_rival = _is_plainer(whole, drawn, mended)
+        has_rival = len(whole.parts) < len(drawn.parts)
         ahead = mended.objective - mended.off >= rival
         if ahead and not (has_rival and featured.may_explain(whole, mended.score)):
             return drawn, True
