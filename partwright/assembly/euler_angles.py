@@ -8,10 +8,8 @@ import numpy as np
 
 from partwright.assembly.similarity import Quaternion, quaternions, rotation_matrix
 
-_TYPED, _NEAR = (
-    0.5,
-    1e-3,
-)  # degrees that people type a multiple of, and how near to one all three are taken for it
+_TYPED = 0.5  # degrees: people type multiples of it
+_NEAR = 1e-3  # degrees: so near to these all three angles are taken for them
 
 
 def fixed_axes_angles(rotation: np.ndarray) -> tuple[float, float, float]:

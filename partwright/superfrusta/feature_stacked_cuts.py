@@ -37,9 +37,8 @@ def with_cuts_once(features: Sequence[Feature], distance: Distance) -> list[Feat
 
 
 def _both(one: Feature, other: Feature, distance: Distance) -> Part | None:
-    if not (_is_upright_cut(one) and _is_upright_cut(other)) or len(one.part.copies) != len(
-        other.part.copies
-    ):
+    copies = len(one.part.copies), len(other.part.copies)
+    if not (_is_upright_cut(one) and _is_upright_cut(other)) or copies[0] != copies[1]:
         return None
     whole = _as_long(one.part, other.part)
     if not same_solid(whole, _as_long(other.part, one.part), _SAME):
