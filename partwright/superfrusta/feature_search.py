@@ -83,9 +83,8 @@ class FeatureSearch:
     ) -> None:
         self.mend = mend or (lambda tree: tree)
         self.samples, self.alpha, self.checkpoint, self.told = samples, alpha, checkpoint, told
-        self.most = min(most or _MOST, _MOST)
+        self.most, self.limit = min(most or _MOST, _MOST), most or _MOST + _FOR_MENDING
         self.tie = _TIE[0] * math.sqrt(_TIE[1] / max(1, samples.near))
-        self.limit = most or _MOST + _FOR_MENDING
         self.reach = typed_reach(shape.frame.scale)
         vertices, faces = shape.unit_mesh
         self.body = Manifold(Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
