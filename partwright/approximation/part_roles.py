@@ -34,6 +34,7 @@ FREEFORM = "freeform"
 _FLAT = 0.3  # a plate's thickness over its next longer side, at most
 _LONG = 3.0  # a bar's length over its next shorter side, at least
 _BORE = 0.5  # of the narrowest side of what it is in: a hole that is wider is its bore
+_HEAD = 1.5  # times a hole's radius: where a screw's head is sunk it is wider, where an edge is broken less
 _BEYOND = 1e-3  # of its height: how far outside a hole's ends have to lie
 _ACROSS = 9  # points each way across an end
 
@@ -97,8 +98,8 @@ def _bulk(node: Node) -> float:
 
 
 _CUTS = (
-    "hole", "bolt_hole", "blind_hole", "counterbored_hole", "countersunk_hole", "bore", "countersink",
-    "dimple", "groove", "slot", "opening", "pocket", "island", GAP,
+    "hole", "bolt_hole", "blind_hole", "counterbored_hole", "countersunk_hole", "chamfered_hole",
+    "bore", "countersink", "dimple", "groove", "slot", "opening", "pocket", "island", GAP,
 )  # fmt: skip
 
 
@@ -177,16 +178,21 @@ def _hole(part: Part, cut_from: Node, through: bool) -> str:
 
 
 def _turned_cut(profile: Profile) -> str:
-    """A stepped or tapering hole where it reaches the axis, else a groove."""
+    """A stepped, tapering or chamfered hole where it reaches the axis, else a groove."""
     outline = [side for side in profile.sides[0] if side.centre is None]
     if not any(side.start[0] == 0 == side.end[0] for side in outline):
         return "groove"
     size = _BEYOND * profile.size
     sloped = [s for s in outline if min(abs(s.end[i] - s.start[i]) for i in (0, 1)) > size]
-    if any(min(side.start[0], side.end[0]) > 0 for side in sloped):
+    cones = [sorted((side.start[0], side.end[0])) for side in sloped]
+    if any(wide > _HEAD * narrow > 0 for narrow, wide in cones):
         return "countersunk_hole"
-    walls = [s for s in outline if min(s.start[0], s.end[0]) > size and abs(s.end[0] - s.start[0]) <= size]
-    return "counterbored_hole" if len(walls) > 1 else "blind_hole" if walls else "dimple"
+    off_axis = [s for s in outline if min(s.start[0], s.end[0]) > size]
+    if any(abs(s.end[1] - s.start[1]) <= size for s in off_axis):
+        return "counterbored_hole"
+    if any(narrow > 0 for narrow, _ in cones):
+        return "chamfered_hole"
+    return "blind_hole" if any(abs(s.end[0] - s.start[0]) <= size for s in off_axis) else "dimple"
 
 
 def _is_slot(profile: Profile) -> bool:

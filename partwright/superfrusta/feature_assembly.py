@@ -10,16 +10,17 @@ import numpy as np
 
 from partwright.approximation.part_roles import FREEFORM, with_role_names
 from partwright.approximation.plain_numbers import plain, plain_move, with_plain_numbers
-from partwright.approximation.sketches.ends import typed_reach
+from partwright.approximation.sketches.ends import typed_reach, with_open_ends
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.approximation.sketches.round_holes import RoundHole
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.group_copies import in_runs
-from partwright.fields import Cylinder
+from partwright.fields import Cylinder, Tube
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_drilling import empty_round_holes
 from partwright.superfrusta.feature_groups import grouped
-from partwright.superfrusta.feature_mouths import HoleMouths
+from partwright.superfrusta.feature_hole_walls import HoleWalls
+from partwright.superfrusta.feature_mouths import HoleMouths, has_mouths
 from partwright.superfrusta.feature_stacked_cuts import with_cuts_once
 from partwright.superfrusta.feature_stepped_holes import with_stepped_holes
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, with_open_ends_everywhere
@@ -63,7 +64,10 @@ class FeatureAssembly:
         drilled: list[Part] = []
         for i, feature in enumerate(tree.features):
             for own, empty in self._alone(feature, i == 0):
-                if empty:
+                bores = [] if own.added else self._true_bores(own)
+                if bores:
+                    drilled += bores
+                elif empty:
                     drilled += own.parts
                 else:
                     result.append(own)
@@ -82,6 +86,16 @@ class FeatureAssembly:
             for f, name in zip(result, names, strict=True)
         ]
 
+    def _true_bores(self, cut: Feature) -> list[Part]:
+        """The shape's own holes in place of a round cut that is as wide as none of their walls; none where it
+        is right."""
+        walls = HoleWalls(self.round_holes, self.distance)
+        found = [walls.of(part) for part in cut.parts]
+        bores = [bore for own in found if own is not None for bore in own]
+        if any(own is None for own in found):
+            return []
+        return [with_open_ends(bore, False, self.distance, self.reach) for bore in bores]
+
     def _alone(self, feature: Feature, is_base: bool) -> list[tuple[Feature, bool]]:
         """Its holes apart, ends that are open further out; and of each whether it is a drilled hole in which
         there is nothing of the shape."""
@@ -94,7 +108,7 @@ class FeatureAssembly:
         if feature.freeform:
             yield feature, False
             return
-        part, holes = holes_apart(feature.part) if feature.added else (feature.part, ())
+        part, holes = self._holes_apart(feature.part) if feature.added else (feature.part, ())
         if not is_base and not all(is_empty(hole, self.distance) for hole in holes):
             part, holes = feature.part, ()  # cut by themselves they would open what is there before
         parts = [(part, feature.added), *((hole, False) for hole in holes)]
@@ -104,6 +118,15 @@ class FeatureAssembly:
                 own = with_open_ends_everywhere(own, self.distance, self.reach)
             drilled = not added and isinstance(own.part.field, Cylinder)
             yield own, drilled and is_empty(own.part, self.distance)
+
+    def _holes_apart(self, part: Part) -> tuple[Part, tuple[Part, ...]]:
+        """As `holes_apart`; of a tube the bore, where the shape has a cone at an end of it."""
+        if isinstance(part.field, Tube):
+            outer, height = part.field.radius, part.field.height
+            bore = dataclasses.replace(part, field=Cylinder(outer - part.field.thickness, height))
+            if has_mouths(bore, self.round_holes):
+                return dataclasses.replace(part, field=Cylinder(outer, height)), (bore,)
+        return holes_apart(part)
 
 
 def in_unit_frame(shape: Shape, whole: Assembly) -> Assembly:

@@ -27,7 +27,7 @@ Distance = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 ASIDE = 1e-3  # unit lengths: how far axes of one hole may lie apart, and numbers of copies differ
 PARALLEL = 1e-6  # of a cosine
-_CHORDS = 0.01  # of a radius, by which that of a mesh's wall may differ, whose corners may lie on chords
+WALL = 0.01  # of a radius, by which that of a mesh's wall may differ, whose corners may lie on chords
 _AROUND = 8  # points around a mouth
 _WITHIN = 0.5, 0.8  # of a mouth's depth, at which it is looked at
 _ACROSS = 0.5, 0.95  # of a mouth's radius, at which what lies beyond is
@@ -134,6 +134,14 @@ class LeftOut:
         return float(np.linalg.norm(point - self.place)) < self.radius
 
 
+def has_mouths(bore: Part, holes: Sequence[RoundHole]) -> bool:
+    """Whether a copy of a round cut is a hole of a shape that ends in a cone."""
+    ending = [hole for hole in holes if any(hole.mouths)]
+    return any(
+        _is_of(hole, copy, rotation_matrix(copy.rotation)[:, 2]) for copy in bore.copies for hole in ending
+    )
+
+
 def mouths_left_out(holes: Sequence[RoundHole], distance: Distance) -> list[LeftOut]:
     """Those of holes of a shape that a solid fills, the widest first, those alike by their place; distance:
     (N,) of that at points (N, 3), unit lengths."""
@@ -195,7 +203,7 @@ def _is_of(hole: RoundHole, copy: Part, axis: Floats) -> bool:
         abs(float(axis @ way)) > 1 - PARALLEL
         and abs(height) < copy.field.height / 2
         and aside < ASIDE
-        and abs(copy.field.radius - hole.radius) < _CHORDS * copy.field.radius
+        and abs(copy.field.radius - hole.radius) < WALL * copy.field.radius
     )
 
 

@@ -73,6 +73,8 @@ def test_a_hole_that_ends_in_a_pocket_goes_through_its_floor_and_the_pocket_does
 def test_holes_are_called_after_how_they_are_made() -> None:
     through = Profile([(0, -5), (2, -5), (2, 3), (4, 3), (4, 8), (0, 8)])
     sunk = Profile([(0, -5), (2, -5), (2, 1), (4, 3), (4, 8), (0, 8)])
+    broken = Profile([(0, -5), (2, -5), (2, 2.5), (2.5, 3), (2.5, 8), (0, 8)])
+    stepped = Profile([(0, -5), (2, -5), (2, 1), (3, 1), (3, 2.5), (3.5, 3), (3.5, 8), (0, 8)])
     drilled = Profile([(0, 0), (2, 1), (2, 8), (0, 8)])
     slot = Profile([(-3, -1, 0), (3, -1, 1), (3, 1, 0), (-3, 1, 1)])
     ring = Profile([(5, 2), (6, 2), (6, 8), (5, 8)])
@@ -81,12 +83,15 @@ def test_holes_are_called_after_how_they_are_made() -> None:
         Part(Revolution(through), name="a"),
         Part(Revolution(sunk), (10, 0, 0), name="b"),
         Part(Revolution(drilled), (0, 10, 0), name="c"),
+        Part(Revolution(broken), (10, -10, 0), name="g"),
+        Part(Revolution(stepped), (0, -10, 0), name="h"),
         Part(Extrusion(slot, 20), (10, 10, 0), name="d"),
         Part(Revolution(ring), (-10, -10, 0), name="e"),
         Part(Cylinder(1, 20), (-12, 10, 0), name="f", instances=moved),
     )
     after = with_role_names(Assembly((Part(Box((40, 40, 6)), name="x"), *cuts), "difference"))
-    names = ["counterbored_hole", "countersunk_hole", "blind_hole", "slot", "groove", "bolt_hole"]
+    names = ["counterbored_hole", "countersunk_hole", "blind_hole", "chamfered_hole"]
+    names += ["counterbored_hole_02", "slot", "groove", "bolt_hole"]
     assert [part.name for part in after.parts] == ["base_plate", *names]
 
 

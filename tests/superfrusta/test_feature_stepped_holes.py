@@ -92,7 +92,7 @@ def test_a_chamfer_of_either_cut_is_part_of_the_hole() -> None:
     drawn = (Part(Cylinder(3.3, 12.0)), Part(Cylinder(5.5, 6.0), (0.0, 0.0, 3.0)))
     cut, whole = made(*drawn, seen=(rim, floor))
     (_, hole) = whole.parts
-    assert hole.name == "countersunk_hole"
+    assert hole.name == "counterbored_hole"
     assert np.unique(np.round(diameters(hole), 1)) == pytest.approx([6.6, 8.6, 11.0, 13.0], abs=0.15)
     assert mesh_assembly(whole).volume == pytest.approx(mesh_assembly(cut).volume, rel=1e-4)
 
