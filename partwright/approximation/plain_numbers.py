@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, cast
 
 import numpy as np
 
+from partwright.approximation.plain import plain
+from partwright.approximation.plain_levels import Levels, along, walls
 from partwright.assembly import Part, Similarity
 from partwright.assembly.checks import Vector
 from partwright.assembly.euler_angles import typed_turn
@@ -23,38 +25,27 @@ from partwright.assembly.instance_patterns import (
     pattern,
     with_pattern,
 )
-from partwright.assembly.similarity import rotation_matrix
+from partwright.assembly.similarity import NO_ROTATION, rotation_matrix
 from partwright.errors import ParameterError
-from partwright.fields import Box, Field, Revolution, Solid, Swept
-from partwright.fields.profile import Loop, Profile
+from partwright.fields import Box, Extrusion, Field, Revolution, Solid, Swept
+from partwright.fields.profile import Loop, Profile, circle, circle_of
 
 _ANGLES = ("taper", "angle")
 _ALONG = 1e-9  # of a cosine
 _MOVED = 3.0  # times as far as a number, that the numbers of a circle move a place together
 
 
-def plain(value: float, within: float) -> float:
-    """The number of the fewest digits at most `within` away: 0, or multiples of 0.5 before further digits."""
-    if value == 0 or within <= 0:
-        return value
-    if abs(value) <= within:
-        return 0.0
-    digits = -math.floor(math.log10(abs(value)))
-    for decimals in range(digits, 13):
-        for halves in (1, 2):
-            unit = 10.0**-decimals / halves
-            nearest = round(value / unit) * unit
-            if abs(nearest - value) <= within:
-                return round(nearest, max(decimals + halves - 1, 0)) + 0.0
-    return value
-
-
-def with_plain_numbers(part: Part, within: float) -> Part:
+def with_plain_numbers(part: Part, within: float, levels: Levels | None = None) -> Part:
     """With lengths, corners and places made plain, each by at most `within` (own units). Turns lose their
     dust alone, and copies that are turned, in no pattern, are at plain places.
 
-    A field that does not allow its plain numbers stays as it is.
+    levels: of all parts that it may share walls and axes with, which stay one. A field that does not allow
+    its plain numbers stays as it is.
     """
+    levels = Levels.of((), within) if levels is None else levels
+    pair = _plain_pair(part, within, levels)
+    if pair is not None:
+        return pair
     part = dataclasses.replace(part, rotation=typed_turn(part.rotation))
     try:
         field = _plain_field(part.field, within)
@@ -63,10 +54,30 @@ def with_plain_numbers(part: Part, within: float) -> Part:
     copies = _plain_copies(part, within)
     if copies is None:
         own = Similarity(1.0, part.rotation, part.translation)
-        plain_own = Similarity(1.0, part.rotation, _plain_place(part.translation, within))
+        x, y, z = (levels.number(k, value) for k, value in enumerate(part.translation))
+        plain_own = Similarity(1.0, part.rotation, (x, y, z))
         moves = tuple(_plain_copy(move, own, plain_own, within) for move in part.instances)
         copies = dataclasses.replace(part, translation=plain_own.translation, instances=moves)
-    return _between_plain_ends(part, dataclasses.replace(copies, field=field), within)
+    made = dataclasses.replace(copies, field=field)
+    return _on_shared_walls(part, _between_plain_ends(part, made, levels), levels)
+
+
+def _plain_pair(part: Part, within: float, levels: Levels) -> Part | None:
+    """Of two copies along the axes, each where other parts have its walls, as the first has them; None of
+    others."""
+    if len(part.instances) != 1 or not isinstance(part.field, Box | Extrusion):
+        return None
+    if any(len(along(copy)) < 3 for copy in part.copies):
+        return None
+    one, other = (with_plain_numbers(copy, within, levels) for copy in part.copies)
+    shifted = _plain_copies(part, within)  # a box that is turned by half is not turned
+    if shifted is not None and shifted.instances[0].rotation == NO_ROTATION:
+        move = Similarity(translation=tuple(np.subtract(other.translation, one.translation)))
+    else:
+        move = other.pose @ one.pose.inverse()
+    x, y, z = (round(v, 12) + 0.0 for v in move.translation)
+    move = Similarity(1.0, typed_turn(move.rotation), (x, y, z))
+    return dataclasses.replace(one, name=part.name, instances=(move,))
 
 
 def _plain_copies(part: Part, within: float) -> Part | None:
@@ -108,37 +119,36 @@ def _plain_place(place: Vector, within: float) -> Vector:
     return x, y, z
 
 
-def _between_plain_ends(given: Part, part: Part, within: float) -> Part:
+def _between_plain_ends(given: Part, part: Part, levels: Levels) -> Part:
     """Between plain ends where its axes are the coordinates', so that parts that meet there go on meeting:
     along z, and a box without copies on all sides.
 
     given: the part before its numbers were made plain.
     """
-    if within <= 0:
+    if levels.within <= 0:
         return part
     try:
         for axis in (0, 1, 2) if isinstance(part.field, Box) and not part.instances else (2,):
-            part = _between(given, part, axis, within)
+            part = _between(given, part, axis, levels)
     except ParameterError:
         pass
     return part
 
 
-def _between(given: Part, part: Part, axis: int, within: float) -> Part:
+def _between(given: Part, part: Part, axis: int, levels: Levels) -> Part:
     """With ends that are plain along one of its axes; what has none there, or lies askew, as it is."""
-    column = rotation_matrix(part.rotation)[:, axis]
-    k = int(np.abs(column).argmax())
+    k, sign = next(((k, sign) for own, k, sign in along(part) if own == axis), (0, 0.0))
     moved = abs(given.translation[k] - part.translation[k])  # another copy may have become the first
-    if abs(column[k]) < 1 - _ALONG or moved > _MOVED * within:
+    if sign == 0 or moved > _MOVED * levels.within:
         return part
     field: Any = part.field
     if isinstance(field, Revolution):
-        return _at_plain_levels(given, part, k, float(column[k]), within)
+        return _at_plain_levels(given, part, k, sign, levels)
     length = _length(given.field, axis)
     if length is None or _length(field, axis) is None:
         return part
     # Of ends at one level the same number comes, whatever else the parts are.
-    low, high = (plain(given.translation[k] + end * length / 2, within) for end in (-1, 1))
+    low, high = (levels.number(k, given.translation[k] + end * length / 2) for end in (-1, 1))
     length = round(high - low, 12)
     place = list(part.translation)
     place[k] = round((low + high) / 2, 12) + 0.0
@@ -157,14 +167,14 @@ def _length(field: Any, axis: int) -> float | None:
     return float(field.height) if "height" in _names(field) and axis == 2 else None
 
 
-def _at_plain_levels(given: Part, part: Part, k: int, sign: float, within: float) -> Part:
+def _at_plain_levels(given: Part, part: Part, k: int, sign: float, levels: Levels) -> Part:
     """What is turned, with corners at plain levels along its axis, which is the coordinate `k`."""
     own, place = cast(Revolution, given.field), part.translation[k]
 
     def loop(before: Loop, now: Loop) -> Loop:
-        levels = (plain(given.translation[k] + sign * y, within) for _, y, _ in before)
+        own = (levels.number(k, given.translation[k] + sign * y) for _, y, _ in before)
         return tuple(
-            (x, round(sign * (level - place), 12), b) for (x, _, b), level in zip(now, levels, strict=True)
+            (x, round(sign * (level - place), 12), b) for (x, _, b), level in zip(now, own, strict=True)
         )
 
     before, now = own.profile, cast(Revolution, part.field).profile
@@ -173,6 +183,76 @@ def _at_plain_levels(given: Part, part: Part, k: int, sign: float, within: float
         cast(Revolution, part.field), profile=Profile(loop(before.outline, now.outline), holes)
     )
     return dataclasses.replace(part, field=field)
+
+
+def _on_shared_walls(given: Part, part: Part, levels: Levels) -> Part:
+    """An extrusion with walls and axes of holes where other parts have them; of copies the first.
+
+    given: the part before its numbers were made plain.
+    """
+    moved = math.dist(given.translation, part.translation)  # another copy may have become the first
+    if not isinstance(part.field, Extrusion) or moved > _MOVED * levels.within:
+        return part
+    try:
+        for axis, k, sign in along(part):
+            if axis < 2:
+                part = _on_shared_walls_across(given, part, axis, k, sign, levels)
+    except ParameterError:  # of a profile that crosses itself then
+        pass
+    return part
+
+
+def _on_shared_walls_across(given: Part, part: Part, axis: int, k: int, sign: float, levels: Levels) -> Part:
+    """The same across one of its axes, the world's `k` but for its sign: the whole is moved so that it lies
+    between such walls, or the widest of them stays where its plain profile has it."""
+    before, field = cast(Extrusion, given.field).profile, cast(Extrusion, part.field)
+    found: dict[float, float] = {}
+    for value in {*walls(before, axis), *_centres(before, axis)}:
+        level = levels.shared(k, given.translation[k] + sign * value)
+        if level is not None:
+            found[value] = level
+    if not found:
+        return part
+    numbers = {
+        own[axis]: now[axis]
+        for loop, made in zip(before.loops, field.profile.loops, strict=True)
+        for own, now in zip(loop, made, strict=True)
+    }
+    place = list(part.translation)
+    low, high = min(found), max(found)
+    ends = [float(end[axis]) for end in before.bounds()]
+    if low < high and np.allclose([low, high], ends, rtol=0, atol=_ALONG * before.size):
+        place[k] = round((found[low] + found[high]) / 2, 12) + 0.0
+    else:
+        widest = max(found, key=lambda value: (value in numbers, abs(value), value))
+        place[k] = round(found[widest] - sign * numbers.get(widest, widest), 12) + 0.0
+
+    def there(value: float) -> float:
+        return round(sign * (found[value] - place[k]), 12) + 0.0
+
+    def loop_there(loop: Loop, made: Loop) -> Loop:
+        round_, now = circle_of(loop), circle_of(made)
+        if round_ is not None and now is not None:
+            middle = list(now[1])
+            if round_[1][axis] in found:
+                middle[axis] = there(round_[1][axis])
+            return circle(now[0], middle)
+        corners = []
+        for own, corner in zip(loop, made, strict=True):
+            x, y, bulge = corner
+            if own[axis] in found:
+                x, y = (there(own[axis]), y) if axis == 0 else (x, there(own[axis]))
+            corners.append((x, y, bulge))
+        return tuple(corners)
+
+    loops = [loop_there(*pair) for pair in zip(before.loops, field.profile.loops, strict=True)]
+    moved = dataclasses.replace(field, profile=Profile.of_loops(loops))
+    return dataclasses.replace(part, field=moved, translation=(place[0], place[1], place[2]))
+
+
+def _centres(profile: Profile, axis: int) -> Iterator[float]:
+    """Of its round holes, and its outline."""
+    return (round_[1][axis] for loop in profile.loops if (round_ := circle_of(loop)))
 
 
 def _names(field: Any) -> set[str]:

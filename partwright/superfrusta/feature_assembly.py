@@ -9,7 +9,9 @@ from functools import cached_property, partial
 import numpy as np
 
 from partwright.approximation.part_roles import FREEFORM, with_role_names
-from partwright.approximation.plain_numbers import plain, plain_move, with_plain_numbers
+from partwright.approximation.plain import plain
+from partwright.approximation.plain_levels import Levels
+from partwright.approximation.plain_numbers import plain_move, with_plain_numbers
 from partwright.approximation.sketches.ends import typed_reach, with_open_ends
 from partwright.approximation.sketches.holes import holes_apart, is_empty, merged_holes
 from partwright.approximation.sketches.round_holes import RoundHole
@@ -55,7 +57,8 @@ class FeatureAssembly:
     def _plain(self, tree: FeatureTree) -> Assembly:
         frame = self.shape.frame
         whole = grouped(self._numbered(tree), self._meetings).scaled(1 / frame.scale).translated(frame.centre)
-        return _with_plain_numbers(whole, _PLAIN / frame.scale)
+        within = _PLAIN / frame.scale
+        return _with_plain_numbers(whole, within, Levels.of(whole.parts, within))
 
     def _numbered(self, tree: FeatureTree) -> list[Feature]:
         """Round holes of profiles apart, each size once, with their mouths and counterbores; ends that are
@@ -134,13 +137,13 @@ def in_unit_frame(shape: Shape, whole: Assembly) -> Assembly:
     return whole.translated((x, y, z)).scaled(shape.frame.scale)
 
 
-def _with_plain_numbers(node: Assembly, within: float) -> Assembly:
+def _with_plain_numbers(node: Assembly, within: float, levels: Levels) -> Assembly:
     children: list[Node] = []
     for child, copies in in_runs(node):
         if isinstance(child, Part):
-            children.append(with_plain_numbers(child, within))
+            children.append(with_plain_numbers(child, within, levels))
             continue
-        first = _with_plain_numbers(child, within)
+        first = _with_plain_numbers(child, within, levels)
         children.append(first)
         for k, copy in enumerate(copies, start=2):  # exactly what the first is
             move = plain_move(copy.move, partial(plain, within=within))

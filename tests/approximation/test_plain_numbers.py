@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from partwright.approximation.plain_numbers import plain, with_plain_numbers
+from partwright.approximation.plain import plain
+from partwright.approximation.plain_numbers import with_plain_numbers
 from partwright.assembly import Part, Similarity
 from partwright.assembly.euler_angles import fixed_axes_angles
 from partwright.assembly.instance_patterns import Circle, Grid, Ring, Row, pattern, with_pattern
