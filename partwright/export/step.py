@@ -28,6 +28,7 @@ from partwright.atomic_io import replacing
 from partwright.errors import NoSurfaceError, OutputError
 from partwright.export.brep import built
 from partwright.export.brep_facets import FacetsWarning, faceted
+from partwright.export.brep_healing import SHORT, without_short_edges
 from partwright.export.brep_rims import SHALLOW
 from partwright.export.brep_swept_profile import has_common_rims
 from partwright.export.brep_topology import faces_of, volume_and_area
@@ -117,9 +118,9 @@ def _saved(
     save: Callable[[list[TopoDS_Shape], Path], None],
     again: bool,
 ) -> tuple[Compromises, list[Change]]:
-    """Saves the products so that the file reads as valid solids of their volumes: as they are, with wider
-    tolerances (again: whether to try those), as facets; and what that cost. As they are where nothing helps,
-    which is told."""
+    """Saves the products so that the file reads as valid solids of their volumes: as they are, without edges
+    that are too short, with wider tolerances (again: whether to try those), as facets; and what that cost. As
+    they are where nothing helps, which is told."""
     made = Compromises()
     solids = [combined(product, ball, made) for product in products]
     save(solids, path)
@@ -128,6 +129,12 @@ def _saved(
         return made, []
     spare = path.with_name(f"{path.name}.again")
     try:
+        for share in SHORT if off is None else ():
+            healed = [without_short_edges(solid, share) for solid in solids]
+            save(healed, spare)
+            if _read_off(spare, products, solids, made) == 0:
+                spare.replace(path)
+                return made, []
         if again and not made.repairs.spent:  # slivers that the file's digits lose
             rough = Compromises(rough=True, repairs=made.repairs)
             solids = [combined(product, ball, rough) for product in products]

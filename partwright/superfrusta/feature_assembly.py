@@ -22,7 +22,7 @@ from partwright.shapes import Shape
 from partwright.superfrusta.feature_drilling import empty_round_holes
 from partwright.superfrusta.feature_groups import grouped
 from partwright.superfrusta.feature_hole_walls import HoleWalls
-from partwright.superfrusta.feature_mouths import HoleMouths, has_mouths
+from partwright.superfrusta.feature_mouths import HoleMouths
 from partwright.superfrusta.feature_stacked_cuts import with_cuts_once
 from partwright.superfrusta.feature_stepped_holes import with_stepped_holes
 from partwright.superfrusta.feature_steps import Feature, FeatureTree, with_open_ends_everywhere
@@ -67,17 +67,18 @@ class FeatureAssembly:
         drilled: list[Part] = []
         for i, feature in enumerate(tree.features):
             for own, empty in self._alone(feature, i == 0):
-                bores = [] if own.added else self._true_bores(own)
-                if bores:
-                    drilled += bores
+                true = [] if own.added else self._true_bores(own)
+                if true:
+                    drilled += true
                 elif empty:
                     drilled += own.parts
                 else:
                     result.append(own)
         result = with_cuts_once(result, self.distance)
         none = np.zeros(0, bool)
-        fold = FeatureTree(list(result)).distance
-        mouths = HoleMouths(self.round_holes, self.distance, fold, self.reach)
+        result, bores = self._with_bores_apart(result)
+        drilled += bores
+        mouths = self._mouths(result)
         holes = [one for hole in merged_holes(drilled, self.distance) for one in mouths.of(hole)]
         result += [Feature(False, hole, none, 0) for hole in with_stepped_holes(holes, self.distance)]
         stems = {True: "part", False: "cut"}
@@ -88,6 +89,20 @@ class FeatureAssembly:
             dataclasses.replace(f, part=dataclasses.replace(f.part, name=name))
             for f, name in zip(result, names, strict=True)
         ]
+
+    def _mouths(self, features: list[Feature]) -> HoleMouths:
+        fold = FeatureTree(features).distance
+        return HoleMouths(self.round_holes, self.distance, fold, self.reach)
+
+    def _with_bores_apart(self, features: list[Feature]) -> tuple[list[Feature], list[Part]]:
+        """Rings whose bore ends in a cone that they fill as discs, and the bores of these."""
+        mouths, result, bores = self._mouths(features), list(features), []
+        for i, ring in enumerate(features):
+            own = _bores(ring)
+            if any(mouths.are_missing(bore) and is_empty(bore, self.distance) for bore, _ in own):
+                bores += [with_open_ends(bore, False, self.distance, self.reach) for bore, _ in own]
+                result[i] = dataclasses.replace(ring, part=dataclasses.replace(ring.part, field=own[0][1]))
+        return result, bores
 
     def _true_bores(self, cut: Feature) -> list[Part]:
         """The shape's own holes in place of a round cut that is as wide as none of their walls; none where it
@@ -111,7 +126,7 @@ class FeatureAssembly:
         if feature.freeform:
             yield feature, False
             return
-        part, holes = self._holes_apart(feature.part) if feature.added else (feature.part, ())
+        part, holes = holes_apart(feature.part) if feature.added else (feature.part, ())
         if not is_base and not all(is_empty(hole, self.distance) for hole in holes):
             part, holes = feature.part, ()  # cut by themselves they would open what is there before
         parts = [(part, feature.added), *((hole, False) for hole in holes)]
@@ -122,14 +137,17 @@ class FeatureAssembly:
             drilled = not added and isinstance(own.part.field, Cylinder)
             yield own, drilled and is_empty(own.part, self.distance)
 
-    def _holes_apart(self, part: Part) -> tuple[Part, tuple[Part, ...]]:
-        """As `holes_apart`; of a tube the bore, where the shape has a cone at an end of it."""
+
+def _bores(ring: Feature) -> list[tuple[Part, Cylinder]]:
+    """Of a tube that was added, and of its mirror image, what is within, and the disc without it; none of
+    others."""
+    found = []
+    for part in ring.parts if ring.added and not ring.freeform else ():
         if isinstance(part.field, Tube):
             outer, height = part.field.radius, part.field.height
-            bore = dataclasses.replace(part, field=Cylinder(outer - part.field.thickness, height))
-            if has_mouths(bore, self.round_holes):
-                return dataclasses.replace(part, field=Cylinder(outer, height)), (bore,)
-        return holes_apart(part)
+            inner = Cylinder(outer - part.field.thickness, height)
+            found.append((dataclasses.replace(part, field=inner), Cylinder(outer, height)))
+    return found
 
 
 def in_unit_frame(shape: Shape, whole: Assembly) -> Assembly:

@@ -84,6 +84,10 @@ class HoleMouths:
             further = hole.instances if len(needed) == 1 else [moves[k] @ back for k in others]
             yield replace(part, name=hole.name, instances=tuple(further))
 
+    def are_missing(self, hole: Part) -> bool:
+        """Whether the fold fills a mouth of one of the copies of a drilled hole."""
+        return any(self._is_filled(copy, self._cones(copy)) for copy in hole.copies)
+
     def _cones(self, copy: Part) -> Cones:
         """At its lower and its upper end."""
         axis, ends = rotation_matrix(copy.rotation)[:, 2], [_End(-np.inf, None), _End(-np.inf, None)]
@@ -132,14 +136,6 @@ class LeftOut:
     def is_beside(self, point: Floats) -> bool:
         """Whether a point (3,) is one of its own."""
         return float(np.linalg.norm(point - self.place)) < self.radius
-
-
-def has_mouths(bore: Part, holes: Sequence[RoundHole]) -> bool:
-    """Whether a copy of a round cut is a hole of a shape that ends in a cone."""
-    ending = [hole for hole in holes if any(hole.mouths)]
-    return any(
-        _is_of(hole, copy, rotation_matrix(copy.rotation)[:, 2]) for copy in bore.copies for hole in ending
-    )
 
 
 def mouths_left_out(holes: Sequence[RoundHole], distance: Distance) -> list[LeftOut]:

@@ -12,6 +12,7 @@ from partwright.assembly import Assembly, Part
 from partwright.errors import NoSurfaceError
 from partwright.export import brep_facets, export, step
 from partwright.export.brep_facets import FacetsWarning
+from partwright.export.brep_healing import SHORT
 from partwright.export.brep_topology import volume_and_area
 from partwright.fields import Box, Cylinder
 from tests.export.step_faces import read_back
@@ -33,7 +34,7 @@ def _read_badly(monkeypatch: pytest.MonkeyPatch, times: int) -> None:
 def test_a_file_that_never_reads_well_becomes_facets_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    _read_badly(monkeypatch, 2)  # as it is, and with wide tolerances
+    _read_badly(monkeypatch, 2 + len(SHORT))  # as it is, without short edges, with wide tolerances
     pin = Part(Cylinder(0.5, 4), name="pin")
     tree = Assembly((Part(Box((2, 2, 2)), name="box"), pin), "difference", unit="cm", name="plate")
     with pytest.warns(FacetsWarning, match="plate: .* flat facets stand for all"):
@@ -79,7 +80,7 @@ def test_what_not_even_facets_mend_is_written_and_named(
     def too_small(*_: object, **__: object) -> None:
         raise NoSurfaceError("too small")
 
-    _read_badly(monkeypatch, 3)
+    _read_badly(monkeypatch, 3 + len(SHORT))
     if not made:
         monkeypatch.setattr(step, "faceted", too_small)
     with pytest.warns(FacetsWarning, match="not read as a valid solid"):
