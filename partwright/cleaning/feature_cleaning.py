@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -20,7 +21,7 @@ from partwright.assembly import Assembly, Part
 from partwright.cleaning.dimensions import dimensions, reaches, values, with_values
 from partwright.cleaning.feature_levels import Key, Level, Lying, levels, lying, sides_of, sizes, with_place
 from partwright.cleaning.grid import Grid
-from partwright.cleaning.hole_standards import standard_hole
+from partwright.cleaning.hole_standards import is_drawn_in_inches, standard_hole
 from partwright.cleaning.model import with_leaves
 from partwright.cleaning.outline_equations import (
     Equation,
@@ -39,6 +40,8 @@ from partwright.methods import Cancellation
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
+_Holes = Callable[[float, float], tuple[str, float] | None]
+"""The standard hole of a diameter, within a tolerance."""
 
 _SMOOTH = np.radians(3.0)  # corners that turn by less were smooth
 _ROUNDED = 1 / 3  # tolerances that rounding may move a number: many are rounded at once
@@ -60,7 +63,8 @@ def cleaned_features(assembly: Assembly, tolerance: float, grid: Grid, cancel: C
     """The assembly with plain numbers, no surface moved by more than twice the tolerance."""
     frames: list[Floats] = [np.eye(3)]
     parts = [lying(part, frames, tolerance) for part in assembly.parts]
-    targets = _targets(parts, tolerance, grid, assembly.unit)
+    holes = partial(standard_hole, unit=assembly.unit, inches=is_drawn_in_inches(assembly))
+    targets = _targets(parts, tolerance, grid, holes)
     made = []
     for index, one in enumerate(parts):
         if cancel.requested:
@@ -99,7 +103,7 @@ def _same_field(one: Field, other: Field, near: float) -> bool:
     return same and bool((corners <= [near, near, 1e-5]).all())
 
 
-def _targets(parts: Sequence[Lying], tolerance: float, grid: Grid, unit: str | None) -> _Targets:
+def _targets(parts: Sequence[Lying], tolerance: float, grid: Grid, holes: _Holes) -> _Targets:
     found = [level for i, one in enumerate(parts) for level in levels(i, one, tolerance)]
     places: dict[tuple[int, int, Key], float] = {}
     sorts: dict[tuple[int, int, str], list[Level]] = {}
@@ -115,7 +119,7 @@ def _targets(parts: Sequence[Lying], tolerance: float, grid: Grid, unit: str | N
     for whole in (True, False):
         alike = [size for size in measured if size.whole == whole]
         for same in groups(alike, lambda one: one.value, tolerance):
-            radius = _plain_radius([one.value for one in same], whole, tolerance, grid, unit)
+            radius = _plain_radius([one.value for one in same], whole, tolerance, grid, holes)
             radii |= {(one.part, one.key): radius for one in same}
     return _Targets(places, radii)
 
@@ -152,14 +156,12 @@ def _kept(value: float, limit: float) -> bool:
     return bool(abs(value - round(value / step) * step) <= 1e-9 * max(abs(value), step))
 
 
-def _plain_radius(
-    given: Sequence[float], whole: bool, tolerance: float, grid: Grid, unit: str | None
-) -> float:
+def _plain_radius(given: Sequence[float], whole: bool, tolerance: float, grid: Grid, holes: _Holes) -> float:
     """As `_plain`; what goes all around by its diameter, which may be one of a standard hole."""
     if not whole:
         return _plain(given, tolerance, grid)
     low, high = 2 * min(given), 2 * max(given)
-    standard = standard_hole((low + high) / 2, 2 * tolerance - (high - low) / 2, unit)
+    standard = holes((low + high) / 2, 2 * tolerance - (high - low) / 2)
     plain = _plain([low, high], 2 * tolerance, grid)
     if standard is not None and abs(standard[1] - (low + high) / 2) <= abs(plain - (low + high) / 2):
         return standard[1] / 2

@@ -14,7 +14,7 @@ from partwright.cleaning.dimensions import dimensions, values
 from partwright.cleaning.feature_cleaning import groups
 from partwright.cleaning.feature_levels import Key, Lying, Size, levels, lying, sides_of, sizes
 from partwright.cleaning.grid import Grid
-from partwright.cleaning.hole_standards import standard_hole
+from partwright.cleaning.hole_standards import is_drawn_in_inches, standard_hole
 from partwright.cleaning.outline_equations import bend_at
 from partwright.cleaning.relations import Relation
 from partwright.fields import Extrusion, Revolution, Swept
@@ -120,7 +120,7 @@ def _smooth(field: Swept) -> Iterator[int]:
 def feature_numbers(given: Assembly, made: Assembly, tolerance: float) -> tuple[FeatureNumber, ...]:
     """Numbers of the parts of `made` beside those of the same parts in `given`. tolerance: how far a hole may
     be off the size that it is made for."""
-    cuts = subtracted_names(made)
+    cuts, inches = subtracted_names(made), is_drawn_in_inches(made)
     found: list[FeatureNumber] = []
     for before, after in zip(given.parts, made.parts, strict=True):
         cut = after.name in cuts
@@ -129,7 +129,7 @@ def feature_numbers(given: Assembly, made: Assembly, tolerance: float) -> tuple[
             if key not in known:
                 continue
             hole = cut and name == "diameter"
-            standard = standard_hole(nominal, tolerance, made.unit) if hole else None
+            standard = standard_hole(nominal, tolerance, made.unit, inches) if hole else None
             one = FeatureNumber(after.name, name, nominal, known[key][1], standard[0] if standard else "")
             if one not in found:
                 found.append(one)

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from partwright.assembly import Assembly, Part, load_assembly
+from partwright.assembly import Assembly, Part, Similarity, load_assembly
 from partwright.cleaning import clean
-from partwright.cleaning.hole_standards import standard_hole
+from partwright.cleaning.hole_standards import is_drawn_in_inches, standard_hole
 from partwright.cleaning.outline_equations import Solver, centred, coordinate, round_of
 from partwright.cli.main import main
 from partwright.errors import CancelledError
@@ -134,6 +134,32 @@ def test_holes_are_called_after_their_screws(
     found = standard_hole(diameter, tolerance, unit)
     assert (found[0] if found else None) == name
     assert found is None or math.isclose(found[1], diameter, abs_tol=tolerance)
+
+
+def inch_plate(inch: float) -> Assembly:
+    """8 x 12 x 1/2 with four holes for screws of a quarter of an inch, an inch being so long."""
+    outline = Profile.rectangle(8 * inch, 12 * inch, corner=inch)
+    plate = Part(Extrusion(outline, inch / 2), name="plate")
+    moves = [Similarity(translation=(x * inch, y * inch, 0.0)) for x, y in ((6.5, 0), (0, 9), (6.5, 9))]
+    hole = Part(Cylinder(0.133 * inch, inch), (-3.25 * inch, -4.5 * inch, 0), name="hole", instances=moves)
+    slot = Part(Extrusion(Profile.rectangle(1.75 * inch, 0.625 * inch), inch), name="slot")
+    return Assembly((plate, hole, slot), operation="difference", unit="mm")
+
+
+def test_holes_of_parts_that_were_drawn_in_inches_are_for_unified_screws() -> None:
+    """Whatever unit they are stored in; 6.76 mm would be for a tap of M8. Of the same in metric numbers they
+    are ISO's."""
+    imperial = inch_plate(25.4)
+    assert is_drawn_in_inches(imperial)
+    assert is_drawn_in_inches(dataclasses.replace(imperial.scaled(0.1), unit="cm"))
+    metric = inch_plate(25.5)
+    assert not is_drawn_in_inches(metric)
+    assert not is_drawn_in_inches(dataclasses.replace(imperial, unit=None))
+    for plate, name in ((imperial, "1/4 clearance, ASME B18.2.8 close"), (metric, "M8 tapping, ISO 2306")):
+        made = clean(plate, tolerance=0.05)
+        (number,) = [one for one in made.numbers if one.part == "hole" and one.name == "diameter"]
+        assert number.standard == name
+    assert clean(imperial, tolerance=0.05).assembly["hole"].field.radius == pytest.approx(25.4 * 0.133)
 
 
 def test_a_cancelled_cleaning_says_so() -> None:
