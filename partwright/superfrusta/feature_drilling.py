@@ -63,7 +63,7 @@ def hole_warnings(shape: Shape, holes: Sequence[RoundHole]) -> tuple[str, ...]:
 
 
 def with_holes_drilled(search: FeatureSearch, tree: FeatureTree, holes: Sequence[RoundHole]) -> FeatureTree:
-    """The tree with those of holes cut that it fills, each size once, as many as its features may be; round
+    """The tree with those of holes cut that it fills, each size once, as many parts as are asked for; round
     holes that some copies of a profile have only in the tree are none of it before.
 
     They cost nothing where trees are compared: what is known to be there needs no other reason.
@@ -71,7 +71,7 @@ def with_holes_drilled(search: FeatureSearch, tree: FeatureTree, holes: Sequence
     features = [_with_true_holes(search, tree, feature) for feature in tree.features]
     missing = without_feature(holes, FeatureTree(features).distance)
     parts = merged_holes([hole.part() for hole in missing], search.samples.measure)
-    parts = parts[: max(0, search.limit - len(features))]
+    parts = parts if search.asked is None else parts[: max(0, search.asked - len(features))]
     if not parts and all(one is other for one, other in zip(features, tree.features, strict=True)):
         return tree
     cuts = [Feature(False, part, covers(part, search.points), _SIDES) for part in parts]

@@ -83,7 +83,7 @@ class FeatureSearch:
     ) -> None:
         self.mend = mend or (lambda tree: tree)
         self.samples, self.alpha, self.checkpoint, self.told = samples, alpha, checkpoint, told
-        self.most, self.limit = min(most or _MOST, _MOST), most or _MOST + _FOR_MENDING
+        self.asked, self.most, self.limit = most, min(most or _MOST, _MOST), most or _MOST + _FOR_MENDING
         self.tie = _TIE[0] * math.sqrt(_TIE[1] / max(1, samples.near))
         self.reach = typed_reach(shape.frame.scale)
         vertices, faces = shape.unit_mesh

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,19 @@ def test_what_a_tree_fills_is_drilled_within_the_budget(most: int | None, copies
     told = hole_warnings(SHAPE, left)
     assert len(left) == 4 - copies
     assert told == () if copies else told[0].startswith("left out: 4 round holes, up to 2 mm wide, at the")
+
+
+def test_a_tree_that_is_long_has_its_holes_too() -> None:
+    """Its length is what the search allows itself, and not what was asked for."""
+    settings = Settings.for_quality("draft")
+    search = FeatureSearch(SHAPE, FitSamples.of(SHAPE, settings), settings.alpha)
+    plate, bore = in_unit_frame(SHAPE, Assembly((PLATE, BORE), operation="difference")).parts
+    none = np.zeros(0, bool)
+    cuts = [replace(bore, translation=(0.0, 0.0, 3.0 + k)) for k in range(search.limit)]  # of nothing
+    features = [Feature(True, plate, none, 4), *(Feature(False, cut, none, 2) for cut in (*cuts, bore))]
+    drilled = with_holes_drilled(search, search.scored(FeatureTree(features)), empty_round_holes(SHAPE))
+    assert len(drilled.features) == len(features) + 1
+    assert len(drilled.features[-1].part.copies) == 4
 
 
 def test_a_hole_that_a_copy_has_only_in_the_tree_is_none_of_it() -> None:
