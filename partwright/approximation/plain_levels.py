@@ -103,6 +103,11 @@ def walls(profile: Profile, axis: int) -> Iterator[float]:
                 yield side.start[axis]
 
 
+def centres(profile: Profile, axis: int) -> Iterator[float]:
+    """Of its round holes, and its outline where that is a circle."""
+    return (round_[1][axis] for loop in profile.loops if (round_ := circle_of(loop)))
+
+
 def _coordinates(part: Part) -> Iterator[tuple[int, float]]:
     """Of the part without its copies: world axes and values, of its ends, its walls, and axes of what is
     round."""
@@ -124,4 +129,4 @@ def _own_coordinates(part: Part, axis: int) -> Iterator[float]:
         yield from (-height / 2, height / 2)
     elif axis < 2 and isinstance(field, Extrusion):
         yield from walls(field.profile, axis)
-        yield from (circle[1][axis] for loop in field.profile.loops if (circle := circle_of(loop)))
+        yield from centres(field.profile, axis)

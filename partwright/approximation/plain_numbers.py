@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import Any, cast
 
 import numpy as np
 
 from partwright.approximation.plain import plain
-from partwright.approximation.plain_levels import Levels, along, walls
+from partwright.approximation.plain_levels import Levels, along, centres, walls
 from partwright.assembly import Part, Similarity
 from partwright.assembly.checks import Vector
 from partwright.assembly.euler_angles import typed_turn
@@ -207,7 +207,7 @@ def _on_shared_walls_across(given: Part, part: Part, axis: int, k: int, sign: fl
     between such walls, or the widest of them stays where its plain profile has it."""
     before, field = cast(Extrusion, given.field).profile, cast(Extrusion, part.field)
     found: dict[float, float] = {}
-    for value in {*walls(before, axis), *_centres(before, axis)}:
+    for value in {*walls(before, axis), *centres(before, axis)}:
         level = levels.shared(k, given.translation[k] + sign * value)
         if level is not None:
             found[value] = level
@@ -248,11 +248,6 @@ def _on_shared_walls_across(given: Part, part: Part, axis: int, k: int, sign: fl
     loops = [loop_there(*pair) for pair in zip(before.loops, field.profile.loops, strict=True)]
     moved = dataclasses.replace(field, profile=Profile.of_loops(loops))
     return dataclasses.replace(part, field=moved, translation=(place[0], place[1], place[2]))
-
-
-def _centres(profile: Profile, axis: int) -> Iterator[float]:
-    """Of its round holes, and its outline."""
-    return (round_[1][axis] for loop in profile.loops if (round_ := circle_of(loop)))
 
 
 def _names(field: Any) -> set[str]:

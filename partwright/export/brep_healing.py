@@ -22,7 +22,7 @@ def without_short_edges(solid: TopoDS_Shape, share: float) -> TopoDS_Shape:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
     from OCP.ShapeFix import ShapeFix_Shape, ShapeFix_Wireframe
 
-    length = share * volume_and_area(solid)[0] ** (1 / 3)
+    length = share * abs(volume_and_area(solid)[0]) ** (1 / 3)
     try:
         wires = ShapeFix_Wireframe(BRepBuilderAPI_Copy(solid).Shape())  # it changes what it is given
         wires.SetPrecision(length)
