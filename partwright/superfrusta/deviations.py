@@ -18,8 +18,8 @@ from partwright.superfrusta.samples import FitSamples, Rows
 
 Floats = NDArray[np.float32]
 
-_ON = 0.004  # unit lengths: points this near to a surface are on it
-_CLOSE = 0.009  # unit lengths, half a hundredth of the longest side: what is nearer is not off
+ON = 0.004  # unit lengths: points this near to a surface are on it
+CLOSE = 0.009  # unit lengths, half a hundredth of the longest side: what is nearer is not off
 _BESIDE = 0.005  # unit lengths from a surface at which a gap is looked for
 _MOST_FAR = 60_000  # cells at most that are looked at
 _DEEP, _SLIVER = 0.05, 5e-4  # unit lengths: so deep inside, any place is a void whose field is more
@@ -73,20 +73,20 @@ def deviations(samples: FitSamples, rows: Rows) -> Deviations:
     added = np.flatnonzero(rows[:, Column.SIGN] > 0)
     surfaces = surface_points(rows)
     found = zip(
-        _of_parts(samples, rows, added, surfaces),
+        of_parts(samples, rows, added, surfaces),
         _of_shape(samples, rows, added),
-        _of_voxels(samples, rows, added),
-        _of_far_cells(samples, rows, added, surfaces[added]),
+        of_voxels(samples, rows, added),
+        of_far_cells(samples, rows, added, surfaces[added]),
         strict=True,
     )
     points, distance, off, part = (np.concatenate(one) for one in found)
     # At an edge, what is read off the grid may be wrong by half a voxel.
-    kept = off > max(_CLOSE, samples.grid.spacing / 2)
+    kept = off > max(CLOSE, samples.grid.spacing / 2)
     off = np.where(distance > 0, np.float32(OUTSIDE), np.float32(1)) * off
     return Deviations(points[kept], distance[kept], off[kept], part[kept].astype(np.int64), len(rows))
 
 
-def _of_parts(
+def of_parts(
     samples: FitSamples, rows: Rows, added: NDArray[np.int64], surfaces: NDArray[np.float64]
 ) -> tuple[NDArray[Any], ...]:
     """Points on the assembly's surface that stick out of the shape, or enclose a gap inside it."""
@@ -94,15 +94,15 @@ def _of_parts(
     part = np.repeat(np.arange(len(rows)), points.shape[1])
     points = points.reshape(-1, 3)
     field = samples.distance_of(rows, points)
-    shown = np.abs(field) < _ON
+    shown = np.abs(field) < ON
     # Under a blend the surface is further out than that of any part.
-    under = np.flatnonzero((field <= -_ON) & (field > -_DEEPEST_BLEND))
-    shown[under] = (samples.parts_of(rows[added], points[under]) > -_ON).all(axis=0)
+    under = np.flatnonzero((field <= -ON) & (field > -_DEEPEST_BLEND))
+    shown[under] = (samples.parts_of(rows[added], points[under]) > -ON).all(axis=0)
     points, field, part = points[shown], field[shown], part[shown]
     distance = samples.near_distance(points)
     off = np.where(distance > 0, distance - field, 0)
     # Deep inside, parts that touch leave no gap between them although the surfaces of both are met there.
-    deep = np.flatnonzero(distance < -_CLOSE)
+    deep = np.flatnonzero(distance < -CLOSE)
     around = samples.distance_of(rows, (points[deep] + _AROUND).reshape(-1, 3)).reshape(len(_AROUND), -1)
     gap = deep[around.max(axis=0) > _BESIDE / 2]
     off[gap] = -distance[gap]
@@ -113,13 +113,13 @@ def _of_shape(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tupl
     """Points on the shape's surface that no part covers, and those deep under parts: walls of what is filled,
     which may be too narrow for its voxels to tell how deep it is."""
     field = samples.distance_of(rows, samples.surface)
-    open_, filled = np.flatnonzero(field > _CLOSE), np.flatnonzero(field < -_CLOSE)
+    open_, filled = np.flatnonzero(field > CLOSE), np.flatnonzero(field < -CLOSE)
     gap = walked(samples, rows, samples.surface[open_], field[open_])
     index = np.concatenate([open_, filled])
     points, off = samples.surface[index], np.concatenate([gap, -field[filled]])
     part = added[samples.parts_of(rows[added], points).argmin(axis=0)]
     # What is filled lies outside of the shape, if only just.
-    distance = np.repeat(np.array([0, _ON], np.float32), [len(open_), len(filled)])
+    distance = np.repeat(np.array([0, ON], np.float32), [len(open_), len(filled)])
     return points, distance, off, part
 
 
@@ -129,11 +129,11 @@ def walked(samples: FitSamples, rows: Rows, points: Floats, gap: Floats) -> Floa
     Beside thin, bent and blended parts the field is less than the distance: what is missing of a tip counted
     half. So points walk to the surface, and the way that they are off is measured.
     """
-    place, field = _walked_to(samples, rows, points, gap)
-    return np.where(np.abs(field) < _CLOSE, np.maximum(gap, np.linalg.norm(place - points, axis=1)), gap)
+    place, field = walked_to(samples, rows, points, gap)
+    return np.where(np.abs(field) < CLOSE, np.maximum(gap, np.linalg.norm(place - points, axis=1)), gap)
 
 
-def _walked_to(samples: FitSamples, rows: Rows, points: Floats, field: Floats) -> tuple[Floats, Floats]:
+def walked_to(samples: FitSamples, rows: Rows, points: Floats, field: Floats) -> tuple[Floats, Floats]:
     """Where points (n, 3) come to that walk to the assembly's surface, and its field (n,) there."""
     place = points
     for _ in range(_STEPS):
@@ -145,7 +145,7 @@ def _walked_to(samples: FitSamples, rows: Rows, points: Floats, field: Floats) -
     return place, field
 
 
-def _of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
+def of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
     """Places inside the shape that no part fills, and outside that one does.
 
     Where blends wall a void no part's surface is near it, and a hole may lie between the points of a face. A
@@ -153,10 +153,10 @@ def _of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tup
     """
     points, distance = samples.lattice
     field = samples.lattice_field(rows)
-    beside = np.flatnonzero((field > 0) & (field < samples.grid.spacing) & (distance - field > _CLOSE))
-    onto, field_there = _walked_to(samples, rows, points[beside], field[beside])
+    beside = np.flatnonzero((field > 0) & (field < samples.grid.spacing) & (distance - field > CLOSE))
+    onto, field_there = walked_to(samples, rows, points[beside], field[beside])
     wrong = np.where(distance < 0, field, -field) > np.where(distance < -_DEEP, _SLIVER, _BESIDE / 2)
-    onto = onto[np.abs(field_there) < _CLOSE]
+    onto = onto[np.abs(field_there) < CLOSE]
     deepest = samples.parts_of(rows[added], points[wrong]).argmin(axis=0)
     nearest = np.abs(samples.parts_of(rows[added], onto)).argmin(axis=0)
     points = np.concatenate([points[wrong], onto])
@@ -164,7 +164,7 @@ def _of_voxels(samples: FitSamples, rows: Rows, added: NDArray[np.int64]) -> tup
     return points, distance, np.abs(distance), added[np.concatenate([deepest, nearest])]
 
 
-def _of_far_cells(
+def of_far_cells(
     samples: FitSamples, rows: Rows, added: NDArray[np.int64], surfaces: NDArray[np.float64]
 ) -> tuple[NDArray[Any], ...]:
     """Places that an assembly fills further out than the lattice of voxels goes. surfaces: (M, K, 3) of the
@@ -177,7 +177,7 @@ def _of_far_cells(
     points = points[:: 1 + len(points) // _MOST_FAR]
     field = samples.distance_of(rows, points)
     beside = np.flatnonzero((field > 0) & (field < CELL))
-    onto, field_there = _walked_to(samples, rows, points[beside], field[beside])
+    onto, field_there = walked_to(samples, rows, points[beside], field[beside])
     points = np.concatenate([points[field < 0], onto[np.abs(field_there) < _SLIVER]])
     distance = samples.measure(points).astype(np.float32)
     part = np.abs(samples.parts_of(rows[added], points)).argmin(axis=0)

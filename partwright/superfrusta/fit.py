@@ -81,10 +81,17 @@ def fit(request: FitRequest[Settings]) -> Fitted:
             f"can see. Check its thickness{advice}"
         )
     search.leaves = search.leaves or [RepeatedPart(row) for row in search.best]
-    if outcome != "interrupted" and not settings.curve:
-        with search.timed("rejoin"):
-            search.leaves = rejoined(search.samples, search.leaves, search.settings)  # less what holes take
-    holes.cut()
+    whole_search = outcome != "interrupted" and not settings.curve
+    try:
+        if whole_search:
+            with search.timed("rejoin"):
+                # Less what holes take.
+                search.leaves = rejoined(search.samples, search.leaves, search.settings)
+        known = holes.cut()
+        if whole_search and search.mending:
+            search.polish(shape, known)
+    except CancelledError:
+        outcome = "interrupted"
     leaves = search.leaves
     whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
     if features is not None:

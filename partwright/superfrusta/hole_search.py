@@ -53,21 +53,26 @@ class HoleSearch:
                 search.samples = filled(samples, np.any(hiding, axis=0))
         return cls(search, shape, patterns, samples, most)
 
-    def cut(self) -> None:
-        """The holes, out of the leaves that the search found, which sees the shape as it is from then on."""
+    def cut(self) -> int:
+        """The holes, out of the leaves that the search found, which sees the shape as it is from then on.
+
+        How many of the leaves, the last of them, are round holes, whose place and size are known.
+        """
         search = self.search
         search.settings = replace(search.settings, max_parts=self.max_parts)
         if self.shape is None:
-            return
+            return 0
         found = search.leaves
         with search.timed("holes"):
             if self.patterns:
                 search.take_samples(self.unfilled(search.samples))
                 found = with_holes(search.samples, found, self.patterns, search.settings, search.locked)
+            others = len(found)
             found = with_round_holes(self.shape, search.samples, found, search.settings)
         if found is not search.leaves:
             search.leaves, rows = found, expanded(found)
             search.report_progress("holes", search.settings.rounds, rows, 1.0, len(found))
+        return len(found) - others
 
     def unfilled(self, samples: FitSamples) -> FitSamples:
         """Samples of the shape as it is, at the points of others: where something was astray, they are more

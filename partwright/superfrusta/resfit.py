@@ -19,6 +19,7 @@ from partwright.shapes import Shape
 from partwright.superfrusta.carving import Carving
 from partwright.superfrusta.frontier import Frontier
 from partwright.superfrusta.growing import grow
+from partwright.superfrusta.last_polish import last_polished
 from partwright.superfrusta.mending import Mending
 from partwright.superfrusta.merging import cheapest_merger, merge
 from partwright.superfrusta.objective import coverage, score, volume_iou
@@ -282,6 +283,13 @@ class ResidualFit:
             self.leaves = repeat(self.samples, self.best, found, self.settings, self.locked, nearly)
             rows = expanded(self.leaves)
         self.report_progress("symmetry", self.settings.rounds, rows, 1.0, len(self.leaves))
+
+    def polish(self, shape: Shape, known: int) -> None:
+        """The leaves, but for those that are locked and the last, of which so many are `known`."""
+        index = np.arange(len(self.leaves))
+        moving = (index >= self.locked) & (index < len(self.leaves) - known)
+        with self.timed("polish"):
+            self.leaves = last_polished(shape, self.samples, self.leaves, self.settings, moving)
 
     def enforce_budget(self) -> None:
         """What an interruption or a fit without thinning left over the part budget goes, without refits."""

@@ -59,6 +59,8 @@ class Settings:
     """Price in the objective, for each unit length that parts are off, while mending."""
     mends: int = 16
     """Tries to mend parts that stick out of the shape or leave places of it out."""
+    looks: int = 24
+    """At most so many assemblies are looked at closely while the largest deviations are taken in at last."""
     trials: int = 3
     """Removals that are tried with a refit before the cheapest is taken."""
     patience: int = 2
@@ -82,7 +84,7 @@ class Settings:
     def __post_init__(self) -> None:
         for name in ("rounds", "regions", "attempts", "trials", "patience", "near", "uniform"):
             check_number(name, getattr(self, name), low=1)
-        for name in ("cycles", "mends"):
+        for name in ("cycles", "mends", "looks"):
             check_number(name, getattr(self, name), low=0)
         check_number("resolution", self.resolution, low=24, high=512)
         check_number("kappa", self.kappa, low=1e-4, high=1.0)
@@ -129,7 +131,9 @@ class Settings:
 
 
 PRESETS: dict[str, Settings] = {
-    "draft": Settings(rounds=4, regions=14, trials=1, mends=1, near=10_000, uniform=10_000, resolution=64),
+    "draft": Settings(
+        rounds=4, regions=14, trials=1, mends=1, looks=0, near=10_000, uniform=10_000, resolution=64
+    ),
     "normal": Settings(),
     "high": Settings(attempts=4),
 }

@@ -171,31 +171,60 @@ def refit(
     """
     target = samples.target(samples.optimised_indices)
     rows = np.stack([leaf.row for leaf in leaves])
-    tied = ties(rows, settings)
-    free = freedom(rows, np.arange(len(leaves)) >= locked, settings)
-    free[tied, Tangent.SY] = False
-    free_entries = np.flatnonzero(free)
-    copies = _Copies.of(leaves)
-    lift = copies.lift(tied)[:, free_entries]
+    steps = LeafSteps.of(leaves, settings, np.arange(len(leaves)) >= locked)
     damping = _DAMPING
     for beta, iterations in sharpened(stages, samples.thickness):
         terms = (target, float(beta), penalties(settings), samples.threads)
 
         def linearise(at: Rows, terms: Terms = terms) -> tuple[float, Floats, Floats]:
-            loss, gradient, matrix = samples.kernel.normal_equations(copies.rows(at), *terms)
-            return loss, lift.T @ gradient, lift.T @ matrix @ lift
+            loss, gradient, matrix = samples.kernel.normal_equations(steps.copies(at), *terms)
+            return loss, *steps.projected(gradient, matrix)
 
         def loss(at: Rows, terms: Terms = terms) -> float:
-            return samples.kernel.loss(copies.rows(at), *terms)
+            return samples.kernel.loss(steps.copies(at), *terms)
 
-        def move(at: Rows, entries: Floats) -> Rows:
-            step = np.zeros(free.shape)
-            step[free] = entries
-            return np.concatenate([at[:locked], _moved(at, step, free, tied)[locked:]])
-
-        found = minimise(rows, linearise, loss, move, replace(damping, trials=int(iterations)))
+        found = minimise(rows, linearise, loss, steps.taken, replace(damping, trials=int(iterations)))
         rows, damping = found.state, replace(damping, start=found.damping)
     return [RepeatedPart(row, leaf.isometries) for row, leaf in zip(rows, leaves, strict=True)]
+
+
+@dataclass(frozen=True)
+class LeafSteps:
+    """How leaves (L,) move, those that are `moving` (L,), all copies of each as one."""
+
+    moving: NDArray[np.bool_]
+    _copies: _Copies
+    _free: NDArray[np.bool_]
+    _tied: NDArray[np.bool_]
+    _lift: Floats
+
+    @classmethod
+    def of(cls, leaves: Sequence[RepeatedPart], settings: Settings, moving: NDArray[np.bool_]) -> LeafSteps:
+        rows = np.stack([leaf.row for leaf in leaves])
+        tied = ties(rows, settings)
+        free = freedom(rows, moving, settings)
+        free[tied, Tangent.SY] = False
+        copies = _Copies.of(leaves)
+        return cls(moving, copies, free, tied, copies.lift(tied)[:, np.flatnonzero(free)])
+
+    @property
+    def leaf(self) -> NDArray[np.int64]:
+        """(C,) that each copy is of."""
+        return self._copies.leaf
+
+    def copies(self, rows: Rows) -> Rows:
+        """(C, 17) of the leaves' rows (L, 17)."""
+        return self._copies.rows(rows)
+
+    def projected(self, gradient: Floats, matrix: Floats) -> tuple[Floats, Floats]:
+        """Normal equations of all copies as those of the entries (n,) that may move."""
+        return self._lift.T @ gradient, self._lift.T @ matrix @ self._lift
+
+    def taken(self, rows: Rows, entries: Floats) -> Rows:
+        """The leaves' rows after a step (n,) of what may move."""
+        step = np.zeros(self._free.shape)
+        step[self._free] = entries
+        return np.where(self.moving[:, None], _moved(rows, step, self._free, self._tied), rows)
 
 
 def _moved(rows: Rows, step: Floats, free: NDArray[np.bool_], tied: NDArray[np.bool_]) -> Rows:

@@ -12,14 +12,17 @@ from partwright.methods import Cancellation, FitRequest, Fitted, Progress, Run
 from partwright.metrics.frames import in_unit_frame
 from partwright.metrics.iou import iou
 from partwright.shapes import Shape, load_shape
-from partwright.superfrusta import Settings, carving
+from partwright.superfrusta import Settings, carving, resfit
 from partwright.superfrusta.carving import Carving
+from partwright.superfrusta.close_look import CloseLook
 from partwright.superfrusta.fit import fit
 from partwright.superfrusta.flat_tree import flattened
 from partwright.superfrusta.outcome import Step, chosen
 from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import NOTHING, FitSamples
+from partwright.superfrusta.symmetric_fit import RepeatedPart
 from tests.superfrusta.meshes import box, bracket, corner_tie, drilled_block, half_torus, pipe, table, union
+from tests.superfrusta.rows import random_rows
 
 OUTCOMES = {"converged", "budget_reached", "target_reached", "interrupted"}
 
@@ -242,3 +245,33 @@ def test_an_interruption_while_carving_keeps_what_was_there() -> None:
     assert reached(stopped.assembly, shape) > 0.9
     assert seen == sorted(seen)
     assert max(seen) < 0.7
+
+
+def test_an_interruption_while_all_parts_are_polished_keeps_them(
+    table_shape: Shape, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drafts are not polished: this one is to be."""
+    cancel = Cancellation()
+    begun = CloseLook.at
+
+    def interrupted(shape: Shape, samples: FitSamples) -> CloseLook:
+        cancel.request()
+        return begun(shape, samples)
+
+    whole = draft(table_shape)
+    monkeypatch.setattr(CloseLook, "at", interrupted)
+    stopped = draft(table_shape, cancel=cancel, looks=8)
+    assert stopped.outcome == "interrupted"
+    assert stopped.assembly == whole.assembly
+
+
+def test_what_is_locked_and_holes_that_are_known_are_not_polished(
+    table_shape: Shape, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = []
+    monkeypatch.setattr(resfit, "last_polished", lambda *given: told.append(given) or given[2])
+    settings = Settings.for_quality("draft")
+    search = ResidualFit(FitSamples.of(table_shape, settings), settings, locked=1)
+    search.leaves = [RepeatedPart(row) for row in random_rows(5, seed=0)]
+    search.polish(table_shape, 2)
+    assert told[0][-1].tolist() == [False, True, True, False, False]

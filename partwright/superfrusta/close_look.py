@@ -1,0 +1,196 @@
+"""How far an assembly and a shape are apart, seen as closely as the report measures it.
+
+A search looks hundreds of times, at few points, and takes the field for the distance: in a crease that is
+filled the field of the parts beside it is a fraction of that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from partwright.fields.columns import Column
+from partwright.metrics.deviation import buried
+from partwright.shapes import Shape
+from partwright.superfrusta.deviations import (
+    CLOSE,
+    ON,
+    Deviations,
+    of_far_cells,
+    of_parts,
+    of_voxels,
+    walked_to,
+)
+from partwright.superfrusta.part_surfaces import surface_points
+from partwright.superfrusta.samples import FitSamples, Rows
+
+Floats = NDArray[np.float32]
+
+_DRAWN = 14_000  # points of the shape's surface
+_CORNERS = 10_000  # of the input's vertices, at most
+_LOOSE = 1.25  # times the field: where a walk was longer, it need not have ended at what is nearest
+_AMONG_FURTHEST = 0.7  # of the furthest: so far are those that are looked at once more
+_SLOPE = 2.5  # times that a part's field outside may be less than the distance, where it is bent or tapers
+_BLENDED = 0.02  # unit lengths: a blend covers as much between parts
+_AGAIN = 40  # points at once, thrice at most
+_TIMES = 3
+_FELT = (
+    0.5  # of what is furthest off in the whole: less adds a sixteenth of that or less to the norm over parts
+)
+_WAYS, _SHELLS = 64, 12  # from a point outwards, and distances that are tried in each
+STICKS_OUT = (
+    1.8  # times that sticking out counts, which is seen first; what is filled or left out counts once
+)
+
+
+@dataclass(frozen=True)
+class Seen(Deviations):
+    """times: (n,) that each point's length counts in `off`."""
+
+    times: Floats
+
+
+@dataclass
+class CloseLook:
+    """Points (N, 3) of a shape's surface, corners included, at which assemblies are looked at.
+
+    Which of them cannot be seen, as they lie in cracks, is found out where it matters.
+    """
+
+    samples: FitSamples
+    points: Floats
+    _shown: NDArray[np.bool_] = field(init=False)
+    _asked: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._shown = np.ones(len(self.points), bool)
+        self._asked = np.zeros(len(self.points), bool)
+
+    @classmethod
+    def at(cls, shape: Shape, samples: FitSamples) -> CloseLook:
+        corners = shape.frame.to_unit(shape.vertices).astype(np.float32)
+        corners = corners[:: -(-len(corners) // _CORNERS)]
+        drawn = shape.unit_surface(_DRAWN, samples.seed).points.astype(np.float32)
+        return cls(samples, np.concatenate([drawn, corners]))
+
+    def deviations(self, rows: Rows) -> Seen:
+        """Of an assembly."""
+        added = np.flatnonzero(rows[:, Column.SIGN] > 0)
+        surfaces = surface_points(rows)
+        of_solid = (
+            of_parts(self.samples, rows, added, surfaces),
+            of_voxels(self.samples, rows, added),
+            of_far_cells(self.samples, rows, added, surfaces[added]),
+        )
+        points, distance, off, part = (np.concatenate(one) for one in zip(*of_solid, strict=True))
+        off = self._exactly(points, distance, off)
+        least = max(CLOSE, _FELT * float(off.max(initial=0)))
+        of_shape = self._of_shape(rows, added, surfaces.reshape(-1, 3).astype(np.float32), least)
+        times = np.where(distance > 0, np.float32(STICKS_OUT), np.float32(1))
+        both = zip((points, distance, off, part, times), (*of_shape, np.ones_like(of_shape[2])), strict=True)
+        points, distance, off, part, times = (np.concatenate(one) for one in both)
+        kept = off > max(CLOSE, self.samples.grid.spacing / 2)
+        points, distance, off, part, times = (one[kept] for one in (points, distance, off, part, times))
+        return Seen(points, distance, times * off, part.astype(np.int64), len(rows), times)
+
+    def _exactly(self, points: Floats, distance: Floats, off: Floats) -> Floats:
+        """How far (n,) the solid is off at points (n, 3), exactly where it sticks out the furthest: what is
+        read off the grid may be wrong by half a voxel."""
+        result = off.copy()
+        outside = distance > 0
+        furthest = np.flatnonzero(outside & (off > _AMONG_FURTHEST * off[outside].max(initial=0)))
+        if len(furthest):
+            result[furthest] = self.samples.away(points[furthest])
+        return result
+
+    def _of_shape(
+        self, rows: Rows, added: NDArray[np.int64], surfaces: Floats, least: float
+    ) -> tuple[NDArray[Any], ...]:
+        """Points of the shape's surface further than `least` from the assembly's, filled or not covered.
+
+        surfaces: (K, 3) of its parts.
+        """
+        samples = self.samples
+        field = samples.distance_of(rows, self.points)
+        mine = self._suspects(rows[added], field, least)
+        on_it = surfaces[np.abs(samples.distance_of(rows, surfaces)) < ON]
+        if not len(mine) or not len(on_it):
+            return self.points[:0], field[:0], field[:0], added[:0]
+        # Between the points of the assembly's surface these are rather too far than too near.
+        tree = cKDTree(on_it, balanced_tree=False, compact_nodes=False)  # a few queries are not worth those
+        mine = mine[np.isinf(tree.query(self.points[mine], distance_upper_bound=least)[0])]
+        points, field = self.points[mine], field[mine]
+        nearest = np.maximum(tree.query(points)[0], np.abs(field))
+        off = self._measured(rows, points, field, nearest)
+        far = off > least
+        mine, points, field, off = mine[far], points[far], field[far], off[far]
+        seen = self._seen(mine, off)
+        points, field, off = points[seen], field[seen], off[seen]
+        part = added[samples.parts_of(rows[added], points).argmin(axis=0)] if len(points) else added[:0]
+        # What is filled lies outside of the shape, if only just.
+        return points, np.where(field < 0, np.float32(ON), np.float32(0)), off, part
+
+    def _suspects(self, added: Rows, field: Floats, least: float) -> NDArray[np.int64]:
+        """Points that may be further than `least`, by the field (N,) there: where parts meet, it may be any
+        fraction of what is filled. Then another part is as near as the nearest one's surface."""
+        suspects = ((field > least / _SLOPE) | (field < -least)) & self._shown
+        filled = np.flatnonzero((field < -ON / 2) & ~suspects & self._shown)
+        if len(added) > 1 and len(filled):
+            apart = np.partition(self.samples.parts_of(added, self.points[filled]), 1, axis=0)[1]
+            suspects[filled[apart < _BLENDED - field[filled]]] = True
+        return np.flatnonzero(suspects)
+
+    def _measured(self, rows: Rows, points: Floats, field: Floats, most: Floats) -> Floats:
+        """How far (n,) points (n, 3) are from the assembly's surface, that is at most so far (n,): by the way
+        that they walk to it, and by looking around where that may be another than the shortest."""
+        if not len(points):
+            return field
+        place, there = walked_to(self.samples, rows, points, field)
+        way = np.where(np.abs(there) < CLOSE / 2, np.linalg.norm(place - points, axis=1), np.inf)
+        off = np.clip(way, np.abs(field), most)
+        loose = way > _LOOSE * np.abs(field)
+        for _ in range(_TIMES):
+            again = np.flatnonzero(loose & (off > _AMONG_FURTHEST * off.max()))
+            if not len(again):
+                break
+            again = again[np.argsort(-off[again], kind="stable")[:_AGAIN]]
+            off[again] = self._around(rows, points[again], field[again], off[again])
+            loose[again] = False
+        return np.asarray(off, np.float32)
+
+    def _around(self, rows: Rows, points: Floats, field: Floats, most: Floats) -> Floats:
+        """How far (n,) from points (n, 3) the assembly begins or ends, in one of many ways."""
+        least = np.abs(field)
+        share = np.arange(1, _SHELLS + 1, dtype=np.float32) / _SHELLS
+        radius = least[:, None] + (most - least)[:, None] * share
+        places = points[:, None, None] + radius[:, :, None, None] * _ways()
+        there = self.samples.distance_of(rows, np.ascontiguousarray(places.reshape(-1, 3), np.float32))
+        across = (there >= 0).reshape(*radius.shape, _WAYS) != (field >= 0)[:, None, None]
+        found = across.any(axis=2)
+        return np.where(found.any(axis=1), radius[np.arange(len(points)), found.argmax(axis=1)], most)
+
+    def _seen(self, index: NDArray[np.int64], off: Floats) -> NDArray[np.bool_]:
+        """Which of the points with these indices (n,) can be seen; those that are far less off (n,) than any
+        that can are not asked for."""
+        while True:
+            shown = self._shown[index]
+            furthest = off > _AMONG_FURTHEST * off[shown].max(initial=0)
+            asked = index[shown & furthest & ~self._asked[index]]
+            if not len(asked):
+                return shown
+            self._asked[asked] = True
+            self._shown[asked] = ~buried(self.samples.measure, self.points[asked])
+
+
+@cache
+def _ways() -> Floats:
+    """Unit vectors (W, 3), evenly about a point, on a spiral."""
+    count = np.arange(_WAYS) + 0.5
+    up, turn = 1 - 2 * count / _WAYS, np.pi * (1 + 5**0.5) * count
+    aside = np.sqrt(1 - up**2)
+    return np.stack([aside * np.cos(turn), aside * np.sin(turn), up], axis=1).astype(np.float32)

@@ -1,0 +1,156 @@
+"""The last steps of a fit: all parts move at once by what is felt at a look, overlaps and largest deviations.
+
+A deviation is a length, the largest of many. Occupancies, whatever their weights, hardly tell 3 from 2 %, so
+here the steps of the overlaps' normal equations bend to the slopes of the lengths themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import cycle
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.fields import kernel
+from partwright.fields.kernel import Target
+from partwright.shapes import Shape
+from partwright.superfrusta.close_look import CloseLook, Seen
+from partwright.superfrusta.deviations import norm
+from partwright.superfrusta.objective import score, volume_iou
+from partwright.superfrusta.refining import penalties, sharpened
+from partwright.superfrusta.samples import FitSamples, Rows
+from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.symmetric_fit import LeafSteps, RepeatedPart, expanded
+
+Floats = NDArray[np.float64]
+Equations = tuple[Floats, Floats]
+
+_SHARPNESS = 100.0  # of the sigmoid, for solids of ordinary thickness
+# What the loss of overlaps counts beside lengths: it goes with the square of what is wrong, and near the best
+# falls far less than R rises. How much less differs, so they take turns.
+_SCALES = (30.0, 10.0)
+_POWER = (
+    16.0  # by which points of a part count: those that are within a quarter of the furthest, more or less
+)
+_LEAST_SHARE = 0.01  # of what the furthest counts
+_LINEAR = 4.0  # sharpness at which an occupancy near the surface is the distance, but for its sign
+_LEAST_OFF = 1e-4  # unit lengths
+_GAIN = 2e-5  # of the value, from which on a step is taken
+_SPENT = 1e-3  # of R, at most, for lengths
+_DAMPING, _LESS, _MORE, _LEAST_DAMPING = (
+    0.1,
+    0.1,
+    10.0,
+    1e-3,
+)  # of the first step; after one that gains or not
+_TRIES = 4  # of one scale: a step that is damped a thousand times more follows the slope alone
+_STIFFNESS = 1e-4  # added to the diagonal: what neither feels stays
+_MOST_COPIES = 200  # the normal equations grow with their square
+
+
+def last_polished(
+    shape: Shape,
+    samples: FitSamples,
+    leaves: list[RepeatedPart],
+    settings: Settings,
+    moving: NDArray[np.bool_],
+) -> list[RepeatedPart]:
+    """Leaves, those `moving` (L,) moved together, copies of each as one, while R less a price on how far they
+    are off rises; at most `settings.looks` assemblies are looked at.
+
+    R does not fall by more than a thousandth, nor below an IoU that the settings ask for.
+    """
+    rows = expanded(leaves)
+    if not settings.looks or not moving.any() or len(rows) > _MOST_COPIES:
+        return leaves
+    polish = _Polish(CloseLook.at(shape, samples), settings, LeafSteps.of(leaves, settings, moving))
+    found = polish.best(np.stack([leaf.row for leaf in leaves]))
+    polished = [RepeatedPart(row, leaf.isometries) for row, leaf in zip(found, leaves, strict=True)]
+    if settings.min_iou is not None:
+        least = min(settings.min_iou, volume_iou(samples, rows))
+        if volume_iou(samples, expanded(polished)) < least:
+            return leaves
+    return polished
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """Leaves (L, 17), where their copies are off, how far each leaf is (L,), and what they are worth."""
+
+    rows: Rows
+    off: Seen
+    by_leaf: Floats
+    score: float
+    value: float
+
+
+@dataclass
+class _Polish:
+    look: CloseLook
+    settings: Settings
+    steps: LeafSteps
+    looks: int = field(default=0, init=False)
+
+    def trial(self, rows: Rows) -> _Trial:
+        self.looks += 1
+        copies = self.steps.copies(rows)
+        off = self.look.deviations(copies)
+        by_leaf = np.zeros(len(rows))
+        np.maximum.at(by_leaf, self.steps.leaf[off.part], off.off)
+        reached = score(self.look.samples, copies)
+        return _Trial(rows, off, by_leaf, reached, reached - self.settings.firmness * norm(by_leaf))
+
+    def best(self, rows: Rows) -> Rows:
+        """The leaves' rows (L, 17) after steps that gain."""
+        best = self.trial(rows)
+        least = best.score - _SPENT
+        damping = dict.fromkeys(_SCALES, _DAMPING)
+        vain = 0  # scales in a row
+        for scale in cycle(_SCALES):
+            if not best.by_leaf.any() or vain == len(_SCALES):
+                break
+            if not vain:
+                overlaps, lengths = self.overlaps(best), self.lengths(best)
+            gradient, matrix = (scale * one + other for one, other in zip(overlaps, lengths, strict=True))
+            stiff = np.diag(np.diag(matrix) + _STIFFNESS)
+            vain += 1
+            for _ in range(min(_TRIES, self.settings.looks - self.looks)):
+                step = np.asarray(-np.linalg.solve(matrix + damping[scale] * stiff, gradient), np.float64)
+                trial = self.trial(self.steps.taken(best.rows, step))
+                if trial.value > best.value + _GAIN and trial.score >= least:
+                    damping[scale] = max(_LESS * damping[scale], _LEAST_DAMPING)
+                    best, vain = trial, 0
+                    break
+                damping[scale] *= _MORE
+        return best.rows
+
+    def overlaps(self, at: _Trial) -> Equations:
+        """Gradient and matrix of what optimisation minimises."""
+        samples = self.look.samples
+        ((beta, _),) = sharpened(((_SHARPNESS, 1),), samples.thickness)
+        target = samples.target(samples.optimised_indices)
+        _, gradient, matrix = samples.kernel.normal_equations(
+            self.steps.copies(at.rows), target, float(beta), penalties(self.settings), samples.threads
+        )
+        return self.steps.projected(gradient, matrix)
+
+    def lengths(self, at: _Trial) -> Equations:
+        """Gradient of the price on how far leaves are off, and the matrix of the least squares whose weights
+        give it. Of a leaf those points count that are nearly the furthest."""
+        samples, off, copies = self.look.samples, at.off, self.steps.copies(at.rows)
+        leaf = self.steps.leaf[off.part]
+        share = (off.off / at.by_leaf[leaf]) ** _POWER
+        felt = np.flatnonzero(share > _LEAST_SHARE)
+        in_all = np.bincount(leaf[felt], share[felt], len(at.by_leaf))
+        of_leaf = self.settings.firmness * (at.by_leaf / norm(at.by_leaf)) ** 3
+        price = of_leaf[leaf[felt]] * share[felt] / in_all[leaf[felt]]
+        points, outside = off.points[felt], off.distance[felt] > 0
+        slope = price * np.where(outside, -1.0, 1.0) * off.times[felt]  # of the price by the field
+        gradient = kernel.gradients(copies, points, slope.astype(np.float32), samples.threads)
+        weight = (np.abs(slope) / np.maximum(off.off[felt], _LEAST_OFF)).astype(np.float32)
+        # An occupancy's slope is a quarter of its sharpness.
+        there = samples.distance_of(copies, points)
+        target = Target(points, there, weight * np.float32((4 / _LINEAR) ** 2))
+        _, _, matrix = samples.kernel.normal_equations(copies, target, _LINEAR, threads=samples.threads)
+        return self.steps.projected(gradient.ravel(), matrix)

@@ -1,0 +1,84 @@
+"""Deviations as the report measures them, where a search's own look is too hasty."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from partwright.metrics.comparison import Comparison
+from partwright.shapes import Shape, load_shape
+from partwright.superfrusta import Settings
+from partwright.superfrusta.close_look import CloseLook
+from partwright.superfrusta.deviations import deviations
+from partwright.superfrusta.outcome import assembly_of
+from partwright.superfrusta.samples import FitSamples, Rows
+from tests.superfrusta.meshes import box, union
+from tests.superfrusta.rows import box as box_row
+
+SETTINGS = Settings.for_quality("draft")
+WIDTH, DEPTH = 0.08, 0.3  # of a groove
+
+
+def seen(shape: Shape, rows: Rows) -> tuple[FitSamples, np.ndarray, np.ndarray]:
+    """What a close look sees: lengths, and how often each counts."""
+    samples = FitSamples.of(shape, SETTINGS)
+    found = CloseLook.at(shape, samples).deviations(rows)
+    return samples, found.off / found.times, found.times
+
+
+def grooved() -> Shape:
+    """1.8 long; a groove goes across its top."""
+    side = (1.8 - WIDTH) / 2
+    blocks = [box((side, 0.8, 0.8), (x * (side + WIDTH) / 2, 0, 0)) for x in (-1, 1)]
+    return load_shape(union(*blocks, box((1.0, 0.8, 0.8 - DEPTH), (0, 0, -DEPTH / 2))))
+
+
+def test_the_depth_of_a_groove_that_is_filled_is_seen() -> None:
+    """Two blocks meet in it: nowhere is one deeper than half of its width under their surfaces."""
+    over = np.array([box_row((0.92, 0.8, 0.8), (x * 0.44, 0, 0)) for x in (-1, 1)])
+    shape = grooved()
+    samples, lengths, _ = seen(shape, over)
+    assert deviations(samples, over).by_part.max() < WIDTH
+    assert lengths.max() == pytest.approx(DEPTH, rel=0.08)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_sees_what_the_report_will_say(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shape = load_shape(union(box((1.8, 0.6, 0.5)), box((0.5, 0.6, 1.1), (0.2, 0.0, 0.3))))
+    low = shape.frame.to_unit(shape.vertices)
+    middle = (low.min(axis=0) + low.max(axis=0)) / 2
+    exact = [box_row((1.8, 0.6, 0.5)), box_row((0.5, 0.6, 1.1), (0.2, 0.0, 0.3))]
+    rows = np.array(exact)
+    rows[:, :3] += shape.frame.to_unit(np.zeros((1, 3)))[0]
+    rows[:, :3] += rng.uniform(-0.05, 0.05, (2, 3))
+    assert np.abs(middle).max() < 1e-6
+    _, lengths, times = seen(shape, rows)
+    told = Comparison(assembly_of(shape, rows, SETTINGS), shape).deviation
+    assert lengths.max() == pytest.approx(told.maximum, rel=0.1)
+    assert lengths[times > 1].max(initial=0) == pytest.approx(told.protrusion, rel=0.1, abs=0.01)
+
+
+def test_what_cannot_be_seen_is_not_off() -> None:
+    """A crack of 0.2 % of the longest side, that one block fills."""
+    side = 0.898
+    halves = [box((side, 0.8, 0.8), (x * (0.9 - side / 2), 0, 0)) for x in (-1, 1)]
+    shape = load_shape(union(*halves))
+    _, lengths, _ = seen(shape, box_row((1.8, 0.8, 0.8))[None])
+    assert not len(lengths)
+    wider = [box((0.87, 0.8, 0.8), (x * (0.9 - 0.435), 0, 0)) for x in (-1, 1)]
+    _, lengths, _ = seen(load_shape(union(*wider)), box_row((1.8, 0.8, 0.8))[None])
+    assert lengths.max() > 0.3
+
+
+def test_of_what_sticks_out_the_exact_length_counts_most() -> None:
+    shape = load_shape(box((1.8, 0.8, 0.8)))
+    samples = FitSamples.of(shape, dataclasses.replace(SETTINGS, resolution=32))
+    rows = np.array([box_row((1.8, 0.8, 0.8)), box_row((0.2, 0.2, 0.2), (0.3, 0.1, 0.375))])
+    found = CloseLook.at(shape, samples).deviations(rows)
+    worst = found.off.argmax()
+    assert found.times[worst] > 1
+    assert found.off[worst] / found.times[worst] == pytest.approx(0.075, abs=0.003)
+    assert found.part[worst] == 1
