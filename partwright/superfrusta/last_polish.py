@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from partwright.fields import kernel
+from partwright.fields.columns import Column
 from partwright.fields.kernel import Target
 from partwright.shapes import Shape
 from partwright.superfrusta.close_look import CloseLook, Seen
@@ -38,6 +39,9 @@ _LINEAR = 4.0  # sharpness at which an occupancy near the surface is the distanc
 _LEAST_OFF = 1e-4  # unit lengths
 _GAIN = 2e-5  # of the value, from which on a step is taken
 _SPENT = 1e-3  # of R, at most, for lengths
+_OVERLAP = (
+    0.01  # of what parts cover: so much more may be covered twice, which a thin shape's losses hardly feel
+)
 _DAMPING, _LESS, _MORE, _LEAST_DAMPING = (
     0.1,
     0.1,
@@ -104,7 +108,7 @@ class _Polish:
     def best(self, rows: Rows) -> Rows:
         """The leaves' rows (L, 17) after steps that gain."""
         best = self.trial(rows)
-        least = best.score - _SPENT
+        least, most = best.score - _SPENT, self.overlap(rows) + _OVERLAP
         damping = dict.fromkeys(_SCALES, _DAMPING)
         vain = 0  # scales in a row
         for scale in cycle(_SCALES):
@@ -118,12 +122,20 @@ class _Polish:
             for _ in range(min(_TRIES, self.settings.looks - self.looks)):
                 step = np.asarray(-np.linalg.solve(matrix + damping[scale] * stiff, gradient), np.float64)
                 trial = self.trial(self.steps.taken(best.rows, step))
-                if trial.value > best.value + _GAIN and trial.score >= least:
+                gains = trial.value > best.value + _GAIN and trial.score >= least
+                if gains and self.overlap(trial.rows) <= most:
                     damping[scale] = max(_LESS * damping[scale], _LEAST_DAMPING)
                     best, vain = trial, 0
                     break
                 damping[scale] *= _MORE
         return best.rows
+
+    def overlap(self, rows: Rows) -> float:
+        """Share of what parts that are added cover that more than one does."""
+        samples, copies = self.look.samples, self.steps.copies(rows)
+        covers = samples.covered_by(copies[copies[:, Column.SIGN] > 0], samples.points[samples.near :])
+        count = np.count_nonzero(covers, axis=0)
+        return int((count > 1).sum()) / max(int((count > 0).sum()), 1)
 
     def overlaps(self, at: _Trial) -> Equations:
         """Gradient and matrix of what optimisation minimises."""

@@ -11,10 +11,10 @@ from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Settings
 from partwright.superfrusta.close_look import CloseLook
 from partwright.superfrusta.deviations import norm
-from partwright.superfrusta.last_polish import last_polished
+from partwright.superfrusta.last_polish import _Polish, last_polished
 from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.samples import FitSamples
-from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded
+from partwright.superfrusta.symmetric_fit import LeafSteps, RepeatedPart, expanded
 from partwright.superfrusta.symmetry import Isometry
 from tests.superfrusta.meshes import box, union
 from tests.superfrusta.rows import box as box_row
@@ -104,3 +104,19 @@ def test_few_looks_are_few(shape: Shape, samples: FitSamples, monkeypatch: pytes
 def test_the_same_again(shape: Shape, samples: FitSamples) -> None:
     one, other = (last_polished(shape, samples, leaves(), SETTINGS, BOTH) for _ in range(2))
     assert (expanded(one) == expanded(other)).all()
+
+
+def test_lengths_are_not_bought_with_parts_that_cover_one_another(
+    shape: Shape, samples: FitSamples, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps = LeafSteps.of(leaves(), SETTINGS, BOTH)
+    polish = _Polish(CloseLook.at(shape, samples), SETTINGS, steps)
+    rows = np.array([leaf.row for leaf in leaves()])
+    assert polish.overlap(rows) == 0
+    moved = rows.copy()
+    moved[1, 0] -= 0.3
+    volume, both = 1.2 * 0.8 * 0.5 + 0.65 * 0.19 * 0.5, 0.3 * 0.19 * 0.5
+    assert polish.overlap(moved) == pytest.approx(both / (volume - both), rel=0.25)
+    shares = iter([0.0] + [1.0] * SETTINGS.looks)
+    monkeypatch.setattr(_Polish, "overlap", lambda *_: next(shares))
+    assert (polish.best(rows) == rows).all()
