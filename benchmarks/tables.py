@@ -52,6 +52,8 @@ TABLES = (
           "KayKit-Game-Assets' Restaurant Bits, Space Base Bits and Character Pack Adventures, "
           "kits/generated/ with the meshes of AsimAslah/TripoSR-Image-to-3D and Bingeljell/image-to-3dlab, "
           "kits/common/ with OBJs of alecjacobson/common-3d-test-models"),
+    Table("last_polish.md", "last_polish.py", "--names mug", 1,
+          "--shapes {data} --sets toys,cad --seed 1", 12),
     Table("ablations.md", "ablations.py", "--names mug --rows default,cuboid", 2, "--shapes {data}", 240),
     Table("ablations-carving.md", "ablations.py", "--names mug --rows default,mended --tag carving", 1,
           '--shapes {data} --rows "default,subtracted,mended" --tag carving --jobs 2', 8),
