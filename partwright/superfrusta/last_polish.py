@@ -31,23 +31,15 @@ _SHARPNESS = 100.0  # of the sigmoid, for solids of ordinary thickness
 # What the loss of overlaps counts beside lengths: it goes with the square of what is wrong, and near the best
 # falls far less than R rises. How much less differs, so they take turns.
 _SCALES = (30.0, 10.0)
-_POWER = (
-    16.0  # by which points of a part count: those that are within a quarter of the furthest, more or less
-)
+_POWER = 16.0  # by which points of a part count: those within a quarter of the furthest, more or less
 _LEAST_SHARE = 0.01  # of what the furthest counts
 _LINEAR = 4.0  # sharpness at which an occupancy near the surface is the distance, but for its sign
 _LEAST_OFF = 1e-4  # unit lengths
 _GAIN = 2e-5  # of the value, from which on a step is taken
 _SPENT = 1e-3  # of R, at most, for lengths
-_OVERLAP = (
-    0.01  # of what parts cover: so much more may be covered twice, which a thin shape's losses hardly feel
-)
-_DAMPING, _LESS, _MORE, _LEAST_DAMPING = (
-    0.1,
-    0.1,
-    10.0,
-    1e-3,
-)  # of the first step; after one that gains or not
+_OVERLAP = 0.01  # of what parts cover: so much more may be covered twice, which thin shapes hardly feel
+_DAMPING, _LEAST_DAMPING = 0.1, 1e-3  # of the first step, and of any
+_LESS, _MORE = 0.1, 10.0  # times as much after a step that gains, and one that does not
 _TRIES = 4  # of one scale: a step that is damped a thousand times more follows the slope alone
 _STIFFNESS = 1e-4  # added to the diagonal: what neither feels stays
 _MOST_COPIES = 200  # the normal equations grow with their square
