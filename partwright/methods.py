@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 Outcome = Literal["converged", "budget_reached", "target_reached", "interrupted"]
 Quality = Literal["draft", "normal", "high"]
 DEVICES = ("auto", "cpu", "cuda")
+HIGHEST_SEED = 2**63 - 1  # that torch takes
 
 
 class Ability(Enum):
@@ -166,7 +167,7 @@ class Run:
     """Asked at each step."""
 
     def __post_init__(self) -> None:
-        check_count("seed", self.seed, low=0)
+        check_seed("seed", self.seed)
         check_count("threads", self.threads, low=0)
         if self.device not in DEVICES:
             raise SettingError(f"device: expected one of {', '.join(DEVICES)}, got {self.device!r}")
@@ -317,6 +318,13 @@ def check_count(name: str, value: int, low: int) -> None:
     """Raises SettingError unless the value is a whole number of at least `low`."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < low:
         raise SettingError(f"{name}: expected a whole number of at least {low}, got {value!r}")
+
+
+def check_seed(name: str, value: int) -> None:
+    """Raises SettingError unless the value is one that all generators of random numbers take."""
+    check_count(name, value, low=0)
+    if value > HIGHEST_SEED:
+        raise SettingError(f"{name}: expected a whole number of at most {HIGHEST_SEED}, got {value}")
 
 
 @contextmanager

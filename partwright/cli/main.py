@@ -32,6 +32,7 @@ from partwright.cli.interrupts import INTERRUPTED
 from partwright.cli.parser import Parser
 from partwright.cli.terminal import note
 from partwright.errors import CancelledError, PartwrightError
+from partwright.methods import check_seed
 
 COMMANDS = (
     fit,
@@ -72,6 +73,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
             outputs.check(arguments)
+            if getattr(arguments, "seed", None) is not None:
+                check_seed("--seed", arguments.seed)
             return _run(arguments)
     except (CancelledError, KeyboardInterrupt):
         note("interrupted; nothing was written")

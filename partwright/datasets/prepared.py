@@ -291,6 +291,11 @@ def _check(where: str, tensors: dict[str, NDArray[Any]]) -> None:
 
 
 def _read_manifest(path: Path) -> dict[str, Any]:
+    if path.parent.is_dir() and not path.exists():
+        raise UnreadableFileError(
+            f"{path}: no such file; check the path, or make a family of a folder of shapes with named parts: "
+            f"parts prepare {path.parent} -o FAMILY"
+        )
     try:
         data = json.loads(_read_bytes(path))
     except (ValueError, RecursionError) as error:

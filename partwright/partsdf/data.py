@@ -13,6 +13,7 @@ from partwright.datasets.prepared import PreparedFamily, PreparedShape
 from partwright.errors import FamilyError
 from partwright.partsdf.config import Config
 from partwright.partsdf.poses import PoseTensors, identity, local_points
+from partwright.shapes.cleaning import counted
 
 WHOLE = "whole"  # the name of the one part of "Ours-1P"
 
@@ -130,7 +131,8 @@ def check_training_shapes(family: PreparedFamily, samples: FamilySamples, config
     """Raise FamilyError unless there are two shapes or more, and each part is in one of them."""
     if len(samples) < 2:
         raise FamilyError(
-            f"{family.folder}: {len(samples)} shapes to train on; a prior over shapes needs two or more"
+            f"{family.folder}: {counted(len(samples), 'shape')} to train on; a prior over shapes needs two "
+            "or more"
         )
     for name, shown in zip(part_names(family, config), samples.present.any(dim=0).tolist(), strict=True):
         if not shown:

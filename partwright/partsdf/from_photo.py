@@ -115,6 +115,7 @@ def reconstruct_seen(
     sight, seen = looked.sight, time.perf_counter()
     standpoint, fit = moved_to_outline(looked)
     shape, camera, moved = fit.shape, fit.eye.camera, time.perf_counter()
+    covered = round(fit.iou, 4)  # once, or a summary and a warning may round it to different percents
     meshed = mesh_shape(shape, resolution, parts=False)
     surface = meshed.whole
     report = {
@@ -128,7 +129,7 @@ def reconstruct_seen(
             "elevation": round(camera.elevation, 1),
             "field_of_view": camera.field_of_view,
         },
-        "silhouette_iou": round(fit.iou, 4),
+        "silhouette_iou": covered,
         "silhouette_iou_as_seen": round(standpoint.iou, 4),
         "certainty": round(sight.certainty, 4),
         "oddness": round(sight.oddness, 4),
@@ -141,7 +142,7 @@ def reconstruct_seen(
             "fit": round(moved - seen, 3),
             "mesh": round(time.perf_counter() - moved, 3),
         },
-        "warnings": warnings_of(encoder, looked, fit.iou),
+        "warnings": warnings_of(encoder, looked, covered),
     }
     assembly = to_assembly(shape, up=model.up, source=name)
     return PhotoParts(shape, assembly, surface, looked, camera, report)

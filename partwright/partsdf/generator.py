@@ -38,6 +38,7 @@ from partwright.partsdf.seeds import mixed
 KIND = "generator"
 _MATCHED = "matched"  # in a file, beside the settings
 _WAVES = 16  # by which a network sees the time
+_TOGETHER = 8  # shapes that are made at a time, always so many: sums round otherwise for fewer
 _FORGOTTEN = 0.3  # dropout of forms: poses tell little of them, and single shapes would be learned by heart
 
 
@@ -145,24 +146,43 @@ class Generator:
         keep_layout: bool = False,
         change: float = 0.0,
     ) -> list[NeuralShape]:
-        """Shapes, each by its own noise: the first n of more are those of n. As they come:
+        """Shapes, each by its own noise: the first n of more are those of n, to the bit. As they come:
         `sound_samples` makes those anew whose parts come apart.
 
-        count: how many, or which. source: a shape whose parts `keep` stay as they are, or, with
-        `keep_layout`, all of whose poses and no latent; or, with `change`, above 0 and at most 1, which the
-        samples are like: 1 leaves nothing of it.
+        count: how many, or which, each of these by itself. source: a shape whose parts `keep` stay as they
+        are, or, with `keep_layout`, all of whose poses and no latent; or, with `change`, above 0 and at most
+        1, which the samples are like: 1 leaves nothing of it.
 
         Raises:
             SettingError: none is asked for, nothing would be left to make, or the source is missing or of
                 another model.
         """
-        draws = [Draw(number) for number in range(count)] if isinstance(count, int) else list(count)
-        if not draws:
+        if isinstance(count, int):
+            firsts = range(0, count, _TOGETHER)
+            batches = [[Draw(first + i) for i in range(_TOGETHER)] for first in firsts]
+        else:
+            batches = [[draw] for draw in count]
+        if not batches:
             raise SettingError(f"{count} samples: expected 1 or more")
         kept = torch.zeros(len(self.model.parts), dtype=torch.bool)
         for name in keep:
             kept[self.model.index(name)] = True
         self._check(source, kept, keep_layout, change)
+        made = [
+            shape for draws in batches for shape in self._made(draws, seed, source, kept, keep_layout, change)
+        ]
+        return made[:count] if isinstance(count, int) else made
+
+    def _made(
+        self,
+        draws: Sequence[Draw],
+        seed: int,
+        source: NeuralShape | None,
+        kept: Tensor,
+        keep_layout: bool,
+        change: float,
+    ) -> list[NeuralShape]:
+        """As `generate`, all draws together. kept: (P,) bool, the parts that stay."""
         noise = _noise(draws, seed, (len(kept), POSE + 2 + self.vectors.width))
         begun, sets, latents = noise.split([POSE, 2, self.vectors.width], dim=-1)
         present = self._present(sets, source, kept, keep_layout, change)

@@ -34,6 +34,7 @@ COARSEST = 8  # cells along a cube of the first level
 FINEST = 2  # cells along a cube whose corners are evaluated
 MAX_RESOLUTION = 1024  # cells along the box
 _DEFAULT_RESOLUTION, _MAX_RESOLUTION_FOR_WALLS = 128, 256
+_MOST_CELLS = 2048  # along the box, however far out parts lie: the first level alone takes a gigabyte there
 _BATCH = 1 << 14  # points between two reports of progress
 _LAST_EXCESS = 0.5  # of what the constant is above 1, at the last level
 
@@ -67,7 +68,7 @@ def mesh_shape(
     part's wall is two cells. parts: also mesh each part alone. progress: told the share that is done.
 
     Raises:
-        SettingError: the resolution cannot be used.
+        SettingError: the resolution cannot be used, or parts lie so far out that cells would be too many.
         NoSurfaceError: there is no surface at all, or it is thinner than a cell.
     """
 
@@ -101,10 +102,17 @@ def mesh_parts(
 def _lattice(
     shape: NeuralShape, distances: Distances, resolution: int, progress: ShareDone | None
 ) -> SparseLattice:
+    half = bounding_half_side(shape)
+    if not half * _checked(resolution) <= _MOST_CELLS:
+        raise SettingError(
+            f"parts of this shape reach {half:.3g} unit lengths from its middle, where those of "
+            f"{shape.model.name} reach about 1; at resolution {resolution} up to "
+            f"{_MOST_CELLS / resolution:.3g} can be meshed"
+        )
     return SparseLattice(
         distances,
-        bounding_half_side(shape),
-        _checked(resolution),
+        half,
+        resolution,
         shape.model.lipschitz,
         _near_cuboids(shape),
         progress,

@@ -26,6 +26,9 @@ from partwright.shapes.source import Piece, Source, in_utf8, unique_names
 if TYPE_CHECKING:
     import trimesh
 
+_NO_MESH = "holds no triangles; export the shape again with its mesh"
+# A PLY may be a scan, too.
+_NOTHING = {".ply": "holds neither triangles nor points; export the shape again, or the scan with its points"}
 READ_BY_TRIMESH = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 
 # What trimesh, numpy and json raise on bytes that are not what the suffix says. A parser fails
@@ -67,7 +70,7 @@ def read_mesh(path: Path) -> Source:
         normals = _ply_normals(next(iter(scene.geometry.values()))) if len(scene.geometry) == 1 else None
         source = source_of_points(stem, np.concatenate(clouds), normals)
     else:
-        raise EmptyShapeError(f"{stem}: holds no triangles; export the shape again with its mesh")
+        raise EmptyShapeError(f"{stem}: {_NOTHING.get(suffix, _NO_MESH)}")
     is_gltf = suffix in (".glb", ".gltf")
     return replace(source, unit="m", up="y") if is_gltf else source
 

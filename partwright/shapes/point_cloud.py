@@ -73,7 +73,7 @@ def source_of_points(name: str, points: NDArray[Any], normals: NDArray[Any] | No
     normals = _usable(name, normals, notes)
     if len(points) < _FEWEST:
         raise NeedsSurfaceError(
-            f"{name}: {len(points)} points without faces were given; expected at least {_FEWEST} points, "
+            f"{name}: {counted(len(points), 'point')} without faces; expected at least {_FEWEST} points, "
             "better 10,000, or a mesh"
         )
     frame = UnitFrame.of(points)

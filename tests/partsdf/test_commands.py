@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -227,6 +228,16 @@ def test_edit(file: Path, model: Model, capsys: pytest.CaptureFixture[str]) -> N
     assert after == pytest.approx((before[0], before[1], before[2] / 2))
 
 
+@pytest.mark.parametrize("edit", [["--move", "ball=1e9,0,0"], ["--scale", "ball=1,1e9,1"]])
+def test_a_part_that_is_far_out_is_told_before_anything_is_written(
+    file: Path, edit: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = set(Path().iterdir())
+    assert main(["parts", "edit", f"{file}:lamp1", "-o", "a.json", *edit]) == 2
+    assert re.search(r"error: parts of this shape reach [\d.]+e\+0[89] unit lengths", capsys.readouterr().err)
+    assert set(Path().iterdir()) == before
+
+
 def test_a_part_is_swapped_for_that_of_an_assembly_or_of_its_folder(file: Path, model: Model) -> None:
     other = NeuralShape.trained(model, "lamp3")
     Path("found").mkdir()
@@ -263,11 +274,33 @@ def test_interpolate(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["edit", "lamp.obj", "-o", "a.json"], "no assembly file"),
         (["edit", "{}:lamp1", "-o", "a.glb"], "written as .json"),
         (["edit", "{}:lamp1", "-o", "a.json", "--move", "ball=1,2"], "3 numbers"),
+        (["edit", "{}:lamp1", "-o", "a.json", "--move", "ball=nan,0,0"], "3 numbers"),
+        (
+            ["edit", "{}:lamp1", "-o", "a.json", "--resample", "ball=nan"],
+            "a seed, a whole number of at least 0",
+        ),
+        (
+            ["edit", "{}:lamp1", "-o", "a.json", "--resample", "ball=-1"],
+            "a seed, a whole number of at least 0",
+        ),
         (["edit", "{}:lamp1", "-o", "a.json", "--drop", "arm"], "no part 'arm'"),
         (["edit", "{}:lamp1", "-o", "a.json", "--swap", "plate"], "expected PART=SHAPE"),
         (["edit", "{}", "-o", "a.json"], "`parts reconstruct MODEL FILE` makes one of a mesh"),
         (["edit", "{}:lamp99", "-o", "a.json"], "was not trained on 'lamp99'"),
         (["edit", "sofas:1", "-o", "a.json"], "no model is named 'sofas'"),
+        (
+            ["generate", "--model", "{}", "-o", "out", "--seed", "-1"],
+            "--seed: expected a whole number of at least 0",
+        ),
+        (["prepare", "chairs", "-o", "out", "--seed", "-1"], "--seed: expected a whole number of at least 0"),
+        (
+            ["reconstruct", "{}", "a.ply", "--seed", f"{2**63}"],
+            "--seed: expected a whole number of at most 9223372",
+        ),
+        (
+            ["train-encoder", "{}", "."],
+            "make a family of a folder of shapes with named parts: parts prepare . -o",
+        ),
         (["generate", "--model", ".", "-o", "out"], ".: a folder without model.safetensors; here are: cars,"),
         (["generate", "--model", "/dev/null", "-o", "out"], "/dev/null: no model's file; here are: cars,"),
         (["interpolate", "{}:1", "{}:2", "-o", "a.avi"], "written as .gif"),

@@ -201,7 +201,7 @@ def test_families_that_teach_nothing_are_refused_by_name(lamps: PreparedFamily, 
         family = write_family(tmp_path / name, name, PARTS, shapes, lamps.average_pose)  # type: ignore[arg-type]
         train(small_config(family), tmp_path / f"{name}-out")
 
-    with pytest.raises(FamilyError, match="1 shapes to train on"):
+    with pytest.raises(FamilyError, match="1 shape to train on"):
         trained("single", [(lamp("a", 1), "train"), (lamp("b", 2), "test")])
     with pytest.raises(FamilyError, match=r"none of the 2 training shapes has the part 'knob'"):
         trained("bare", [(lamp("a", 1, knob=False), "train"), (lamp("b", 2, knob=False), "train")])

@@ -224,10 +224,22 @@ def test_points_that_show_no_inside_are_named():
         load_shape(np.ones((500, 3)))
     with pytest.raises(NeedsSurfaceError, match="99 points"):
         load_shape(rng.random((99, 3)))
+    with pytest.raises(NeedsSurfaceError, match="1 point without faces"):
+        load_shape(rng.random((1, 3)))
     with pytest.raises(NeedsSurfaceError, match="2 places"):
         load_shape(np.repeat([[0.0, 0, 0], [1, 1, 1]], 100, axis=0))
     with pytest.raises(NotFiniteError, match="1 of 201"):
         load_shape(np.vstack([rng.random((200, 3)), [[0, np.nan, 0]]]))
+
+
+@pytest.mark.parametrize("faces", ["", "element face 0\nproperty list uchar int vertex_indices\n"])
+def test_a_scan_without_a_point_is_not_told_that_it_lacks_triangles(tmp_path, faces):
+    path, axes = tmp_path / "scan.ply", "".join(f"property float {axis}\n" for axis in "xyz")
+    path.write_text(f"ply\nformat ascii 1.0\nelement vertex 0\n{axes}{faces}end_header\n")
+    with pytest.raises(
+        EmptyShapeError, match="scan: holds neither triangles nor points; export the shape again"
+    ):
+        load_shape(path)
 
 
 @pytest.mark.parametrize("shape", [(5,), (5, 2), (2, 2, 2, 2)])

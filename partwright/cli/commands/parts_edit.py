@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable, Sequence
 
 from partwright.cli.assembly_argument import shape_text
@@ -25,10 +26,14 @@ def run(arguments: argparse.Namespace) -> int:
         shape = source.shape
         for name, text in arguments.edits:
             shape = _edited(shape, name, text)
-        source.assembly(shape).save(arguments.output)
+        assembly = source.assembly(shape)
         work.stage("drawing")
         camera = Camera(up=source.up or "z")
-        write_png(still, picture(shape, camera=camera, size=480, progress=work.show))
+        drawn = picture(
+            shape, camera=camera, size=480, progress=work.show
+        )  # first, as it may not be possible
+        assembly.save(arguments.output)
+        write_png(still, drawn)
     say(f"{', '.join(shape.names())}: written to {arguments.output}, drawn in {still}")
     return 0
 
@@ -42,8 +47,7 @@ def _edited(shape: NeuralShape, name: str, text: str) -> NeuralShape:
             raise SettingError(f"--swap {text}: expected PART=SHAPE, as seat=chairs:3 or seat=other.json")
         return editing.swapped(shape, part, open_source(shape_text(value)).shape)
     if name == "resample":
-        (seed,) = _numbers(name, text, 1)
-        return editing.resampled(shape, part, int(seed))
+        return editing.resampled(shape, part, _seed(text))
     if name == "turn":
         *axis, degrees = _numbers(name, text, 4)
         return editing.turned(shape, part, axis, degrees)
@@ -57,6 +61,13 @@ def _numbers(name: str, text: str, count: int) -> list[float]:
         values = [float(v) for v in text.partition("=")[2].split(",")]
     except ValueError:
         values = []
-    if len(values) != count:
+    if len(values) != count or not all(map(math.isfinite, values)):
         raise SettingError(f"--{name} {text}: expected PART= and {count} numbers, separated by commas")
     return values
+
+
+def _seed(text: str) -> int:
+    _, _, value = text.partition("=")
+    if not value.isdecimal():
+        raise SettingError(f"--resample {text}: expected PART= and a seed, a whole number of at least 0")
+    return int(value)
