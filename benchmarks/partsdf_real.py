@@ -37,7 +37,7 @@ def reality(arguments: argparse.Namespace) -> None:
         "Whole shapes without labels, by `pw.fit(shape, pw.LearnedParts(MODEL))`. Deviation: the largest, "
         "both ways, of the longest side. Residual: mean error of the distance near the surface, as a share "
         "of the clamp; oddest: the part whose latent is farthest from the mean, as a multiple of the "
-        "farthest training shape's.",
+        "farthest training shape's; both before numbers move freely.",
         "",
         command_line(),
         "",

@@ -52,7 +52,7 @@ class Familiarity:
         """The residual, as many times as parts lie farther from the usual than the family's do, and as its
         oddest part is formed more oddly; of points, which tell little of forms, by how they lie alone."""
         off = self.residual * max(1.0, self.layout)
-        return off if self.of_points else off * min(max(1.0, *self.latents.values()), _ODDEST)
+        return off if self.of_points else off * min(max((1.0, *self.latents.values())), _ODDEST)
 
     @property
     def odd(self) -> bool:

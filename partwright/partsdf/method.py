@@ -10,10 +10,12 @@ from partwright.errors import SettingError
 from partwright.methods import Ability, Checkpoint, FitRequest, Fitted, Method, Progress, preset, timed
 from partwright.partsdf.assemblies import remember_meshes, to_assembly
 from partwright.partsdf.cores import one_core_each
-from partwright.partsdf.familiarity import familiarity
+from partwright.partsdf.freed import judged
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import load_model
-from partwright.partsdf.reconstruction import Step, mean_error, reconstruct_from
+from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.optimisation import Step
+from partwright.partsdf.reconstruction import mean_error, reconstruct_from
 from partwright.partsdf.settings import Settings
 from partwright.partsdf.starts import Start, find_starts, ways_to_stand
 from partwright.partsdf.targets import Target
@@ -89,8 +91,10 @@ class LearnedParts(Method[Settings]):
         told(Step(0, max(1, settings.iterations), loss, lambda: first.shape, first.turn))
         with timed(seconds, "optimise"):
             found, turn = reconstruct_from(starts, settings, run.seed, told, checkpoint)
-            seen = found
+            seen, known = judged(found, target.turned(turn), settings, run.seed, checkpoint)
             found = with_unseen(seen, target.turned(turn))
+            # As the assembly has it, in which those that are not there are as in the family.
+            found = NeuralShape.of(model, found.latents, found.poses, found.present)
         unseen = [name for name in found.names() if name not in seen.names()]
         with timed(seconds, "mesh"):
             meshed = mesh_shape(found, settings.resolution)  # with the parts, which files ask for
@@ -98,7 +102,6 @@ class LearnedParts(Method[Settings]):
         remember_meshes(assembly, meshed)
         surface = meshed.whole
         surface.vertices = shape.frame.from_unit(Similarity(1.0, turn)(surface.vertices))
-        known = familiarity(seen, target.turned(turn))
         learned = {
             "model": {"name": model.name, "hash": model.hash},
             "starts": [_origin(s, settings) for s in starts],

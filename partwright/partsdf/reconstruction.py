@@ -7,7 +7,6 @@ shape that fits best as it is, and all of them move (section 3.4).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,15 +16,16 @@ from torch import Tensor
 from partwright.assembly.checks import Quaternion
 from partwright.assembly.similarity import NO_ROTATION
 from partwright.datasets.prepared import PreparedShape
-from partwright.errors import CancelledError, ModelError
+from partwright.errors import ModelError
 from partwright.methods import Cancellation, Checkpoint
 from partwright.partsdf.cores import one_core_each
 from partwright.partsdf.data import pose_tensors, present_parts
 from partwright.partsdf.familiarity import familiarity
-from partwright.partsdf.losses import aggregate, intersection, terms
+from partwright.partsdf.freed import judged
 from partwright.partsdf.model import Model
 from partwright.partsdf.needless import needed
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.optimisation import Step, Told, optimised, poses_move
 from partwright.partsdf.pose_naming import named_like
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.settings import ReconstructionSettings
@@ -37,31 +37,13 @@ from partwright.partsdf.starts import (
     latents_by_part,
 )
 from partwright.partsdf.targets import Target
-from partwright.partsdf.unknowns import Unknowns, unknowns_of
 from partwright.partsdf.unseen import with_unseen
 from partwright.shapes import Shape
-
-
-class Step(NamedTuple):
-    """One iteration, the `number`th `of` all."""
-
-    number: int
-    of: int
-    loss: float
-    shape: Callable[[], NeuralShape]
-    """Makes the shape as it is now."""
-    turn: Quaternion = NO_ROTATION
-    """From how the shape's family stands to how the target does."""
-
-
-Told = Callable[[Step], None]
-
 
 LEAST = 1e-3
 _SCOUTED = 8  # of the iterations, the part that a start is given which comes into question
 _BRIEF, _LIKELY = 32, 3  # the part that tells which ones do, where there are more than so many
 _KNOWN = 4  # starts of known parts
-_ABSENT = 10.0  # unit lengths to a part that is not there
 
 
 @one_core_each()
@@ -100,7 +82,7 @@ def reconstruct(
     # Latents start at N(0, 0.01^2), as the authors': near the centre of their prior.
     noise = torch.Generator().manual_seed(seed)
     start = replace(start, latents=0.01 * torch.randn(start.latents.shape, generator=noise))
-    return _optimised(start, target, settings, seed, told, checkpoint, _posed(model, settings))[0]
+    return optimised(start, target, settings, seed, told, checkpoint, poses_move(model, settings))[0]
 
 
 def reconstruct_unknown(
@@ -115,7 +97,9 @@ def reconstruct_unknown(
 
     Once the checkpoint's cancellation is requested, it ends with what was found.
     """
-    return reconstruct_standing(model, target, [NO_ROTATION], settings, seed, told, checkpoint)[0]
+    settings = settings or ReconstructionSettings()
+    found, _ = reconstruct_standing(model, target, [NO_ROTATION], settings, seed, told, checkpoint)
+    return judged(found, target, settings, seed, checkpoint)[0]
 
 
 @one_core_each()
@@ -128,8 +112,8 @@ def reconstruct_standing(
     told: Told | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> tuple[NeuralShape, Quaternion]:
-    """The shape as its family stands, with parts that points do not show, and that one of the `turns` which
-    brings it to where the target is."""
+    """The shape as its family stands, along its directions, with parts that points do not show, and that one
+    of the `turns` which brings it to where the target is."""
     settings = settings or ReconstructionSettings()
     starts = find_starts(model, target, turns, settings)
     found, turn = reconstruct_from(starts, settings, seed, told, checkpoint)
@@ -168,8 +152,8 @@ def _of_needed(
     while not torch.equal(present := needed(shape, target), shape.present):
         if familiarity(shape, target).odd:
             break
-        fewer, posed = replace(shape, present=present), _posed(shape.model, settings)
-        shape, _ = _optimised(fewer, target, again, seed, None, checkpoint, posed)
+        fewer, posed = replace(shape, present=present), poses_move(shape.model, settings)
+        shape, _ = optimised(fewer, target, again, seed, None, checkpoint, posed)
         shape = replace(shape, present=_filling(shape, target))
     return shape
 
@@ -294,13 +278,8 @@ class _Scouts:
                 self.told(step._replace(number=done + step.number, of=self._of, turn=start.turn))
 
         self._done += settings.iterations
-        poses = _posed(start.shape.model, settings)
-        return _optimised(start.shape, start.target, settings, self.seed, ahead, self.checkpoint, poses)
-
-
-def _posed(model: Model, settings: ReconstructionSettings) -> bool:
-    """Whether poses move."""
-    return model.config.poses and settings.pose_rate > 0
+        poses = poses_move(start.shape.model, settings)
+        return optimised(start.shape, start.target, settings, self.seed, ahead, self.checkpoint, poses)
 
 
 def _closest(starts: list[Start], count: int = 1) -> list[Start]:
@@ -316,78 +295,3 @@ def mean_error(shape: NeuralShape, target: Target, count: int = 8192) -> float:
     rows = torch.linspace(0, len(target.sdf) - 1, min(count, len(target.sdf))).long()
     whole = torch.from_numpy(shape.distances(target.points[rows].numpy()))
     return float(target.error(whole, rows, shape.model.config.losses).mean())
-
-
-def _optimised(
-    start: NeuralShape,
-    target: Target,
-    settings: ReconstructionSettings,
-    seed: int,
-    told: Told | None,
-    checkpoint: Checkpoint | None,
-    move_poses: bool,
-) -> tuple[NeuralShape, bool]:
-    """Adam on the latents, and on the poses if they are to move; a cancellation keeps what was found. Also
-    whether all iterations were done."""
-    unknowns = unknowns_of(start, move_poses, target)
-    optimiser = torch.optim.Adam(unknowns.groups(settings))
-    generator = torch.Generator().manual_seed(seed)
-    halves = target.halves()
-
-    def found() -> NeuralShape:
-        final = unknowns.poses()
-        unit = final.rotation / final.rotation.norm(dim=-1, keepdim=True)
-        placed = final._replace(rotation=unit).map(lambda t: t.detach().clone())
-        return replace(start, latents=unknowns.latents().detach().clone(), poses=placed)
-
-    try:
-        for i in range(settings.iterations):
-            if i == settings.iterations // 2:
-                for group in optimiser.param_groups:
-                    group["lr"] *= settings.decay
-            moved = move_poses and i >= settings.pose_delay * settings.iterations
-            rows = _drawn(halves, settings.points, generator)
-            loss = _loss(start, unknowns, moved, target, rows, late=2 * i >= settings.iterations)
-            optimiser.zero_grad()
-            loss.backward()
-            optimiser.step()
-            if told:
-                told(Step(i + 1, settings.iterations, float(loss.detach()), found))
-            if checkpoint:
-                checkpoint()
-    except CancelledError:
-        return found(), False
-    return found(), True
-
-
-def _loss(
-    shape: NeuralShape, unknowns: Unknowns, moved: bool, target: Target, rows: Tensor, late: bool
-) -> Tensor:
-    """Eq. 6 at some samples; with known parts the whole shape's loss waits for the second half.
-
-    moved: whether poses move by now.
-    """
-    poses = unknowns.poses() if moved else shape.poses
-    each = shape.model.part_distances(unknowns.latents(), poses, target.points[rows])[None]
-    if target.part is None:
-        each = each.masked_fill(~shape.present[:, None], _ABSENT)
-    decoder, losses = shape.model.config.decoder, shape.model.config.losses
-    sdf = target.sdf[rows]
-    if target.low is not None:
-        whole = aggregate(each, decoder)[0]
-        on_surface = float(whole.detach().abs()[sdf <= 0].mean())
-        error = losses.whole * target.error(whole, rows, losses).mean()
-        return error + losses.inter * intersection(each, losses) + unknowns.prior(on_surface, moved)
-    known = target.part is not None
-    part = target.part[rows] if target.part is not None else torch.zeros_like(sdf).long()
-    found = terms(each, sdf[None], part[None], losses, decoder)
-    weights = losses if late or not known else replace(losses, whole=0.0)
-    return found.total(weights, known) + unknowns.prior(0.0, moved)
-
-
-def _drawn(halves: tuple[Tensor, Tensor], count: int, generator: torch.Generator) -> Tensor:
-    """`count` rows, half of them inside as far as there are any."""
-    some = [half for half in halves if len(half)]
-    return torch.cat(
-        [half[torch.randint(len(half), (count // len(some),), generator=generator)] for half in some]
-    )

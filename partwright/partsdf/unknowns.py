@@ -79,10 +79,12 @@ def _mean(values: Tensor, spread: Tensor, over: tuple[int, ...]) -> Tensor:
 
 class FreeUnknowns:
     """Every number by itself; half-lengths by their logarithm: they stay positive, and long and short sides
-    alike."""
+    alike. moving: (P,) bool, parts that move; all if None."""
 
-    def __init__(self, start: NeuralShape, move_poses: bool) -> None:
+    def __init__(self, start: NeuralShape, move_poses: bool, moving: Tensor | None = None) -> None:
         self._start, self._move_poses = start, move_poses
+        moving = torch.ones_like(start.present) if moving is None else moving
+        self._held = (~moving)[:, None]
         self._latents = start.latents.clone().requires_grad_()
         self._placed = start.poses.map(lambda t: t.clone().requires_grad_(move_poses))
         self._size = start.poses.scale.log().requires_grad_(move_poses)
@@ -95,10 +97,14 @@ class FreeUnknowns:
         return groups
 
     def latents(self) -> Tensor:
-        return self._latents
+        return torch.where(self._held, self._start.latents, self._latents)
 
     def poses(self) -> PoseTensors:
-        return self._placed._replace(scale=self._size.exp()) if self._move_poses else self._start.poses
+        if not self._move_poses:
+            return self._start.poses
+        placed = self._placed._replace(scale=self._size.exp())
+        pairs = zip(self._start.poses, placed, strict=True)
+        return PoseTensors(*(torch.where(self._held, still, moved) for still, moved in pairs))
 
     def prior(self, off: float, moved: bool) -> Tensor:
         losses = self._start.model.config.losses

@@ -18,9 +18,10 @@ from partwright.partsdf.companions import beside
 from partwright.partsdf.encoder import KIND, Encoder, EncoderSettings, load_encoder
 from partwright.partsdf.encoder_training import train_encoder
 from partwright.partsdf.model import Model, load_model
+from partwright.partsdf.optimisation import Step
 from partwright.partsdf.part_vectors import PartVectors, quaternions
 from partwright.partsdf.poses import rotation_matrices
-from partwright.partsdf.reconstruction import ReconstructionSettings, Step, mean_error, reconstruct_unknown
+from partwright.partsdf.reconstruction import ReconstructionSettings, mean_error, reconstruct_unknown
 from partwright.partsdf.starts import find_starts
 from partwright.partsdf.targets import Target
 from partwright.shapes.sampling import sample_triangles

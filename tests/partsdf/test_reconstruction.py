@@ -20,9 +20,9 @@ from partwright.partsdf import reconstruction
 from partwright.partsdf.meshing import mesh_shape
 from partwright.partsdf.model import Model
 from partwright.partsdf.neural import NeuralShape
+from partwright.partsdf.optimisation import Step
 from partwright.partsdf.poses import rotation_matrices
 from partwright.partsdf.reconstruction import (
-    Step,
     _scouted,
     mean_error,
     reconstruct,
@@ -213,7 +213,7 @@ def test_of_many_starts_three_come_into_question_and_one_goes_all_the_way(
     def error(shape: NeuralShape, _: Target) -> float:
         return ([4, 2, 1, 3] if len(went) < 5 else [0, 1, 2, 3])[number(shape)]
 
-    monkeypatch.setattr(reconstruction, "_optimised", go)
+    monkeypatch.setattr(reconstruction, "optimised", go)
     monkeypatch.setattr(reconstruction, "mean_error", error)
     found = _scouted(starts, ReconstructionSettings(iterations=64, exchange=False))
     assert found.shape is shapes[1]
