@@ -21,7 +21,8 @@ from partwright.input_files import check_file
 from partwright.methods import check_count
 from partwright.partsdf.model import SUFFIX, Model, about_file, file_of
 
-VERSIONS = {"encoder": 1, "image-encoder": 1, "generator": 2}  # by kind; 2: parts are drawn before poses
+# By kind; generators of 2 draw parts before poses, image encoders of 2 know the family by two scales.
+VERSIONS = {"encoder": 1, "image-encoder": 2, "generator": 2}
 _TRAINED_BY = {
     "encoder": "parts train-encoder",
     "image-encoder": "parts train-encoder --from images",

@@ -87,7 +87,7 @@ class ImageNetwork(PartQueries):
         self.token_middle, self.token_far = nn.Conv2d(middle, width, 1), nn.Conv2d(far, width, 1)
         self.place = nn.Parameter(0.1 * torch.randn(sum(c * c for c in cells), width))
         self.camera = nn.Sequential(nn.LayerNorm(width), nn.Linear(width, CAMERA))
-        self.known = nn.Linear(2 * far, 1)  # learned at last, by itself (`likeness`)
+        self.known = nn.Linear(2 * (middle + far), 1)  # learned at last, by itself (`likeness`)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         return self.told_of(*self.scales(pictures))
@@ -98,10 +98,11 @@ class ImageNetwork(PartQueries):
         middle = self.middle(near)
         return near, middle, self.far(middle)
 
-    def features(self, far: Tensor) -> Tensor:
-        """(B, 2 far) by which the family's pictures are known, of what is seen at a sixteenth: how much there
-        is of each thing, and how clear it is where it is clearest."""
-        return torch.cat([far.mean(dim=(2, 3)), far.amax(dim=(2, 3))], dim=1)
+    def features(self, middle: Tensor, far: Tensor) -> Tensor:
+        """(B, 2 (middle + far)) by which the family's pictures are known, of what is seen at an eighth and a
+        sixteenth: how much there is of each thing, and how clear it is where it is clearest."""
+        both = [how for seen in (middle, far) for how in (seen.mean(dim=(2, 3)), seen.amax(dim=(2, 3)))]
+        return torch.cat(both, dim=1)
 
     def told_of(self, near: Tensor, middle: Tensor, far: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """As `forward`, of the scales."""
@@ -168,7 +169,7 @@ class ImageEncoder:
             camera[:, :2].norm(dim=1),  # the mean of unit vectors is shorter, the more they differ
             places.square().mean(dim=(1, 2)).sqrt(),
             torch.distributions.Bernoulli(logits=logits).entropy().mean(dim=1) / math.log(2),
-            self.network.known(self.network.features(far))[:, 0],
+            self.network.known(self.network.features(middle, far))[:, 0],
         )
         rows = zip(shapes, silhouette.sigmoid(), *(n.tolist() for n in numbers), strict=True)
         return [Sight(*row) for row in rows]

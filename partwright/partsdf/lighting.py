@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor
 
@@ -10,6 +12,7 @@ from partwright.partsdf.views import SHADED, SIDE, Views
 MIDDLE, SPREAD = 0.5, 0.25  # of a picture's numbers, which are from 0 to 1, for a network
 _WHITE = 0.3  # of the backgrounds are plain and light
 _ONE_COLOUR = 0.5  # of the shapes are of one colour
+_THINGS, _THERE = 8, 0.6  # at most, of clutter, and the chance of each
 
 
 def lit(views: Views, rows: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
@@ -58,6 +61,37 @@ def lit(views: Views, rows: Tensor, generator: torch.Generator) -> tuple[Tensor,
     picture = torch.where(chance(0.15), plain, picture)
     noise = uniform(batch, 1, 1, 1, high=0.05) * torch.randn(picture.shape, generator=generator)
     return (picture + noise).clamp(0, 1), silhouette
+
+
+def before_clutter(pictures: Tensor, silhouette: Tensor, generator: torch.Generator) -> Tensor:
+    """Pictures (B, 3, SIDE, SIDE) of shapes that are where `silhouette` (B, SIDE, SIDE) is 1, half of them
+    before boxes, balls, stripes and walls of any colour."""
+    batch = len(pictures)
+
+    def uniform(*size: int, low: float = 0.0, high: float = 1.0) -> Tensor:
+        return low + (high - low) * torch.rand(batch, *size, generator=generator)
+
+    place = (torch.arange(SIDE) + 0.5) / SIDE
+    strength, some = uniform(1, 1, 1, low=0.2), uniform(1, 1) < 0.5
+    behind = pictures
+    for _ in range(_THINGS):
+        across, down = place - uniform(1, 1), place[:, None] - uniform(1, 1)
+        angle = uniform(1, 1, high=math.pi)
+        along = angle.cos() * across + angle.sin() * down
+        aside = angle.cos() * down - angle.sin() * across
+        half, other = uniform(1, 1, low=0.03, high=0.33), uniform(1, 1, low=0.03, high=0.33)
+        kinds = torch.stack(
+            [
+                (along.abs() < half) & (aside.abs() < other),
+                (along / half).square() + (aside / other).square() < 1,
+                (2 * math.pi * uniform(1, 1, low=2.0, high=16.0) * along).sin() > 0.5,
+                along > half,
+            ]
+        )
+        kind = torch.randint(len(kinds), (batch,), generator=generator)
+        there = kinds[kind, torch.arange(batch)] & some & (uniform(1, 1) < _THERE)
+        behind = torch.where(there[:, None], torch.lerp(behind, uniform(3, 1, 1), strength), behind)
+    return torch.where(silhouette[:, None] > 0, pictures, behind)
 
 
 def _clouded(batch: int, generator: torch.Generator) -> Tensor:

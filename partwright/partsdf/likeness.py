@@ -2,7 +2,8 @@
 
 An encoder makes a shape of the family of whatever it is shown, and how sure it is of that tells little. What
 its convolutions see tells more: they were made for the family's pictures, which show other things, and more
-clearly, than pictures of heaps of blocks, balls, cones and rings. One weight for each of these things is
+clearly, than pictures of heaps of blocks, balls, cones and rings, both before plain grounds and cluttered
+ones. One weight for each of these things is
 learned, by logistic regression, once all else is; what is seen of the family stays as it is.
 """
 
@@ -16,7 +17,7 @@ from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from partwright.partsdf.image_encoder import ImageNetwork
-from partwright.partsdf.lighting import lit
+from partwright.partsdf.lighting import before_clutter, lit
 from partwright.partsdf.poses import PoseTensors
 from partwright.partsdf.views import EACH, PartMeshes, Views, views_of
 
@@ -27,7 +28,7 @@ _SIZE, _VARIED = math.log(0.2), 0.6  # mean and standard deviation of the logari
 _UPRIGHT = _ROUND = 0.5  # of them
 _LIT = 3  # times that each view is lit
 _BATCH = 64
-_HELD = 3e-3  # weight of the squares of what is learned
+_HELD = 1e-2  # weight of the squares of what is learned
 _STEPS = 200
 
 
@@ -92,5 +93,6 @@ def draw_heaps(up: str, count: int, generator: torch.Generator, workers: int = 1
 @torch.no_grad()
 def _features(network: ImageNetwork, views: Views, rows: Tensor, generator: torch.Generator) -> Tensor:
     """(_LIT R, F) of pictures of the views `rows` (R,)."""
-    pictures = (lit(views, some, generator)[0] for _ in range(_LIT) for some in rows.split(_BATCH))
-    return torch.cat([network.features(network.scales(one)[2]) for one in pictures])
+    lights = (lit(views, some, generator) for _ in range(_LIT) for some in rows.split(_BATCH))
+    pictures = (before_clutter(*each, generator) for each in lights)
+    return torch.cat([network.features(*network.scales(one)[1:]) for one in pictures])

@@ -28,6 +28,7 @@ COVERED = 0.6  # IoU of the moved parts' outline with what is seen, at least; 0.
 MIRRORED = 0.8  # IoU with what is seen in the mirror image, at least
 _SHAPES, _PIXELS = 32, 4 * SIDE
 _UNUSUAL = 0.05  # of the pictures of validation shapes lie below the limit
+_BETWEEN = 0.25  # the way from 0 to them, where they lie above
 NO_LIMIT = -99.0  # a likeness that everything has
 _ELEVATIONS = (5.0, 40.0)  # degrees
 
@@ -53,13 +54,16 @@ def warnings_of(encoder: ImageEncoder, looked: Looked, covered: float = 1.0) -> 
 
 
 def usual_likeness(encoder: ImageEncoder, shapes: Sequence[PreparedShape], seed: int = 0) -> float:
-    """The likeness that a few of the pictures of shapes are below, which it did not learn from; 0 at most,
-    above which a picture is liker the family's than those of heaps."""
+    """The likeness that a few of the pictures of shapes are below, which it did not learn from. Above 0 a
+    picture is liker the family's than those of heaps; where these few lie above, a quarter of theirs."""
     found = []
     for photo in _pictures(shapes, encoder.model.up, seed):
         with suppress(EmptyShapeError):  # nothing is seen, which is told by itself
             found.append(look_at(encoder, photo).sight.likeness)
-    return min(0.0, float(np.quantile(found, _UNUSUAL))) if found else NO_LIMIT
+    if not found:
+        return NO_LIMIT
+    few = float(np.quantile(found, _UNUSUAL))
+    return few if few < 0 else _BETWEEN * few
 
 
 def held_out(family: PreparedFamily) -> list[PreparedShape]:

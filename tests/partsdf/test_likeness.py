@@ -9,7 +9,7 @@ import trimesh
 
 from partwright.partsdf.encoder import EncoderSettings
 from partwright.partsdf.image_encoder import ImageNetwork, ImageSettings
-from partwright.partsdf.lighting import lit
+from partwright.partsdf.lighting import before_clutter, lit
 from partwright.partsdf.likeness import draw_heaps, learn_likeness
 from partwright.partsdf.poses import PoseTensors, identity
 from partwright.partsdf.views import EACH, PartMeshes, Views, views_of
@@ -41,7 +41,7 @@ def rods(seed: int) -> Views:
 def likeness(network: ImageNetwork, seen: Views) -> np.ndarray:
     rows = torch.arange(len(seen.label))
     pictures, _ = lit(seen, rows, torch.Generator().manual_seed(9))
-    return network.known(network.features(network.scales(pictures)[2]))[:, 0].numpy()
+    return network.known(network.features(*network.scales(pictures)[1:]))[:, 0].numpy()
 
 
 def test_heaps_are_told_from_the_family(network: ImageNetwork) -> None:
@@ -62,3 +62,16 @@ def test_heaps_are_of_one_to_eight_solids() -> None:
     seen = (heaps.label > 0).flatten(1).float().mean(dim=1)
     assert seen.min() > 0
     assert heaps.donors.unique().tolist() == [0, 1, 2, 3, 4]
+
+
+def test_clutter_is_behind_half_of_the_shapes() -> None:
+    random = torch.Generator().manual_seed(0)
+    pictures = torch.full((400, 3, 64, 64), 0.5)
+    silhouette = torch.zeros(400, 64, 64)
+    silhouette[:, 20:40, 10:30] = 1
+    seen = before_clutter(pictures, silhouette, random)
+    there = (silhouette > 0)[:, None].expand_as(seen)
+    assert (seen[there] == 0.5).all()
+    changed = ((seen != 0.5) & ~there).flatten(1).any(dim=1)
+    assert 0.4 < float(changed.float().mean()) < 0.6
+    assert 0.0 <= float(seen.min()) < float(seen.max()) <= 1.0
