@@ -175,7 +175,7 @@ def test_it_learns_and_sees_a_held_out_lamp(
     found = reconstruct_photo(encoder.model, photo, 48)
     held = lamps.load(lamps.split("test")[0])
     assert found.shape.names() == list(np.array(lamps.parts)[held.present.astype(bool)])
-    assert found.standpoint.iou > 0.6
+    assert found.report["silhouette_iou_as_seen"] > 0.6
     assert found.looked.silhouette.mean() > 0.25  # it was looked at closely
     there = found.shape.present.numpy()
     off = np.abs(found.shape.poses.translation.numpy() - held.translation)[there]
