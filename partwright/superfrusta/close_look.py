@@ -39,13 +39,9 @@ _SLOPE = 2.5  # times that a part's field outside may be less than the distance,
 _BLENDED = 0.02  # unit lengths: a blend covers as much between parts
 _AGAIN = 40  # points at once, thrice at most
 _TIMES = 3
-_FELT = (
-    0.5  # of what is furthest off in the whole: less adds a sixteenth of that or less to the norm over parts
-)
+_FELT = 0.5  # of what is furthest off in the whole: less adds a sixteenth at most to the norm over parts
 _WAYS, _SHELLS = 64, 12  # from a point outwards, and distances that are tried in each
-STICKS_OUT = (
-    1.8  # times that sticking out counts, which is seen first; what is filled or left out counts once
-)
+STICKS_OUT = 1.8  # times that sticking out counts, which is seen first: more than in a search
 
 
 @dataclass(frozen=True)

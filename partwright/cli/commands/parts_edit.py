@@ -29,9 +29,8 @@ def run(arguments: argparse.Namespace) -> int:
         assembly = source.assembly(shape)
         work.stage("drawing")
         camera = Camera(up=source.up or "z")
-        drawn = picture(
-            shape, camera=camera, size=480, progress=work.show
-        )  # first, as it may not be possible
+        # Before anything is written, as it may not be possible.
+        drawn = picture(shape, camera=camera, size=480, progress=work.show)
         assembly.save(arguments.output)
         write_png(still, drawn)
     say(f"{', '.join(shape.names())}: written to {arguments.output}, drawn in {still}")
