@@ -3,8 +3,8 @@
 An encoder makes a shape of the family of whatever it is shown, and how sure it is of that tells little. What
 its convolutions see tells more: they were made for the family's pictures, which show other things, and more
 clearly, than pictures of heaps of blocks, balls, cones and rings, both before plain grounds and cluttered
-ones. One weight for each of these things is
-learned, by logistic regression, once all else is; what is seen of the family stays as it is.
+ones. One weight for each of these things is learned, by logistic regression, once all else is; what is seen
+of the family stays as it is.
 """
 
 from __future__ import annotations
