@@ -13,6 +13,7 @@ from partwright.fields.operations import (
     smooth_union,
     union,
 )
+from partwright.fields.pipe import Pipe
 from partwright.fields.profile import Profile
 from partwright.fields.quadric import Quadric
 from partwright.fields.quadric_forms import NormalForm, normal_form
@@ -46,6 +47,7 @@ __all__ = [
     "HollowBox",
     "HollowFrustum",
     "NormalForm",
+    "Pipe",
     "Profile",
     "Quadric",
     "Revolution",

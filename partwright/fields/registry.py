@@ -27,6 +27,7 @@ KINDS: Registry[type[Field]] = Registry(
         "hollow_frustum": "partwright.fields.solids:HollowFrustum",
         "extrusion": "partwright.fields.extrusion:Extrusion",
         "revolution": "partwright.fields.revolution:Revolution",
+        "pipe": "partwright.fields.pipe:Pipe",
         "quadric": "partwright.fields.quadric:Quadric",
         "neural": "partwright.partsdf.field:NeuralField",
     },

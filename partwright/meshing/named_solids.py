@@ -1,4 +1,4 @@
-"""Named solids, extrusions and revolutions as closed meshes whose chords are within a tolerance."""
+"""Named solids, extrusions, revolutions and pipes as closed meshes whose chords are within a tolerance."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from partwright.fields import (
     Frustum,
     HollowBox,
     HollowFrustum,
+    Pipe,
     Revolution,
     Solid,
     Sphere,
@@ -25,21 +26,24 @@ from partwright.fields import (
     Torus,
     Tube,
 )
+from partwright.meshing.pipes import piped
 from partwright.meshing.revolve import corners_of_circle, revolve
 from partwright.meshing.swept_solids import extruded, revolved
 
 
 def is_named(field: Field) -> bool:
     """Whether `named_solid` makes it."""
-    return isinstance(field, Solid | Swept)
+    return isinstance(field, Solid | Swept | Pipe)
 
 
 def named_solid(solid: Field, tolerance: float) -> Manifold:
-    """A `Solid`, extrusion or revolution in its own frame."""
+    """A `Solid`, extrusion, revolution or pipe in its own frame."""
     if isinstance(solid, Extrusion):
         return extruded(solid, tolerance)
     if isinstance(solid, Revolution):
         return revolved(solid, tolerance)
+    if isinstance(solid, Pipe):
+        return piped(solid, tolerance)
     assert isinstance(solid, Solid)
     angular = _ANGULAR.get(type(solid))
     if angular is not None:

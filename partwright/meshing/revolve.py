@@ -41,7 +41,7 @@ def revolve(profile: np.ndarray, corners: int, stretch: tuple[float, float] = (1
     count = len(rings)
     index = np.arange(count * corners).reshape(count, corners)
     low, high = (index, np.roll(index, -1, axis=0)) if loop else (index[:-1], index[1:])
-    faces = _quads(low, np.roll(low, -1, axis=1), np.roll(high, -1, axis=1), high)
+    faces = quads(low, np.roll(low, -1, axis=1), np.roll(high, -1, axis=1), high)
     vertices = rings.reshape(-1, 3)
     if not loop:
         bottom, top = len(vertices), len(vertices) + 1
@@ -57,10 +57,10 @@ def under_graph(across: np.ndarray, along: np.ndarray, top: np.ndarray, bottom: 
     upper = np.column_stack([flat, top.ravel()])
     lower = np.column_stack([flat, np.full(len(flat), bottom)])
     index = np.arange(u * v).reshape(u, v)
-    lid = _quads(index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
+    lid = quads(index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:])
     rim = np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
     after = np.roll(rim, -1)
-    wall = _quads(rim + u * v, after + u * v, after, rim)
+    wall = quads(rim + u * v, after + u * v, after, rim)
     return closed(np.concatenate([upper, lower]), np.concatenate([lid, lid[:, ::-1] + u * v, wall]))
 
 
@@ -83,7 +83,7 @@ def subdivided(curve: Callable[[np.ndarray], np.ndarray], start: np.ndarray, tol
     return points
 
 
-def _quads(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
+def quads(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
     """Two triangles (F, 3) for each of the corners a, b, c, d, counter-clockwise seen from outside."""
     a, b, c, d = (corner.ravel() for corner in (a, b, c, d))
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
