@@ -22,6 +22,7 @@ from partwright.fields import (
     Extrusion,
     Field,
     Frustum,
+    Pipe,
     Profile,
     Revolution,
     Sphere,
@@ -99,7 +100,7 @@ def _bulk(node: Node) -> float:
 
 _CUTS = (
     "hole", "bolt_hole", "blind_hole", "counterbored_hole", "countersunk_hole", "chamfered_hole",
-    "bore", "countersink", "dimple", "groove", "slot", "opening", "pocket", "island", GAP,
+    "bore", "countersink", "dimple", "groove", "channel", "slot", "opening", "pocket", "island", GAP,
 )  # fmt: skip
 
 
@@ -139,6 +140,8 @@ def _added(field: Field) -> str:
         return round_role(*size)
     if isinstance(field, Revolution):
         return "turned"
+    if isinstance(field, Pipe):
+        return "pipe" if field.thickness else "rod"
     if short < _FLAT * middle:
         return "plate"
     return "bar" if long > _LONG * middle else "block"
@@ -153,6 +156,8 @@ def _cut(part: Part, cut_from: Node, beside: Sequence[Node]) -> str:
     turned = _turned_cut(field.profile) if isinstance(field, Revolution) else None
     if turned == "groove":
         return turned
+    if isinstance(field, Pipe):
+        return "channel"
     through = _goes_through(part, cut_from, beside)
     round_ = None if _has_core(field) else round_size(field)
     tapers = isinstance(field, Cone | Frustum)

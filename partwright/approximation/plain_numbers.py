@@ -27,7 +27,7 @@ from partwright.assembly.instance_patterns import (
 )
 from partwright.assembly.similarity import NO_ROTATION, rotation_matrix
 from partwright.errors import ParameterError
-from partwright.fields import Box, Extrusion, Field, Revolution, Solid, Swept
+from partwright.fields import Box, Extrusion, Field, Pipe, Revolution, Solid, Swept
 from partwright.fields.profile import Loop, Profile, circle, circle_of
 
 _ANGLES = ("taper", "angle")
@@ -255,7 +255,7 @@ def _names(field: Any) -> set[str]:
 
 
 def _plain_field(field: Field, within: float) -> Field:
-    if not isinstance(field, Solid | Swept):
+    if not isinstance(field, Solid | Swept | Pipe):
         return field
     given: Any = field  # every kind of them is a dataclass
     names = [own.name for own in dataclasses.fields(given)]

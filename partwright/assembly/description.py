@@ -107,6 +107,8 @@ def _value(value: object, digits: int) -> str:
     """Names as they are, hashes by their beginning; of a long row of numbers only its length."""
     if isinstance(value, str):
         return value if len(value) < _LONG_NAME else f"{value[:12]}..."
+    if isinstance(value, tuple) and isinstance(value[0], tuple):
+        return f"of {len(value)} corners"
     if isinstance(value, tuple) and len(value) > _MAX_NUMBERS:
         return f"of {len(value)} numbers"
     if isinstance(value, Profile):

@@ -15,8 +15,7 @@ import numpy as np
 
 from partwright.assembly.following import followed as with_followers
 from partwright.assembly.motion import Motion
-from partwright.assembly.numbers import numbers_of, with_values
-from partwright.assembly.profile_numbers import PREFIX
+from partwright.assembly.numbers import TOGETHER, numbers_of, with_values
 from partwright.assembly.repeated_groups import alike_leaves
 from partwright.assembly.tree import Assembly, Part
 from partwright.errors import ParameterError
@@ -36,7 +35,8 @@ def with_numbers(assembly: Assembly, values: Mapping[str, float], alone: bool = 
 
     values: by "part.number", lengths in the assembly's unit and angles in degrees; the part's name may be a
     pattern ("hole*.diameter"). Copies of a part change with it. They are set in order, but those of a
-    profile that are given for the same parts together, with the first: they are counted before any is set.
+    profile or path that are given for the same parts together, with the first: of a profile they are counted
+    before any is set, and bends of a path may not fit one by one.
     alone: parts in the same place of groups that are copies of one another stay as they are; otherwise they
     change alike, and move alike, but for those that the pattern names, too: each of these has the number.
 
@@ -90,12 +90,12 @@ def _changed(
 
 
 def _steps(assembly: Assembly, values: Mapping[str, float]) -> list[tuple[list[str], dict[str, float]]]:
-    """Names of parts, and the numbers that they get at once: one, or all of a profile that are given."""
+    """Names of parts, and the numbers that they get at once: one, or all of a profile or path."""
     steps: list[tuple[list[str], dict[str, float]]] = []
     of_profiles: dict[tuple[str, ...], dict[str, float]] = {}
     for name, value in values.items():
         wanted, number = _split(assembly, name)
-        if not number.startswith(PREFIX):
+        if not number.startswith(TOGETHER):
             steps.append((wanted, {number: value}))
             continue
         key = tuple(wanted)

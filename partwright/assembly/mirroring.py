@@ -10,7 +10,7 @@ import numpy as np
 
 from partwright.assembly.similarity import Similarity, quaternion_product
 from partwright.errors import ParameterError
-from partwright.fields import Extrusion, Field, Quadric, Revolution, SuperFrustum
+from partwright.fields import Extrusion, Field, Pipe, Quadric, Revolution, SuperFrustum
 from partwright.fields.profile import Profile
 from partwright.fields.solids import Solid
 
@@ -85,6 +85,8 @@ def _in_y(field: Field, name: str) -> tuple[Field, Quaternion]:
     if isinstance(field, Revolution):
         half = -math.radians(field.angle) / 2
         return field, (math.cos(half), 0.0, 0.0, math.sin(half))
+    if isinstance(field, Pipe):
+        return dataclasses.replace(field, path=tuple((x, -y, z, r) for x, y, z, r in field.path)), straight
     if isinstance(field, Quadric):
         a, b, c, d, e, f, g, xy, yz, zx = field.coefficients
         return Quadric((a, b, c, d, -e, f, g, -xy, -yz, zx)), straight

@@ -8,17 +8,20 @@ from typing import Any
 
 from partwright.assembly.files import MAX_PARTS
 from partwright.assembly.instance_patterns import Circle, Grid, Line, Ring, pattern, with_pattern
+from partwright.assembly.pipe_numbers import PREFIXES, pipe_numbers, with_pipe_numbers
 from partwright.assembly.profile_numbers import PREFIX, profile_numbers, with_profile_numbers
 from partwright.assembly.tree import Part
 from partwright.errors import ParameterError
 
+TOGETHER = (PREFIX, *PREFIXES)
+"""What numbers begin with that are set together."""
 _OF_COPIES = ("count", "circle", "start", "counts", "spacing", "step")
 
 
 def numbers_of(part: Part) -> dict[str, float]:
-    """The part's numbers by name: those of its field ("radius", "diameter", "size.x"), of its profile
-    (`profile_numbers`), of its place ("x") and of the pattern of its copies ("count", "circle", "start";
-    "counts.x", "spacing.x"; "count", "step.x")."""
+    """The part's numbers by name: those of its field ("radius", "diameter", "size.x"), of its profile or
+    path (`profile_numbers`, `pipe_numbers`), of its place ("x") and of the pattern of its copies ("count",
+    "circle", "start"; "counts.x", "spacing.x"; "count", "step.x")."""
     found: dict[str, float] = {}
     for entry in dataclasses.fields(part.field):  # type: ignore[arg-type]
         value = getattr(part.field, entry.name)
@@ -28,7 +31,7 @@ def numbers_of(part: Part) -> dict[str, float]:
                 found[entry.name.replace("radius", "diameter")] = 2 * value
         elif entry.name == "size":
             found |= {f"size.{axis}": v for axis, v in zip("xyz", value, strict=True)}
-    found |= profile_numbers(part.field)
+    found |= profile_numbers(part.field) | pipe_numbers(part.field)
     return found | dict(zip("xyz", part.translation, strict=True)) | _numbers_of_copies(part)
 
 
@@ -49,13 +52,16 @@ def _numbers_of_copies(part: Part) -> dict[str, float]:
 
 
 def with_values(part: Part, values: Mapping[str, float]) -> Part:
-    """The part with some of its `numbers_of`; those of its profile are counted before any is set. Raises
-    ParameterError where its field does not allow them."""
+    """The part with some of its `numbers_of`; those of its profile are counted before any is set, and all of
+    its path are set at once. Raises ParameterError where its field does not allow them."""
     of_profile = {number: value for number, value in values.items() if number.startswith(PREFIX)}
+    of_path = {number: value for number, value in values.items() if number.startswith(PREFIXES)}
     if of_profile:
         part = dataclasses.replace(part, field=with_profile_numbers(part.field, of_profile))
+    if of_path:
+        part = dataclasses.replace(part, field=with_pipe_numbers(part.field, of_path))
     for number, value in values.items():
-        part = part if number in of_profile else with_number(part, number, value)
+        part = part if number in of_profile or number in of_path else with_number(part, number, value)
     return part
 
 
@@ -67,7 +73,7 @@ def with_number(part: Part, number: str, value: float) -> Part:
         return dataclasses.replace(part, translation=(place[0], place[1], place[2]))
     if number.partition(".")[0] in _OF_COPIES:
         return _with_number_of_copies(part, number, value)
-    if number.startswith(PREFIX):
+    if number.startswith(TOGETHER):
         return with_values(part, {number: value})
     if "diameter" in number:
         number, value = number.replace("diameter", "radius"), value / 2

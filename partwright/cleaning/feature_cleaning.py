@@ -33,7 +33,7 @@ from partwright.cleaning.outline_equations import (
     smooth,
 )
 from partwright.errors import CancelledError, ParameterError
-from partwright.fields import Extrusion, Field, Revolution, Swept
+from partwright.fields import Extrusion, Field, Pipe, Revolution, Swept
 from partwright.fields.extrusion import RIMS
 from partwright.fields.profile import Profile, circle, circle_of
 from partwright.methods import Cancellation
@@ -92,6 +92,9 @@ def same_numbers(a: Assembly, b: Assembly, grid: Grid) -> bool:
 
 
 def _same_field(one: Field, other: Field, near: float) -> bool:
+    if isinstance(one, Pipe) and isinstance(other, Pipe):
+        first, second = ([p.radius, p.thickness, *p.corners.ravel()] for p in (one, other))
+        return bool(np.allclose(first, second, rtol=0, atol=near))
     if not isinstance(one, Swept) or not isinstance(other, Swept):
         return one == other or bool(np.allclose(values(one), values(other), atol=near))
     lengths = [
@@ -186,6 +189,9 @@ def _cleaned(index: int, one: Lying, targets: _Targets, tolerance: float, grid: 
             at[k] = _plain([at[k]], tolerance, grid)
         at = _tidy_place(at, grid)
         return with_place(one, at, field=_swept(index, one, at, wanted, targets, tolerance, grid))
+    if isinstance(field, Pipe):
+        at = _tidy_place(np.array([_plain([v], tolerance, grid) for v in at.tolist()]), grid)
+        return with_place(one, at, field=_pipe(index, one, field, at, wanted, targets))
     numbers = values(field)
     for k in range(len(numbers)):
         numbers[k] = targets.sizes.get((index, ("number", k)), numbers[k])
@@ -282,6 +288,26 @@ def _swept(
     if ends[0] is not None and ends[1] is not None and ends[0] != ends[1]:
         height = float(f"{abs(ends[1] - ends[0]):.{_DIGITS}g}")
     return dataclasses.replace(field, profile=made, height=height, **rims)
+
+
+def _pipe(
+    index: int,
+    one: Lying,
+    field: Pipe,
+    at: Floats,
+    wanted: dict[tuple[int, Key], float],
+    targets: _Targets,
+) -> Pipe:
+    """With its corners at the levels that they are to be at."""
+    path = []
+    for i, (*_, bend) in enumerate(field.path):
+        place = []
+        for local in range(3):
+            k, sign = one.axis(local)
+            place.append(float(f"{sign * (wanted[local, ('corner', i)] - float(at[k])):.{_DIGITS}g}"))
+        path.append((place[0], place[1], place[2], targets.sizes.get((index, ("bend", i)), bend)))
+    wall = targets.sizes.get((index, ("thickness",)), 0.0)
+    return Pipe(tuple(path), targets.sizes[index, ("radius",)], wall)
 
 
 def _pairs(field: Swept, loop: int) -> list[tuple[tuple[int, int], tuple[int, int]]]:

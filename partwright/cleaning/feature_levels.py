@@ -15,7 +15,7 @@ from partwright.assembly.similarity import rotation_matrix
 from partwright.cleaning.dimensions import dimensions, flat, reaches, turned_freely, values
 from partwright.cleaning.orientations import CUBE, along
 from partwright.cleaning.outline_equations import arc
-from partwright.fields import Extrusion, Revolution, Swept
+from partwright.fields import Extrusion, Pipe, Revolution, Swept
 from partwright.fields.extrusion import RIMS
 from partwright.fields.profile import circle_of
 
@@ -54,7 +54,8 @@ class Level:
     local: int
     """The part's own axis."""
     key: Key
-    """("end", 0 or 1), ("side", corner, next), ("arc", corner, next), ("circle", loop) or ("place",)."""
+    """("end", 0 or 1), ("side", corner, next), ("arc", corner, next), ("circle", loop), ("place",), or of a
+    pipe ("corner", index)."""
     axis: int
     value: float
 
@@ -65,7 +66,8 @@ class Size:
 
     part: int
     key: Key
-    """("number", index), ("arc" or "turned", corner, next), ("circle", loop) or ("rim", name)."""
+    """("number", index), ("arc" or "turned", corner, next), ("circle", loop), ("rim", name), or of a pipe
+    ("radius",), ("thickness",) or ("bend", index)."""
     value: float
     whole: bool
     """Whether it goes all around, so that a drawing gives the diameter."""
@@ -103,7 +105,7 @@ def freely(part: Part) -> bool:
         return False
     if isinstance(part.field, Revolution):
         return part.field.full
-    return not isinstance(part.field, Swept) and turned_freely(part.field) in ("axis", "arrow", "all")
+    return not isinstance(part.field, Swept | Pipe) and turned_freely(part.field) in ("axis", "arrow", "all")
 
 
 def levels(index: int, one: Lying, tolerance: float) -> Iterator[Level]:
@@ -118,6 +120,9 @@ def levels(index: int, one: Lying, tolerance: float) -> Iterator[Level]:
     elif isinstance(field, Revolution):
         yield from (_level(index, one, "centre", k, ("place",), 0.0) for k in (0, 1))
         yield from _of_profile(index, one, (None, 2), _SHORT * tolerance)
+    elif isinstance(field, Pipe):
+        for i, corner in enumerate(field.path):
+            yield from (_level(index, one, "centre", k, ("corner", i), corner[k]) for k in range(3))
     else:
         reach = reaches(field)
         for k in range(3):
@@ -170,6 +175,13 @@ def _level(index: int, one: Lying, kind: str, local: int, key: Key, value: float
 def sizes(index: int, one: Lying, tolerance: float) -> Iterator[Size]:
     """Radii of a part."""
     field = one.part.field
+    if isinstance(field, Pipe):
+        yield Size(index, ("radius",), field.radius, True, "radius")
+        if field.thickness:
+            yield Size(index, ("thickness",), field.thickness, False, "thickness")
+        bends = ((i, bend) for i, (*_, bend) in enumerate(field.path) if bend)
+        yield from (Size(index, ("bend", i), bend, False, "bend") for i, bend in bends)
+        return
     if not isinstance(field, Swept):
         for k, dimension in enumerate(dimensions(type(field))):
             if dimension.name in ROUND:

@@ -17,7 +17,7 @@ from partwright.cleaning.grid import Grid
 from partwright.cleaning.hole_standards import is_drawn_in_inches, standard_hole
 from partwright.cleaning.outline_equations import bend_at
 from partwright.cleaning.relations import Relation
-from partwright.fields import Extrusion, Revolution, Swept
+from partwright.fields import Extrusion, Pipe, Revolution, Swept
 from partwright.fields.profile import circle_of
 
 _SAME = 20.0  # times what is one length on the grid
@@ -139,7 +139,7 @@ def feature_numbers(given: Assembly, made: Assembly, tolerance: float) -> tuple[
 def _numbers(part: Part, cut: bool, tolerance: float) -> dict[Key, tuple[str, float]]:
     """Names and values by where the part has them. tolerance: within which a side is upright."""
     field, along = part.field, "depth" if cut else "height"
-    if not isinstance(field, Swept):
+    if not isinstance(field, Swept | Pipe):
         own = zip(dimensions(type(field)), values(field).tolist(), strict=True)
         return {(k,): _named(dimension.name, value, along) for k, (dimension, value) in enumerate(own)}
     one = Lying(part, np.eye(3), np.eye(3), np.zeros(3))

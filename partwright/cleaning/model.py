@@ -216,7 +216,8 @@ def check_cleanable(part: Part) -> None:
     if part.field.superfrustum() is None:
         raise UncleanableError(
             f"part {part.name!r} is a {part.field.kind}, whose numbers no relation can bind; SuperFrusta, "
-            "named solids, extrusions and revolutions can be cleaned: fit --method solids --clean makes such"
+            "named solids, extrusions, revolutions and pipes can be cleaned: fit --method solids --clean "
+            "makes such"
         )
     if size_of(part) == 0:
         raise UncleanableError(f"part {part.name!r} has no size; take it out, or give it one")

@@ -29,7 +29,7 @@ from partwright.cleaning.repeated_parts import collapsed, tidy, unchanged
 from partwright.cleaning.snapping import snapped
 from partwright.cleaning.solid_kinds import plainer
 from partwright.errors import SettingError
-from partwright.fields import Swept
+from partwright.fields import Pipe, Swept
 from partwright.meshing import mesh_assembly
 from partwright.methods import Cancellation
 from partwright.shapes import Shape
@@ -98,7 +98,7 @@ def clean(
         NoSurfaceError: nothing is left of the assembly.
     """
     told = told or _nobody
-    if any(isinstance(part.field, Swept) for part in assembly.parts):
+    if any(isinstance(part.field, Swept | Pipe) for part in assembly.parts):
         return _with_features(assembly, shape, tolerance, cancel or Cancellation(), told)
     told("sampling")
     model = Model.of(assembly)
@@ -138,9 +138,9 @@ def _with_features(
     cancel: Cancellation,
     told: Callable[[str], None],
 ) -> Cleaned:
-    """`clean` where some parts are extrusions or revolutions; parts that are SuperFrusta stay."""
+    """`clean` where some parts are extrusions, revolutions or pipes; parts that are SuperFrusta stay."""
     for part in assembly.parts:
-        if not isinstance(part.field, Swept):
+        if not isinstance(part.field, Swept | Pipe):
             check_cleanable(part)
     target = assembly if shape is None else shape
     tolerance = checked_tolerance(tolerance, target)

@@ -14,7 +14,7 @@ import numpy as np
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.rows import as_superfrustum
 from partwright.errors import ParameterError
-from partwright.fields import Extrusion, Field, Revolution, SuperFrustum, Swept
+from partwright.fields import Extrusion, Field, Pipe, Revolution, SuperFrustum, Swept
 from partwright.fields.extrusion import RIMS
 from partwright.fields.profile_growth import grown_profile
 from partwright.fields.solids import (
@@ -85,8 +85,8 @@ def _resized(assembly: Assembly, part: Part, by: float) -> Assembly:
 
 
 def _thinnest(field: Field) -> float:
-    """A profile that grows checks itself."""
-    return field.wall if isinstance(field, Swept) else as_superfrustum(field).thinnest
+    """Profiles and pipes that grow check themselves."""
+    return field.wall if isinstance(field, Swept | Pipe) else as_superfrustum(field).thinnest
 
 
 def grown(part: Part, by: float) -> Part:
@@ -123,6 +123,17 @@ def _grown_extrusion(field: Extrusion, by: float) -> Extrusion:
         for name, value in rims.items()
     }
     return replace(field, profile=grown_profile(field.profile, out), height=field.height + 2 * by, **rims)
+
+
+def _grown_pipe(field: Pipe, by: float) -> Pipe:
+    """Its ends go out along the path; where its wall meets in the middle it is solid."""
+    path = field.corners
+    for end, (_, out) in zip((0, -1), field.ends, strict=True):
+        path[end, :3] += by * out
+    wall = field.thickness + 2 * by if field.thickness else 0.0
+    corners = tuple((x, y, z, bend) for x, y, z, bend in path.tolist())
+    radius = field.radius + by
+    return replace(field, path=corners, radius=radius, thickness=wall if wall < radius else 0.0)
 
 
 def _grown(field: Field, by: float) -> tuple[Field, float]:
@@ -162,6 +173,8 @@ def _grown(field: Field, by: float) -> tuple[Field, float]:
             return HollowFrustum(bottom, top, wall, field.height + 2 * by), 0.0
         case Extrusion():
             return _grown_extrusion(field, by), 0.0
+        case Pipe():
+            return _grown_pipe(field, by), 0.0
         case Revolution():  # whose flat ends, where it is no whole turn, stay
             return replace(field, profile=field.grown_profile(by)), 0.0
     raise ParameterError(f"a field of kind {field.kind!r} has no offset of its own kind")

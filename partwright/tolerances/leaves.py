@@ -2,8 +2,8 @@
 
 The chain rule in two halves: how the tree's fold weighs each copy of each leaf at a point, in closed form,
 and how a copy's own distance moves with its leaf's numbers, by central differences in the kernel. So any tree
-of SuperFrusta, named solids, extrusions and revolutions will do: blends, differences, and repeats whose
-copies move as one.
+of SuperFrusta, named solids, extrusions, revolutions and pipes will do: blends, differences, and repeats
+whose copies move as one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from partwright.assembly.rows import rows
 from partwright.assembly.similarity import rotation_matrix
 from partwright.assembly.tree import Node
 from partwright.errors import ParameterError
-from partwright.fields import Extrusion, Field, Revolution, SuperFrustum, Swept, kernel
+from partwright.fields import Extrusion, Field, Pipe, Revolution, SuperFrustum, Swept, kernel
 from partwright.fields.columns import ROTATION_STEP, TRANSLATION_STEP, Tangent
 from partwright.fields.operations import SHARP
 from partwright.fields.profile_growth import grown_profile
@@ -50,12 +50,12 @@ class Slope:
 
 def copies_at(parts: Sequence[Part], points: NDArray[np.float32]) -> Floats:
     """(C, N) distances of the copies of all parts at points (N, 3), part by part."""
-    rest = [part for part in parts if not isinstance(part.field, Swept)]
+    rest = [part for part in parts if not isinstance(part.field, Swept | Pipe)]
     found = iter(kernel.evaluate_parts(rows(rest), points).astype(np.float64) if rest else ())
     values = []
     for part in parts:
         for copy in part.copies:
-            if isinstance(part.field, Swept):
+            if isinstance(part.field, Swept | Pipe):
                 local = (points - np.array(copy.translation)) @ rotation_matrix(copy.rotation)
                 values.append(np.asarray(part.field(local), np.float64))
             else:
@@ -70,6 +70,8 @@ def free_numbers(part: Part) -> NDArray[np.bool_]:
     turn = rotation_matrix(part.rotation)
     free[ROTATION_STEP] = (np.abs(turn - np.rint(turn)) > _ALONG).any()
     free[-1] = part.blend > SHARP
+    if isinstance(part.field, Pipe):
+        free[_POSE:-1] = numbers(part.field) > 0  # what is solid gets no wall
     if isinstance(part.field, SuperFrustum):
         free[Tangent.ROUNDNESS : Tangent.BLEND] = numbers(part.field)[_PROPORTIONS:] != _PLAIN
         free[Tangent.ROUNDNESS] &= part.field.roundness != 1
@@ -80,9 +82,11 @@ def numbers(field: Field) -> Floats:
     """The field's numbers in the order of its declaration, triples flattened.
 
     Of a profile that is moved or turned, how much further out it lies than it does, which is 0, and the
-    height: its corners keep what they are to one another."""
+    height: its corners keep what they are to one another. Of a pipe radius and wall: it keeps its path."""
     if isinstance(field, Swept):
         return np.array([0.0, field.height] if isinstance(field, Extrusion) else [0.0])
+    if isinstance(field, Pipe):
+        return np.array([field.radius, field.thickness])
     return np.concatenate([np.atleast_1d(getattr(field, f.name)) for f in fields(field)])  # type: ignore[arg-type]
 
 
@@ -97,6 +101,8 @@ def with_numbers(field: Field, values: Floats) -> Field:
         return replace(field, profile=profile, height=float(values[1]))
     if isinstance(field, Revolution):
         return replace(field, profile=field.grown_profile(float(values[0]))) if values[0] else field
+    if isinstance(field, Pipe):
+        return replace(field, radius=float(values[0]), thickness=float(values[1]))
     new, at = {}, 0
     for entry in fields(field):  # type: ignore[arg-type]
         old = getattr(field, entry.name)

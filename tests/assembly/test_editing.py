@@ -15,7 +15,7 @@ from partwright.assembly.numbers import numbers_of
 from partwright.assembly.repeated_groups import copies_of, line, ring
 from partwright.cli.main import main
 from partwright.errors import ParameterError
-from partwright.fields import Box, Cylinder, Extrusion, Profile, Revolution
+from partwright.fields import Box, Cylinder, Extrusion, Pipe, Profile, Revolution
 from partwright.meshing import mesh_assembly
 
 SHIFT = Similarity(translation=(40, 0, 0))
@@ -196,6 +196,25 @@ def test_profiles_have_numbers_to_set() -> None:
         assert mesh_assembly(after).euler_number == mesh_assembly(before).euler_number
     with pytest.raises(ParameterError, match="sides cross"):
         with_numbers(before, {"hub.profile.diameter.3": 8.0})
+
+
+def test_pipes_have_corners_and_bends_to_set() -> None:
+    """Several at once, as none may fit without the others."""
+    pipe = Pipe(((0, 0, 0), (30, 0, 0, 10), (30, 20, 0, 8), (30, 20, 30)), 3)
+    before = Assembly((Part(pipe, name="pipe"),))
+    numbers = numbers_of(before["pipe"])
+    assert {
+        "path.2.x": 30,
+        "bend.2": 10,
+        "bend.3": 8,
+        "path.4.z": 30,
+        "diameter": 6,
+    }.items() <= numbers.items()
+    assert "bend.1" not in numbers
+    after = with_numbers(before, {"pipe.bend.2": 24.0, "pipe.path.3.y": 40.0, "pipe.path.4.y": 40.0}).assembly
+    assert after["pipe"].field == Pipe(((0, 0, 0), (30, 0, 0, 24), (30, 40, 0, 8), (30, 40, 30)), 3)
+    with pytest.raises(ParameterError, match="smaller bend"):
+        with_numbers(before, {"pipe.bend.2": 24.0})
 
 
 def hub(*corners: tuple[float, float]) -> Part:

@@ -13,6 +13,7 @@ from partwright.fields import (
     Extrusion,
     Field,
     HollowBox,
+    Pipe,
     Quadric,
     Revolution,
     SuperFrustum,
@@ -31,6 +32,7 @@ FIELDS = (
     BENT,
     Extrusion(SKEW, 3),
     SECTOR,
+    Pipe(((0, 0, 0), (4, 0, 0, 1), (4, 3, 0, 1), (4, 3, 3)), 0.5, 0.2),
     SADDLE,
 )
 POSE = Similarity(1.0, (0.8, -0.2, 0.5, 0.3), (1.0, -2.0, 0.5))

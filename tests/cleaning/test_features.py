@@ -16,7 +16,7 @@ from partwright.cleaning.hole_standards import is_drawn_in_inches, standard_hole
 from partwright.cleaning.outline_equations import Solver, centred, coordinate, round_of
 from partwright.cli.main import main
 from partwright.errors import CancelledError
-from partwright.fields import Cylinder, Extrusion, Revolution, Swept
+from partwright.fields import Cylinder, Extrusion, Pipe, Revolution, Swept
 from partwright.fields.profile import Profile, circle
 from partwright.meshing import mesh_csg
 from partwright.methods import Cancellation
@@ -80,6 +80,20 @@ def test_a_shaken_bracket_is_as_it_was() -> None:
     hole = next(one for one in cleaned.numbers if one.part == "hole_40" and one.name == "diameter")
     assert (hole.nominal, hole.standard) == (6.6, "M6 clearance, ISO 273 medium")
     assert 0 < abs(hole.deviation) < 0.04
+
+
+def test_a_shaken_pipe_is_as_it_was_and_its_corner_where_a_plate_has_its_face() -> None:
+    wanted = (((0.0, 0.0, 0.0), (40.0, 0.0, 0.0, 12.0), (40.0, 30.0, 0.0)), 5.0, 1.5)
+    path = ((0.011, -0.013, 0.012), (40.012, 0.007, -0.014, 12.013), (39.991, 30.008, 0.009))
+    plate = Part(Cylinder(12.0, 4.0), (40.0, 30.0, 0.0), name="plate")
+    cleaned = clean(
+        Assembly((Part(Pipe(path, 5.012, 1.509), name="pipe"), plate), unit="mm"), tolerance=TOLERANCE
+    )
+    assert cleaned.assembly["pipe"].field == Pipe(*wanted)
+    told = {(one.name, one.nominal) for one in cleaned.numbers if one.part == "pipe"}
+    assert {("diameter", 10.0), ("thickness", 1.5), ("bend", 12.0)} <= told
+    again = clean(cleaned.assembly, tolerance=TOLERANCE)
+    assert not again.changed
 
 
 def test_a_second_time_changes_nothing() -> None:

@@ -19,6 +19,7 @@ from partwright.fields import (
     Extrusion,
     Frustum,
     HollowBox,
+    Pipe,
     Profile,
     Revolution,
     Sphere,
@@ -48,6 +49,8 @@ SOLIDS = (
     Extrusion(PLATE, 0.4),
     Extrusion(Profile.rectangle(0.8, 0.6, 0.2), 0.5, top_fillet=0.15, bottom_chamfer=0.1),
     Extrusion(Profile.rectangle(0.9, 0.8, 0.3), 0.3, 10),
+    Pipe(((-0.5, -0.4, 0), (0.4, -0.4, 0, 0.3), (0.4, 0.4, 0, 0.3), (0.4, 0.4, 0.5)), 0.12),
+    Pipe(((-0.5, -0.4, 0), (0.4, -0.4, 0, 0.4), (0.4, 0.5, 0)), 0.25, 0.12),
     Revolution(Profile([(0, -0.3), (0.5, -0.3), (0.5, 0.1), (0.3, 0.3, 0.3), (0, 0.35)])),
 )
 POINTS = np.random.default_rng(0).uniform(-1, 1, (4000, 3)).astype(np.float32)
