@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from partwright.approximation.sketches.candidate import Candidate
 from partwright.approximation.sketches.candidates import candidates, silhouettes
 from partwright.approximation.sketches.directions import frames, long_axis
+from partwright.approximation.sketches.pipe_paths import pipe_candidates
 
 Frames = Sequence[NDArray[np.float64]]
 
@@ -42,6 +43,7 @@ class PieceCandidates:
             found = [
                 *candidates(piece, [*self._whole, *own], holes=True),
                 *(candidate for candidate in slanted if stands_for(candidate, piece)),
+                *pipe_candidates(piece),
             ]
             seen = [replace(one, beyond=True) for one in silhouettes(piece, own) if one.sides <= _PLAIN]
             if seen and not any(stands_for(candidate, piece, _SAME) for candidate in found):

@@ -23,6 +23,7 @@ from partwright.approximation.sketches.candidates import candidates
 from partwright.approximation.sketches.directions import frames
 from partwright.approximation.sketches.drafts import leans
 from partwright.approximation.sketches.ends import typed_reach
+from partwright.approximation.sketches.pipe_paths import pipe_candidates
 from partwright.approximation.sketches.teeth import FEATURE
 from partwright.fields import Swept
 from partwright.meshing.manifolds import simplified
@@ -110,7 +111,7 @@ class FeatureSearch:
         """The best tree; None where the surface encloses nothing to take sections of."""
         if self.body.is_empty() or self.volume <= 0:
             return None
-        own = candidates(self.body, self.frames, holes=True)
+        own = [*candidates(self.body, self.frames, holes=True), *pipe_candidates(self.body)]
         if not own:
             return None
         gains = self.gains(self.empty, own, True)
