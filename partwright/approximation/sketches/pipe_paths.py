@@ -34,6 +34,7 @@ _NEAR = 0.1  # of the radius: so near to the wall vertices are its own
 _POINTS = 1500
 _ROBUST = 0.01  # of the radius: of places that are further off only the sense counts
 _STAY = 1e-3  # of how far a corner is moved, against how far vertices are off: ends may slide freely
+_FITS = 0.5  # the same of bends that do not fit, or halves that are not alike
 _OFF = 0.03  # of the radius, by which most of its vertices may be off a wall
 _TIGHT = 0.05  # of a leg's length, by which its bends may be longer than it before they are made to fit
 _ENTERS, _FULL = 2.0, 0.97  # radii that a rod goes on into what it meets; of its section, that lies in that
@@ -66,13 +67,13 @@ def _candidate(pipe: Pipe) -> Candidate:
 
 def pipe_of(traced: Traced) -> Pipe | None:
     """The pipe whose wall is nearest to the one that was traced; None where none is near."""
-    corners = _corners(traced)
-    if corners is None:
+    first = _corners(traced)
+    if first is None:
         return None
-    walls = _walls(corners, traced.radius, traced.wall)
+    walls = _walls(first.path, traced.radius, traced.wall)
     if walls is None:
         return None
-    corners, radius = _fitted(corners, traced.radius, walls)
+    corners, radius = _fitted(first, traced.radius, walls)
     legs = _loose(corners)
     off = np.abs(_reach(legs, walls) - radius)
     if np.quantile(off, 0.9) > _OFF * radius:
@@ -87,19 +88,28 @@ def pipe_of(traced: Traced) -> Pipe | None:
         return None
 
 
+class _Corners(NamedTuple):
+    """path: (K, 4) corners and bends. halves: of a bend that turns too far for one corner, the first's place
+    among the bends."""
+
+    path: Floats
+    halves: list[int]
+
+
 class _Line(NamedTuple):
     place: Floats
     way: Floats
 
 
-def _corners(traced: Traced) -> Floats | None:
-    """(K, 4) corners and bends near the traced middles; None where it is straight."""
+def _corners(traced: Traced) -> _Corners | None:
+    """Corners near the traced middles; None where it is straight."""
     ends, middles = traced.middles[[0, -1]], _evenly(traced.middles)
     ways, curving, axes = _curvature(middles)
     turns = curving * traced.radius > _CURVED
     runs = _runs(turns, axes)
     lines: list[_Line] = []
     bends: list[float] = []
+    halves: list[int] = []
     start = 0
     for first, last in runs:
         angle = math.acos(float(np.clip(ways[max(first - 1, 0)] @ ways[min(last + 1, len(ways) - 1)], -1, 1)))
@@ -112,6 +122,7 @@ def _corners(traced: Traced) -> Floats | None:
             middle = (first + last) // 2
             lines.append(_Line(middles[middle], ways[middle]))
             bends.append(bend)
+            halves.append(len(bends) - 1)
         bends.append(bend)
         start = last
     if not bends:
@@ -120,7 +131,7 @@ def _corners(traced: Traced) -> Floats | None:
     places = [_foot(lines[0], ends[0])]
     places += [_meeting(one, other) for one, other in pairwise(lines)]
     places.append(_foot(lines[-1], ends[1]))
-    return np.column_stack([np.array(places), [0.0, *bends, 0.0]])
+    return _Corners(np.column_stack([np.array(places), [0.0, *bends, 0.0]]), halves)
 
 
 def _evenly(middles: Floats) -> Floats:
@@ -249,10 +260,13 @@ def _reach(legs: Sequence[Run | Bend], walls: _Walls) -> Floats:
     return found
 
 
-def _fitted(corners: Floats, radius: float, walls: _Walls) -> tuple[Floats, float]:
-    """Corners and bends (K, 4), and the radius, for which vertices are nearest to the wall."""
-    count = len(corners)
+def _fitted(first: _Corners, radius: float, walls: _Walls) -> tuple[Floats, float]:
+    """Corners and bends (K, 4), and the radius, for which places are nearest to the wall: bends fit between
+    one another, and the halves of one are alike."""
+    corners, count = first.path, len(first.path)
     given = np.concatenate([corners[:, :3].ravel(), corners[1:-1, 3], [radius]])
+    weight = math.sqrt(len(walls.points))
+    halves = np.array(first.halves, dtype=int)
 
     def taken(values: Floats) -> tuple[Floats, float]:
         moved = corners.copy()
@@ -262,24 +276,33 @@ def _fitted(corners: Floats, radius: float, walls: _Walls) -> tuple[Floats, floa
 
     def off(values: Floats) -> Floats:
         moved, size = taken(values)
-        stays = _STAY * math.sqrt(len(walls.points)) * (values - given)
-        return np.concatenate([_reach(_loose(moved), walls) - size, stays])
+        bends = moved[1:-1, 3]
+        over = np.maximum(_lacking(moved), 0)
+        unlike = bends[halves] - bends[halves + 1]
+        held = weight * np.concatenate([_STAY * (values - given), _FITS * over, _FITS * unlike])
+        return np.concatenate([_reach(_loose(moved), walls) - size, held])
 
     found = least_squares(off, given, loss="soft_l1", f_scale=_ROBUST * radius, x_scale=radius, max_nfev=30)
     return taken(found.x)
 
 
+def _lacking(corners: Floats) -> Floats:
+    """(K - 1,) by how much each leg is too short for the bends at its ends."""
+    bends = [piece for piece in _loose(corners) if isinstance(piece, Bend)]
+    reach = np.array([0.0, *(bend.radius * math.tan(bend.angle / 2) for bend in bends), 0.0])
+    lengths = np.linalg.norm(np.diff(corners[:, :3], axis=0), axis=1)
+    return np.asarray(reach[:-1] + reach[1:] - lengths)
+
+
 def _made_to_fit(corners: Floats) -> bool:
     """Bends a little smaller where two take a little more than the leg between them; whether all fit."""
-    legs = [piece for piece in _loose(corners) if isinstance(piece, Bend)]
-    tangents = np.array([0.0, *(math.tan(bend.angle / 2) for bend in legs), 0.0])
-    for k, (a, b) in enumerate(pairwise(corners)):
-        length = math.dist(a[:3], b[:3])
-        needed = float(tangents[k] * a[3] + tangents[k + 1] * b[3])
-        if needed > (1 + _TIGHT) * length:
+    for k in range(len(corners) - 1):
+        lengths = np.linalg.norm(np.diff(corners[:, :3], axis=0), axis=1)
+        more = float(_lacking(corners)[k])
+        if more > _TIGHT * lengths[k]:
             return False
-        if needed > length:
-            corners[k : k + 2, 3] *= (length / needed) * (1 - 1e-12)
+        if more > 0:
+            corners[k : k + 2, 3] *= lengths[k] / (lengths[k] + more) * (1 - 1e-12)
     return True
 
 
