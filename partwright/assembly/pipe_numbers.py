@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 
 from partwright.fields import Field, Pipe
@@ -25,8 +24,8 @@ def pipe_numbers(field: Field) -> dict[str, float]:
 def with_pipe_numbers(field: Field, values: Mapping[str, float]) -> Pipe:
     """The pipe with some of its numbers. Raises ParameterError where bends do not fit then."""
     assert isinstance(field, Pipe)
-    path = [list(corner) for corner in field.path]
+    path = field.corners
     for number, value in values.items():
         kind, index, *axis = number.split(".")
-        path[int(index) - 1]["xyz".index(axis[0]) if kind == "path" else 3] = value
-    return dataclasses.replace(field, path=tuple((x, y, z, bend) for x, y, z, bend in path))
+        path[int(index) - 1, "xyz".index(axis[0]) if kind == "path" else 3] = value
+    return field.with_corners(path)

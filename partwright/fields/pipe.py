@@ -68,6 +68,10 @@ class Pipe(Field):
         """(K, 4) of x, y, z and bend."""
         return np.array(self.path)
 
+    def with_corners(self, corners: np.ndarray) -> Pipe:
+        """Along another path: corners (K, 4) of x, y, z and bend."""
+        return dataclasses.replace(self, path=path_of(corners))
+
     @cached_property
     def pieces(self) -> tuple[Run | Bend, ...]:
         """Of the path, in order: each goes over smoothly into the next."""
@@ -188,7 +192,7 @@ class Pipe(Field):
 
     def scaled(self, factor: float) -> Self:
         factor = checked(f"{self.kind}: scale factor", factor, 0.0, LARGEST, above=True)
-        path = tuple((factor * x, factor * y, factor * z, factor * bend) for x, y, z, bend in self.path)
+        path = path_of(factor * self.corners)
         return dataclasses.replace(
             self, path=path, radius=factor * self.radius, thickness=factor * self.thickness
         )
@@ -197,6 +201,11 @@ class Pipe(Field):
         path = [list(corner if corner[3] else corner[:3]) for corner in self.path]
         own = {"kind": self.kind, "path": path, "radius": self.radius}
         return own | ({"thickness": self.thickness} if self.thickness else {})
+
+
+def path_of(corners: np.ndarray) -> tuple[Corner, ...]:
+    """Corners (K, 4) of x, y, z and bend as a path."""
+    return tuple((x, y, z, bend) for x, y, z, bend in corners.tolist())
 
 
 def _corners(given: object) -> tuple[Corner, ...]:

@@ -131,9 +131,8 @@ def _grown_pipe(field: Pipe, by: float) -> Pipe:
     for end, (_, out) in zip((0, -1), field.ends, strict=True):
         path[end, :3] += by * out
     wall = field.thickness + 2 * by if field.thickness else 0.0
-    corners = tuple((x, y, z, bend) for x, y, z, bend in path.tolist())
     radius = field.radius + by
-    return replace(field, path=corners, radius=radius, thickness=wall if wall < radius else 0.0)
+    return replace(field.with_corners(path), radius=radius, thickness=wall if wall < radius else 0.0)
 
 
 def _grown(field: Field, by: float) -> tuple[Field, float]:

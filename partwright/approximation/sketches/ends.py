@@ -8,10 +8,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from partwright.approximation.sketches.directions import frame_along
 from partwright.assembly import Part
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import ParameterError
-from partwright.fields import Box, Cylinder, Extrusion, Field, Tube
+from partwright.fields import Box, Cylinder, Extrusion, Field, Pipe, Tube
 
 BEYOND = 0.03
 """Unit lengths: how far an open end goes on at most."""
@@ -43,9 +44,12 @@ def with_open_ends(
 
     So no skin is left over a hole and no slit under a boss, whatever moves a little. distance: (N,) of the
     shape at points (N, 3), unit lengths like the part, negative inside. reach: how much longer, at most
-    `BEYOND`. Only ends along z of a box, a cylinder, a tube or an extrusion; all copies have to agree.
+    `BEYOND`. Only ends along z of a box, a cylinder, a tube or an extrusion, and those of a pipe; all copies
+    have to agree.
     """
     field = part.field
+    if isinstance(field, Pipe):
+        return _with_open_pipe_ends(part, field, -1.0 if added else 1.0, distance, reach)
     if not isinstance(field, LONG):
         return part
     low, high = field.bounds()
@@ -77,6 +81,25 @@ def with_open_ends(
         return dataclasses.replace(part, field=longer(field, up + down), translation=(x, y, z))
     except ParameterError:  # a leaning side would vanish
         return part
+
+
+def _with_open_pipe_ends(
+    part: Part, field: Pipe, sign: float, distance: Callable[[np.ndarray], np.ndarray], reach: float
+) -> Part:
+    path, size = field.corners, np.full(2, field.radius)
+
+    def depth(flat: np.ndarray) -> np.ndarray:
+        away = np.linalg.norm(flat, axis=1)
+        return np.maximum(away - field.radius, field.bore - away)
+
+    flat = within(-size, size, depth, _LATTICE, min(EDGE, 0.4 * field.wall))
+    for end, (place, out) in zip((0, -1), field.ends, strict=True):
+        frame = frame_along(out)
+        there = np.concatenate([place + flat @ frame[:, :2].T + step * out for step in STEPS])
+        placed = [there @ rotation_matrix(copy.rotation).T + copy.translation for copy in part.copies]
+        if not (sign * distance(np.concatenate(placed)) < 0).any():
+            path[end, :3] += reach * out
+    return dataclasses.replace(part, field=field.with_corners(path))
 
 
 def interior(field: Field, low: np.ndarray, high: np.ndarray) -> np.ndarray:

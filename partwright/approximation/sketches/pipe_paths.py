@@ -20,6 +20,7 @@ from partwright.assembly import Part
 from partwright.errors import ParameterError
 from partwright.fields import Pipe
 from partwright.fields.bent_path import Bend, Run
+from partwright.fields.pipe import path_of
 from partwright.meshing.manifolds import surface_of
 from partwright.meshing.pipes import piped
 
@@ -37,8 +38,9 @@ _STAY = 1e-3  # of how far a corner is moved, against how far vertices are off: 
 _FITS = 0.5  # the same of bends that do not fit, or halves that are not alike
 _OFF = 0.03  # of the radius, by which most of its vertices may be off a wall
 _TIGHT = 0.05  # of a leg's length, by which its bends may be longer than it before they are made to fit
-_ENTERS, _FULL = 2.0, 0.97  # radii that a rod goes on into what it meets; of its section, that lies in that
-_STEPS = 8
+_ENTERS = 3.0  # radii that a rod goes on into what it meets at most
+_PARTLY, _FULL = 0.3, 0.97  # of its section, that lies in that on the way and in the end
+_STEPS = 12
 _CHORDS = 1e-3  # unit lengths
 _COMPLEX = 120_000  # triangles of a body whose rods are not traced
 
@@ -83,7 +85,7 @@ def pipe_of(traced: Traced) -> Pipe | None:
         return None
     wall = radius - traced.bore if traced.bore else 0.0
     try:
-        return Pipe(tuple((x, y, z, bend) for x, y, z, bend in corners.tolist()), radius, wall)
+        return Pipe(path_of(corners), radius, wall)
     except ParameterError:
         return None
 
@@ -307,21 +309,22 @@ def _made_to_fit(corners: Floats) -> bool:
 
 
 def _entering(pipe: Pipe, body: Manifold) -> Pipe:
-    """The pipe with ends that go on into the body where it goes on there: a handle's, into its mug."""
+    """The pipe with ends that go on into what it meets, until all of its section lies in that: a handle's,
+    into the wall of its mug, also where it is round or they meet askew."""
     corners = pipe.corners
     disc = CrossSection.circle(pipe.radius, 32)
     for end, (place, out) in zip((0, -1), pipe.ends, strict=True):
         frame = frame_along(out)
         there = body.transform(np.column_stack([frame.T, -frame.T @ place]))
-        further = 0.0
         for step in range(1, _STEPS + 1):
             by = _ENTERS * pipe.radius * step / _STEPS
-            section = there.slice(by)
-            if float((section ^ disc).area()) < _FULL * disc.area():
+            within = float((there.slice(by) ^ disc).area()) / disc.area()
+            if within < _PARTLY:
                 break
-            further = by
-        corners[end, :3] += further * out
+            if within > _FULL:
+                corners[end, :3] += by * out
+                break
     try:
-        return dataclasses.replace(pipe, path=tuple((x, y, z, b) for x, y, z, b in corners.tolist()))
+        return pipe.with_corners(corners)
     except ParameterError:
         return pipe
