@@ -32,6 +32,7 @@ from partwright.fields.profile import Loop, Profile, circle, circle_of
 
 _ANGLES = ("taper", "angle")
 _ALONG = 1e-9  # of a cosine
+_ROUNDED_OFF = 1e-2  # of a leg of a pipe, that its bends may take more than it has when they are rounded
 _MOVED = 3.0  # times as far as a number, that the numbers of a circle move a place together
 
 
@@ -257,6 +258,11 @@ def _names(field: Any) -> set[str]:
 def _plain_field(field: Field, within: float) -> Field:
     if not isinstance(field, Solid | Swept | Pipe):
         return field
+    if isinstance(field, Pipe):
+        radius, wall = plain(field.radius, within), plain(field.thickness, within)
+        made = dataclasses.replace(field, radius=radius, thickness=wall)
+        numbers = [[plain(value, within) for value in corner] for corner in field.path]
+        return made.with_corners(np.array(numbers), _ROUNDED_OFF)
     given: Any = field  # every kind of them is a dataclass
     names = [own.name for own in dataclasses.fields(given)]
     result: Field = dataclasses.replace(given, **{n: _number(n, getattr(given, n), within) for n in names})

@@ -45,6 +45,7 @@ _Holes = Callable[[float, float], tuple[str, float] | None]
 
 _SMOOTH = np.radians(3.0)  # corners that turn by less were smooth
 _ROUNDED = 1 / 3  # tolerances that rounding may move a number: many are rounded at once
+_ROUNDED_OFF = 1e-2  # of a leg of a pipe, that its bends may take more than it has when they are rounded
 _FURTHER = 2.0  # tolerances that a corner may go, which two sides move
 _DIGITS = 13
 
@@ -306,8 +307,9 @@ def _pipe(
             k, sign = one.axis(local)
             place.append(float(f"{sign * (wanted[local, ('corner', i)] - float(at[k])):.{_DIGITS}g}"))
         path.append((place[0], place[1], place[2], targets.sizes.get((index, ("bend", i)), bend)))
-    wall = targets.sizes.get((index, ("thickness",)), 0.0)
-    return Pipe(tuple(path), targets.sizes[index, ("radius",)], wall)
+    wall, radius = targets.sizes.get((index, ("thickness",)), 0.0), targets.sizes[index, ("radius",)]
+    made = dataclasses.replace(field, radius=radius, thickness=wall)
+    return made.with_corners(np.array(path), _ROUNDED_OFF)
 
 
 def _pairs(field: Swept, loop: int) -> list[tuple[tuple[int, int], tuple[int, int]]]:

@@ -132,6 +132,36 @@ def _check_fits(i: int, reach: float, left: float, near: float) -> None:
         )
 
 
+def with_fitting_bends(corners: np.ndarray, share: float) -> np.ndarray:
+    """Corners (K, 4) with bends a little smaller where those at the ends of a leg take more than it has, by
+    at most this share of it: as corners that were rounded do. What lacks more stays as it is."""
+    places, bends = corners[:, :3], corners[:, 3].copy()
+    lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    tangents = _tangents(places)
+    for k, length in enumerate(lengths.tolist()):
+        taken = float(bends[k] * tangents[k] + bends[k + 1] * tangents[k + 1])
+        if length < taken <= (1 + share) * length:
+            bends[k : k + 2] *= length / taken * (1 - 1e-12)
+    return np.column_stack([places, bends])
+
+
+def _tangents(places: np.ndarray) -> np.ndarray:
+    """(K,) of half the angle by which a path turns at each corner (K, 3): what a bend of radius 1 takes of
+    the legs beside it."""
+    steps = np.diff(places, axis=0)
+    ways = steps / np.maximum(np.linalg.norm(steps, axis=1), 1e-300)[:, None]
+    sine = np.linalg.norm(np.cross(ways[:-1], ways[1:]), axis=1)
+    turns = np.arctan2(sine, (ways[:-1] * ways[1:]).sum(axis=1))
+    return np.concatenate([[0.0], np.tan(turns / 2), [0.0]])
+
+
+def lacking(corners: np.ndarray) -> np.ndarray:
+    """(K - 1,) by how much each leg of a path (K, 4) is too short for the bends at its ends."""
+    taken = _tangents(corners[:, :3]) * corners[:, 3]
+    lengths = np.linalg.norm(np.diff(corners[:, :3], axis=0), axis=1)
+    return np.asarray(taken[:-1] + taken[1:] - lengths)
+
+
 def like(points: Any, values: np.ndarray) -> Any:
     """Values as what points are: of their kind, precision and device."""
     return points.new_tensor(values) if is_tensor(points) else values

@@ -13,7 +13,7 @@ import numpy as np
 
 from partwright.errors import ParameterError
 from partwright.fields.base import LARGEST, Array, Field, checked, normalise, number
-from partwright.fields.bent_path import NEAR, Bend, Run, bent_path, like
+from partwright.fields.bent_path import NEAR, Bend, Run, bent_path, like, with_fitting_bends
 from partwright.fields.operations import is_tensor, library
 
 Corner = tuple[float, float, float, float]
@@ -68,9 +68,10 @@ class Pipe(Field):
         """(K, 4) of x, y, z and bend."""
         return np.array(self.path)
 
-    def with_corners(self, corners: np.ndarray) -> Pipe:
-        """Along another path: corners (K, 4) of x, y, z and bend."""
-        return dataclasses.replace(self, path=path_of(corners))
+    def with_corners(self, corners: np.ndarray, share: float = 0.0) -> Pipe:
+        """Along another path: corners (K, 4) of x, y, z and bend. Bends that take more than the leg between
+        them, by up to this share of it, are made to fit."""
+        return dataclasses.replace(self, path=path_of(with_fitting_bends(corners, share)))
 
     @cached_property
     def pieces(self) -> tuple[Run | Bend, ...]:

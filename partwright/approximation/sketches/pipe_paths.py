@@ -19,7 +19,7 @@ from partwright.approximation.sketches.pipe_tracing import PipeTracing, Traced
 from partwright.assembly import Part
 from partwright.errors import ParameterError
 from partwright.fields import Pipe
-from partwright.fields.bent_path import Bend, Run
+from partwright.fields.bent_path import Bend, Run, lacking, with_fitting_bends
 from partwright.fields.pipe import path_of
 from partwright.meshing.manifolds import surface_of
 from partwright.meshing.pipes import piped
@@ -81,8 +81,7 @@ def pipe_of(traced: Traced) -> Pipe | None:
     if np.quantile(off, 0.9) > _OFF * radius:
         return None
     corners[1:-1, 3] = np.maximum(corners[1:-1, 3], _WIDER * radius)
-    if not _made_to_fit(corners):
-        return None
+    corners = with_fitting_bends(corners, _TIGHT)
     wall = radius - traced.bore if traced.bore else 0.0
     try:
         return Pipe(path_of(corners), radius, wall)
@@ -279,33 +278,13 @@ def _fitted(first: _Corners, radius: float, walls: _Walls) -> tuple[Floats, floa
     def off(values: Floats) -> Floats:
         moved, size = taken(values)
         bends = moved[1:-1, 3]
-        over = np.maximum(_lacking(moved), 0)
+        over = np.maximum(lacking(moved), 0)
         unlike = bends[halves] - bends[halves + 1]
         held = weight * np.concatenate([_STAY * (values - given), _FITS * over, _FITS * unlike])
         return np.concatenate([_reach(_loose(moved), walls) - size, held])
 
     found = least_squares(off, given, loss="soft_l1", f_scale=_ROBUST * radius, x_scale=radius, max_nfev=30)
     return taken(found.x)
-
-
-def _lacking(corners: Floats) -> Floats:
-    """(K - 1,) by how much each leg is too short for the bends at its ends."""
-    bends = [piece for piece in _loose(corners) if isinstance(piece, Bend)]
-    reach = np.array([0.0, *(bend.radius * math.tan(bend.angle / 2) for bend in bends), 0.0])
-    lengths = np.linalg.norm(np.diff(corners[:, :3], axis=0), axis=1)
-    return np.asarray(reach[:-1] + reach[1:] - lengths)
-
-
-def _made_to_fit(corners: Floats) -> bool:
-    """Bends a little smaller where two take a little more than the leg between them; whether all fit."""
-    for k in range(len(corners) - 1):
-        lengths = np.linalg.norm(np.diff(corners[:, :3], axis=0), axis=1)
-        more = float(_lacking(corners)[k])
-        if more > _TIGHT * lengths[k]:
-            return False
-        if more > 0:
-            corners[k : k + 2, 3] *= lengths[k] / (lengths[k] + more) * (1 - 1e-12)
-    return True
 
 
 def _entering(pipe: Pipe, body: Manifold) -> Pipe:
