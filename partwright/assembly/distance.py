@@ -19,6 +19,7 @@ from partwright.assembly.similarity import Similarity, rotation_matrix
 from partwright.errors import ParameterError
 from partwright.fields import kernel, smooth_difference, smooth_intersection, smooth_union
 from partwright.fields.operations import is_tensor
+from partwright.fields.pipe import Pipe
 from partwright.fields.swept import Swept
 
 if TYPE_CHECKING:
@@ -131,9 +132,9 @@ def _evaluate(node: Node, points: np.ndarray) -> np.ndarray:
 
 
 def _ends_in_a_box(operation: Operation, node: Node) -> bool:
-    """Whether a child leaves the result as it is wherever the box around it is far enough away: solids of a
-    profile are nowhere nearer than their boxes, and take long enough for that to pay."""
-    return operation != "intersection" and node.is_part and isinstance(node.field, Swept)
+    """Whether a child leaves the result as it is wherever the box around it is far enough away: pipes and
+    solids of a profile are nowhere nearer than their boxes, and take long enough for that to pay."""
+    return operation != "intersection" and node.is_part and isinstance(node.field, Swept | Pipe)
 
 
 def _folded_near(operation: Operation, result: np.ndarray, part: Part, points: np.ndarray) -> np.ndarray:
