@@ -23,6 +23,7 @@ from partwright.fields import (
     Frustum,
     HollowBox,
     HollowFrustum,
+    Pipe,
     SuperFrustum,
     Swept,
     Tube,
@@ -36,7 +37,7 @@ Keep = Callable[[Part], Approximation | None]
 
 def _looped(part: Part) -> bool:
     """Whether its repeats stay repeats in a source."""
-    return type(part.field) in _LOOPED or isinstance(part.field, Swept) or closes_alike(part)
+    return type(part.field) in _LOOPED or isinstance(part.field, Swept | Pipe) or closes_alike(part)
 
 
 def _keep_none(_: Part) -> None:

@@ -2,8 +2,8 @@
 
 Three constructions cover the SuperFrustum: round ones are their profile turned about the axis, other straight
 ones their profile swept around the rounded rectangle, bent ones that along the arc. Extrusions and
-revolutions are what OpenCASCADE makes of their profiles. What was built is checked against the field: where
-OpenCASCADE lost something, the part does not count as built.
+revolutions are what OpenCASCADE makes of their profiles; pipes are sewn of the walls along their paths. What
+was built is checked against the field: where OpenCASCADE lost something, the part does not count as built.
 """
 
 from __future__ import annotations
@@ -25,13 +25,14 @@ from partwright.errors import NoSurfaceError
 from partwright.export.brep_bent import bent_solid
 from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_mended_profile import mended
+from partwright.export.brep_pipe import pipe_solid
 from partwright.export.brep_profile import Outline, clipped, inner_outline, outer_outline
 from partwright.export.brep_rims import shallower
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
 from partwright.export.brep_swept_profile import swept_profile
 from partwright.export.brep_topology import faces_of, volume_and_area
-from partwright.fields import Field, SuperFrustum, Swept
+from partwright.fields import Field, Pipe, SuperFrustum, Swept
 from partwright.meshing import mesh_part
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ def built(part: Part) -> Approximation | None:
         return Approximation(field, part, 0.0, 0.0)
     if isinstance(field, Swept):
         return _built_swept(part, field)
+    if isinstance(field, Pipe):
+        return Approximation(field, part, 0.0, 0.0)
     f = field.superfrustum()
     if f is None or f.thinnest < SAME * max(*f.size, f.dilation):
         return None
@@ -86,6 +89,8 @@ def solid_of(field: Field) -> TopoDS_Shape:
     """
     if isinstance(field, Swept):
         return _swept(field)
+    if isinstance(field, Pipe):
+        return pipe_solid(field)
     f = as_superfrustum(field)
     longest = max(*f.size, f.dilation)
     corner = f.roundness * min(f.size[:2]) / 2

@@ -30,18 +30,19 @@ from partwright.atomic_io import write_bytes
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
+from partwright.export.pipe_source import build123d_pipe
 from partwright.export.profile_source import BUILD123D, BUILD123D_SOURCE, draws_loops, loops
 from partwright.export.quadric_facets import few_quadric_facets
 from partwright.export.solid_source import (
     SourcePart,
     children_and_poses,
     drawn,
+    helper_source,
     literal,
     plain_unions,
     source_parts,
-    superfrustum_source,
 )
-from partwright.fields import Extrusion, SuperFrustum, Swept
+from partwright.fields import Extrusion, Pipe, SuperFrustum, Swept
 from partwright.fields.extrusion import RIMS
 from partwright.meshing.manifolds import surface_of
 from partwright.shapes import canonical_unit
@@ -79,6 +80,7 @@ _RESERVED = (
     "loop",
     "grid",
     "polyhedron",
+    "bent_path",
 )
 _TRIANGLES = 800  # for a quadric, at most: OpenCASCADE takes minutes for thousands of faces
 _TIGHT = 0.99999  # of a rim's depth, where nothing else would be left between rims
@@ -113,13 +115,14 @@ def write(assembly: Assembly, path: str | Path) -> None:
     plain = plain_unions(tree)
     parts = source_parts(parts_once(plain), own_axes_angles, _RESERVED)
     unit = canonical_unit(assembly.unit) if assembly.unit else None
-    drawing = superfrustum_source(parts, "build123d_superfrustum.txt")
+    drawing = helper_source(parts, SuperFrustum, "build123d_superfrustum.txt")
+    bending = helper_source(parts, Pipe, "build123d_pipe.txt")
     swept = [field for part in parts if isinstance(field := part.part.field, Swept)]
     lines = [
         f"# {comment(assembly.name) or 'Assembly'}: {len(parts)} parts. "
         f"Lengths in {unit or 'an unknown unit'}, angles in degrees.",
         "",
-        *(["import math"] if drawing else []),
+        *(["import math"] if drawing or bending else []),
         "from pathlib import Path",
         "",
         "import build123d as bd",
@@ -127,6 +130,7 @@ def write(assembly: Assembly, path: str | Path) -> None:
         *(line for part in parts for line in _table(part, unit)),
         "",
         *([*drawing, "", ""] if drawing else []),
+        *([*bending, "", ""] if bending else []),
         *([*_GRID.splitlines(), "", ""] if any(isinstance(part.copies, Grid) for part in parts) else []),
         *([*BUILD123D_SOURCE.splitlines(), "", ""] if draws_loops(swept) else []),
         *([*_POLYHEDRON.splitlines(), "", ""] if facets else []),
@@ -195,6 +199,9 @@ def _function(part: SourcePart, facets: Mapping[str, tuple[Manifold, float]]) ->
         corners, faces = surface_of(facets[part.part.name][0])
         points = literal(tuple(map(tuple, corners.tolist())), "()")
         solid = f"polyhedron({points}, {faces.tolist()})"
+    elif isinstance(field, Pipe):
+        path, solid = build123d_pipe(names)
+        yield f"    path = {path}"
     else:
         solid = _swept(field, names) if isinstance(field, Swept) else _SOLIDS[field.kind].format(**names)
     yield f"    solid = {solid}"

@@ -27,18 +27,19 @@ from partwright.errors import ParameterError
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment
+from partwright.export.pipe_source import scad_pipe
 from partwright.export.profile_source import SCAD, SCAD_RIMS, SCAD_SOURCE, draws_loops, loops
 from partwright.export.quadric_facets import quadric_facets
 from partwright.export.solid_source import (
     SourcePart,
     children_and_poses,
     drawn,
+    helper_source,
     number,
     plain_unions,
     source_parts,
-    superfrustum_source,
 )
-from partwright.fields import Extrusion, Field, Profile, Swept
+from partwright.fields import Extrusion, Field, Pipe, Profile, SuperFrustum, Swept
 from partwright.fields.profile_offset import turn_between
 from partwright.meshing.manifolds import surface_of
 from partwright.meshing.named_solids import named_solid
@@ -79,7 +80,7 @@ _RESERVED = (
     "intersection translate rotate scale mirror hull minkowski cube sphere cylinder polyhedron circle "
     "square polygon text color offset resize render children import projection surface linear_extrude "
     "rotate_extrude multmatrix intersection_for group version end superfrustum loop side_points "
-    "extrude_with_rims rim_slices rim_point grid"
+    "extrude_with_rims rim_slices rim_point grid pipe_along"
 )
 _GRID = """\
 // Places in rows along x, y and z about their middle: how many along each, and how far apart.
@@ -120,7 +121,8 @@ def write(assembly: Assembly, path: str | Path, facets: int = 96) -> None:
         *_tree(plain, {p.part.name: p.function for p in parts}, ""),
         "",
         *(line for part in parts for line in _module(part, ball, facets)),
-        *superfrustum_source(parts, "superfrustum.scad"),
+        *helper_source(parts, SuperFrustum, "superfrustum.scad"),
+        *helper_source(parts, Pipe, "pipe.scad"),
         *(SCAD_RIMS.splitlines() if any(_has_rims(part.part.field) for part in parts) else []),
         *(_GRID.splitlines() if any(isinstance(part.copies, Grid) for part in parts) else []),
         *(SCAD_SOURCE.splitlines() if draws_loops(_drawn_swept(parts)) else []),
@@ -152,6 +154,8 @@ def _module(part: SourcePart, ball: Ball, facets: int) -> Iterator[str]:
         solid = _faces(quadric_facets(quadric, part.part, ball, facets))
     elif isinstance(field, Swept):
         solid = _swept(field, names, facets)
+    elif isinstance(field, Pipe):
+        solid = scad_pipe(names)
     else:
         solid = _SOLIDS[field.kind].format(**names)
     yield f"module {part.function}() {{  // {part.title}"

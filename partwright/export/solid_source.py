@@ -20,8 +20,10 @@ from partwright.assembly.motion import Motion
 from partwright.assembly.repeated_groups import children_once, repeats
 from partwright.assembly.similarity import rotation_matrix
 from partwright.export.identifiers import comment, identifiers
+from partwright.export.pipe_source import MEANING as PIPE_MEANING
+from partwright.export.pipe_source import pipe_parameters
 from partwright.export.profile_source import meaning, swept_parameters
-from partwright.fields import Field, HollowBox, HollowFrustum, SuperFrustum, Swept
+from partwright.fields import Field, HollowBox, HollowFrustum, Pipe, SuperFrustum, Swept
 from partwright.fields.extrusion import RIMS
 
 MEANING = {
@@ -55,6 +57,7 @@ MEANING = {
     "top_chamfer": "by which the edges of the upper end are cut off at 45 degrees",
     "angle": "through which the profile is turned",
     "centre": "about which these turns are",
+    **PIPE_MEANING,
 }
 _LEAN = "by which the walls lean inwards on their way up"
 _NO_UNIT = ("roundness", "taper", "bulge", "onion", "count", "counts", "poses")
@@ -66,6 +69,7 @@ _SHARED = (
     "top_radius",
     "major_radius",
     "minor_radius",
+    "bend",
     *RIMS,
 )
 Value = float | tuple[Any, ...]
@@ -199,6 +203,8 @@ def _parameters(field: Field) -> dict[str, Value]:
     """By name; a quadric's coefficients mean nothing to a reader."""
     if isinstance(field, Swept):
         return swept_parameters(field)
+    if isinstance(field, Pipe):
+        return pipe_parameters(field)
     if field.quadric() is not None:
         return {}
     return {entry.name: getattr(field, entry.name) for entry in dataclasses.fields(field)}  # type: ignore[arg-type]
@@ -212,13 +218,13 @@ def literal(value: Value, brackets: str) -> str:
 
 
 def drawn(part: Part) -> Approximation | None:
-    """A hollow solid, an extrusion or revolution, or a SuperFrustum as the sources' `superfrustum` draws it.
+    """A hollow solid, an extrusion, revolution or pipe, or a SuperFrustum as the sources draw it.
 
     None where a named solid is the same, or where it does not: without volume, with a hole that the dilation
     closes at one end only, or bent about a centre within itself.
     """
     f = part.field
-    if isinstance(f, HollowBox | HollowFrustum | Swept):
+    if isinstance(f, HollowBox | HollowFrustum | Swept | Pipe):
         return Approximation(f, part, 0.0, 0.0)
     if not isinstance(f, SuperFrustum) or exact_solid(f) is not None:
         return None
@@ -232,9 +238,9 @@ def drawn(part: Part) -> Approximation | None:
     return Approximation(f, part, 0.0, 0.0)
 
 
-def superfrustum_source(parts: Sequence[SourcePart], name: str) -> list[str]:
-    """The lines of the file beside this one that draws a SuperFrustum, where one of the parts is that."""
-    if not any(isinstance(part.part.field, SuperFrustum) for part in parts):
+def helper_source(parts: Sequence[SourcePart], kind: type[Field], name: str) -> list[str]:
+    """The lines of the file beside this one that draws fields of a kind, where one of the parts is that."""
+    if not any(isinstance(part.part.field, kind) for part in parts):
         return []
     return files("partwright.export").joinpath(name).read_text("utf-8").splitlines()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,6 +60,17 @@ class Bend(NamedTuple):
     def length(self) -> float:
         return self.radius * self.angle
 
+    @property
+    def axis(self) -> np.ndarray:
+        """(3,) unit vector about which the path turns."""
+        return np.cross(self.outwards, self.along)
+
+    def turned(self, vector: np.ndarray) -> np.ndarray:
+        """The vector (3,) as the bend turns it from its beginning to its end."""
+        cosine, sine = math.cos(self.angle), math.sin(self.angle)
+        level = float(self.axis @ vector) * self.axis
+        return np.asarray(level + cosine * (vector - level) + sine * np.cross(self.axis, vector))
+
     def at(self, share: np.ndarray) -> np.ndarray:
         turn = share[:, None] * self.angle
         spoke = np.cos(turn) * self.outwards + np.sin(turn) * self.along
@@ -100,7 +112,7 @@ def bent_path(corners: np.ndarray) -> tuple[Run | Bend, ...]:
     start, left = places[0], float(lengths[0])
     for i in range(1, len(places) - 1):
         before, after = ways[i - 1], ways[i]
-        turn = math.atan2(float(np.linalg.norm(np.cross(before, after))), float(before @ after))
+        turn = _turn(before, after)
         if turn < _STRAIGHT:
             left += float(lengths[i])
             continue
@@ -122,6 +134,24 @@ def bent_path(corners: np.ndarray) -> tuple[Run | Bend, ...]:
     if left > near:
         found.append(Run(start, places[-1]))
     return tuple(found)
+
+
+def bent_corners(corners: np.ndarray) -> np.ndarray:
+    """The corners (K, 4) without those between the ends at which the path goes straight on."""
+    ways = np.diff(corners[:, :3], axis=0)
+    turns = [_turn(before, after) for before, after in pairwise(ways)]
+    return corners[[True, *(turn >= _STRAIGHT for turn in turns), True]]
+
+
+def _turn(before: np.ndarray, after: np.ndarray) -> float:
+    """Radians between two directions."""
+    return math.atan2(float(np.linalg.norm(np.cross(before, after))), float(before @ after))
+
+
+def perpendicular(vector: np.ndarray) -> np.ndarray:
+    """A unit vector (3,) across another."""
+    across = np.cross(vector, np.eye(3)[int(np.abs(vector).argmin())])
+    return np.asarray(across / np.linalg.norm(across))
 
 
 def _check_fits(i: int, reach: float, left: float, near: float) -> None:

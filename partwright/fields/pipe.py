@@ -13,7 +13,7 @@ import numpy as np
 
 from partwright.errors import ParameterError
 from partwright.fields.base import LARGEST, Array, Field, checked, normalise, number
-from partwright.fields.bent_path import NEAR, Bend, Run, bent_path, like, with_fitting_bends
+from partwright.fields.bent_path import NEAR, Bend, Run, bent_corners, bent_path, like, with_fitting_bends
 from partwright.fields.operations import is_tensor, library
 
 Corner = tuple[float, float, float, float]
@@ -72,6 +72,11 @@ class Pipe(Field):
         """Along another path: corners (K, 4) of x, y, z and bend. Bends that take more than the leg between
         them, by up to this share of it, are made to fit."""
         return dataclasses.replace(self, path=path_of(with_fitting_bends(corners, share)))
+
+    @property
+    def bent_corners(self) -> tuple[Corner, ...]:
+        """Those of the path without any at which it goes straight on."""
+        return tuple(map(tuple, bent_corners(self.corners).tolist()))
 
     @cached_property
     def pieces(self) -> tuple[Run | Bend, ...]:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from manifold3d import Manifold
 
-from partwright.fields.bent_path import Bend
+from partwright.fields.bent_path import Bend, perpendicular
 from partwright.fields.pipe import Pipe
 from partwright.fields.profile import arc_chords
 from partwright.meshing.manifolds import closed
@@ -48,9 +48,7 @@ def rings(field: Pipe, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
         places.append(piece.at(share))
         ways.append(piece.directions(share))
     path, along = np.concatenate(places), np.concatenate(ways)
-    first = np.eye(3)[int(np.abs(along[0]).argmin())]
-    first = np.cross(along[0], first)
-    across = [first / np.linalg.norm(first)]
+    across = [perpendicular(along[0])]
     for before, after in pairwise(along):
         across.append(_turned(across[-1], before, after))
     one = np.array(across)
