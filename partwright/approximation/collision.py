@@ -18,10 +18,11 @@ from partwright.approximation.convex_piece import Limits
 from partwright.approximation.light_hull import light_hull
 from partwright.approximation.nearest import Approximation, nearest_solid
 from partwright.approximation.pieces import Piece, piece_mesh, pieces, require_some
+from partwright.approximation.pipe_chain import has_narrow_bore, pipe_chain, straight_rod
 from partwright.approximation.separation import node_solid
 from partwright.assembly import Assembly, Node, Part, Similarity
 from partwright.errors import NoSurfaceError, ParameterError
-from partwright.fields import Box, Field, Solid
+from partwright.fields import Box, Cylinder, Field, Pipe, Solid
 from partwright.meshing import mesh_part
 from partwright.meshing.hulls import file_hull
 from partwright.meshing.manifolds import as_mesh, surface_of
@@ -36,6 +37,7 @@ _SPACING = 0.04  # of its size: between the points of a hull that are held again
 _NATIVE_FOR = 0.05  # of its volume: by how much a solid may be worse than the hull that it saves
 _EXTRA = 0.1  # of its volume: what the hulls of its pieces may add, before they are balanced
 _AS_GOOD = 0.02  # of a piece's volume: a solid that is off by no more takes the place of its hull
+_FILLED = "its bore is filled"
 _CHORD = 0.05  # of the tolerance, or the thinnest wall: what curved faces may lose
 _LIGHT = 0.1  # of the tolerance: what hulls may lose for fewer corners
 _COMPARED = 32  # cells along what is compared
@@ -112,6 +114,9 @@ def _stand_ins(
     """
     names = piece.part_names
     part = piece.node if isinstance(piece.node, Part) else None
+    rod = straight_rod(part) if part is not None and Cylinder in kinds else None
+    if rod is not None:
+        return [Geometry(piece.name, piece.colour, rod, None, piece.name, names, True)], None
     near = nearest_solid(part, kinds) if part is not None else None
     if near is not None and near.exact:
         return [Geometry(piece.name, piece.colour, near.part_with_solid, None, piece.name, names, True)], None
@@ -129,10 +134,12 @@ def _stand_ins(
     if boxes:
         found = _numbered(piece, boxes)
         return found, _compared(piece, found, "4 boxes")
-    chain = _chain(part, kinds, allowed) if part is not None else []
+    chain = _chain(part, kinds, allowed, convex) if part is not None else []
     if chain:
         found = _numbered(piece, chain)
-        return found, _compared(piece, found, f"chain of {len(chain)} solids")
+        change = _compared(piece, found, f"chain of {len(chain)} solids")
+        filled = part is not None and has_narrow_bore(part, allowed)
+        return found, dataclasses.replace(change, note=_FILLED) if filled else change
     if not convex:
         return whole, mesh_change
     found = _numbered(piece, _covered(piece.node, kinds, allowed))
@@ -168,8 +175,14 @@ def _covered(node: Node, kinds: Sequence[type[Field]], allowed: float) -> list[P
     return forms
 
 
-def _chain(part: Part, kinds: Sequence[type[Field]], allowed: float) -> list[Part]:
-    """The straight segments of a bent part as solids; none where one of them is near to no solid."""
+def _chain(part: Part, kinds: Sequence[type[Field]], allowed: float, convex: bool) -> list[Part]:
+    """The straight segments of a bent part as solids; none where one of them is near to no solid.
+
+    Where only convex pieces collide, which would be very many around a bore, one within what is allowed is
+    filled."""
+    if isinstance(part.field, Pipe):
+        solid = not part.field.bore or (convex and has_narrow_bore(part, allowed))
+        return pipe_chain(part, kinds, allowed) if solid else []
     named = [kind for kind in kinds if issubclass(kind, Solid)]
     own = part.field.superfrustum()
     forms: list[Part] = []

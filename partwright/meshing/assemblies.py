@@ -11,7 +11,7 @@ import numpy as np
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.joint import is_joint
 from partwright.errors import NoSurfaceError
-from partwright.fields import SuperFrustum, Swept
+from partwright.fields import Pipe, SuperFrustum, Swept
 from partwright.fields.base import LIPSCHITZ
 from partwright.meshing.csg import check_count, has_exact_mesh, mesh_csg
 from partwright.meshing.marching import mesh_field
@@ -127,14 +127,14 @@ def _carved(node: Assembly | Part) -> bool:
 def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimesh.Trimesh:
     """One part alone, watertight, in its own units and place; all copies of a repeated one, each closed.
 
-    The mesh of a quadric, extrusion or revolution is exact, see `mesh_assembly`. A learned part's is by its
-    model, with more cells where it is thin. Any other is meshed along its own axes. Cells are made shorter
-    where the part is thin, each axis by itself, so that walls come out complete, as long as that takes no
-    more than about 100,000 cells.
+    The mesh of a quadric, extrusion, revolution or pipe is exact, see `mesh_assembly`. A learned part's is by
+    its model, with more cells where it is thin. Any other is meshed along its own axes. Cells are made
+    shorter where the part is thin, each axis by itself, so that walls come out complete, as long as that
+    takes no more than about 100,000 cells.
 
     Raises NoSurfaceError for a part without volume, or without end, as most quadrics are.
     """
-    if part.field.quadric() is not None or isinstance(part.field, Swept):
+    if part.field.quadric() is not None or isinstance(part.field, Swept | Pipe):
         return _repeated(_exact(replace(part, instances=()), resolution), part.instances)
     mesh = part.field.surface(resolution)
     if mesh is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import runpy
@@ -11,11 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from partwright.approximation.pipe_chain import has_narrow_bore, pipe_chain, straight_rod
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.atomic_io import report_path
 from partwright.export import export
-from partwright.fields import Box, Cylinder, Pipe
+from partwright.fields import Box, Capsule, Cylinder, Field, Pipe
 from partwright.meshing import mesh_assembly
+from partwright.meshing.pipes import rings
 from tests.export.step_faces import read_back
 from tests.export.test_openscad import rendered
 
@@ -156,3 +159,89 @@ def test_openscad_drills_a_pipe(tmp_path: Path) -> None:
     export(drilled((0, 0, 8), (1, 1, 0, 0)), path, facets=32)
     whole = mesh_assembly(drilled((0, 0, 8), (1, 1, 0, 0)), 256)
     assert rendered(path).volume == pytest.approx(whole.volume, rel=2e-2)
+
+
+RIGID: list[tuple[str, dict[str, Any]]] = [
+    (".mjcf.xml", {}),
+    (".urdf", {}),
+    (".sdf", {}),
+    (".usda", {"physics": "usd"}),
+    (".glb", {"physics": "khr"}),
+    (".glb", {"physics": "godot"}),
+    (".glb", {"physics": "unreal"}),
+]
+
+
+def colliding(tmp_path: Path, pipe: Pipe, suffix: str, options: dict[str, Any]) -> list[Any]:
+    """What the report says of it."""
+    if suffix == ".usda":
+        pytest.importorskip("pxr")
+    path = tmp_path / f"a{suffix}"
+    export(dataclasses.replace(lone(pipe), unit="cm"), path, **options)
+    return changes(path)
+
+
+@pytest.mark.parametrize(("suffix", "options"), RIGID)
+def test_a_rod_collides_as_a_chain_of_solids(tmp_path: Path, suffix: str, options: dict[str, Any]) -> None:
+    (change,) = colliding(tmp_path, PIPES["a rod"][0], suffix, options)
+    assert change["to"] == "chain of 9 solids"
+    assert change["volume_error_ratio"] < 0.06
+    assert change["max_deviation"] < 0.5 * 1.5  # of the radius: the edges of ends that are balls in Unreal
+
+
+@pytest.mark.parametrize(("suffix", "options"), RIGID[:-1])
+def test_a_straight_rod_collides_as_the_cylinder_that_it_is(
+    tmp_path: Path, suffix: str, options: dict[str, Any]
+) -> None:
+    assert not colliding(tmp_path, Pipe(((0, 0, 0), (3, 4, 0)), 1), suffix, options)
+
+
+def test_a_straight_rod_is_in_its_place() -> None:
+    part = Part(Pipe(((0, 0, 1), (3, 4, 1)), 1), (1, 2, 3), (1, 2, 3, 4))
+    rod = straight_rod(part)
+    points = np.random.default_rng(0).uniform(-8, 8, (1000, 3)).astype(np.float32)
+    assert rod is not None
+    np.testing.assert_allclose(
+        Assembly((rod,)).distance(points), Assembly((part,)).distance(points), atol=1e-5
+    )
+
+
+def test_a_narrow_bore_is_filled_where_only_convex_pieces_collide(tmp_path: Path) -> None:
+    narrow, wide = PIPES["a tube"][0], Pipe(((0, 0, 0), (20, 0, 0, 10), (20, 20, 0)), 6, 0.8)
+    (change,) = colliding(tmp_path, narrow, ".mjcf.xml", {})
+    assert (change["to"], change["note"]) == ("chain of 9 solids", "its bore is filled")
+    (change,) = colliding(tmp_path, narrow, ".urdf", {})
+    assert change["to"] == "mesh"
+    assert not has_narrow_bore(Part(wide), 1.3)
+
+
+@pytest.mark.heavy
+def test_a_wide_bore_stays_open(tmp_path: Path) -> None:
+    wide = Pipe(((0, 0, 0), (20, 0, 0, 10), (20, 20, 0)), 6, 0.8)
+    (change,) = colliding(tmp_path, wide, ".mjcf.xml", {})
+    assert change["to"].endswith("convex pieces")
+
+
+@pytest.mark.parametrize("kinds", [(Capsule,), (Capsule, Cylinder)])
+@pytest.mark.parametrize("pipe", [pipe for pipe, _ in PIPES.values()], ids=PIPES)
+def test_a_chain_has_no_gaps_and_stays_near(pipe: Pipe, kinds: tuple[type[Field], ...]) -> None:
+    """All that lies this deep within the pipe is within the chain, and nothing is this far outside."""
+    chain = Assembly(tuple(pipe_chain(Part(pipe), kinds, 0.2)))
+    whole = Assembly((Part(dataclasses.replace(pipe, thickness=0.0)),))
+    off = 0.2 + 0.1 * pipe.radius
+    middles, across = rings(pipe, 1e-4)
+    around = np.linspace(0, 2 * np.pi, 24)
+    circle = np.stack([np.cos(around), np.sin(around)], axis=1) @ across
+    # A chord's end is not quite square to the path, and the last capsule ends in a ball.
+    at_end = (0.25 if Cylinder in kinds else 1.5) * pipe.radius
+    inner = np.array(
+        [
+            ring
+            for middle, ring in zip(middles, middles[:, None] + (pipe.radius - off) * circle, strict=True)
+            if min(np.linalg.norm(middle - place) for place, _ in pipe.ends) > at_end
+        ]
+    ).reshape(-1, 3)
+    assert chain.distance(inner.astype(np.float32)).max(initial=-1.0) < 1e-5
+    lower, upper = whole.bounds()
+    points = np.random.default_rng(0).uniform(lower - 1, upper + 1, (20_000, 3)).astype(np.float32)
+    assert chain.distance(points[whole.distance(points) > off]).min() > 0
