@@ -7,7 +7,7 @@ import { viteSingleFile } from "vite-plugin-singlefile";
 /** Every file that the page is made of, in a fixed order: partwright's tests compute the same hash without Node. */
 function sourceHash(root: string): string {
   const files = ["index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"];
-  for (const formula of ["distance", "superfrustum", "quadric", "profile"]) files.push(`../partwright/export/${formula}.glsl`);
+  for (const formula of ["distance", "superfrustum", "quadric", "profile", "pipe"]) files.push(`../partwright/export/${formula}.glsl`);
   for (const entry of readdirSync(join(root, "src"), { recursive: true, withFileTypes: true })) {
     if (entry.isFile()) files.push(relative(root, join(entry.parentPath, entry.name)).replaceAll("\\", "/"));
   }

@@ -82,3 +82,8 @@ float smooth_difference(float a, float b, float k) {
 float smooth_intersection(float a, float b, float k) {
     return -smooth_union(-a, -b, k);
 }
+
+vec3 into_frame(vec3 p, vec3 translation, vec4 rotation) {
+    vec3 v = p - translation, axis = -rotation.xyz;
+    return v + 2.0 * cross(axis, cross(axis, v) + rotation.w * v);
+}

@@ -1,9 +1,9 @@
 """GLSL: one self-contained `float sdf(vec3 p)`, for GLSL 3.30, GLSL ES 3.00 and later.
 
 The formulas (distance.glsl, by which the studio draws as well, superfrustum.glsl and, where there are
-any, quadric.glsl and profile.glsl, beside this file) are followed by a table of the parts, one constant each,
-or a function for what is swept of a profile, and by the tree of operations. All lengths are in the assembly's
-own unit.
+any, quadric.glsl, profile.glsl and pipe.glsl, beside this file) are followed by a table of the parts, one
+constant each, or a function for what is swept of a profile or along a path, and by the tree of operations.
+All lengths are in the assembly's own unit.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.rows import as_superfrustum
 from partwright.atomic_io import write_bytes
 from partwright.export.formats import Format, Holds
+from partwright.export.glsl_pipes import pipe_function
 from partwright.export.glsl_profiles import swept_function
 from partwright.export.identifiers import comment, identifiers
-from partwright.fields import Swept
+from partwright.fields import Pipe, Swept
 from partwright.shapes import canonical_unit
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def write(assembly: Assembly, path: str | Path) -> None:
     """Write the assembly's exact signed distance, blends and all.
 
     Raises:
-        ParameterError: a part is no SuperFrustum, quadric, extrusion or revolution.
+        ParameterError: a part is no SuperFrustum, quadric, extrusion, revolution or pipe.
         OutputError: the file cannot be written.
     """
     write_bytes(path, to_glsl(assembly).encode())
@@ -55,10 +56,14 @@ def to_glsl(assembly: Assembly) -> str:
         head.append(_formula("quadric.glsl"))
     if any(isinstance(part.field, Swept) for part in assembly.parts):
         head.append(_formula("profile.glsl"))
+    if any(isinstance(part.field, Pipe) for part in assembly.parts):
+        head.append(_formula("pipe.glsl"))
     table, functions = [], []
     for name, part in zip(constants, assembly.parts, strict=True):
         if isinstance(part.field, Swept):
             functions += swept_function(name.lower(), part, _numbers)
+        elif isinstance(part.field, Pipe):
+            functions += pipe_function(name.lower(), part, _numbers)
         else:
             table.append(_constant(name, part))
     _function(assembly, "sdf", iter(constants), (f"group_{i}" for i in count(1)), functions)
@@ -111,7 +116,7 @@ def _call(
 ) -> tuple[str, str]:
     if child.is_part:
         constant = next(constants)
-        if isinstance(child.field, Swept):
+        if isinstance(child.field, Swept | Pipe):
             return f"{constant.lower()}_sdf(p)", _numbers([child.blend])
         function = "part_sdf" if child.field.quadric() is None else "quadric_sdf"
         return f"{function}(p, {constant})", f"{constant}.blend"

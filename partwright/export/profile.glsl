@@ -62,8 +62,3 @@ float turned_partly(float side, vec2 first, vec2 last, vec2 p, float angle) {
     if ((turn < 0.0 ? turn + 6.283185307 : turn) > angle) return ends;
     return side < 0.0 ? -min(-side, ends) : side;
 }
-
-vec3 into_frame(vec3 p, vec3 translation, vec4 rotation) {
-    vec3 v = p - translation, axis = -rotation.xyz;
-    return v + 2.0 * cross(axis, cross(axis, v) + rotation.w * v);
-}

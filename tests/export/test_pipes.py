@@ -16,9 +16,11 @@ from partwright.approximation.pipe_chain import has_narrow_bore, pipe_chain, str
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.atomic_io import report_path
 from partwright.export import export
+from partwright.export.glsl import to_glsl
 from partwright.fields import Box, Capsule, Cylinder, Field, Pipe
 from partwright.meshing import mesh_assembly
 from partwright.meshing.pipes import rings
+from tests.export.opengl import run_sdf
 from tests.export.step_faces import read_back
 from tests.export.test_openscad import rendered
 
@@ -245,3 +247,21 @@ def test_a_chain_has_no_gaps_and_stays_near(pipe: Pipe, kinds: tuple[type[Field]
     lower, upper = whole.bounds()
     points = np.random.default_rng(0).uniform(lower - 1, upper + 1, (20_000, 3)).astype(np.float32)
     assert chain.distance(points[whole.distance(points) > off]).min() > 0
+
+
+def test_the_shader_finds_the_distances() -> None:
+    """Of pipes turned and moved, one of them twice, and one that is taken away."""
+    parts = [
+        Part(pipe, (0, 0, 30 * i), (1, 0.2 * i, 0.3, 0), name=name, blend=0.5 * (i == 1))
+        for i, (name, (pipe, _)) in enumerate(PIPES.items())
+    ]
+    parts[0] = dataclasses.replace(parts[0], instances=(Similarity(translation=(0, 40, 0)),))
+    whole = Assembly((Assembly(tuple(parts[:4])), parts[4]), "difference")
+    lower, upper = whole.bounds()
+    points = np.random.default_rng(0).uniform(lower - 3, upper + 3, (20_000, 3)).astype(np.float32)
+    np.testing.assert_allclose(run_sdf(to_glsl(whole), points), whole.distance(points), atol=1e-4)
+    for part in parts:
+        alone = Assembly((part,))
+        lower, upper = alone.bounds()
+        points = np.random.default_rng(1).uniform(lower - 1, upper + 1, (5_000, 3)).astype(np.float32)
+        np.testing.assert_allclose(run_sdf(to_glsl(alone), points), alone.distance(points), atol=1e-4)

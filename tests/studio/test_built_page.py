@@ -19,7 +19,7 @@ def source_hash() -> str:
     names = ["index.html", "package.json", "package-lock.json", "tsconfig.json", "vite.config.ts"]
     names += [
         f"../partwright/export/{formula}.glsl"
-        for formula in ("distance", "superfrustum", "quadric", "profile")
+        for formula in ("distance", "superfrustum", "quadric", "profile", "pipe")
     ]
     names += [path.relative_to(SOURCES).as_posix() for path in (SOURCES / "src").rglob("*") if path.is_file()]
     result = hashlib.sha256()

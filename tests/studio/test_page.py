@@ -22,6 +22,7 @@ from partwright.fields import (
     Frustum,
     HollowBox,
     HollowFrustum,
+    Pipe,
     Profile,
     Quadric,
     Revolution,
@@ -49,6 +50,8 @@ SOLIDS = (
     Extrusion(Profile.rectangle(20, 14, 4), 8, top_fillet=3, bottom_chamfer=2),
     Revolution(PLATE.moved((14, 0))),
     Revolution(Profile([(0, -8), (9, -8), (9, 0, 0.6), (0, 7)]), 230),
+    Pipe(((-15, 0, 0), (10, 0, 0, 6), (10, 12, 0, 5), (10, 12, 15)), 3),
+    Pipe(((-15, 0, 0), (-15, 0, 15, 5), (-5, 0, 15, 5), (-5, 0, -9), (-5, 0, -12)), 3, 0.8),
 )
 
 

@@ -1,10 +1,12 @@
 /** One self-contained `float sdf(vec3 p)`, as `partwright export -o FILE.glsl` writes it. */
 
 import distanceFormula from "../../../partwright/export/distance.glsl?raw";
+import pipeFormula from "../../../partwright/export/pipe.glsl?raw";
 import profileFormula from "../../../partwright/export/profile.glsl?raw";
 import quadricFormula from "../../../partwright/export/quadric.glsl?raw";
 import superfrustumFormula from "../../../partwright/export/superfrustum.glsl?raw";
 import { quadric, superfrustum } from "../model/fields";
+import { isPipe, NO_BORE, pipe } from "../model/pipes";
 import { hasRims, isSwept, type Side, swept } from "../model/profiles";
 import { type Group, type Node, type Part, isGroup, leaves, poses } from "../model/tree";
 
@@ -44,6 +46,22 @@ export function toGlsl(root: Group): string {
         body.push(`    return ${whole ? side : `turned_partly(${side}, ${first}, ${last}, v.xy, ${literal(profile.angle)})`};`);
       }
       functions.push([...body, "}", ""].join("\n"));
+      rows.push(`// ${comment(part.name)}: ${stem}`);
+      return `${stem}(p)`;
+    }
+    const along = pipe(part.field);
+    if (along) {
+      const stem = `piped_${rows.length}`;
+      const vec = (values: number[]) => `vec${values.length}(${numbers(values)})`;
+      const [radii, near] = [vec([along.radius, along.bore || NO_BORE]), literal(along.near)];
+      const pieces = along.pieces.map(({ at, way, out, size, angle }) =>
+        out
+          ? `pipe_bend(v, ${vec(at)}, ${vec(out)}, ${vec(way)}, ${vec([size, Math.cos(angle), Math.sin(angle)])}, ${near}, square);`
+          : `pipe_run(v, ${vec(at)}, ${vec(way)}, ${literal(size)}, ${near}, square);`,
+      );
+      const ends = along.ends.map(([middle, out]) => `pipe_end(v, ${vec(middle)}, ${vec(out)}, ${radii})`);
+      const body = [`vec3 v = into_frame(p, ${place});`, "float square = 1e30;", ...pieces, `return pipe(square, ${radii}, ${ends.join(", ")});`];
+      functions.push([`float ${stem}(vec3 p) {  // ${comment(part.name)}`, ...body.map((line) => `    ${line}`), "}", ""].join("\n"));
       rows.push(`// ${comment(part.name)}: ${stem}`);
       return `${stem}(p)`;
     }
@@ -89,6 +107,7 @@ export function toGlsl(root: Group): string {
     superfrustumFormula,
     ...(parts.some((part) => part.field.kind === "quadric") ? [quadricFormula] : []),
     ...(parts.some((part) => isSwept(part.field)) ? [profileFormula] : []),
+    ...(parts.some((part) => isPipe(part.field)) ? [pipeFormula] : []),
     ...rows,
     "",
     ...functions,

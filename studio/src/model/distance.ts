@@ -1,5 +1,6 @@
 /** Signed distances in double precision: for picking, snapping and meshing. The shader does the pixels. */
 
+import { pipeDistance } from "./pipes";
 import { sweptDistance } from "./profiles";
 import type { Program } from "./program";
 import { INTERSECTION, POP, PUSH, UNION } from "./program";
@@ -123,7 +124,10 @@ export function leafDistance(program: Program, i: number, x: number, y: number, 
   const ly = poses[p + 4] * x + poses[p + 5] * y + poses[p + 6] * z + poses[p + 7];
   const lz = poses[p + 8] * x + poses[p + 9] * y + poses[p + 10] * z + poses[p + 11];
   const profile = program.swept[i];
-  if (profile) return sweptDistance(profile, lx / program.frame.scale, ly / program.frame.scale, lz / program.frame.scale) * program.frame.scale;
+  const along = program.pipes[i];
+  const { scale } = program.frame;
+  if (profile) return sweptDistance(profile, lx / scale, ly / scale, lz / scale) * scale;
+  if (along) return pipeDistance(along, lx / scale, ly / scale, lz / scale) * scale;
   if (program.quadrics[i]) return quadricDistance(lx, ly, lz, rows, i * 12);
   return superfrustumDistance(lx, ly, lz, rows, i * 12);
 }

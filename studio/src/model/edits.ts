@@ -2,6 +2,7 @@
 
 import type { FieldData } from "./fields";
 import { superfrustum } from "./fields";
+import { isPipe, pipeComplaint, withCorners } from "./pipes";
 import { isSwept, withLoops } from "./profiles";
 import {
   type Group,
@@ -177,6 +178,10 @@ export function stretched(field: FieldData, axis: number, factor: number): Field
       [0, 0, 2, 0, 0, 1, 0, 0, 1, 1],
     ][axis];
     return { ...field, coefficients: c.map((v, i) => v / factor ** powers[i]) };
+  }
+  if (isPipe(field)) {
+    const made = withCorners(field, (corner) => corner.map((v, i) => (i === axis ? v! * factor : v!)));
+    return pipeComplaint(made) ? field : made; // its bends, which stay, may not fit
   }
   const along = axis === 2 && "height" in field;
   // A profile keeps its arcs round: it grows along both of its axes.

@@ -1,5 +1,6 @@
 /** The kinds of field: their parameters, and the one formula that most of them are (SuperFrusta, section 3.2). */
 
+import { isPipe, pipe, pipeBox, pipeComplaint, withCorners } from "./pipes";
 import { RIMS, isSwept, loops, swept, sweptBox, withLoops } from "./profiles";
 import { type Box, type Vec3, dot } from "./vectors";
 
@@ -62,6 +63,7 @@ export const PARAMETERS: Record<string, Parameter[]> = {
   neural: [{ name: "half_lengths", label: "half length", sort: "extents", low: 1e-6, help: "of the part's cuboid; the others adapt" }],
   hollow_frustum: [BOTTOM, TOP, WALL, HEIGHT],
   extrusion: [HEIGHT, ...RIMS.map((name) => length(name, "by which the edges of that end are rounded or cut off", 0))],
+  pipe: [RADIUS, length("thickness", "of the wall; 0 where it is solid", 0)],
   revolution: [fraction("angle", 360, "degrees through which the profile is turned")],
 };
 
@@ -128,6 +130,7 @@ export function complaint(field: FieldData): string | null {
     const wrong = values.some((v) => typeof v !== "number" || !(v >= parameter.low && v <= high));
     if (wrong) return `${parameter.label} has to be from ${parameter.low} to ${high}`;
   }
+  if (isPipe(field)) return pipeComplaint(field);
   if (isSwept(field) && !profileIsGood(field)) return "its profile is no outline of corners";
   const [bottomFillet, bottomChamfer, topFillet, topChamfer] = RIMS.map(get);
   if ((bottomFillet && bottomChamfer) || (topFillet && topChamfer)) return "an end has a fillet or a chamfer, not both";
@@ -232,6 +235,8 @@ export function fieldBox(field: FieldData): Box {
   const given = superfrustum(field);
   const profile = swept(field);
   if (profile) return sweptBox(profile);
+  const along = pipe(field);
+  if (along) return pipeBox(along);
   if (field.kind === "neural") {
     // A learned surface may leave its cuboid by a little.
     const half = (field.half_lengths as number[]).map((v) => 1.1 * v) as Vec3;
@@ -265,7 +270,9 @@ export function scaledField(field: FieldData, factor: number): FieldData {
   }
   const result: FieldData = isSwept(field)
     ? withLoops(field, ([x, y, ...bulge]) => [x * factor, y * factor, ...bulge])
-    : { ...field };
+    : isPipe(field)
+      ? withCorners(field, (corner) => corner.map((v) => v! * factor))
+      : { ...field };
   for (const parameter of PARAMETERS[field.kind] ?? []) {
     const value = field[parameter.name];
     if (parameter.sort === "length" && typeof value === "number") result[parameter.name] = value * factor;

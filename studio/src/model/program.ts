@@ -8,6 +8,7 @@
 import { programDistance } from "./distance";
 import { fieldBox, quadric, superfrustum } from "./fields";
 import { isLearned } from "./learned";
+import { type Pipe, pipe } from "./pipes";
 import { type Swept, swept } from "./profiles";
 import { type Group, type Node, type Part, isGroup, leaves, poses } from "./tree";
 import {
@@ -72,6 +73,8 @@ export interface Program {
   quadrics: Uint8Array;
   /** Of each instruction: the extrusion or revolution that it is, in own lengths. */
   swept: (Swept | null)[];
+  /** Of each instruction: the pipe that it is, in own lengths. */
+  pipes: (Pipe | null)[];
   /** Of pushes: the operation by which the group is folded into what is around it. */
   roles: Uint8Array;
   /** How deep groups are nested. */
@@ -193,6 +196,7 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
   const quadrics: number[] = [];
   const bent: number[] = [];
   const profiles: (Swept | null)[] = [];
+  const pipes: (Pipe | null)[] = [];
   let infinite = false;
 
   const emit = (action: number, operation: number, blend: number, part = -1) => {
@@ -204,6 +208,7 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
       quadrics.push(0);
       bent.push(0);
       profiles.push(null);
+      pipes.push(null);
     }
     return instructions.length - 1;
   };
@@ -234,6 +239,7 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
     }
     quadrics.push(surface ? 1 : 0);
     profiles.push(swept(part.field));
+    pipes.push(pipe(part.field));
     bent.push((superfrustum(part.field)?.[6] ?? 0) > 0.03 ? 1 : 0);
     const hull = surface
       ? null
@@ -286,6 +292,7 @@ export function compile(root: Group, frame: Frame, hidden: Set<number> = new Set
     quadrics: Uint8Array.from(quadrics),
     bent: Uint8Array.from(bent),
     swept: profiles,
+    pipes,
     roles: new Uint8Array(instructions.length),
     depth: 0,
     scope,

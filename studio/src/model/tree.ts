@@ -2,6 +2,7 @@
 
 import type { FieldData, Value } from "./fields";
 import { complaint, PARAMETERS, scaledField } from "./fields";
+import { isPipe, withCorners } from "./pipes";
 import { withLoops } from "./profiles";
 import { type Quat, type Vec3, add, mul, normalised, NO_ROTATION, product, rotate } from "./vectors";
 
@@ -317,6 +318,7 @@ export function mirrored(node: Node, axis: number, at: number): Node {
 /** At its own xz-plane. */
 function mirroredField(field: FieldData): FieldData {
   if (field.kind === "quadric") return mirroredQuadric(field);
+  if (isPipe(field)) return withCorners(field, ([x, y, z, ...bend]) => [x, -y, z, ...(bend as number[])]);
   if (field.kind !== "extrusion") return field;
   return withLoops(field, ([x, y, bulge]) => (bulge ? [x, -y, -bulge] : [x, -y]));
 }

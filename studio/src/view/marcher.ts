@@ -7,6 +7,7 @@ import type { Vec3 } from "../model/vectors";
 import type { View } from "./camera";
 import type { Gpu, Shader, Target } from "./gpu";
 import distanceSource from "../../../partwright/export/distance.glsl?raw";
+import pipeSource from "../../../partwright/export/pipe.glsl?raw";
 import profileSource from "../../../partwright/export/profile.glsl?raw";
 import programSource from "./shaders/field.glsl?raw";
 import marchSource from "./shaders/march.frag?raw";
@@ -16,7 +17,7 @@ import shadeSource from "./shaders/shade.frag?raw";
 import { cull, LISTED, wholeList } from "./tiles";
 
 /** The field of a program, for any shader to ask. */
-export const fieldSource = distanceSource + profileSource + programSource;
+export const fieldSource = distanceSource + profileSource + pipeSource + programSource;
 
 const BLOCKS = 2; // a side of a tile: rays of one block start together
 

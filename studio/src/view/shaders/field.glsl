@@ -61,11 +61,27 @@ float swept(vec3 v, int i) {
     return turned_partly(side, start, end, v.xy, b.y);
 }
 
-float leaf(vec3 p, int i, bool isQuadric, bool isSwept) {
+// Its pieces follow the instructions in the table, and both ends after them.
+float piped(vec3 v, int i) {
+    vec4 a = row(i, 5);
+    int first = int(a.x), last = first + int(a.y);
+    float square = 1e30, near = row(i, 6).x;
+    for (int k = first; k < last; k++) {
+        vec4 at = row(k, 0), way = row(k, 1);
+        if (way.w == 0.0) pipe_run(v, at.xyz, way.xyz, at.w, near, square);
+        else pipe_bend(v, at.xyz, row(k, 2).xyz, way.xyz, vec3(at.w, row(k, 3).xy), near, square);
+    }
+    float begin = pipe_end(v, row(last, 0).xyz, row(last, 1).xyz, a.zw);
+    return pipe(square, a.zw, begin, pipe_end(v, row(last, 2).xyz, row(last, 3).xyz, a.zw));
+}
+
+// kind: 0 a SuperFrustum, 1 swept of a profile, 2 a quadric, 3 a pipe.
+float leaf(vec3 p, int i, int kind) {
     vec4 q = vec4(p, 1.0);
     vec3 v = vec3(dot(row(i, 2), q), dot(row(i, 3), q), dot(row(i, 4), q));
-    if (isSwept) return swept(v, i);
-    return isQuadric ? quadric(v, i) : superfrustum(v, i);
+    if (kind == 1) return swept(v, i);
+    if (kind == 3) return piped(v, i);
+    return kind == 2 ? quadric(v, i) : superfrustum(v, i);
 }
 
 float fold(int operation, float a, float b, float k) {
@@ -109,7 +125,7 @@ float field(vec3 p, int start, int count, bool exact) {
         int code = int(head.x), action = code >> 4, operation = (code >> 2) & 3;
         if (action == LEAF) {
             if (exact || !beyond(p, i, operation, result, head.y))
-                result = fold(operation, result, leaf(p, i, (code & 2) != 0, (code & 1) != 0), head.y);
+                result = fold(operation, result, leaf(p, i, code & 3), head.y);
         } else if (action == PUSH) {
             int length_ = listed(++n);
             // A push knows how its group will be folded in, so that one that lies far off is passed over.

@@ -124,7 +124,7 @@ vec3 colourAt(vec3 p, int start, int count, out int leaf_) {
             int index = int(head.z);
             int layer = int(head.w) % LAYERS - 1;
             nextColour = layer >= 0 ? mapped(p, i, layer) : texelFetch(uColours, ivec2(index & 255, index >> 8), 0).rgb;
-            next = leaf(p, i, (code & 2) != 0, (code & 1) != 0);
+            next = leaf(p, i, code & 3);
             nextOwner = float(i);
         }
         // Positive where the next one's surface is the nearer to what is seen.
