@@ -25,6 +25,7 @@ from partwright.errors import NoSurfaceError
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment, free_name
 from partwright.export.texturing import own_colour, textured
+from partwright.fields import Pipe
 from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit
 
@@ -156,6 +157,8 @@ def _part(part: Part, resolution: int) -> _Solid:
     f = part.field.superfrustum()
     if f is not None:
         entry |= {name: list(v) if isinstance(v := getattr(f, name), tuple) else v for name in _PARAMETERS}
+    if isinstance(part.field, Pipe):
+        entry |= {"radius": part.field.radius, "thickness": part.field.thickness}
     return _looking(entry, mesh_part(Part(part.field), resolution), part)
 
 

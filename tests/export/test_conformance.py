@@ -35,7 +35,17 @@ from partwright.errors import (
 from partwright.export import export
 from partwright.export.axes import to_gltf, to_metres_z_up
 from partwright.export.formats import FORMATS, Format, Holds
-from partwright.fields import Box, Cylinder, Extrusion, Profile, Quadric, Revolution, Sphere, SuperFrustum
+from partwright.fields import (
+    Box,
+    Cylinder,
+    Extrusion,
+    Pipe,
+    Profile,
+    Quadric,
+    Revolution,
+    Sphere,
+    SuperFrustum,
+)
 from partwright.fields.joint import JointField, Member
 from partwright.meshing import mesh_assembly
 from partwright.shapes import METRES
@@ -83,6 +93,14 @@ def assemblies() -> dict[str, Assembly]:
             (
                 Part(Extrusion(bracket, 0.4), name="bracket"),
                 Part(Revolution(Profile.circle(0.2, (0.5, 0)), 120), (0, 0, 0.6), name="handle"),
+            ),
+            unit="mm",
+            up="z",
+        ),
+        "pipes": Assembly(
+            (
+                Part(Pipe(((0, 0, 0), (0, 0, 2, 0.5), (2, 0, 2)), 0.3), name="rod"),
+                Part(Pipe(((0, 2, 0), (2, 2, 0, 1), (2, 4, 0)), 0.6, 0.2), name="tube"),
             ),
             unit="mm",
             up="z",

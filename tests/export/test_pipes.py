@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from partwright.approximation.pipe_chain import has_narrow_bore, pipe_chain, straight_rod
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.atomic_io import report_path
+from partwright.errors import UnsupportedFormatError
 from partwright.export import export
 from partwright.export.glsl import to_glsl
 from partwright.fields import Box, Capsule, Cylinder, Field, Pipe
@@ -79,7 +81,13 @@ def saddle() -> Assembly:
     return Assembly((Part(Pipe(((-10, 0, 0), (10, 0, 0)), 2), name="main"), Part(branch, name="branch")))
 
 
+def channel() -> Assembly:
+    bore = Pipe(((-12, 0, 0), (0, 0, 0, 2), (0, 6, 0, 2), (12, 6, 3)), 1)
+    return Assembly((Part(Box((20, 20, 10)), name="block"), Part(bore, name="bore")), "difference", unit="mm")
+
+
 BOOLEANS = {
+    "a bent channel": (channel(), {"Plane": 6, "Cylinder": 3, "Torus": 2}),
     "a plate": (joined(), {"Plane": 8, "Cylinder": 6, "Torus": 4}),
     "a hole in a run": (drilled((0, 0, 8), (1, 1, 0, 0)), {"Plane": 2, "Cylinder": 8, "Torus": 4}),
     "a hole in a bend": (drilled((2, 0, 18), (1, 0, 0, 0)), None),
@@ -265,3 +273,25 @@ def test_the_shader_finds_the_distances() -> None:
         lower, upper = alone.bounds()
         points = np.random.default_rng(1).uniform(lower - 1, upper + 1, (5_000, 3)).astype(np.float32)
         np.testing.assert_allclose(run_sdf(to_glsl(alone), points), alone.distance(points), atol=1e-4)
+
+
+def test_meshes_are_exact_and_blender_has_the_numbers(tmp_path: Path) -> None:
+    for name, (pipe, _) in PIPES.items():
+        export(lone(pipe), tmp_path / "a.blender.py", resolution=256)
+        text = (tmp_path / "a.blender.py").read_text("ascii")
+        data: dict[str, Any] = {}
+        exec(text[: text.index("import bpy")], data)
+        (entry,) = data["PARTS"]
+        assert (entry["radius"], entry["thickness"]) == (pipe.radius, pipe.thickness), name
+        export(lone(pipe), tmp_path / "a.stl", resolution=256)
+        mesh = trimesh.load_mesh(tmp_path / "a.stl")
+        assert mesh.is_watertight
+        assert mesh.volume == pytest.approx(volume(pipe), rel=2e-2)
+        assert np.abs(lone(pipe).distance(mesh.vertices)).max() < 1e-3
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".dxf"])
+def test_drawings_of_profiles_refuse_what_has_none(tmp_path: Path, suffix: str) -> None:
+    with pytest.raises(UnsupportedFormatError, match="holds profiles"):
+        export(lone(PIPES["a rod"][0]), tmp_path / f"a{suffix}")
+    assert not list(tmp_path.iterdir())

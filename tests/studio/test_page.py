@@ -211,6 +211,23 @@ def test_a_drag_of_a_handle_is_one_step(shown: Callable[[Assembly], Page]) -> No
     assert load_assembly_text(page) == start
 
 
+def test_the_numbers_of_a_pipe_are_edited(shown: Callable[[Assembly], Page]) -> None:
+    """A radius that its bends do not take is refused in words."""
+    pipe = Pipe(((-15, 0, 0), (10, 0, 0, 6), (10, 12, 0, 5), (10, 12, 15)), 3)
+    page = shown(Assembly((Part(pipe, name="pipe"),), unit="mm", up="z"))
+    page.page.locator(".row[data-name=pipe]").click()
+    assert page.page.get_by_label("Kind").input_value() == "pipe"
+    for label, value in (("radius", "4"), ("thickness", "0.5"), ("radius", "5.5")):
+        field = page.page.get_by_label(label, exact=True).first
+        field.fill(value)
+        field.press("Enter")
+    assert "bends have to be wider" in page.page.locator("body").inner_text()
+    edited = load_assembly_text(page)["pipe"].field
+    assert (edited.radius, edited.thickness, edited.path) == (4, 0.5, pipe.path)
+    page.settle()
+    assert not page.errors
+
+
 def test_a_hole_is_drilled_and_measured(shown: Callable[[Assembly], Page]) -> None:
     page = shown(small())
     page.page.get_by_role("button", name="Add").click()

@@ -186,7 +186,7 @@ export class Inspector {
       return [this.section("Shape", h("p", { class: "hint" }, "A quadric: a face without end of its own. Move, turn and scale it; S with X, Y or Z stretches it."))];
     const rows = parameters.flatMap((parameter) => this.parameter(part, parameter));
     if (isLearned(part)) return [this.section("Learned part", ...rows, ...this.learnedActions(part))];
-    const kind = h("select", { "aria-label": "Kind" }, ...KINDS.map((k) => h("option", { value: k, selected: k === part.field.kind }, k.replace("_", " "))));
+    const kind = h("select", { "aria-label": "Kind" }, ...[...new Set([...KINDS, part.field.kind])].map((k) => h("option", { value: k, selected: k === part.field.kind }, k.replace("_", " "))));
     kind.addEventListener("change", () => this.become(part, kind.value));
     return [h("section", {}, h("h3", {}, "Shape", kind), ...rows)];
   }
