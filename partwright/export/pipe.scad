@@ -1,6 +1,6 @@
 // A round rod, or a tube whose wall has this thickness, flat at its ends. Its path is straight from corner to corner
-// and takes those between its ends in bends of this radius, or of one each. One polyhedron: OpenSCAD does not join
-// cylinders and turned circles that only touch.
+// and takes those between its ends in bends of this radius, or of one each. One polyhedron: the union
+// of cylinders and turned circles takes OpenSCAD a hundred times as long.
 module pipe_along(corners, bends, radius, thickness = 0) {
     last = len(corners) - 1;
     function unit(v) = v / norm(v);
