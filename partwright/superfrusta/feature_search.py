@@ -82,8 +82,8 @@ class FeatureSearch:
         told: Callable[[FeatureTree], None] | None = None,
         mend: Callable[[FeatureTree], FeatureTree] | None = None,
     ) -> None:
-        self.mend = mend or (lambda tree: tree)
-        self.samples, self.alpha, self.checkpoint, self.told = samples, alpha, checkpoint, told
+        self.told, self.mend = told or (lambda tree: None), mend or (lambda tree: tree)
+        self.samples, self.alpha, self.checkpoint = samples, alpha, checkpoint
         self.asked, self.most, self.limit = most, min(most or _MOST, _MOST), most or _MOST + _FOR_MENDING
         self.tie = _TIE[0] * math.sqrt(_TIE[1] / max(1, samples.near))
         self.reach = typed_reach(shape.frame.scale)
@@ -210,8 +210,7 @@ class FeatureSearch:
             if step is None:
                 break
             tree = step
-            if self.told is not None:
-                self.told(tree)
+            self.told(tree)
             if best is not None and self.is_behind(tree, best, patient):
                 break
         return tree
