@@ -240,11 +240,13 @@ def _moved(rows: Rows, step: Floats, free: NDArray[np.bool_], tied: NDArray[np.b
     moved[:, ROTATION] = units(np.stack(quaternion_product(_components(pose), _components(turn)), axis=-1))
     clipped = np.clip(moved[:, SHAPE] + step[:, SHAPE_STEP], lower[SHAPE_STEP], upper[SHAPE_STEP])
     moved[:, SHAPE] = np.where(free[:, SHAPE_STEP], clipped, moved[:, SHAPE])
-    for row, loose, is_round in zip(moved, free, tied, strict=True):
+    for row, before, loose, is_round in zip(moved, rows, free, tied, strict=True):
         if is_round and loose[Tangent.SX]:
             row[Column.SY] = row[Column.SX]
         if loose[Tangent.BULGE]:
-            row[Column.BULGE] = min(row[Column.BULGE], tightest_bulge(row[Column.SX], row[Column.SZ]))
+            # What is bent further already may stay so: all steps would end with it unbent.
+            tightest = max(tightest_bulge(row[Column.SX], row[Column.SZ]), float(before[Column.BULGE]))
+            row[Column.BULGE] = min(row[Column.BULGE], tightest)
     return moved.astype(np.float32)
 
 
