@@ -36,13 +36,12 @@ _LEAST_SHARE = 0.01  # of what the furthest counts
 _LINEAR = 4.0  # sharpness at which an occupancy near the surface is the distance, but for its sign
 _LEAST_OFF = 1e-4  # unit lengths
 _GAIN = 2e-5  # of the value, from which on a step is taken
-_SPENT = 1e-3  # of R, at most, for lengths
+SPENT = 3e-3  # of R, at most, for lengths: less than a part's price
 _OVERLAP = 0.01  # of what parts cover: so much more may be covered twice, which thin shapes hardly feel
-_DAMPING, _LEAST_DAMPING = 0.1, 1e-3  # of the first step, and of any
-_LESS, _MORE = 0.1, 10.0  # times as much after a step that gains, and one that does not
+_LEAST_DAMPING = 1e-3
 _TRIES = 4  # of one scale: a step that is damped a thousand times more follows the slope alone
 _STIFFNESS = 1e-4  # added to the diagonal: what neither feels stays
-_MOST_COPIES = 200  # the normal equations grow with their square
+MOST_COPIES = 200  # the normal equations grow with their square
 
 
 def last_polished(
@@ -55,12 +54,12 @@ def last_polished(
     """Leaves, those `moving` (L,) moved together, copies of each as one, while R less a price on how far they
     are off rises; at most `settings.looks` assemblies are looked at.
 
-    R does not fall by more than a thousandth, nor below an IoU that the settings ask for.
+    R does not fall by more than three thousandths, nor below an IoU that the settings ask for.
     """
     rows = expanded(leaves)
-    if not settings.looks or not moving.any() or len(rows) > _MOST_COPIES:
+    if not settings.looks or not moving.any() or len(rows) > MOST_COPIES:
         return leaves
-    polish = _Polish(CloseLook.at(shape, samples), settings, LeafSteps.of(leaves, settings, moving))
+    polish = Polish(CloseLook.at(shape, samples), settings, LeafSteps.of(leaves, settings, moving))
     found = polish.best(np.stack([leaf.row for leaf in leaves]))
     polished = [RepeatedPart(row, leaf.isometries) for row, leaf in zip(found, leaves, strict=True)]
     if settings.min_iou is not None:
@@ -71,7 +70,19 @@ def last_polished(
 
 
 @dataclass(frozen=True)
-class _Trial:
+class Damping:
+    """Of the first step, and times as much after a step that gains, and after one that does not."""
+
+    first: float
+    less: float
+    more: float
+
+
+LASTING, BRIEF = Damping(0.1, 0.1, 10.0), Damping(1.0, 0.7, 3.0)  # for many looks, and for a few
+
+
+@dataclass(frozen=True)
+class Trial:
     """Leaves (L, 17), where their copies are off, how far each leaf is (L,), and what they are worth."""
 
     rows: Rows
@@ -82,29 +93,35 @@ class _Trial:
 
 
 @dataclass
-class _Polish:
+class Polish:
     look: CloseLook
     settings: Settings
     steps: LeafSteps
+    damped: Damping = LASTING
     looks: int = field(default=0, init=False)
 
-    def trial(self, rows: Rows) -> _Trial:
+    def trial(self, rows: Rows) -> Trial:
         self.looks += 1
         copies = self.steps.copies(rows)
         off = self.look.deviations(copies)
         by_leaf = np.zeros(len(rows))
         np.maximum.at(by_leaf, self.steps.leaf[off.part], off.off)
         reached = score(self.look.samples, copies)
-        return _Trial(rows, off, by_leaf, reached, reached - self.settings.firmness * norm(by_leaf))
+        return Trial(rows, off, by_leaf, reached, reached - self.settings.firmness * norm(by_leaf))
 
     def best(self, rows: Rows) -> Rows:
         """The leaves' rows (L, 17) after steps that gain."""
-        best = self.trial(rows)
-        least, most = best.score - _SPENT, self.overlap(rows) + _OVERLAP
-        damping = dict.fromkeys(_SCALES, _DAMPING)
+        return self.further(self.trial(rows)).rows
+
+    def further(self, best: Trial, hopeless: float = -np.inf) -> Trial:
+        """What steps that gain make of leaves that have been looked at; given up after half of the looks
+        where their value is `hopeless` still."""
+        least, most = best.score - SPENT, self.overlap(best.rows) + _OVERLAP
+        damping = dict.fromkeys(_SCALES, self.damped.first)
         vain = 0  # scales in a row
         for scale in cycle(_SCALES):
-            if not best.by_leaf.any() or vain == len(_SCALES):
+            given_up = 2 * self.looks > self.settings.looks and best.value < hopeless
+            if not best.by_leaf.any() or vain == len(_SCALES) or given_up:
                 break
             if not vain:
                 overlaps, lengths = self.overlaps(best), self.lengths(best)
@@ -116,11 +133,11 @@ class _Polish:
                 trial = self.trial(self.steps.taken(best.rows, step))
                 gains = trial.value > best.value + _GAIN and trial.score >= least
                 if gains and self.overlap(trial.rows) <= most:
-                    damping[scale] = max(_LESS * damping[scale], _LEAST_DAMPING)
+                    damping[scale] = max(self.damped.less * damping[scale], _LEAST_DAMPING)
                     best, vain = trial, 0
                     break
-                damping[scale] *= _MORE
-        return best.rows
+                damping[scale] *= self.damped.more
+        return best
 
     def overlap(self, rows: Rows) -> float:
         """Share of what parts that are added cover that more than one does."""
@@ -129,7 +146,7 @@ class _Polish:
         count = np.count_nonzero(covers, axis=0)
         return int((count > 1).sum()) / max(int((count > 0).sum()), 1)
 
-    def overlaps(self, at: _Trial) -> Equations:
+    def overlaps(self, at: Trial) -> Equations:
         """Gradient and matrix of what optimisation minimises."""
         samples = self.look.samples
         ((beta, _),) = sharpened(((_SHARPNESS, 1),), samples.thickness)
@@ -139,7 +156,7 @@ class _Polish:
         )
         return self.steps.projected(gradient, matrix)
 
-    def lengths(self, at: _Trial) -> Equations:
+    def lengths(self, at: Trial) -> Equations:
         """Gradient of the price on how far leaves are off, and the matrix of the least squares whose weights
         give it. Of a leaf those points count that are nearly the furthest."""
         samples, off, copies = self.look.samples, at.off, self.steps.copies(at.rows)

@@ -19,6 +19,7 @@ from partwright.shapes import Shape
 from partwright.superfrusta.carving import Carving
 from partwright.superfrusta.frontier import Frontier
 from partwright.superfrusta.growing import grow
+from partwright.superfrusta.last_changes import last_changes
 from partwright.superfrusta.last_polish import last_polished
 from partwright.superfrusta.mending import Mending
 from partwright.superfrusta.merging import cheapest_merger, merge
@@ -290,6 +291,9 @@ class ResidualFit:
         moving = (index >= self.locked) & (index < len(self.leaves) - known)
         with self.timed("polish"):
             self.leaves = last_polished(shape, self.samples, self.leaves, self.settings, moving)
+        with self.timed("change"):
+            for better in last_changes(shape, self.samples, self.leaves, self.settings, moving):
+                self.leaves = better
 
     def enforce_budget(self) -> None:
         """What an interruption or a fit without thinning left over the part budget goes, without refits."""

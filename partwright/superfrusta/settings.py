@@ -61,6 +61,8 @@ class Settings:
     """Tries to mend parts that stick out of the shape or leave places of it out."""
     looks: int = 24
     """At most so many assemblies are looked at closely while the largest deviations are taken in at last."""
+    changes: int = 6
+    """Places at most where what is off after that is changed: cut, filled, or its part fitted anew."""
     trials: int = 3
     """Removals that are tried with a refit before the cheapest is taken."""
     patience: int = 2
@@ -84,7 +86,7 @@ class Settings:
     def __post_init__(self) -> None:
         for name in ("rounds", "regions", "attempts", "trials", "patience", "near", "uniform"):
             check_number(name, getattr(self, name), low=1)
-        for name in ("cycles", "mends", "looks"):
+        for name in ("cycles", "mends", "looks", "changes"):
             check_number(name, getattr(self, name), low=0)
         check_number("resolution", self.resolution, low=24, high=512)
         check_number("kappa", self.kappa, low=1e-4, high=1.0)
@@ -132,7 +134,15 @@ class Settings:
 
 PRESETS: dict[str, Settings] = {
     "draft": Settings(
-        rounds=4, regions=14, trials=1, mends=1, looks=0, near=10_000, uniform=10_000, resolution=64
+        rounds=4,
+        regions=14,
+        trials=1,
+        mends=1,
+        looks=0,
+        changes=0,
+        near=10_000,
+        uniform=10_000,
+        resolution=64,
     ),
     "normal": Settings(),
     "high": Settings(attempts=4),

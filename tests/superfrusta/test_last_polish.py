@@ -7,11 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from partwright.fields.columns import Column
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Settings
 from partwright.superfrusta.close_look import CloseLook
 from partwright.superfrusta.deviations import norm
-from partwright.superfrusta.last_polish import _Polish, last_polished
+from partwright.superfrusta.last_polish import Polish, last_polished
 from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.symmetric_fit import LeafSteps, RepeatedPart, expanded
@@ -110,7 +111,7 @@ def test_lengths_are_not_bought_with_parts_that_cover_one_another(
     shape: Shape, samples: FitSamples, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     steps = LeafSteps.of(leaves(), SETTINGS, BOTH)
-    polish = _Polish(CloseLook.at(shape, samples), SETTINGS, steps)
+    polish = Polish(CloseLook.at(shape, samples), SETTINGS, steps)
     rows = np.array([leaf.row for leaf in leaves()])
     assert polish.overlap(rows) == 0
     moved = rows.copy()
@@ -118,5 +119,17 @@ def test_lengths_are_not_bought_with_parts_that_cover_one_another(
     volume, both = 1.2 * 0.8 * 0.5 + 0.65 * 0.19 * 0.5, 0.3 * 0.19 * 0.5
     assert polish.overlap(moved) == pytest.approx(both / (volume - both), rel=0.25)
     shares = iter([0.0] + [1.0] * SETTINGS.looks)
-    monkeypatch.setattr(_Polish, "overlap", lambda *_: next(shares))
+    monkeypatch.setattr(Polish, "overlap", lambda *_: next(shares))
     assert (polish.best(rows) == rows).all()
+
+
+def test_a_part_that_is_bent_too_far_already_does_not_jump() -> None:
+    bent = box_row(*ARM)
+    bent[Column.BULGE] = 1.0  # wider than long
+    bent[Column.SX], bent[Column.SZ] = 0.8, 0.4
+    leaves = [RepeatedPart(box_row(*BODY)), RepeatedPart(bent)]
+    rows = np.array([leaf.row for leaf in leaves])
+    steps = LeafSteps.of(leaves, SETTINGS, BOTH)
+    still = np.zeros(steps.projected(np.zeros(30), np.zeros((30, 30)))[0].shape)
+    assert np.allclose(steps.taken(rows, still), rows, atol=1e-6)
+    assert steps.taken(rows, still + 0.1)[1, Column.BULGE] <= 1.0
