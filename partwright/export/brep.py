@@ -31,7 +31,7 @@ from partwright.export.brep_rims import shallower
 from partwright.export.brep_solids import revolved
 from partwright.export.brep_swept import Sweep
 from partwright.export.brep_swept_profile import swept_profile
-from partwright.export.brep_topology import faces_of, volume_and_area
+from partwright.export.brep_topology import faces_of, volume_and_area, volume_of
 from partwright.fields import Field, Pipe, SuperFrustum, Swept
 from partwright.meshing import mesh_part
 
@@ -117,7 +117,7 @@ def _swept(field: Swept) -> TopoDS_Shape:
 
     shape = swept_profile(field)
     volume = float(mesh_part(Part(field), 128).volume)
-    if abs(volume_and_area(shape)[0] / volume - 1) > _SAME_VOLUME or not BRepCheck_Analyzer(shape).IsValid():
+    if abs(volume_of(shape) / volume - 1) > _SAME_VOLUME or not BRepCheck_Analyzer(shape).IsValid():
         raise NoSurfaceError(f"OpenCASCADE fails at an {field.kind}; keep its outline from touching itself")
     return shape
 

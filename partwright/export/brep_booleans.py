@@ -17,7 +17,7 @@ import numpy as np
 
 from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
-from partwright.export.brep_topology import faces_of, volume_and_area
+from partwright.export.brep_topology import faces_of, volume_of
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -85,7 +85,7 @@ def operated_on_moved(
     Raises:
         NoSurfaceError: no way gives a valid solid of that volume.
     """
-    scale = max(volume_and_area(solid)[0] for solid in solids) ** (1 / 3)
+    scale = max(volume_of(solid) for solid in solids) ** (1 / 3)
     for distance in (share * scale for share in _MOVES[rough:]):
         found = _closest(_moved_results(operation, solids, distance, repairs), right)
         if found is not None:
@@ -99,7 +99,7 @@ def _closest(results: Iterator[TopoDS_Shape], right: float | None) -> TopoDS_Sha
     for result in results:
         if right is None:
             return result
-        off = abs(volume_and_area(result)[0] / right - 1)
+        off = abs(volume_of(result) / right - 1)
         if off < error:
             closest, error = result, off
         if off < _RIGHT:
@@ -133,7 +133,7 @@ def _results(
     operation: str, solids: Sequence[TopoDS_Shape], tolerances: Sequence[float], repairs: Repairs
 ) -> Iterator[TopoDS_Shape]:
     """Valid results of volumes that they can have."""
-    volumes = [volume_and_area(solid)[0] for solid in solids]
+    volumes = [volume_of(solid) for solid in solids]
     low, high = {
         "union": (max(volumes), sum(volumes)),
         "difference": (volumes[0] - sum(volumes[1:]), volumes[0]),
@@ -146,7 +146,7 @@ def _results(
         if i and not repairs.allow(solids):
             return
         result = way(operation, solids, tolerance * max(volumes) ** (1 / 3))
-        if result is not None and low - slack <= volume_and_area(result)[0] <= high + slack:
+        if result is not None and low - slack <= volume_of(result) <= high + slack:
             yield result
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from partwright.export.brep_errors import opencascade_errors
-from partwright.export.brep_topology import volume_and_area
+from partwright.export.brep_topology import volume_of
 
 if TYPE_CHECKING:
     from OCP.TopoDS import TopoDS_Shape
@@ -22,7 +22,7 @@ def without_short_edges(solid: TopoDS_Shape, share: float) -> TopoDS_Shape:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
     from OCP.ShapeFix import ShapeFix_Shape, ShapeFix_Wireframe
 
-    length = share * abs(volume_and_area(solid)[0]) ** (1 / 3)
+    length = share * abs(volume_of(solid)) ** (1 / 3)
     try:
         wires = ShapeFix_Wireframe(BRepBuilderAPI_Copy(solid).Shape())  # it changes what it is given
         wires.SetPrecision(length)

@@ -1,4 +1,4 @@
-"""Profiles that OpenCASCADE takes, near to those that it does not: outlines that touch themselves."""
+"""Profiles that OpenCASCADE takes, near to others, whose outlines touch or cross themselves."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from manifold3d import CrossSection, FillRule
 from partwright.approximation.sketches.pinches import unpinched
 from partwright.approximation.sketches.slits import section_of, touches_itself, without_slits
 from partwright.errors import ParameterError
+from partwright.export.brep_crossed_corners import uncrossed
 from partwright.fields import Extrusion, Revolution, Swept
 from partwright.fields.profile import Loop, Profile
 
@@ -26,6 +27,9 @@ def mended(field: Swept) -> Iterator[tuple[Swept, float]]:
     """Fields of nearly the same profile, and how far each is off: as a length."""
     profile = field.profile
     distance = _APART * profile.size
+    loops, width = uncrossed(profile)
+    if width:
+        yield from _with_profile(field, loops, width)
     outline, holes = unpinched(profile.outline, distance / 2)
     if holes:
         yield from _with_profile(field, (outline, *profile.holes, *holes), distance)

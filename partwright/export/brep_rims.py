@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from contextlib import suppress
+from typing import TYPE_CHECKING, NamedTuple
 
+from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_rim_cuts import with_cut_rims
-from partwright.export.brep_topology import edges_of
+from partwright.export.brep_rim_strips import with_strips
+from partwright.export.brep_topology import edges_of, faces_of
 from partwright.fields import Extrusion, Swept
 from partwright.fields.extrusion import RIMS
 from partwright.fields.rims import Rim
@@ -27,14 +30,34 @@ _SHALLOW = 1e-3  # of its depth, by which a rim may be less deep and say so
 SHALLOW = "its fillets and chamfers are a thousandth less deep: OpenCASCADE builds no others"
 
 
-def with_rims(field: Extrusion, solid: TopoDS_Shape, bottom: TopoDS_Shape, top: TopoDS_Shape) -> TopoDS_Shape:
-    """The solid with its rims, cut where no CAD program makes them. bottom, top: its faces at the ends.
+class Rimmed(NamedTuple):
+    """A solid with its rims. common: whether they are those that OpenCASCADE, and CAD programs that build on
+    it, make by themselves."""
+
+    solid: TopoDS_Shape
+    common: bool
+
+
+def with_rims(field: Extrusion, solid: TopoDS_Shape, bottom: TopoDS_Shape, top: TopoDS_Shape) -> Rimmed:
+    """The solid with its rims as CAD programs make them; face by face where these make none, or leave a patch
+    that is a spline between others; or cut. bottom, top: its faces at the ends.
 
     Raises:
         NoSurfaceError: OpenCASCADE cannot build them.
     """
     made = by_itself(field, solid, bottom, top)
-    return with_cut_rims(field, solid) if made is None else made
+    if made is None or _has_splines(made):
+        with suppress(NoSurfaceError):
+            return Rimmed(with_strips(field), False)
+    return Rimmed(with_cut_rims(field, solid), False) if made is None else Rimmed(made, True)
+
+
+def _has_splines(shape: TopoDS_Shape) -> bool:
+    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP.GeomAbs import GeomAbs_SurfaceType as Kind
+
+    splines = (Kind.GeomAbs_BSplineSurface, Kind.GeomAbs_BezierSurface, Kind.GeomAbs_OtherSurface)
+    return any(BRepAdaptor_Surface(face).GetType() in splines for face in faces_of(shape))
 
 
 def by_itself(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from partwright.errors import NoSurfaceError
 from partwright.export.brep_errors import opencascade_errors
-from partwright.export.brep_rims import by_itself, with_rims
+from partwright.export.brep_rims import with_rims
 from partwright.export.brep_swept import sewn
 from partwright.export.brep_topology import solids_of
 from partwright.fields import Extrusion, Profile, Revolution, Swept
@@ -42,12 +42,12 @@ def swept_profile(field: Swept) -> TopoDS_Shape:
 
 def has_common_rims(field: Extrusion) -> bool:
     """Whether OpenCASCADE's own fillets and chamfers make its rims, as CAD programs that build on it do."""
-    return by_itself(field, *_upright(field)) is not None
+    return with_rims(field, *_upright(field)).common
 
 
 def _extruded(field: Extrusion) -> TopoDS_Shape:
     solid, bottom, top = _upright(field)
-    return _oriented(with_rims(field, solid, bottom, top)) if field.has_rims else solid
+    return _oriented(with_rims(field, solid, bottom, top).solid) if field.has_rims else solid
 
 
 def _upright(field: Extrusion) -> tuple[TopoDS_Shape, TopoDS_Shape, TopoDS_Shape]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from partwright.shapes.step import parts_of
@@ -50,10 +51,26 @@ def side_by_side(shapes: Sequence[TopoDS_Shape]) -> TopoDS_Shape:
 
 
 def volume_and_area(shape: TopoDS_Shape) -> tuple[float, float]:
+    return volume_of(shape), area_of(shape)
+
+
+@lru_cache(maxsize=128)
+def volume_of(shape: TopoDS_Shape) -> float:
+    """Kept: it takes long, and is asked for as an operation's result, as the next one's operand, and at the
+    end."""
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
 
-    volume, area = GProp_GProps(), GProp_GProps()
+    volume = GProp_GProps()
     BRepGProp.VolumeProperties_s(shape, volume, _INTEGRATED)
+    return float(volume.Mass())
+
+
+@lru_cache(maxsize=128)
+def area_of(shape: TopoDS_Shape) -> float:
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    area = GProp_GProps()
     BRepGProp.SurfaceProperties_s(shape, area)
-    return float(volume.Mass()), float(area.Mass())
+    return float(area.Mass())

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,7 @@ from partwright.export.brep_booleans import Repairs, operated, operated_on_moved
 from partwright.export.brep_errors import opencascade_errors
 from partwright.export.brep_facets import faceted
 from partwright.export.brep_quadrics import quadric_solid
-from partwright.export.brep_topology import side_by_side, solids_of, volume_and_area
+from partwright.export.brep_topology import side_by_side, solids_of, volume_and_area, volume_of
 from partwright.fields import Sphere
 from partwright.meshing import has_exact_mesh, mesh_csg
 from partwright.meshing.sampled_volume import sampled_volume
@@ -126,7 +127,7 @@ def _stepwise(
         whole = [steps.result]
     else:
         whole = [steps.result, *map(steps.rest, steps.waiting)]
-    volume = sum(volume_and_area(one)[0] for one in whole)
+    volume = sum(volume_of(one) for one in whole)
     if right is not None and not (1 - _SAME_MESH) * right < volume < (1 + _OVERLAP) * right:
         raise NoSurfaceError(
             f"OpenCASCADE fails at the {node.operation} of {_label(node)}; move its parts a little"
@@ -164,7 +165,7 @@ class _Steps:
             expected = _volume(Assembly((*self.joined, child), self.operation))
             assert expected is not None
             # By how much this step changes it; what earlier ones are off is not its fault.
-            volume = expected + volume_and_area(self.result)[0] - self._expected
+            volume = expected + volume_of(self.result) - self._expected
         self.result = way(self, child, solid, volume)
         self._expected = expected
         self.joined.append(child)
@@ -224,12 +225,13 @@ def volume_off(
     right = 0.0
     for node, solid in zip(nodes, solids, strict=True):
         own = _volume(node) if isinstance(node, Assembly) and len(node) > 1 else None
-        right += volume_and_area(solid)[0] if own is None else own
+        right += volume_of(solid) if own is None else own
     off = volume / right - 1
     less, more = (_OVERLAP if rough else _SAME_MESH for rough in (made.faceted, made.faceted or made.apart))
     return 0.0 if -less <= off <= more else off
 
 
+@lru_cache(maxsize=64)  # of the whole it is asked for again with each file that is read
 def _volume(node: Node) -> float | None:
     """By its exact mesh, or by points where it has none; None where it has no end."""
     if not np.isfinite(node.bounds()).all():

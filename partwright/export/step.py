@@ -31,7 +31,7 @@ from partwright.export.brep_facets import FacetsWarning, faceted
 from partwright.export.brep_healing import SHORT, without_short_edges
 from partwright.export.brep_rims import SHALLOW
 from partwright.export.brep_swept_profile import has_common_rims
-from partwright.export.brep_topology import faces_of, volume_and_area
+from partwright.export.brep_topology import faces_of, volume_of
 from partwright.export.brep_tree import Compromises, combined, volume_off
 from partwright.export.export_report import write_report
 from partwright.export.formats import Format, Holds
@@ -58,8 +58,10 @@ _NOT_VALID = (
     "the file does not read as a valid solid; move parts a little that nearly touch, or export a mesh"
 )
 _SPENT = "boolean operations that went wrong were tried again only until the budget for that was spent"
-# OpenCASCADE works in millimetres with an absolute tolerance, so all lengths are brought to them.
-_WORKING = METRES["mm"]
+# OpenCASCADE works in millimetres with an absolute tolerance of 1e-7, so all lengths are brought to it. What
+# is smaller than this is made larger by a power of ten until it is written: unions of shapes that are one or
+# two long went wrong, and the same right when they were a hundred.
+_WORKING, _LARGE = METRES["mm"], 100.0
 _UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "km": "KM", "in": "INCH", "ft": "FT"}
 
 
@@ -75,7 +77,8 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
             of its volume.
     """
     unit = canonical_unit(assembly.unit) if assembly.unit else None
-    scale = METRES[unit] / _WORKING if unit else 1.0
+    larger = _enlargement(assembly, METRES[unit] / _WORKING if unit else 1.0)
+    scale = larger * (METRES[unit] / _WORKING if unit else 1.0)
     scaled, changes = solid_tree(assembly.scaled(scale), built, 1 / scale)
     changes = [_with_note(change, assembly.scaled(scale), scaled) for change in changes]
     mitred = [part.name for part in scaled.parts if _is_mitred(part.field)]
@@ -88,8 +91,10 @@ def write(assembly: Assembly, path: str | Path, separate: bool = False) -> None:
         names = [assembly.name or Path(path).stem]
     ball = Ball.around(scaled)
 
-    def save(solids: list[TopoDS_Shape], file: Path) -> None:
-        _write(_document(list(zip(names, solids, strict=True))), file, unit or "mm", Path(path))
+    def save(solids: list[TopoDS_Shape], file: Path) -> float | None:
+        _write(_document(list(zip(names, solids, strict=True)), larger), file, unit or "mm", Path(path))
+        volume = _volume_read(file)
+        return None if volume is None else volume * larger**3
 
     with replacing(path) as temporary:
         made, resorted = _saved(children, ball, temporary, save, len(scaled) <= _MOST_AGAIN)
@@ -115,39 +120,35 @@ def _saved(
     products: Sequence[Node],
     ball: Ball,
     path: Path,
-    save: Callable[[list[TopoDS_Shape], Path], None],
+    save: Callable[[list[TopoDS_Shape], Path], float | None],
     again: bool,
 ) -> tuple[Compromises, list[Change]]:
     """Saves the products so that the file reads as valid solids of their volumes: as they are, without edges
     that are too short, with wider tolerances (again: whether to try those), as facets; and what that cost. As
-    they are where nothing helps, which is told."""
+    they are where nothing helps, which is told. save: it returns the volume that the file reads as."""
     made = Compromises()
     solids = [combined(product, ball, made) for product in products]
-    save(solids, path)
-    off = _read_off(path, products, solids, made)
+    off = _off(save(solids, path), products, solids, made)
     if off == 0:
         return made, []
     spare = path.with_name(f"{path.name}.again")
     try:
         for share in SHORT if off is None else ():
             healed = [without_short_edges(solid, share) for solid in solids]
-            save(healed, spare)
-            if _read_off(spare, products, solids, made) == 0:
+            if _off(save(healed, spare), products, solids, made) == 0:
                 spare.replace(path)
                 return made, []
         if again and not made.repairs.spent:  # slivers that the file's digits lose
             rough = Compromises(rough=True, repairs=made.repairs)
             solids = [combined(product, ball, rough) for product in products]
-            save(solids, spare)
-            if _read_off(spare, products, solids, rough) == 0:
+            if _off(save(solids, spare), products, solids, rough) == 0:
                 spare.replace(path)
                 return rough, []
         parts = tuple(part.name for product in products for part in product.parts)
         if all(has_exact_mesh(product) and np.isfinite(product.bounds()).all() for product in products):
             with contextlib.suppress(NoSurfaceError):  # of facets that are too small; told below
                 solids = [faceted(product, fine=True) for product in products]
-                save(solids, spare)
-                if _read_off(spare, products, solids, Compromises(faceted=list(parts))) == 0:
+                if _off(save(solids, spare), products, solids, Compromises(faceted=list(parts))) == 0:
                     spare.replace(path)
                     note = _RESORTED if off is None else _RESORTED_VOLUME
                     return Compromises(repairs=made.repairs), [Change(parts, "flat facets", note=note)]
@@ -159,13 +160,12 @@ def _saved(
         spare.unlink(missing_ok=True)
 
 
-def _read_off(
-    path: Path, products: Sequence[Node], solids: Sequence[TopoDS_Shape], made: Compromises
+def _off(
+    volume: float | None, products: Sequence[Node], solids: Sequence[TopoDS_Shape], made: Compromises
 ) -> float | None:
-    """By which share the volume that a file of these solids reads as is off, 0 as far as it may be.
+    """By which share a volume that these solids' file reads as is off, 0 as far as it may be.
 
     None where it does not read as valid solids."""
-    volume = _volume_read(path)
     return None if volume is None else volume_off(products, volume, solids, made)
 
 
@@ -182,7 +182,16 @@ def _volume_read(path: Path) -> float | None:
     shape = reader.OneShape()
     if shape.IsNull() or not BRepCheck_Analyzer(shape).IsValid():
         return None
-    return volume_and_area(shape)[0]
+    return volume_of(shape)
+
+
+def _enlargement(assembly: Assembly, working: float) -> float:
+    """Power of ten by which an assembly is made larger. working: the length of its unit in those it is built
+    in."""
+    longest = working * float(np.ptp(np.array(assembly.bounds()), axis=0).max(initial=0.0))
+    if not math.isfinite(longest) or longest <= 0:
+        return 1.0
+    return 10.0 ** max(0, math.ceil(math.log10(_LARGE / longest)))
 
 
 def _with_note(change: Change, assembly: Assembly, made: Assembly) -> Change:
@@ -202,14 +211,15 @@ def _is_mitred(field: Field) -> bool:
     return field.rounds_inner_corners and has_common_rims(field)
 
 
-def _document(products: list[tuple[str, TopoDS_Shape]]) -> TDocStd_Document:
+def _document(products: list[tuple[str, TopoDS_Shape]], larger: float) -> TDocStd_Document:
+    """larger: times that shapes are as large as they are to be read."""
     from OCP.TCollection import TCollection_ExtendedString
     from OCP.TDataStd import TDataStd_Name
     from OCP.TDocStd import TDocStd_Document
     from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
     document = TDocStd_Document(TCollection_ExtendedString("XCAF"))
-    XCAFDoc_DocumentTool.SetLengthUnit_s(document, _WORKING)
+    XCAFDoc_DocumentTool.SetLengthUnit_s(document, _WORKING / larger)
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     for name, shape in products:
         label = shapes.AddShape(_readable(shape), False)
