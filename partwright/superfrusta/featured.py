@@ -19,6 +19,7 @@ from partwright.metrics.deviation import place_in
 from partwright.shapes import Shape
 from partwright.superfrusta.feature_assembly import FeatureAssembly, in_unit_frame
 from partwright.superfrusta.feature_boxes import with_whole_boxes
+from partwright.superfrusta.feature_chips import without_chips
 from partwright.superfrusta.feature_drilling import with_holes_drilled, without_feature
 from partwright.superfrusta.feature_freeform import far_off, most_explained, with_freeform
 from partwright.superfrusta.feature_mouths import LeftOut, mouths_left_out
@@ -160,8 +161,10 @@ class FeaturedFit:
         return self._freeform[id(tree)][1]
 
     def _finished(self, tree: FeatureTree) -> FeatureTree:
-        thin = thinned(self._search, self._with_freeform(tree), self._assemblies.in_unit_frame)
-        return with_holes_drilled(self._search, thin, self._assemblies.round_holes)
+        made = self._assemblies.in_unit_frame
+        thin = thinned(self._search, self._with_freeform(tree), made)
+        drilled = with_holes_drilled(self._search, thin, self._assemblies.round_holes)
+        return without_chips(self._search, drilled, made)
 
     def holes_left_out(self, own: Assembly) -> list[RoundHole]:
         """Round holes of the shape that an assembly in the unit frame fills."""
