@@ -103,14 +103,26 @@ def walls(profile: Profile, axis: int) -> Iterator[float]:
                 yield side.start[axis]
 
 
+def slanting_ends(profile: Profile, axis: int) -> Iterator[float]:
+    """Where sides that lie along none of a profile's axes begin and end: two parts have such a wall in common
+    where they have its ends."""
+    same = _ALONG * profile.size
+    for sides in profile.sides:
+        for side in sides:
+            way = np.abs(np.subtract(side.end, side.start))
+            if side.centre is None and way.min() > same:
+                yield side.start[axis]
+                yield side.end[axis]
+
+
 def centres(profile: Profile, axis: int) -> Iterator[float]:
     """Of its round holes, and its outline where that is a circle."""
     return (round_[1][axis] for loop in profile.loops if (round_ := circle_of(loop)))
 
 
 def _coordinates(part: Part) -> Iterator[tuple[int, float]]:
-    """Of the part without its copies: world axes and values, of its ends, its walls, and axes of what is
-    round."""
+    """Of the part without its copies: world axes and values, of its ends, its walls, the ends of slanting
+    ones, and axes of what is round."""
     if not isinstance(part.field, Box | Extrusion):
         yield from enumerate(part.translation)
     for own, k, sign in along(part):
@@ -129,4 +141,5 @@ def _own_coordinates(part: Part, axis: int) -> Iterator[float]:
         yield from (-height / 2, height / 2)
     elif axis < 2 and isinstance(field, Extrusion):
         yield from walls(field.profile, axis)
+        yield from slanting_ends(field.profile, axis)
         yield from centres(field.profile, axis)

@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from partwright.approximation.plain import plain
-from partwright.approximation.plain_levels import Levels, along, centres, walls
+from partwright.approximation.plain_levels import Levels, along, centres, slanting_ends, walls
 from partwright.assembly import Part, Similarity
 from partwright.assembly.checks import Vector
 from partwright.assembly.euler_angles import typed_turn
@@ -187,7 +187,8 @@ def _at_plain_levels(given: Part, part: Part, k: int, sign: float, levels: Level
 
 
 def _on_shared_walls(given: Part, part: Part, levels: Levels) -> Part:
-    """An extrusion with walls and axes of holes where other parts have them; of copies the first.
+    """An extrusion with walls, ends of those that slant, and axes of holes where other parts have them; of
+    copies the first.
 
     given: the part before its numbers were made plain.
     """
@@ -208,7 +209,7 @@ def _on_shared_walls_across(given: Part, part: Part, axis: int, k: int, sign: fl
     between such walls, or the widest of them stays where its plain profile has it."""
     before, field = cast(Extrusion, given.field).profile, cast(Extrusion, part.field)
     found: dict[float, float] = {}
-    for value in {*walls(before, axis), *centres(before, axis)}:
+    for value in {*walls(before, axis), *slanting_ends(before, axis), *centres(before, axis)}:
         level = levels.shared(k, given.translation[k] + sign * value)
         if level is not None:
             found[value] = level

@@ -78,3 +78,25 @@ def test_walls_that_lie_askew_are_nobodys() -> None:
     turn = Similarity.turn((0, 0, 1), 0.3).rotation
     part, block = Part(ell(1.0, 1.5), (0.0, 0.0, 0.0), turn), Part(Box((1, 1, 1)), (1.5004, 0, 0))
     assert plained(part, block)[0] == with_plain_numbers(part, WITHIN)
+
+
+@given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.3, 2), st.floats(0.3, 2))
+def test_a_slanting_wall_that_two_parts_share_stays_one(
+    x: float, y: float, width: float, height: float
+) -> None:
+    """Stacked extrusions, each with a middle of its own, whose slanting sides have the same ends."""
+    ends = np.array([(x, y), (x + width, y + height)])
+
+    def lying(back: float, z: float) -> Part:
+        corners = np.array([*ends, (x - back, y + height + 0.5), (x - back, y - 0.1)])
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        return Part(Extrusion(Profile.polygon((corners - middle).tolist()), 1.0), (*middle.tolist(), z))
+
+    parts = [lying(1.23456, 0.0), lying(2.71828, 1.0)]
+    sides = []
+    for part in plained(*parts):
+        assert isinstance(part.field, Extrusion)
+        corners = np.array(part.field.profile.outline)[:, :2] + part.translation[:2]
+        sides.append([corners[np.abs(corners - end).sum(axis=1).argmin()] for end in ends])
+        assert np.abs(np.array(sides[-1]) - ends).max() < 2.1 * WITHIN
+    np.testing.assert_allclose(sides[0], sides[1], rtol=0, atol=1e-9)
