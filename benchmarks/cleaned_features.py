@@ -20,7 +20,7 @@ import partwright as pw
 from partwright.atomic_io import write_bytes
 from partwright.cleaning.dimensions import values
 from partwright.export.solid_source import number
-from partwright.fields import Solid, Swept
+from partwright.fields import Pipe, Solid, Swept
 
 
 def digits(assembly: pw.Assembly) -> float:
@@ -31,6 +31,9 @@ def digits(assembly: pw.Assembly) -> float:
         if isinstance(part.field, Swept):
             lengths += [float(v) for v in part.field.profile.corners[:, :2].ravel()]
             lengths += [getattr(part.field, "height", 0.0)]
+        elif isinstance(part.field, Pipe):
+            lengths += [v for corner in part.field.path for v in corner]
+            lengths += [part.field.radius, part.field.thickness]
         elif isinstance(part.field, Solid):
             lengths += values(part.field).tolist()
     return mean(len(number(abs(v)).replace(".", "").strip("0")) for v in lengths if v)
