@@ -46,6 +46,7 @@ _Holes = Callable[[float, float], tuple[str, float] | None]
 _SMOOTH = np.radians(3.0)  # corners that turn by less were smooth
 _ROUNDED = 1 / 3  # tolerances that rounding may move a number: many are rounded at once
 _ROUNDED_OFF = 1e-2  # of a leg of a pipe, that its bends may take more than it has when they are rounded
+_OF_A_WALL = 1 / 60  # of a tube's wall, that its radius or the wall itself may move
 _FURTHER = 2.0  # tolerances that a corner may go, which two sides move
 _DIGITS = 13
 
@@ -192,7 +193,7 @@ def _cleaned(index: int, one: Lying, targets: _Targets, tolerance: float, grid: 
         return with_place(one, at, field=_swept(index, one, at, wanted, targets, tolerance, grid))
     if isinstance(field, Pipe):
         at = _tidy_place(np.array([_plain([v], tolerance, grid) for v in at.tolist()]), grid)
-        return with_place(one, at, field=_pipe(index, one, field, at, wanted, targets))
+        return with_place(one, at, field=_pipe(index, one, field, at, wanted, targets, grid))
     numbers = values(field)
     for k in range(len(numbers)):
         numbers[k] = targets.sizes.get((index, ("number", k)), numbers[k])
@@ -298,16 +299,26 @@ def _pipe(
     at: Floats,
     wanted: dict[tuple[int, Key], float],
     targets: _Targets,
+    grid: Grid,
 ) -> Pipe:
-    """With its corners at the levels that they are to be at."""
+    """With its corners at the levels that they are to be at, and of a tube no number that moves by more than
+    its wall allows."""
+    most = field.thickness * _OF_A_WALL if field.thickness else np.inf
+
+    def near(target: float, own: float) -> float:
+        return target if abs(target - own) <= most else next(grid.nearest(own, most), own)
+
     path = []
     for i, (*_, bend) in enumerate(field.path):
         place = []
         for local in range(3):
             k, sign = one.axis(local)
-            place.append(float(f"{sign * (wanted[local, ('corner', i)] - float(at[k])):.{_DIGITS}g}"))
-        path.append((place[0], place[1], place[2], targets.sizes.get((index, ("bend", i)), bend)))
-    wall, radius = targets.sizes.get((index, ("thickness",)), 0.0), targets.sizes[index, ("radius",)]
+            own = float(one.at[k]) + sign * field.path[i][local]
+            there = near(wanted[local, ("corner", i)], own)
+            place.append(float(f"{sign * (there - float(at[k])):.{_DIGITS}g}"))
+        path.append((place[0], place[1], place[2], near(targets.sizes.get((index, ("bend", i)), bend), bend)))
+    radius = near(targets.sizes[index, ("radius",)], field.radius)
+    wall = near(targets.sizes.get((index, ("thickness",)), 0.0), field.thickness)
     made = dataclasses.replace(field, radius=radius, thickness=wall)
     return made.with_corners(np.array(path), _ROUNDED_OFF)
 

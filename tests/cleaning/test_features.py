@@ -191,3 +191,13 @@ def test_the_command_tells_numbers(tmp_path: Path, capsys: pytest.CaptureFixture
     report = json.loads((tmp_path / "b.json.report.json").read_text())
     assert {"part", "name", "nominal", "measured", "deviation", "standard"} == set(report["numbers"][0])
     assert load_assembly(tmp_path / "b.json").parts[-1].field == Cylinder(3.3, 12)
+
+
+def test_the_wall_of_a_thin_tube_moves_by_little_of_it() -> None:
+    """Half a millimetre: rounded as coarsely as the tube is wide, it would be a fifth thinner."""
+    tube = Pipe(((0, 0, 0), (40, 0, 0, 12), (40, 30, 0)), 5.0, 0.5437)
+    cleaned = clean(Assembly((Part(tube, name="tube"),), unit="mm"), tolerance=0.5)
+    (made,) = (part.field for part in cleaned.assembly.parts)
+    assert isinstance(made, Pipe)
+    assert made.thickness == pytest.approx(tube.thickness, rel=1 / 50)
+    assert made.radius == pytest.approx(tube.radius, abs=0.01)
