@@ -1,5 +1,6 @@
 #include "damped_step.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace partwright {
@@ -24,19 +25,25 @@ PW_CLONES bool factor(Square& a) {
   return true;
 }
 
-// x of U^T U x = b.
-PW_CLONES void solve(const Square& u, const double* __restrict b, double* __restrict x) {
-  alignas(64) double left[PADDED];
-  std::copy_n(b, PADDED, left);
+// The inverse of U^T U, whose product with a vector has no number that waits for another.
+PW_CLONES void invert(const Square& u, Square& inverse) {
+  alignas(64) double x[DERIVATIVES][PADDED] = {};
+  double pivots[DERIVATIVES];
+  for (int k = 0; k < DERIVATIVES; ++k) pivots[k] = 1 / u.rows[k][k];
   for (int k = 0; k < DERIVATIVES; ++k) {
-    const double value = x[k] = left[k] / u.rows[k][k];
-    for (int i = 0; i < PADDED; ++i) left[i] -= u.rows[k][i] * value;
+    x[k][k] += 1;
+    for (int i = 0; i < PADDED; ++i) x[k][i] *= pivots[k];
+    for (int j = k + 1; j < DERIVATIVES; ++j)
+      for (int i = 0; i < PADDED; ++i) x[j][i] -= u.rows[k][j] * x[k][i];
   }
-  for (int i = DERIVATIVES - 1; i >= 0; --i) {
-    double sum = x[i];
-    for (int k = i + 1; k < DERIVATIVES; ++k) sum -= u.rows[i][k] * x[k];
-    x[i] = sum / u.rows[i][i];
+  for (int k = DERIVATIVES - 1; k >= 0; --k) {
+    for (int i = 0; i < PADDED; ++i) x[k][i] *= pivots[k];
+    for (int j = 0; j < k; ++j)
+      for (int i = 0; i < PADDED; ++i) x[j][i] -= u.rows[j][k] * x[k][i];
   }
+  // Where rounding leaves it no symmetric, conjugate gradients would not be conjugate.
+  for (int i = 0; i < DERIVATIVES; ++i)
+    for (int j = 0; j < PADDED; ++j) inverse.rows[i][j] = j < DERIVATIVES ? (x[i][j] + x[j < DERIVATIVES ? j : 0][i]) / 2 : 0.0;
 }
 
 // y += A^T x.
@@ -75,12 +82,12 @@ bool DampedStep::operator()(double damping, std::vector<double>& step) {
   const size_t n = moving_.size();
   Square identity{};
   for (int i = 0; i < DERIVATIVES; ++i) identity.rows[i][i] = 1;
-  factors_.assign(n / PADDED, identity);
+  inverses_.assign(n / PADDED, identity);
   damping_.assign(n, 0.0);
   for (const Pair& pair : pairs_) {
     if (pair.first != pair.second) continue;
     const size_t base = size_t(pair.first) * PADDED;
-    Square& own = factors_[size_t(pair.first)];
+    Square& own = inverses_[size_t(pair.first)];
     for (int r = 0; r < DERIVATIVES; ++r)
       for (int c = 0; c < DERIVATIVES; ++c)
         if (moving_[base + r] && moving_[base + c]) own.rows[r][c] = pair.block.rows[r][c];
@@ -90,12 +97,14 @@ bool DampedStep::operator()(double damping, std::vector<double>& step) {
       own.rows[r][r] += damping_[base + r];
     }
     if (!factor(own)) return false;
+    invert(own, own);
   }
   std::vector<double> x(n), residual(n), z(n), p(n), q(n);
   for (size_t i = 0; i < n; ++i) residual[i] = moving_[i] ? -gradient_[i] : 0.0;
   precondition(residual, z);
+  if (inverses_.size() == 1) x = z;  // which is the step itself
   p = z;
-  double rz = dot(residual, z);
+  double rz = inverses_.size() == 1 ? 0 : dot(residual, z);
   const double enough = rz * 1e-6;
   for (int iteration = 0; iteration < 60 && rz > enough && rz > 0; ++iteration) {
     multiply(p, q);
@@ -115,7 +124,8 @@ bool DampedStep::operator()(double damping, std::vector<double>& step) {
 }
 
 void DampedStep::precondition(const std::vector<double>& r, std::vector<double>& z) const {
-  for (size_t i = 0; i < factors_.size(); ++i) solve(factors_[i], &r[i * PADDED], &z[i * PADDED]);
+  std::fill(z.begin(), z.end(), 0.0);
+  for (size_t i = 0; i < inverses_.size(); ++i) add_product(inverses_[i], &r[i * PADDED], &z[i * PADDED]);
   for (size_t i = 0; i < z.size(); ++i) z[i] = moving_[i] ? z[i] : 0.0;
 }
 

@@ -1,5 +1,5 @@
 // The damped Gauss-Newton step by conjugate gradients. Parts couple only where they touch, so each part's own block
-// is nearly all there is: with the blocks' factors as preconditioner a few products with the sparse matrix do, where
+// is nearly all there is: with the blocks' inverses as preconditioner a few products with the sparse matrix do, where
 // a dense factorisation would cost the cube of the number of parts.
 #pragma once
 
@@ -36,7 +36,7 @@ class DampedStep {
   std::vector<Pair> pairs_;
   std::vector<char> moving_;  // padded, as are all that follow
   std::vector<double> gradient_, damping_;
-  std::vector<Square> factors_;
+  std::vector<Square> inverses_;  // of the parts' own blocks
 };
 
 }  // namespace partwright

@@ -4,16 +4,20 @@
 
 #include "blocks.hpp"
 #include "parallel.hpp"
-#include "products.hpp"
 
 namespace partwright {
 namespace {
 
 constexpr int64_t ENOUGH_FOR_THREADS = 1 << 20;  // bytes: less is summed before a thread is up
 
-PW_CLONES void scale_rows(const float* __restrict d, const float* __restrict by, int rows, int length, float* __restrict out) {
-  for (int r = 0; r < rows; ++r)
-    for (int i = 0; i < BLOCK; ++i) out[r * length + i] = d[r * BLOCK + i] * by[i];
+// The sum of v times by, lane by lane and then of the lanes.
+PW_CLONES double dot(const float* __restrict v, const float* __restrict by) {
+  float lanes[16] = {};
+  for (int i = 0; i < BLOCK; i += 16)
+    for (int lane = 0; lane < 16; ++lane) lanes[lane] += v[i + lane] * by[i + lane];
+  double sum = 0;
+  for (const float lane : lanes) sum += lane;
+  return sum;
 }
 
 PW_CLONES void count(const float* __restrict field, const float* __restrict inside, const float* __restrict weight, float* __restrict both,
@@ -139,9 +143,7 @@ void gradients(const std::vector<Part>& parts, const float* points, const float*
   std::vector<double> sums(size_t(pieces) * size, 0.0);
   parallel_for(pieces, threads, [&](int64_t piece) {
     Workspace w(parts.size());
-    std::vector<float> d(DERIVATIVES * BLOCK), scaled(DERIVATIVES * BLOCK);
-    alignas(64) float ones[BLOCK];
-    std::fill_n(ones, BLOCK, 1.f);
+    std::vector<float> d(DERIVATIVES * BLOCK);
     const auto [first, last] = piece_range(count, piece);
     for (int64_t b = first; b < last; ++b) {
       const int n = load(points, b * BLOCK, count, w.block);
@@ -152,9 +154,9 @@ void gradients(const std::vector<Part>& parts, const float* points, const float*
         const float *share = &w.share[m * BLOCK], *blend = &w.blend[m * BLOCK];
         if (largest(share) == 0 && largest(blend) == 0) continue;
         derivatives(parts[m], w.block, d.data());
-        scale_rows(d.data(), share, FIELD_DERIVATIVES, BLOCK, scaled.data());
-        std::memcpy(&scaled[D_BLEND * BLOCK], blend, BLOCK * sizeof(float));
-        times_vector(scaled.data(), ones, BLOCK, &sums[size_t(piece) * size + m * DERIVATIVES]);
+        double* sum = &sums[size_t(piece) * size + m * DERIVATIVES];
+        for (int i = 0; i < FIELD_DERIVATIVES; ++i) sum[i] += dot(&d[size_t(i) * BLOCK], share);
+        for (int i = 0; i < BLOCK; ++i) sum[D_BLEND] += blend[i];
       }
     }
   });

@@ -1,5 +1,8 @@
 #include "normal_equations.hpp"
 
+#include <algorithm>
+#include <atomic>
+#include <cmath>
 #include <cstring>
 
 #include "blocks.hpp"
@@ -11,6 +14,8 @@ namespace {
 
 // Reconstruction, overlap and smooth-union consistency.
 constexpr int KINDS = 3;
+// Of the steepest that a residual can be: where it moves less with a part, it is not taken to.
+constexpr float LEAST = 3e-4f;
 
 // Residuals of one block and their derivatives by F and by each part's occupancy.
 struct Residuals {
@@ -90,81 +95,107 @@ double residuals(const std::vector<Part>& parts, const SampleBlocks& samples, in
   return all_residuals(s.target, s.root, w.assembled, w.total, beta, penalties, r);
 }
 
-// Points of a block, or of such a selection, that are of any use; as columns of a Jacobian padded to whole lanes.
-struct Selection {
-  int index[BLOCK];
-  int count = 0, padded = 0;
-  bool all = false;
+// Which points of a block are of any use.
+struct Chosen {
+  uint64_t words[BLOCK / 64] = {};
 
-  // Those of `from` points whose size is above the least; all of them where that is most.
-  void collect(const float* size, float least, int from) {
-    count = 0;
-    for (int i = 0; i < from; ++i) {
-      index[count] = i;
-      count += size[i] > least;
-    }
-    if (4 * count > 3 * from)
-      collect_all(from);
-    else
-      pad(false);
-  }
+  bool none() const { return !(words[0] | words[1]); }
+  friend Chosen operator|(Chosen a, Chosen b) { return {{a.words[0] | b.words[0], a.words[1] | b.words[1]}}; }
+  friend Chosen operator&(Chosen a, Chosen b) { return {{a.words[0] & b.words[0], a.words[1] & b.words[1]}}; }
 
-  void collect_all(int from) {
-    count = from;
-    pad(true);
-  }
-
- private:
-  void pad(bool whole) {
-    all = whole;
-    padded = (count + 15) / 16 * 16;
+  // Their indices, and how many they are.
+  int list(uint8_t* index) const {
+    int count = 0;
+    for (int word = 0; word < BLOCK / 64; ++word)
+      for (uint64_t left = words[word]; left; left &= left - 1) index[count++] = uint8_t(64 * word + __builtin_ctzll(left));
+    return count;
   }
 };
+static_assert(BLOCK == 128);
 
-void gather(const float* v, const Selection& selection, float* out) {
-  if (selection.all)
-    std::memcpy(out, v, size_t(selection.count) * sizeof(float));
-  else
-    for (int i = 0; i < selection.count; ++i) out[i] = v[selection.index[i]];
-  std::fill(out + selection.count, out + selection.padded, 0.f);
+// Those whose size is above the least.
+PW_CLONES Chosen above(const float* __restrict size, float least) {
+  alignas(64) uint8_t flags[BLOCK];
+  for (int i = 0; i < BLOCK; ++i) flags[i] = std::fabs(size[i]) > least;
+  Chosen chosen;
+  for (int i = 0; i < BLOCK; i += 8) {
+    // Eight bytes of 0 or 1 times this have their sum of bits in the highest byte.
+    uint64_t eight;
+    std::memcpy(&eight, flags + i, sizeof eight);
+    chosen.words[i / 64] |= (eight * 0x0102040810204080ull >> 56) << i % 64;
+  }
+  return chosen;
 }
 
-// Derivatives d (rows, BLOCK) at selected points, times the selected factors `by`.
-PW_CLONES void scale_selected(const float* __restrict d, const float* __restrict by, const Selection& selection, int rows, int length,
-                              float* __restrict out) {
-  const int padded = selection.padded;
-  for (int r = 0; r < rows; ++r) {
-    const float* row = d + r * BLOCK;
-    if (selection.all)
-      for (int i = 0; i < padded; ++i) out[r * length + i] = row[i] * by[i];
-    else
-      for (int i = 0; i < padded; ++i) out[r * length + i] = row[selection.index[i < selection.count ? i : 0]] * by[i];
+// One residual's rows of points (BLOCK, ROW): derivatives `rows` (count, ROW) of the field at the points of this index,
+// each of whose last is 1, times factors of the field and of its blend, and the residual. All of them by index are written.
+PW_CLONES void scale_rows(const float* __restrict rows, const uint8_t* __restrict index, int count, const float* __restrict by,
+                          const float* __restrict by_blend, const float* __restrict residual, float* __restrict out) {
+  for (int k = 0; k < count; ++k) {
+    const int point = index[k];
+    const float scale = by[point], of_blend = by_blend[point], last = residual[point];
+    for (int i = 0; i < ROW; ++i) out[point * ROW + i] = rows[k * ROW + i] * (i < D_BLEND ? scale : i == D_BLEND ? of_blend : last);
   }
 }
 
-// The selected points of a block, padded with one of them; the block itself where that is all.
-const Block& selected_points(const Block& from, const Selection& selection, Block& block) {
-  if (selection.all) return from;
-  for (int i = 0; i < selection.padded; ++i) {
-    const int j = selection.index[i < selection.count ? i : 0];
-    block.x[i] = from.x[j];
-    block.y[i] = from.y[j];
-    block.z[i] = from.z[j];
-  }
-  return block;
+PW_CLONES void pick(const float* __restrict from, const uint8_t* __restrict index, int count, float* __restrict out) {
+  for (int i = 0; i < count; ++i) out[i] = from[index[i]];
 }
+
+// Sums of a piece: blocks of the matrix by pairs of parts, each with J^T r as its last column.
+class Sums {
+ public:
+  explicit Sums(size_t parts) : parts_(parts), place_(parts * parts, -1) {}
+
+  double* block(int first, int second) {
+    int& place = place_[size_t(first) * parts_ + size_t(second)];
+    if (place < 0) {
+      place = int(pairs_.size());
+      pairs_.emplace_back(first, second);
+      sums_.resize(sums_.size() + DERIVATIVES * ROW, 0.0);
+    }
+    return &sums_[size_t(place) * DERIVATIVES * ROW];
+  }
+
+  void add_to(NormalEquations& total) const {
+    for (size_t at = 0; at < pairs_.size(); ++at) {
+      const auto [first, second] = pairs_[at];
+      const double* from = &sums_[at * DERIVATIVES * ROW];
+      auto& block = total.blocks[pairs_[at]];
+      if (block.empty()) block.assign(DERIVATIVES * DERIVATIVES, 0.0);
+      for (size_t r = 0; r < DERIVATIVES; ++r) {
+        for (size_t c = 0; c < DERIVATIVES; ++c) block[r * DERIVATIVES + c] += from[r * ROW + c];
+        if (first == second) total.gradient[size_t(first) * DERIVATIVES + r] += from[r * ROW + DERIVATIVES];
+      }
+    }
+  }
+
+  double loss = 0;
+
+ private:
+  size_t parts_;
+  std::vector<int> place_;
+  std::vector<std::pair<int, int>> pairs_;
+  std::vector<double> sums_;
+};
+
+// A part that moves and is felt in a block, and the points at which each of its residuals is.
+struct Active {
+  int part;
+  Chosen at[KINDS];
+};
 
 // Buffers of one thread for the equations of M parts.
 struct Scratchpad {
-  explicit Scratchpad(size_t m) : w(m), d(DERIVATIVES * BLOCK), coefficients(m * KINDS * BLOCK) {}
+  explicit Scratchpad(size_t m) : w(m), d(ROW * BLOCK), of_points(BLOCK * ROW), rows(m * KINDS * BLOCK * ROW) {
+    std::fill_n(&d[DERIVATIVES * BLOCK], BLOCK, 1.f);
+  }
   Workspace w;
-  std::vector<float> d, rows, coefficients;
-  std::vector<int> active;
-};
+  std::vector<float> d, of_points, rows;
+  std::vector<Active> active;
 
-PW_CLONES void keep_larger(float* __restrict size, const float* __restrict v) {
-  for (int i = 0; i < BLOCK; ++i) size[i] = std::max(size[i], std::fabs(v[i]));
-}
+  float* rows_of(size_t active, int kind) { return &rows[(active * KINDS + size_t(kind)) * BLOCK * ROW]; }
+};
 
 }  // namespace
 
@@ -181,12 +212,13 @@ namespace {
 constexpr float SILENT = 12;
 float unfelt_from(const Part& part, float beta) { return SILENT / beta + part.blend; }
 
-// The distances of a part in a block, if it is felt there; a single part always is.
-void update(const std::vector<Part>& parts, size_t m, const SampleBlocks& samples, int64_t b, PartDistances& distances) {
+// The distances of a part in a block, if it is felt there; a single part always is. Says whether it is.
+bool update(const std::vector<Part>& parts, size_t m, const SampleBlocks& samples, int64_t b, PartDistances& distances) {
   const SampleBlock& s = samples[b];
   const bool felt = parts.size() == 1 || reaches(parts[m], s.ball, unfelt_from(parts[m], samples.beta()));
   distances.felt(b, m) = felt;
   if (felt) values(parts[m], s.at, distances.block(b) + m * BLOCK);
+  return felt;
 }
 
 }  // namespace
@@ -194,131 +226,119 @@ void update(const std::vector<Part>& parts, size_t m, const SampleBlocks& sample
 void measure(const std::vector<Part>& parts, const SampleBlocks& samples, int threads, PartDistances& distances) {
   parallel_for(piece_count(samples.count()), threads, [&](int64_t piece) {
     const auto [first, last] = piece_range(samples.count(), piece);
-    for (int64_t b = first; b < last; ++b)
+    for (int64_t b = first; b < last; ++b) {
       for (size_t m = 0; m < parts.size(); ++m) update(parts, m, samples, b, distances);
+      distances.still(b) = PartDistances::UNKNOWN;
+    }
   });
 }
 
+namespace {
+
+// One block's part of the sums. Each point has up to three residuals, and where one moves with some part that has a row
+// of derivatives. Saturated points, most of them where beta is large, have none; and where parts hardly blend one part
+// has most of a point's rows.
+void add_block(const std::vector<Part>& parts, const std::vector<char>& live, const SampleBlocks& samples, int64_t b, Penalties penalties,
+               const PartDistances& distances, Scratchpad& pad, Sums& sums) {
+  auto& w = pad.w;
+  Residuals r;
+  const float beta = samples.beta();
+  distances.felt(b, w.folded);
+  const bool moves = std::any_of(w.folded.begin(), w.folded.end(), [&](size_t m) { return live[m]; });
+  const double still = distances.still(b);
+  sums.loss += moves || still < 0 ? residuals(parts, samples, b, penalties, distances.block(b), w, r) : still;
+  if (!moves) return;
+  std::fill_n(w.carried, BLOCK, 1.f);
+  backward(parts, w);
+  alignas(64) static constexpr float none[BLOCK] = {};
+  const bool used[KINDS] = {true, penalties.overlap > 0 && largest(r.over) > 0, penalties.blending > 0 && largest(r.blended) > 0};
+  const float* residual[KINDS] = {r.rec, r.over, r.blended};
+  const float *by_field[KINDS] = {r.rec_f, none, r.blended_f}, *by_occupancy[KINDS] = {none, r.over_o, r.blended_o};
+  const float least = LEAST * 0.25f * beta * samples[b].heaviest;
+  pad.active.clear();
+  for (const size_t m : w.folded) {
+    if (!live[m]) continue;
+    Active one{int(m), {}};
+    Chosen any;
+    alignas(64) float by[KINDS][BLOCK];
+    for (int kind = 0; kind < KINDS; ++kind) {
+      if (!used[kind]) continue;
+      by_part(by_field[kind], &w.share[m * BLOCK], parts[m].sign > 0 ? by_occupancy[kind] : none, &w.occ[m * BLOCK], beta, by[kind]);
+      one.at[kind] = above(by[kind], least);
+      any = any | one.at[kind];
+    }
+    if (any.none()) continue;
+    uint8_t index[BLOCK];
+    const int count = any.list(index), padded = (count + 15) / 16 * 16;
+    std::fill(index + count, index + padded, index[0]);
+    Block at;
+    pick(samples[b].at.x, index, padded, at.x);
+    pick(samples[b].at.y, index, padded, at.y);
+    pick(samples[b].at.z, index, padded, at.z);
+    derivatives(parts[m], at, pad.d.data(), padded);
+    pick(&w.blend[m * BLOCK], index, padded, &pad.d[D_BLEND * BLOCK]);
+    by_points(pad.d.data(), BLOCK, padded, pad.of_points.data());
+    for (int kind = 0; kind < KINDS; ++kind)
+      if (!one.at[kind].none())
+        scale_rows(pad.of_points.data(), index, count, by[kind], by_field[kind], residual[kind], pad.rows_of(pad.active.size(), kind));
+    pad.active.push_back(one);
+  }
+  for (size_t i = 0; i < pad.active.size(); ++i)
+    for (size_t j = i; j < pad.active.size(); ++j) {
+      double* sum = nullptr;
+      for (int kind = 0; kind < KINDS; ++kind) {
+        const Chosen both = pad.active[i].at[kind] & pad.active[j].at[kind];
+        if (both.none()) continue;
+        if (!sum) sum = sums.block(pad.active[i].part, pad.active[j].part);
+        uint8_t index[BLOCK];
+        const int count = both.list(index);
+        add_products(pad.rows_of(i, kind), pad.rows_of(j, kind), index, count, sum);
+      }
+    }
+}
+
+}  // namespace
+
 NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const SampleBlocks& samples,
                                  Penalties penalties, int threads, const PartDistances& distances) {
-  const float beta = samples.beta();
-  std::vector<NormalEquations> pieces(size_t(piece_count(samples.count())));
+  const int64_t count = piece_count(samples.count());
+  std::vector<Sums> pieces(size_t(count), Sums(parts.size()));
   const auto scratch = [&] { return Scratchpad(parts.size()); };
-  parallel_for(int64_t(pieces.size()), threads, scratch, [&](int64_t piece, Scratchpad& pad) {
-    NormalEquations& sum = pieces[size_t(piece)];
-    sum.gradient.assign(parts.size() * DERIVATIVES, 0.0);
-    auto& [w, d, rows, coefficients, active] = pad;
-    Residuals r;
-    Block block;
-    alignas(64) float none[BLOCK] = {};
+  parallel_for(count, threads, scratch, [&](int64_t piece, Scratchpad& pad) {
     const auto [first, last] = piece_range(samples.count(), piece);
-    for (int64_t b = first; b < last; ++b) {
-      distances.felt(b, w.folded);
-      sum.loss += residuals(parts, samples, b, penalties, distances.block(b), w, r);
-      std::fill_n(w.carried, BLOCK, 1.f);
-      backward(parts, w);
-      // Each point has up to three residuals, and each residual that moves with some part is a column of the
-      // block's Jacobian. Saturated points, most of them where beta is large, have none.
-      const bool over = penalties.overlap > 0 && largest(r.over) > 0;
-      const bool blended = penalties.blending > 0 && largest(r.blended) > 0;
-      const bool used[KINDS] = {true, over, blended};
-      const float* residual[KINDS] = {r.rec, r.over, r.blended};
-      const float *by_field[KINDS] = {r.rec_f, none, r.blended_f}, *by_occupancy[KINDS] = {none, r.over_o, r.blended_o};
-      const float least = 1e-3f * 0.25f * beta * samples[b].heaviest;
-      alignas(64) float size[KINDS][BLOCK] = {}, any[BLOCK] = {};
-      active.clear();
-      for (const size_t m : w.folded) {
-        if (!live[m]) continue;
-        float* c = &coefficients[active.size() * KINDS * BLOCK];
-        float top = 0;
-        for (int kind = 0; kind < KINDS; ++kind) {
-          if (!used[kind]) continue;
-          const float* by_added = parts[m].sign > 0 ? by_occupancy[kind] : none;
-          by_part(by_field[kind], &w.share[m * BLOCK], by_added, &w.occ[m * BLOCK], beta, c + kind * BLOCK);
-          top = std::max(top, largest(c + kind * BLOCK));
-        }
-        if (top < least) continue;
-        for (int kind = 0; kind < KINDS; ++kind)
-          if (used[kind]) keep_larger(size[kind], c + kind * BLOCK);
-        active.push_back(int(m));
-      }
-      if (active.empty()) continue;
-      for (const auto& of_kind : size) keep_larger(any, of_kind);
-      // Derivatives are of the points that have a column; what a kind lacks of those is left out of its columns.
-      Selection points, columns[KINDS];
-      points.collect(any, least, BLOCK);
-      const Block& at = selected_points(samples[b].at, points, block);
-      int length = 0;
-      alignas(64) float errors[KINDS * BLOCK], selected[BLOCK], by[BLOCK];
-      for (int kind = 0; kind < KINDS; ++kind) {
-        if (!used[kind]) continue;
-        if (over || blended) {
-          gather(size[kind], points, selected);
-          columns[kind].collect(selected, least, points.count);
-        } else {
-          columns[kind].collect_all(points.count);
-        }
-        gather(residual[kind], points, selected);
-        gather(selected, columns[kind], errors + length);
-        length += columns[kind].padded;
-      }
-      rows.resize(active.size() * DERIVATIVES * size_t(length));
-      for (size_t i = 0; i < active.size(); ++i) {
-        const size_t m = size_t(active[i]);
-        float* out = &rows[i * DERIVATIVES * size_t(length)];
-        derivatives(parts[m], at, d.data(), points.padded);
-        gather(&w.blend[m * BLOCK], points, &d[D_BLEND * BLOCK]);
-        for (int kind = 0, start = 0; kind < KINDS; start += columns[kind++].padded) {
-          if (!used[kind]) continue;
-          gather(&coefficients[(i * KINDS + size_t(kind)) * BLOCK], points, selected);
-          gather(selected, columns[kind], by);
-          scale_selected(d.data(), by, columns[kind], FIELD_DERIVATIVES, length, out + start);
-          gather(by_field[kind], points, selected);
-          gather(selected, columns[kind], by);
-          scale_selected(&d[D_BLEND * BLOCK], by, columns[kind], 1, length, out + D_BLEND * length + start);
-        }
-        times_vector(out, errors, length, &sum.gradient[m * DERIVATIVES]);
-      }
-      for (size_t i = 0; i < active.size(); ++i)
-        for (size_t j = i; j < active.size(); ++j) {
-          auto& product = sum.blocks[{active[i], active[j]}];
-          if (product.empty()) product.assign(DERIVATIVES * DERIVATIVES, 0.0);
-          const float *a = &rows[i * DERIVATIVES * size_t(length)], *c = &rows[j * DERIVATIVES * size_t(length)];
-          if (i == j)
-            outer_square(a, length, product.data());
-          else
-            outer_product(a, c, length, product.data());
-        }
-    }
+    for (int64_t b = first; b < last; ++b) add_block(parts, live, samples, b, penalties, distances, pad, pieces[size_t(piece)]);
   });
-  NormalEquations total = std::move(pieces[0]);
-  for (size_t piece = 1; piece < pieces.size(); ++piece) {
-    const NormalEquations& part = pieces[piece];
-    total.loss += part.loss;
-    for (size_t i = 0; i < total.gradient.size(); ++i) total.gradient[i] += part.gradient[i];
-    for (const auto& [key, block] : part.blocks) {
-      auto& sum = total.blocks[key];
-      if (sum.empty()) sum.assign(DERIVATIVES * DERIVATIVES, 0.0);
-      for (size_t i = 0; i < block.size(); ++i) sum[i] += block[i];
-    }
+  NormalEquations total;
+  total.gradient.assign(parts.size() * DERIVATIVES, 0.0);
+  for (const Sums& piece : pieces) {
+    total.loss += piece.loss;
+    piece.add_to(total);
   }
-  for (auto& [pair, block] : total.blocks)
-    if (pair.first == pair.second) mirror(block);
   return total;
 }
 
 double loss(const std::vector<Part>& parts, const std::vector<char>& live, const SampleBlocks& samples,
-            Penalties penalties, int threads, PartDistances& distances) {
+            Penalties penalties, int threads, PartDistances& distances, double enough) {
   double sums[MOST_PIECES] = {};
+  std::atomic<double> so_far{0};
   const auto workspace = [&] { return Workspace(parts.size()); };
   parallel_for(piece_count(samples.count()), threads, workspace, [&](int64_t piece, Workspace& w) {
     Residuals r;
     const auto [first, last] = piece_range(samples.count(), piece);
-    for (int64_t b = first; b < last; ++b) {
+    for (int64_t b = first; b < last && so_far.load(std::memory_order_relaxed) < enough; ++b) {
+      bool moves = false;
       for (size_t m = 0; m < parts.size(); ++m)
-        if (live[m]) update(parts, m, samples, b, distances);
-      distances.felt(b, w.folded);
-      sums[piece] += residuals(parts, samples, b, penalties, distances.block(b), w, r);
+        if (live[m]) moves |= update(parts, m, samples, b, distances);
+      double& still = distances.still(b);
+      double now = still;
+      if (moves || now < 0) {
+        distances.felt(b, w.folded);
+        now = residuals(parts, samples, b, penalties, distances.block(b), w, r);
+        if (!moves) still = now;
+      }
+      sums[piece] += now;
+      for (double sum = so_far; !so_far.compare_exchange_weak(sum, sum + now);) {
+      }
     }
   });
   double total = 0;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
@@ -30,11 +31,19 @@ struct NormalEquations {
 // at this sharpness, it has none: most parts are far from most blocks.
 class PartDistances {
  public:
+  static constexpr double UNKNOWN = -1;
+
   PartDistances(size_t parts, const SampleBlocks& samples)
-      : parts_(parts), values_(size_t(samples.blocks()) * parts * BLOCK), felt_(size_t(samples.blocks()) * parts) {}
+      : parts_(parts),
+        values_(size_t(samples.blocks()) * parts * BLOCK),
+        felt_(size_t(samples.blocks()) * parts),
+        still_(size_t(samples.blocks()), UNKNOWN) {}
   float* block(int64_t b) { return values_.data() + size_t(b) * parts_ * BLOCK; }
   const float* block(int64_t b) const { return values_.data() + size_t(b) * parts_ * BLOCK; }
   char& felt(int64_t b, size_t part) { return felt_[size_t(b) * parts_ + part]; }
+  // The loss of a block in which no part that moves is felt.
+  double& still(int64_t b) { return still_[size_t(b)]; }
+  double still(int64_t b) const { return still_[size_t(b)]; }
   // The parts with distances in a block, in their order.
   void felt(int64_t b, std::vector<size_t>& parts) const;
 
@@ -42,6 +51,7 @@ class PartDistances {
   size_t parts_;
   std::vector<float> values_;
   std::vector<char> felt_;
+  std::vector<double> still_;
 };
 
 // Brings the distances of all parts up to date, for calls at the samples' sharpness.
@@ -51,8 +61,9 @@ void measure(const std::vector<Part>& parts, const SampleBlocks& samples, int th
 NormalEquations normal_equations(const std::vector<Part>& parts, const std::vector<char>& live, const SampleBlocks& samples,
                                  Penalties penalties, int threads, const PartDistances& distances);
 
-// Brings the distances of live parts up to date on the way.
-double loss(const std::vector<Part>& parts, const std::vector<char>& live, const SampleBlocks& samples,
-            Penalties penalties, int threads, PartDistances& distances);
+// Brings the distances of live parts up to date on the way. Ends early, with what it has then, where the sum so far is no
+// less than `enough` by more than it can be rounded.
+double loss(const std::vector<Part>& parts, const std::vector<char>& live, const SampleBlocks& samples, Penalties penalties,
+            int threads, PartDistances& distances, double enough = std::numeric_limits<double>::infinity());
 
 }  // namespace partwright

@@ -54,9 +54,26 @@ void tie(NormalEquations& system, const std::vector<char>& tied) {
   }
 }
 
-Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied,
-                  SampleBlocks samples, const std::vector<Stage>& stages, Penalties penalties, const Limits& limits,
-                  int threads) {
+// By how much of it a sum may differ with the order of its terms.
+constexpr double ROUNDED = 1e-9;
+
+// stages: each with the samples at its sharpness.
+using Sharpened = std::vector<std::pair<Stage, SampleBlocks>>;
+
+Sharpened sharpened(const Samples& samples, bool compact, const std::vector<Stage>& stages) {
+  Sharpened result;
+  for (const Stage& stage : stages) {
+    if (result.empty())
+      result.emplace_back(stage, SampleBlocks(samples, compact));
+    else
+      result.emplace_back(stage, result.back().second);
+    result.back().second.sharpen(stage.beta);
+  }
+  return result;
+}
+
+Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied, const Sharpened& stages,
+                  Penalties penalties, const Limits& limits, int threads) {
   const int parts = int(rows.size() / COLUMNS);
   std::vector<char> live(size_t(parts), 0);
   for (int i = 0; i < parts; ++i)
@@ -64,10 +81,10 @@ Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const 
   Outcome out{std::move(rows), 0, 0};
   std::vector<char> moving(size_t(parts) * DERIVATIVES);
   std::vector<double> step;
-  PartDistances distances(size_t(parts), samples), tried(distances);
-  for (const Stage& stage : stages) {
+  if (stages.empty()) return out;
+  PartDistances distances(size_t(parts), stages[0].second), tried(distances);
+  for (const auto& [stage, samples] : stages) {
     double damping = 1e-2;
-    samples.sharpen(stage.beta);
     measure(prepared(out.rows), samples, threads, distances);
     tried = distances;
     NormalEquations system = normal_equations(prepared(out.rows), live, samples, penalties, threads, distances);
@@ -90,7 +107,7 @@ Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const 
           std::vector<float> candidate = out.rows;
           for (int i = 0; i < parts; ++i)
             if (live[size_t(i)]) move(&candidate[size_t(i) * COLUMNS], &step[size_t(i) * DERIVATIVES], &moving[size_t(i) * DERIVATIVES], limits, tied[size_t(i)]);
-          const double now = loss(prepared(candidate), live, samples, penalties, threads, tried);
+          const double now = loss(prepared(candidate), live, samples, penalties, threads, tried, system.loss * (1 + ROUNDED));
           if (now < system.loss) {
             gain = (system.loss - now) / system.loss;
             out.rows = std::move(candidate);
@@ -119,22 +136,32 @@ Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const 
 Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied,
                             const Samples& samples, const std::vector<Stage>& stages, Penalties penalties,
                             const Limits& limits, int threads) {
-  SampleBlocks blocks(samples, rows.size() > COLUMNS);
-  return minimised(std::move(rows), free, tied, std::move(blocks), stages, penalties, limits, threads);
+  return minimised(std::move(rows), free, tied, sharpened(samples, rows.size() > COLUMNS, stages), penalties, limits, threads);
 }
 
 std::vector<Outcome> fit_starts(const std::vector<float>& starts, const std::vector<int64_t>& first,
                                 const std::vector<int64_t>& last, const std::vector<char>& free,
                                 const std::vector<char>& tied, const Samples& samples, const std::vector<Stage>& stages,
                                 Penalties penalties, const Limits& limits, int threads) {
-  std::vector<Outcome> out(first.size());
-  parallel_for(int64_t(first.size()), threads, [&](int64_t i) {
-    const int64_t a = first[size_t(i)];
+  // Those of the same range, which mostly come one after another, share its samples.
+  std::vector<size_t> run_of(first.size()), begun;
+  for (size_t i = 0; i < first.size(); ++i) {
+    if (!i || first[i] != first[i - 1] || last[i] != last[i - 1]) begun.push_back(i);
+    run_of[i] = begun.size() - 1;
+  }
+  std::vector<Sharpened> shared(begun.size());
+  parallel_for(int64_t(begun.size()), threads, [&](int64_t run) {
+    const int64_t a = first[begun[size_t(run)]];
     const Samples own{samples.points + 3 * a, samples.distance + a, samples.weight + a,
-                      samples.background ? samples.background + a : nullptr, last[size_t(i)] - a};
-    const std::vector<float> row(&starts[size_t(i) * COLUMNS], &starts[size_t(i) * COLUMNS] + COLUMNS);
-    const std::vector<char> mask(&free[size_t(i) * DERIVATIVES], &free[size_t(i) * DERIVATIVES] + DERIVATIVES);
-    out[size_t(i)] = levenberg_marquardt(row, mask, {tied[size_t(i)]}, own, stages, penalties, limits, 1);
+                      samples.background ? samples.background + a : nullptr, last[begun[size_t(run)]] - a};
+    shared[size_t(run)] = sharpened(own, false, stages);
+  });
+  std::vector<Outcome> out(first.size());
+  parallel_for(int64_t(first.size()), threads, [&](int64_t start) {
+    const size_t i = size_t(start);
+    const std::vector<float> row(&starts[i * COLUMNS], &starts[i * COLUMNS] + COLUMNS);
+    const std::vector<char> mask(&free[i * DERIVATIVES], &free[i * DERIVATIVES] + DERIVATIVES);
+    out[i] = minimised(row, mask, {tied[i]}, shared[run_of[i]], penalties, limits, 1);
   });
   return out;
 }

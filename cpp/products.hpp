@@ -1,18 +1,21 @@
-// Products of rows of DERIVATIVES derivatives over many samples, summed into doubles.
+// Products of rows of a Jacobian over the points of a block, summed into doubles.
 #pragma once
 
-#include <vector>
+#include <cstdint>
+
+#include "superfrustum.hpp"
 
 namespace partwright {
 
-// C (DERIVATIVES, DERIVATIVES) += A B^T; A, B (DERIVATIVES, length), length a multiple of 16.
-void outer_product(const float* a, const float* b, int length, double* c);
+// Entries of one point's row: the derivatives by one part's parameters, and its residual. A whole register, so that the
+// product of two rows is one instruction for each entry of the first.
+constexpr int ROW = DERIVATIVES + 1;
+static_assert(ROW == 16);
 
-// C += A A^T, but only its lower triangle, which `mirror` copies to the upper once all are summed.
-void outer_square(const float* a, int length, double* c);
-void mirror(std::vector<double>& c);
+// So many rows (DERIVATIVES, stride) of derivatives at `count` points, a multiple of 8, as rows of points (count, ROW).
+void by_points(const float* derivatives, int stride, int count, float* rows);
 
-// c (DERIVATIVES,) += A v.
-void times_vector(const float* a, const float* v, int length, double* c);
+// C (DERIVATIVES, ROW) += A^T B, over `count` of their rows (n, ROW).
+void add_products(const float* a, const float* b, const uint8_t* index, int count, double* c);
 
 }  // namespace partwright
