@@ -9,6 +9,7 @@
 #include "beyond_planes.hpp"
 #include "chains.hpp"
 #include "evaluate.hpp"
+#include "grid_values.hpp"
 #include "hull.hpp"
 #include "morphology.hpp"
 #include "normal_equations.hpp"
@@ -299,6 +300,15 @@ NB_MODULE(_kernel, m) {
     std::copy(kept.begin(), kept.end(), out.data());
     return out;
   }, "points"_a, "tolerance"_a, "Indices of the corners of an open chain (K, 2) that lines within the tolerance need.");
+
+  m.def("read_grid", [](In<float> values, In<double> origin, double spacing, In<double> points) {
+    auto out = array<double>({points.shape(0)});
+    const std::array<int64_t, 3> counts{int64_t(values.shape(0)), int64_t(values.shape(1)), int64_t(values.shape(2))};
+    nb::gil_scoped_release release;
+    read_grid(values.data(), counts, origin.data(), spacing, points.data(), int64_t(points.shape(0)), out.data());
+    return out;
+  }, "values"_a, "origin"_a, "spacing"_a, "points"_a,
+     "Distance (N,) at points (N, 3), interpolated in a grid (X, Y, Z); beyond it that of its nearest place, and the way there.");
 
   m.def("networks_distances", [](In<float> local, std::vector<In<float>> weights, std::vector<In<float>> shifts, In<float> scale,
                                  In<float> room, In<float> unit, float reach, int octaves, int threads) {

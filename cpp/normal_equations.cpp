@@ -95,6 +95,16 @@ double residuals(const std::vector<Part>& parts, const SampleBlocks& samples, in
   return all_residuals(s.target, s.root, w.assembled, w.total, beta, penalties, r);
 }
 
+int lowest_bit(uint64_t word) {
+#if defined(__GNUC__)
+  return __builtin_ctzll(word);
+#else
+  int bit = 0;
+  while (!(word >> bit & 1)) ++bit;
+  return bit;
+#endif
+}
+
 // Which points of a block are of any use.
 struct Chosen {
   uint64_t words[BLOCK / 64] = {};
@@ -107,7 +117,7 @@ struct Chosen {
   int list(uint8_t* index) const {
     int count = 0;
     for (int word = 0; word < BLOCK / 64; ++word)
-      for (uint64_t left = words[word]; left; left &= left - 1) index[count++] = uint8_t(64 * word + __builtin_ctzll(left));
+      for (uint64_t left = words[word]; left; left &= left - 1) index[count++] = uint8_t(64 * word + lowest_bit(left));
     return count;
   }
 };
@@ -187,11 +197,12 @@ struct Active {
 
 // Buffers of one thread for the equations of M parts.
 struct Scratchpad {
-  explicit Scratchpad(size_t m) : w(m), d(ROW * BLOCK), of_points(BLOCK * ROW), rows(m * KINDS * BLOCK * ROW) {
+  explicit Scratchpad(size_t m) : w(m), d(ROW * BLOCK), of_points(BLOCK * ROW), rows(new float[m * KINDS * BLOCK * ROW]) {
     std::fill_n(&d[DERIVATIVES * BLOCK], BLOCK, 1.f);
   }
   Workspace w;
-  std::vector<float> d, of_points, rows;
+  std::vector<float> d, of_points;
+  std::unique_ptr<float[]> rows;  // as many as there may be, set as they are needed
   std::vector<Active> active;
 
   float* rows_of(size_t active, int kind) { return &rows[(active * KINDS + size_t(kind)) * BLOCK * ROW]; }
@@ -203,6 +214,13 @@ void PartDistances::felt(int64_t b, std::vector<size_t>& parts) const {
   parts.clear();
   for (size_t m = 0; m < parts_; ++m)
     if (felt_[size_t(b) * parts_ + m]) parts.push_back(m);
+}
+
+void PartDistances::take(const PartDistances& other, const std::vector<char>& live) {
+  felt_ = other.felt_;
+  still_ = other.still_;
+  for (size_t at = 0; at < felt_.size(); ++at)
+    if (felt_[at] && !live[at % parts_]) std::copy_n(&other.values_[at * BLOCK], BLOCK, &values_[at * BLOCK]);
 }
 
 namespace {

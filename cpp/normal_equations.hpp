@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -35,11 +36,15 @@ class PartDistances {
 
   PartDistances(size_t parts, const SampleBlocks& samples)
       : parts_(parts),
-        values_(size_t(samples.blocks()) * parts * BLOCK),
+        values_(new float[size_t(samples.blocks()) * parts * BLOCK]),
         felt_(size_t(samples.blocks()) * parts),
         still_(size_t(samples.blocks()), UNKNOWN) {}
-  float* block(int64_t b) { return values_.data() + size_t(b) * parts_ * BLOCK; }
-  const float* block(int64_t b) const { return values_.data() + size_t(b) * parts_ * BLOCK; }
+
+  // Those of the parts that stay, of another set for the same samples.
+  void take(const PartDistances& other, const std::vector<char>& live);
+
+  float* block(int64_t b) { return values_.get() + size_t(b) * parts_ * BLOCK; }
+  const float* block(int64_t b) const { return values_.get() + size_t(b) * parts_ * BLOCK; }
   char& felt(int64_t b, size_t part) { return felt_[size_t(b) * parts_ + part]; }
   // The loss of a block in which no part that moves is felt.
   double& still(int64_t b) { return still_[size_t(b)]; }
@@ -49,7 +54,7 @@ class PartDistances {
 
  private:
   size_t parts_;
-  std::vector<float> values_;
+  std::unique_ptr<float[]> values_;  // where a part is felt; not set elsewhere
   std::vector<char> felt_;
   std::vector<double> still_;
 };

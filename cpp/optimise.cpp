@@ -82,11 +82,11 @@ Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const 
   std::vector<char> moving(size_t(parts) * DERIVATIVES);
   std::vector<double> step;
   if (stages.empty()) return out;
-  PartDistances distances(size_t(parts), stages[0].second), tried(distances);
+  PartDistances distances(size_t(parts), stages[0].second), tried(size_t(parts), stages[0].second);
   for (const auto& [stage, samples] : stages) {
     double damping = 1e-2;
     measure(prepared(out.rows), samples, threads, distances);
-    tried = distances;
+    tried.take(distances, live);
     NormalEquations system = normal_equations(prepared(out.rows), live, samples, penalties, threads, distances);
     tie(system, tied);
     for (int iteration = 0; iteration < stage.iterations; ++iteration) {

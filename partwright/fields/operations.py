@@ -38,6 +38,11 @@ def smooth_union(a: Array, b: Array, k: float | Array) -> Array:
     w = clamp(1/2 + (b - a) / (2 k), 0, 1) but keeps its gradient accurate for small k.
     """
     xp = library(a)
+    if isinstance(k, float) and xp is np:  # the same values, by half of the passes
+        least: Any = np.minimum(a, b)
+        if k > SHARP:
+            least -= np.maximum(_like(a, k) - abs(a - b), 0) ** 2 / (4 * _like(a, k))
+        return least
     radius = _like(a, k)
     blended = radius > SHARP
     safe = xp.where(blended, radius, xp.ones_like(radius))

@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright import _kernel
 from partwright.shapes.distance import DistanceSource, grid_indices
 from partwright.shapes.frame import LONGEST_SIDE
 
@@ -34,6 +35,14 @@ class DistanceGrid:
         """(n, 3) of some of them, by their places in values.ravel()."""
         index = np.unravel_index(voxels, self.values.shape)
         return self.origin + self.spacing * np.stack(index, axis=1)
+
+    def read(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Signed distance (n,) at points (n, 3), interpolated; beyond the grid, at least the way there."""
+        places = np.ascontiguousarray(points, np.float64)
+        if places.ndim != 2 or places.shape[1] != 3:
+            raise ValueError(f"points must be (N, 3), got {places.shape}")
+        values, origin = np.ascontiguousarray(self.values), np.ascontiguousarray(self.origin, np.float64)
+        return np.asarray(_kernel.read_grid(values, origin, float(self.spacing), places))
 
     def in_bricks(self) -> NDArray[np.int64]:
         """Places of all voxels in values.ravel(), brick by brick: what comes together lies together, so that

@@ -134,11 +134,20 @@ def _largest(
     voxels: NDArray[np.bool_], touching: NDArray[np.float64] | None, count: int, least: float
 ) -> list[NDArray[np.bool_]]:
     """Voxels (X * Y * Z,) of the largest connected pieces, if they are of more than the least size."""
-    pieces, _ = ndimage.label(voxels, touching)
+    if np.count_nonzero(voxels) <= least:
+        return []
+    ends = [np.flatnonzero(voxels.any(axis=tuple({0, 1, 2} - {axis})))[[0, -1]] for axis in range(3)]
+    box = tuple(slice(first, last + 1) for first, last in ends)
+    pieces, _ = ndimage.label(voxels[box], touching)
     sizes = np.bincount(pieces.ravel())
     sizes[0] = 0
     order = np.argsort(-sizes, kind="stable")[:count]
-    return [(pieces == piece).ravel() for piece in order if sizes[piece] > least]
+    found = []
+    for piece in order[sizes[order] > least]:
+        whole = np.zeros(voxels.shape, bool)
+        whole[box] = pieces == piece
+        found.append(whole.ravel())
+    return found
 
 
 def grow(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Grown:
@@ -198,32 +207,26 @@ def finalists(
     All starts are screened briefly on few samples, and the best go on. `overlap` is the price of running into
     the other parts. Growth asks none: a new part that may not cross what is there gets stuck in its region.
     """
-    # Regions of the same voxels, which differ in what they count around them, start alike.
-    of_voxels = {id(region.voxels): region for region in wanted}
-    points = {key: samples.grid_points[np.flatnonzero(one.voxels)] for key, one in of_voxels.items()}
+    # Regions of the same voxels, which differ in what they count around them, go on from the same starts, the
+    # best for the first of them: others are hardly better.
+    first = {id(region.voxels): i for i, region in reversed([*enumerate(wanted)])}
+    points = {key: samples.grid_points[np.flatnonzero(wanted[i].voxels)] for key, i in first.items()}
     views = [_view(samples, region, points[id(region.voxels)]) for region in wanted]
-    starting = {key: _guesses(samples, one, points[key], settings) for key, one in of_voxels.items()}
-    guesses = [starting[id(region.voxels)] for region in wanted]
-    owner = np.repeat(np.arange(len(wanted)), [len(g) for g in guesses])
+    guesses = [_guesses(samples, wanted[i], points[key], settings) for key, i in first.items()]
+    owner = np.repeat(list(first.values()), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))
-    screened, losses = _run(
-        samples,
-        np.concatenate(guesses),
-        owner,
-        views,
-        _SCREEN_EVERY,
-        sharpened(_SCREEN, depth),
-        overlap,
-        settings,
-    )
-    kept = np.concatenate([_best(losses, owner, i, _SCREENED_STARTS) for i in range(len(wanted))])
-    fitted, losses = _run(
-        samples, screened[kept], owner[kept], views, 1, sharpened(_FIT, depth), overlap, settings
-    )
+    rows = np.concatenate(guesses)
+    stages = sharpened(_SCREEN, depth)
+    screened, losses = _run(samples, rows, owner, views, _SCREEN_EVERY, stages, overlap, settings)
+    kept = np.concatenate([_best(losses, owner, i, _SCREENED_STARTS) for i in first.values()])
+    rows, owner = screened[kept], owner[kept]
+    mine = [np.flatnonzero(owner == first[id(region.voxels)]) for region in wanted]
+    rows, owner = rows[np.concatenate(mine)], np.repeat(np.arange(len(wanted)), [len(one) for one in mine])
+    fitted, losses = _run(samples, rows, owner, views, 1, sharpened(_FIT, depth), overlap, settings)
     # A thin part that shoots out of the shape passes between the few samples out there.
     astray = samples.stray_weight(fitted) * (fitted[:, Column.SIGN] > 0)
-    losses += astray / np.array([len(view.index) for view in views])[owner[kept]]
-    return fitted, owner[kept], losses
+    losses += astray / np.array([len(view.index) for view in views])[owner]
+    return fitted, owner, losses
 
 
 def _guesses(samples: FitSamples, region: Region, points: NDArray[np.float32], settings: Settings) -> Rows:

@@ -8,7 +8,6 @@ from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from partwright.fields.columns import WIDTH, Column
 from partwright.fields.kernel import Target
@@ -313,11 +312,7 @@ class FitSamples:
 
     def near_distance(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
         """Signed distance (n,) of the shape at points (n, 3), read off the grid."""
-        grid = self.grid
-        place = (points - grid.origin) / grid.spacing
-        within = np.clip(place, 0, np.array(grid.values.shape) - 1)
-        read = ndimage.map_coordinates(grid.values, within.T, order=1, mode="nearest")
-        return np.asarray(read + grid.spacing * np.linalg.norm(place - within, axis=1), np.float32)
+        return self.grid.read(points).astype(np.float32)
 
     def distance_of(self, rows: Rows, points: NDArray[np.float32]) -> NDArray[np.float32]:
         """Distance (N,) of the assembly at points; far outside where there are no parts yet."""

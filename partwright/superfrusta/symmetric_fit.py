@@ -142,8 +142,8 @@ class _Copies:
         return found
 
     def lift(self, tied: NDArray[np.bool_]) -> Floats:
-        """(C * 15, L * 15) what takes steps of the leaves to steps of their copies: a copy's place moves in
-        the world, it turns about local axes."""
+        """(C, 15, 15) what takes steps of each copy's leaf to its own: it moves in the world and turns about
+        local axes."""
         blocks = np.tile(np.eye(STEP_WIDTH), (len(self.leaf), 1, 1))
         blocks[self.moved, TRANSLATION_STEP, TRANSLATION_STEP] = self.by.linear
         improper = (self.by.flips != np.eye(3)).any(axis=(1, 2))
@@ -151,9 +151,11 @@ class _Copies:
         blocks[self.moved[improper], ROTATION_STEP, ROTATION_STEP] = -_FLIP
         round_ = tied[self.leaf]
         blocks[round_, Tangent.SY] = blocks[round_, Tangent.SX]
-        lift = np.zeros((len(self.leaf), STEP_WIDTH, len(tied), STEP_WIDTH))
-        lift[np.arange(len(self.leaf)), :, self.leaf] = blocks
-        return lift.reshape(len(self.leaf) * STEP_WIDTH, -1)
+        return blocks
+
+    def summed(self, values: Floats) -> Floats:
+        """(L, ...) of each leaf, of values (C, ...) of the copies."""
+        return np.asarray(np.add.reduceat(values, np.flatnonzero(np.diff(self.leaf, prepend=-1)), axis=0))
 
 
 def expanded(leaves: Sequence[RepeatedPart]) -> Rows:
@@ -205,7 +207,7 @@ class LeafSteps:
         free = freedom(rows, moving, settings)
         free[tied, Tangent.SY] = False
         copies = _Copies.of(leaves)
-        return cls(moving, copies, free, tied, copies.lift(tied)[:, np.flatnonzero(free)])
+        return cls(moving, copies, free, tied, copies.lift(tied))
 
     @property
     def leaf(self) -> NDArray[np.int64]:
@@ -218,7 +220,14 @@ class LeafSteps:
 
     def projected(self, gradient: Floats, matrix: Floats) -> tuple[Floats, Floats]:
         """Normal equations of all copies as those of the entries (n,) that may move."""
-        return self._lift.T @ gradient, self._lift.T @ matrix @ self._lift
+        copies, summed = len(self.leaf), self._copies.summed
+        by_copy = (copies, STEP_WIDTH, -1)
+        back = self._lift.swapaxes(1, 2)
+        right = summed(matrix.reshape(-1, copies, STEP_WIDTH).swapaxes(0, 1) @ self._lift)  # (L, C * 15, 15)
+        both = summed(back @ right.swapaxes(0, 1).reshape(by_copy))  # (L, 15, L * 15)
+        may = np.flatnonzero(self._free)
+        one = summed(back @ gradient.reshape(by_copy)).ravel()
+        return one[may], both.reshape(-1, both.shape[-1])[np.ix_(may, may)]
 
     def taken(self, rows: Rows, entries: Floats) -> Rows:
         """The leaves' rows after a step (n,) of what may move."""

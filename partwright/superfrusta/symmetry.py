@@ -11,7 +11,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.rows import lengths
 from partwright.shapes import Shape
 from partwright.shapes.grid import DistanceGrid
 from partwright.superfrusta.settings import Settings
@@ -40,7 +39,7 @@ class Isometry:
 
     def __call__(self, points: NDArray[np.floating]) -> Floats:
         """Points (N, 3) moved, in float64."""
-        return np.asarray(np.einsum("ij,nj->ni", self.linear, points) + self.shift)
+        return np.asarray(points.astype(np.float64) @ self.linear.T + self.shift)
 
     def __matmul__(self, first: Isometry) -> Isometry:
         """`first`, then this one."""
@@ -189,17 +188,7 @@ def _fans(moments: Floats, principal: Floats) -> Iterator[Floats]:
 
 def image_error(grid: DistanceGrid, isometry: Isometry, points: Floats) -> float:
     """Mean distance from the surface of the images of points (N, 3)."""
-    return float(np.abs(_sampled(grid, isometry(points))).mean())
-
-
-def _sampled(grid: DistanceGrid, points: Floats) -> Floats:
-    """Distance (N,) interpolated in the grid; beyond it, at least the way there."""
-    from scipy.ndimage import map_coordinates
-
-    cell = (points - grid.origin) / grid.spacing
-    within = np.clip(cell, 0, np.array(grid.values.shape) - 1)
-    values = map_coordinates(grid.values, within.T, order=1, mode="nearest")
-    return np.asarray(values + grid.spacing * lengths(cell - within), np.float64)
+    return float(np.abs(grid.read(isometry(points))).mean())
 
 
 def refined(
@@ -214,14 +203,14 @@ def refined(
     moved: it after a small rigid motion. enough: mean distance that needs no more.
     """
     for _ in range(_STEPS):
-        residual = _sampled(grid, isometry(points))
+        residual = grid.read(isometry(points))
         if np.abs(residual).mean() < enough:
             break
         nudged = np.concatenate([moved(isometry, nudge)(points) for nudge in _NUDGES])
-        jacobian = (_sampled(grid, nudged).reshape(len(_NUDGES), -1) - residual).T / _WIDTH
+        jacobian = (grid.read(nudged).reshape(len(_NUDGES), -1) - residual).T / _WIDTH
         step = np.linalg.lstsq(jacobian, -residual, rcond=0.05)[0]
         better = moved(isometry, _motion(np.clip(step, -0.1, 0.1)))
-        if np.abs(_sampled(grid, better(points))).mean() >= np.abs(residual).mean():
+        if np.abs(grid.read(better(points))).mean() >= np.abs(residual).mean():
             break
         isometry = better
     return isometry

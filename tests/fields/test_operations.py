@@ -57,3 +57,11 @@ def test_gradients_share_out_one() -> None:
 def test_precision_is_kept(dtype: Any) -> None:
     assert fields.smooth_union(A.astype(dtype), B.astype(dtype), 0.3).dtype == dtype
     assert fields.smooth_union(torch.tensor(A.astype(dtype)), torch.tensor(B), 0.3).dtype == torch.float64
+
+
+@pytest.mark.parametrize("k", [0.0, 1e-9, 1e-8, 0.02, 0.5])
+def test_one_blend_for_all_is_that_blend_for_each(k: float) -> None:
+    a, b = np.random.default_rng(0).normal(size=(2, 500)).astype(np.float32)
+    one, each = fields.smooth_union(a, b, k), fields.smooth_union(a, b, np.full(500, k))
+    assert one.dtype == each.dtype == np.float32
+    np.testing.assert_array_equal(one, each)

@@ -11,6 +11,7 @@ import pytest
 import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy import ndimage
 from solids import box_distance
 
 from partwright.errors import (
@@ -23,6 +24,7 @@ from partwright.errors import (
 )
 from partwright.shapes import load_shape
 from partwright.shapes.contour import contour
+from partwright.shapes.grid import DistanceGrid
 from partwright.shapes.topology import EdgeTable, signed_volumes
 
 CENTRES = np.stack(np.meshgrid(*[np.arange(48) - 23.5] * 3, indexing="ij"), axis=-1)
@@ -268,3 +270,19 @@ def test_contours_of_any_values_are_closed_and_face_outwards(seed):
     assert edges.valence.max() == 2
     assert len(np.unique(vertices, axis=0)) == len(vertices)
     assert signed_volumes(vertices, faces, np.zeros(len(faces), np.int64))[0] > 0
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 10_000), flat=st.booleans())
+def test_a_grid_is_read_as_scipy_reads_it(seed: int, flat: bool) -> None:
+    rng = np.random.default_rng(seed)
+    counts = (4, 1 if flat else 3, 6)
+    grid = DistanceGrid(rng.normal(size=3), 0.3, rng.normal(size=counts).astype(np.float32))
+    end = grid.origin + grid.spacing * (np.array(counts) - 1)
+    points = rng.uniform(grid.origin - 0.5, end + 0.5, (200, 3))
+    points[:2] = grid.origin, end
+    place = (points - grid.origin) / grid.spacing
+    within = np.clip(place, 0, np.array(counts) - 1)
+    read = ndimage.map_coordinates(grid.values.astype(np.float64), within.T, order=1, mode="nearest")
+    away = grid.spacing * np.linalg.norm(place - within, axis=1)
+    np.testing.assert_allclose(grid.read(points), read + away, rtol=1e-12, atol=1e-12)

@@ -15,14 +15,14 @@ from partwright.assembly.parts_from_rows import parts_from_rows
 from partwright.assembly.rows import rows
 from partwright.fields import SuperFrustum, kernel
 from partwright.fields.columns import ROTATION as ROTATION_OF
-from partwright.fields.columns import TRANSLATION, Column
+from partwright.fields.columns import STEP_WIDTH, TRANSLATION, Column
 from partwright.methods import FitRequest
 from partwright.shapes import load_shape
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.repeated_parts import repeat
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, images, refit, rigid
+from partwright.superfrusta.symmetric_fit import LeafSteps, RepeatedPart, expanded, images, refit, rigid
 from partwright.superfrusta.symmetry import Isometry, Symmetry, groups, mirror, rotation, symmetries
 from tests.assembly.strategies import ROTATION, SUPERFRUSTA, VECTOR
 from tests.superfrusta.meshes import box, table, union
@@ -198,6 +198,22 @@ def test_copies_are_refitted_as_one(isometry: Isometry, others: list[int]) -> No
     assert np.array_equal(expanded(after)[:3], exact[others])
     assert score(samples, expanded(before)) < 0.97
     assert score(samples, expanded(after)) > 0.995
+
+
+def test_equations_of_copies_are_those_of_their_leaves() -> None:
+    rng = np.random.default_rng(0)
+    moves = (mirror(X, ORIGIN), rotation(Z, 1.0, X))
+    rows = known_table()[1][:3]
+    leaves = [RepeatedPart(row, moves[:copies]) for row, copies in zip(rows, (0, 2, 1), strict=True)]
+    steps = LeafSteps.of(leaves, DRAFT, np.array([True, True, False]))
+    entries = np.flatnonzero(steps._free)
+    lift = np.zeros((6, STEP_WIDTH, 3, STEP_WIDTH))
+    lift[np.arange(6), :, steps.leaf] = steps._lift
+    lift = lift.reshape(6 * STEP_WIDTH, -1)[:, entries]
+    gradient, matrix = rng.normal(size=len(lift)), rng.normal(size=(len(lift),) * 2)
+    one, both = steps.projected(gradient, matrix + matrix.T)
+    np.testing.assert_allclose(one, lift.T @ gradient, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(both, lift.T @ (matrix + matrix.T) @ lift, rtol=0, atol=1e-12)
 
 
 def test_a_fit_repeats_parts_only_if_asked() -> None:
