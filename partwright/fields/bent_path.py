@@ -14,6 +14,7 @@ from partwright.fields.operations import is_tensor, library
 NEAR = 1e-9
 """Of a path's length: feet so little beyond the ends of runs and bends, which meet there, count."""
 _TINY = 1e-30
+_LEAST_SINE = 1e-12  # of a turn, that nothing is divided by less than
 _STRAIGHT = 1e-7  # radians: a corner that turns by less has no bend
 _SHARPEST = math.radians(175)  # a corner that turns by more lies too far out to say where the bend is
 
@@ -126,14 +127,19 @@ def bent_path(corners: np.ndarray) -> tuple[Run | Bend, ...]:
         begin = places[i] - reach * before
         if left - reach > near:
             found.append(Run(start, begin))
-        inwards = after - float(after @ before) * before
-        inwards = inwards / np.linalg.norm(inwards)
-        found.append(Bend(begin + bends[i] * inwards, -inwards, before, float(bends[i]), turn))
+        found.append(bend_between(before, after, begin, float(bends[i])))
         start, left = places[i] + reach * after, float(lengths[i]) - reach
         _check_fits(i, reach, float(lengths[i]), near)
     if left > near:
         found.append(Run(start, places[-1]))
     return tuple(found)
+
+
+def bend_between(before: np.ndarray, after: np.ndarray, begin: np.ndarray, radius: float) -> Bend:
+    """The bend from one direction (3,) to another, unit vectors, that begins at a place (3,)."""
+    inwards = after - float(after @ before) * before
+    inwards = inwards / max(float(np.linalg.norm(inwards)), _LEAST_SINE)
+    return Bend(begin + radius * inwards, -inwards, before, radius, _turn(before, after))
 
 
 def bent_corners(corners: np.ndarray) -> np.ndarray:
@@ -185,9 +191,14 @@ def _tangents(places: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.tan(turns / 2), [0.0]])
 
 
+def taken_of_legs(corners: np.ndarray) -> np.ndarray:
+    """(K,) what the bend at each corner of a path (K, 4) takes of the legs beside it."""
+    return np.asarray(_tangents(corners[:, :3]) * corners[:, 3])
+
+
 def lacking(corners: np.ndarray) -> np.ndarray:
     """(K - 1,) by how much each leg of a path (K, 4) is too short for the bends at its ends."""
-    taken = _tangents(corners[:, :3]) * corners[:, 3]
+    taken = taken_of_legs(corners)
     lengths = np.linalg.norm(np.diff(corners[:, :3], axis=0), axis=1)
     return np.asarray(taken[:-1] + taken[1:] - lengths)
 

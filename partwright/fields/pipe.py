@@ -103,21 +103,18 @@ class Pipe(Field):
             (last.at(share)[1], last.directions(share)[1]),
         )
 
-    def places(self, step: float) -> tuple[np.ndarray, np.ndarray]:
-        """(K, 3) places along the path that are at most `step` apart, the ends among them, and tangents."""
+    def _places(self, step: float) -> np.ndarray:
+        """(K, 3) places along the path that are at most `step` apart, the ends among them."""
         found: list[np.ndarray] = []
-        tangents: list[np.ndarray] = []
         for piece in self.pieces:
-            count = max(1, math.ceil(piece.length / step))
-            share = np.linspace(0.0, 1.0, count + 1)[1 if found else 0 :]
-            found.append(piece.at(share))
-            tangents.append(piece.directions(share))
-        return np.concatenate(found), np.concatenate(tangents)
+            share = np.linspace(0.0, 1.0, max(1, math.ceil(piece.length / step)) + 1)
+            found.append(piece.at(share[1 if found else 0 :]))
+        return np.concatenate(found)
 
     def _check_clearance(self) -> None:
         """Bends wider than the radius keep the pipe from itself nearby; this looks further along the path."""
         step = max(self.radius / 2, self.length / 2000)
-        places, _ = self.places(step)
+        places = self._places(step)
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
         for i, place in enumerate(places):
             later = along - along[i] > math.pi * self.radius + step

@@ -19,7 +19,7 @@ from partwright.approximation.sketches.pipe_tracing import PipeTracing, Traced
 from partwright.assembly import Part
 from partwright.errors import ParameterError
 from partwright.fields import Pipe
-from partwright.fields.bent_path import Bend, Run, lacking, with_fitting_bends
+from partwright.fields.bent_path import Bend, Run, bend_between, lacking, taken_of_legs, with_fitting_bends
 from partwright.fields.pipe import path_of
 from partwright.meshing.manifolds import surface_of
 from partwright.meshing.pipes import piped
@@ -204,16 +204,11 @@ def _meeting(one: _Line, other: _Line) -> Floats:
 def _loose(corners: Floats) -> list[Run | Bend]:
     """The legs and bends of a path, whether or not these fit between one another."""
     places = corners[:, :3]
-    found: list[Run | Bend] = [Run(a, b) for a, b in pairwise(places)]
-    for i in range(1, len(places) - 1):
-        before, after = (found[k].directions(np.zeros(1))[0] for k in (i - 1, i))
-        inwards = after - float(after @ before) * before
-        turn = math.atan2(float(np.linalg.norm(inwards)), float(after @ before))
-        inwards = inwards / max(float(np.linalg.norm(inwards)), 1e-12)
-        bend = float(corners[i, 3])
-        begin = places[i] - bend * math.tan(turn / 2) * before
-        found.append(Bend(begin + bend * inwards, -inwards, before, bend, turn))
-    return found
+    legs = [Run(a, b) for a, b in pairwise(places)]
+    ways = [leg.directions(np.zeros(1))[0] for leg in legs]
+    begins = places[1:-1] - taken_of_legs(corners)[1:-1, None] * np.array(ways[:-1])
+    bends = map(bend_between, ways[:-1], ways[1:], begins, corners[1:-1, 3].tolist())
+    return [*legs, *bends]
 
 
 class _Walls(NamedTuple):
@@ -224,17 +219,13 @@ class _Walls(NamedTuple):
 
 
 def _walls(corners: Floats, radius: float, near: Floats) -> _Walls | None:
-    own = []
-    legs = _loose(corners)
-    for k, piece in enumerate(legs):
+    own, taken = [], taken_of_legs(corners)
+    for k, piece in enumerate(_loose(corners)):
         squared = piece.squared(near, 0.0)
         if isinstance(piece, Run):  # without what the bends at its ends take
             along = (near - piece.start) @ (piece.end - piece.start) / piece.length
-            cut = [
-                bend.radius * math.tan(bend.angle / 2) if isinstance(bend, Bend) else 0.0
-                for bend in (_bend_at(legs, len(corners), k), _bend_at(legs, len(corners), k + 1))
-            ]
-            squared = np.where((along > cut[0]) & (along < piece.length - cut[1]), squared, np.inf)
+            straight = (along > taken[k]) & (along < piece.length - taken[k + 1])
+            squared = np.where(straight, squared, np.inf)
         own.append(squared)
     squares = np.array(own)
     owner = squares.argmin(axis=0)
@@ -244,11 +235,6 @@ def _walls(corners: Floats, radius: float, near: Floats) -> _Walls | None:
         return None
     chosen = walls[np.linspace(0, len(walls) - 1, min(_POINTS, len(walls))).astype(int)]
     return _Walls(near[chosen], owner[chosen])
-
-
-def _bend_at(legs: Sequence[Run | Bend], count: int, corner: int) -> Bend | None:
-    found = legs[count - 1 + corner - 1] if 0 < corner < count - 1 else None
-    return found if isinstance(found, Bend) else None
 
 
 def _reach(legs: Sequence[Run | Bend], walls: _Walls) -> Floats:

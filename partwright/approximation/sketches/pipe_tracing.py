@@ -68,10 +68,6 @@ class Traced:
     wall: Floats
 
     @property
-    def length(self) -> float:
-        return float(np.linalg.norm(np.diff(self.middles, axis=0), axis=1).sum())
-
-    @property
     def bends(self) -> bool:
         """Whether it turns anywhere."""
         return bool((self.ways @ self.ways[0]).min() < math.cos(math.radians(8)))
