@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from partwright.assembly.tree import Node, Part
 
 _LONG_NAME = 24  # characters, from which on a name is a hash and its beginning is enough
+_MAX_CORNERS = 12  # of a path that are printed
 _MAX_NUMBERS = 6  # of one parameter that are printed
 
 
@@ -108,12 +109,20 @@ def _value(value: object, digits: int) -> str:
     if isinstance(value, str):
         return value if len(value) < _LONG_NAME else f"{value[:12]}..."
     if isinstance(value, tuple) and isinstance(value[0], tuple):
-        return f"of {len(value)} corners"
+        return _path(value, digits)
     if isinstance(value, tuple) and len(value) > _MAX_NUMBERS:
         return f"of {len(value)} numbers"
     if isinstance(value, Profile):
         return str(value)
     return _numbers(value, digits)
+
+
+def _path(corners: tuple[tuple[float, ...], ...], digits: int) -> str:
+    """Of a pipe's corners each with its bend; of a long row of them only how many."""
+    if len(corners) > _MAX_CORNERS:
+        return f"of {len(corners)} corners"
+    bends = (f" bend {_number(bend, digits)}" if bend else "" for *_, bend in corners)
+    return " to ".join(f"{_numbers(c[:3], digits)}{bend}" for c, bend in zip(corners, bends, strict=True))
 
 
 def _numbers(values: object, digits: int) -> str:

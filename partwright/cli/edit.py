@@ -16,7 +16,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description="Sets numbers of parts by name. What stood on a face that moves, or reached out of it, "
         "goes with it, cuts that went through still do, cuts of one face keep their depth, and copies of a "
         "part, or of its group, change with it; each such change is said. `partwright describe` shows names "
-        "and numbers, those of a profile in a row: profile.y (0, 8, 20) are profile.y.1 to profile.y.3.",
+        "and numbers, those of a profile in a row: profile.y (0, 8, 20) are profile.y.1 to profile.y.3; of "
+        "a pipe's path corner k is path.k.x, path.k.y and path.k.z, with bend.k.",
     )
     option = command.add_argument
     add_assembly(command)

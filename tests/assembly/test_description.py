@@ -6,7 +6,7 @@ import dataclasses
 
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.instance_patterns import Circle, Grid, with_pattern
-from partwright.fields import Cylinder, Profile, Quadric, Revolution
+from partwright.fields import Cylinder, Pipe, Profile, Quadric, Revolution
 
 
 def test_the_tree_is_readable() -> None:
@@ -47,3 +47,11 @@ def test_profiles_are_described_by_the_numbers_that_can_be_set() -> None:
     comb = [(x, y) for x in range(1, 9) for y in ((0, x), (x, 0))[x % 2]]
     many = Part(Revolution(Profile.polygon([(0, -1), (9, -1), *comb[::-1], (0, 0)])), name="many")
     assert "profile.diameter of 9 numbers, " in many.describe()
+
+
+def test_a_pipe_is_described_by_its_corners_and_bends() -> None:
+    pipe = Pipe(((0, 0, 0), (30, 0, 0, 10), (30, 20, 0, 8), (30, 20, 30)), 3)
+    text = Assembly((Part(pipe, name="pipe"),)).describe()
+    assert "path (0, 0, 0) to (30, 0, 0) bend 10 to (30, 20, 0) bend 8 to (30, 20, 30), radius 3" in text
+    long = Pipe(tuple((10.0 * k, 0, 0) for k in range(20)), 1)
+    assert "path of 20 corners" in Assembly((Part(long),)).describe()
