@@ -41,6 +41,8 @@ _AGAIN = 40  # points at once, thrice at most
 _TIMES = 3
 _FELT = 0.5  # of what is furthest off in the whole: less adds a sixteenth at most to the norm over parts
 _WAYS, _SHELLS = 64, 12  # from a point outwards, and distances that are tried in each
+_CLIMBED, _PLACE = 32, 0.06  # places beside which others may stick out further, at most, and their side
+_CLIMB_WAYS, _CLIMB = 14, (0.03, 0.015, 0.008, 0.004)  # ways from each, and steps in unit lengths
 STICKS_OUT = 1.8  # times that sticking out counts, which is seen first: more than in a search
 
 
@@ -79,12 +81,15 @@ class CloseLook:
         added = np.flatnonzero(rows[:, Column.SIGN] > 0)
         surfaces = surface_points(rows)
         of_solid = (
-            of_parts(self.samples, rows, added, surfaces),
+            of_parts(self.samples, rows, added, surfaces, onto_blends=True),
             of_voxels(self.samples, rows, added),
             of_far_cells(self.samples, rows, added, surfaces[added]),
         )
         points, distance, off, part = (np.concatenate(one) for one in zip(*of_solid, strict=True))
         off = self._exactly(points, distance, off)
+        beside = self._beside(rows, points, distance, off, part)
+        joined = zip((points, distance, off, part), beside, strict=True)
+        points, distance, off, part = (np.concatenate(one) for one in joined)
         least = max(CLOSE, _FELT * float(off.max(initial=0)))
         of_shape = self._of_shape(rows, added, surfaces.reshape(-1, 3).astype(np.float32), least)
         times = np.where(distance > 0, np.float32(STICKS_OUT), np.float32(1))
@@ -103,6 +108,33 @@ class CloseLook:
         if len(furthest):
             result[furthest] = self.samples.away(points[furthest])
         return result
+
+    def _beside(
+        self, rows: Rows, points: Floats, distance: Floats, off: Floats, part: NDArray[np.int64]
+    ) -> tuple[NDArray[Any], ...]:
+        """Where what sticks out does so the furthest, beside points that do: those of a part's surface may be
+        as far apart as a tenth of it."""
+        samples, outside = self.samples, distance > 0
+        far = np.flatnonzero(outside & (off > _FELT * off[outside].max(initial=0)))
+        far = far[np.argsort(-off[far], kind="stable")]
+        places = np.column_stack([part[far], np.floor(points[far] / _PLACE).astype(np.int64)])
+        _, first = np.unique(places, axis=0, return_index=True)
+        far = far[np.sort(first)[:_CLIMBED]]
+        place, best = points[far], off[far]
+        for radius in _CLIMB if len(far) else ():
+            around = (place[:, None] + radius * _ways(_CLIMB_WAYS)).reshape(-1, 3)
+            onto, field = walked_to(samples, rows, around, samples.distance_of(rows, around))
+            # Half a voxel matters here: what is read off the grid only tells which are outside.
+            there = np.zeros(len(onto), np.float32)
+            outside = (np.abs(field) < ON / 2) & (samples.near_distance(onto) > 0)
+            there[outside] = samples.away(onto[outside])
+            index = np.arange(len(far)), there.reshape(len(far), -1).argmax(axis=1)
+            onto, there = onto.reshape(len(far), -1, 3)[index], there.reshape(len(far), -1)[index]
+            better = there > best
+            place, best = np.where(better[:, None], onto, place), np.where(better, there, best)
+        moved = best > off[far]
+        place, best = place[moved].astype(np.float32), best[moved].astype(np.float32)
+        return place, best, best, part[far[moved]]
 
     def _of_shape(
         self, rows: Rows, added: NDArray[np.int64], surfaces: Floats, least: float
@@ -164,7 +196,7 @@ class CloseLook:
         least = np.abs(field)
         share = np.arange(1, _SHELLS + 1, dtype=np.float32) / _SHELLS
         radius = least[:, None] + (most - least)[:, None] * share
-        places = points[:, None, None] + radius[:, :, None, None] * _ways()
+        places = points[:, None, None] + radius[:, :, None, None] * _ways(_WAYS)
         there = self.samples.distance_of(rows, np.ascontiguousarray(places.reshape(-1, 3), np.float32))
         across = (there >= 0).reshape(*radius.shape, _WAYS) != (field >= 0)[:, None, None]
         found = across.any(axis=2)
@@ -184,9 +216,9 @@ class CloseLook:
 
 
 @cache
-def _ways() -> Floats:
-    """Unit vectors (W, 3), evenly about a point, on a spiral."""
-    count = np.arange(_WAYS) + 0.5
-    up, turn = 1 - 2 * count / _WAYS, np.pi * (1 + 5**0.5) * count
+def _ways(number: int) -> Floats:
+    """Unit vectors (number, 3), evenly about a point, on a spiral."""
+    count = np.arange(number) + 0.5
+    up, turn = 1 - 2 * count / number, np.pi * (1 + 5**0.5) * count
     aside = np.sqrt(1 - up**2)
     return np.stack([aside * np.cos(turn), aside * np.sin(turn), up], axis=1).astype(np.float32)

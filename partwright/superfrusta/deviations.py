@@ -87,9 +87,16 @@ def deviations(samples: FitSamples, rows: Rows) -> Deviations:
 
 
 def of_parts(
-    samples: FitSamples, rows: Rows, added: NDArray[np.int64], surfaces: NDArray[np.float64]
+    samples: FitSamples,
+    rows: Rows,
+    added: NDArray[np.int64],
+    surfaces: NDArray[np.float64],
+    onto_blends: bool = False,
 ) -> tuple[NDArray[Any], ...]:
-    """Points on the assembly's surface that stick out of the shape, or enclose a gap inside it."""
+    """Points on the assembly's surface that stick out of the shape, or enclose a gap inside it.
+
+    onto_blends: those under a blend walk onto it.
+    """
     points = surfaces.astype(np.float32)
     part = np.repeat(np.arange(len(rows)), points.shape[1])
     points = points.reshape(-1, 3)
@@ -97,7 +104,10 @@ def of_parts(
     shown = np.abs(field) < ON
     # Under a blend the surface is further out than that of any part.
     under = np.flatnonzero((field <= -ON) & (field > -_DEEPEST_BLEND))
-    shown[under] = (samples.parts_of(rows[added], points[under]) > -ON).all(axis=0)
+    under = under[(samples.parts_of(rows[added], points[under]) > -ON).all(axis=0)]
+    shown[under] = True
+    if onto_blends and len(under):
+        points[under], field[under] = walked_to(samples, rows, points[under], field[under])
     points, field, part = points[shown], field[shown], part[shown]
     distance = samples.near_distance(points)
     off = np.where(distance > 0, distance - field, 0)

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from trimesh.util import concatenate
 
 from partwright.metrics.comparison import Comparison
 from partwright.shapes import Shape, load_shape
@@ -21,9 +22,11 @@ SETTINGS = Settings.for_quality("draft")
 WIDTH, DEPTH = 0.08, 0.3  # of a groove
 
 
-def seen(shape: Shape, rows: Rows) -> tuple[FitSamples, np.ndarray, np.ndarray]:
+def seen(
+    shape: Shape, rows: Rows, settings: Settings = SETTINGS
+) -> tuple[FitSamples, np.ndarray, np.ndarray]:
     """What a close look sees: lengths, and how often each counts."""
-    samples = FitSamples.of(shape, SETTINGS)
+    samples = FitSamples.of(shape, settings)
     found = CloseLook.at(shape, samples).deviations(rows)
     return samples, found.off / found.times, found.times
 
@@ -82,3 +85,30 @@ def test_of_what_sticks_out_the_exact_length_counts_most() -> None:
     assert found.times[worst] > 1
     assert found.off[worst] / found.times[worst] == pytest.approx(0.075, abs=0.003)
     assert found.part[worst] == 1
+
+
+@pytest.mark.parametrize("place", [0.11, 0.215, -0.33])
+def test_what_sticks_out_the_furthest_is_found_beside_the_points_that_do(place: float) -> None:
+    """A block goes over a slot; in the middle of the slot it is half of its width from both walls."""
+    wide, deep = 0.13, 0.4
+    left, right = place - wide / 2 + 0.9, 0.9 - place - wide / 2
+    shape = union(
+        box((left, 0.8, 0.8), (left / 2 - 0.9, 0, 0)),
+        box((right, 0.8, 0.8), (0.9 - right / 2, 0, 0)),
+        box((1.8, 0.8, 0.8 - deep), (0, 0, -deep / 2)),
+    )
+    _, lengths, times = seen(load_shape(shape), box_row((1.8, 0.8, 0.8))[None], Settings())
+    assert lengths[times > 1].max() == pytest.approx(wide / 2, rel=0.05)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.05])
+def test_a_blend_is_seen_to_stick_out(gap: float) -> None:
+    """Two blocks in a corner, that touch or hardly so, with a blend that the shape lacks."""
+    sizes, places = ((1.8, 0.6, 0.4), (0.4, 0.6, 0.8)), ((0.0, 0.0, 0.0), (-0.4, 0.0, 0.6 + gap))
+    shape = load_shape(concatenate([box(size, place) for size, place in zip(sizes, places, strict=True)]))
+    rows = np.array([box_row(size, place, blend=0.4) for size, place in zip(sizes, places, strict=True)])
+    rows[:, :3] += shape.frame.to_unit(np.zeros((1, 3)))[0]
+    _, lengths, times = seen(shape, rows)
+    told = Comparison(assembly_of(shape, rows, SETTINGS), shape).deviation
+    assert told.protrusion == pytest.approx(0.1, abs=1e-3)
+    assert lengths[times > 1].max() == pytest.approx(told.protrusion, rel=0.01)
