@@ -29,12 +29,12 @@ from partwright.superfrusta.symmetric_fit import LeafSteps, RepeatedPart, expand
 Mask = NDArray[np.bool_]
 Leaves = list[RepeatedPart]
 
-_ENOUGH = 0.026  # unit lengths, 1.4 % of the longest side, 0.8 % outwards: what is nearer is left alone
+_ENOUGH = 0.031  # unit lengths, 1.7 % of the longest side, 0.96 % outwards: what is nearer is left alone
 _SAME_PLACE = 0.03  # unit lengths
 _REFITTED = 2  # changes of one place that are polished, of those that promise most
 _LOOKS = 6  # at each
 _HOPELESS, _STILL = 0.01, 0.003  # of the value: so much worse before it is polished, and after half of that
-_PRICE = 1.25  # times the settings': what is new has to be worth more than what is there
+_PRICE = 2.0  # times the settings', as lengths count twice as much: what is new has to be worth that
 _GAIN = 2e-4  # of the value, for a change to be kept
 _WAYS = 3  # to repeat what is new, at most
 _REMOVALS = 3  # at most

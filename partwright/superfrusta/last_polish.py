@@ -36,7 +36,8 @@ _LEAST_SHARE = 0.01  # of what the furthest counts
 _LINEAR = 4.0  # sharpness at which an occupancy near the surface is the distance, but for its sign
 _LEAST_OFF = 1e-4  # unit lengths
 _GAIN = 2e-5  # of the value, from which on a step is taken
-SPENT = 3e-3  # of R, at most, for lengths: less than a part's price
+FIRMER = 2.0  # times the settings' price on lengths: what is seen counts more, once all parts are there
+SPENT = 5e-3  # of R, at most, for lengths
 _OVERLAP = 0.01  # of what parts cover: so much more may be covered twice, which thin shapes hardly feel
 _LEAST_DAMPING = 1e-3
 _TRIES = 4  # of one scale: a step that is damped a thousand times more follows the slope alone
@@ -54,7 +55,7 @@ def last_polished(
     """Leaves, those `moving` (L,) moved together, copies of each as one, while R less a price on how far they
     are off rises; at most `settings.looks` assemblies are looked at.
 
-    R does not fall by more than three thousandths, nor below an IoU that the settings ask for.
+    R does not fall by more than five thousandths, nor below an IoU that the settings ask for.
     """
     rows = expanded(leaves)
     if not settings.looks or not moving.any() or len(rows) > MOST_COPIES:
@@ -100,6 +101,11 @@ class Polish:
     damped: Damping = LASTING
     looks: int = field(default=0, init=False)
 
+    @property
+    def firmness(self) -> float:
+        """Price on each unit length that leaves are off."""
+        return FIRMER * self.settings.firmness
+
     def trial(self, rows: Rows) -> Trial:
         self.looks += 1
         copies = self.steps.copies(rows)
@@ -107,7 +113,7 @@ class Polish:
         by_leaf = np.zeros(len(rows))
         np.maximum.at(by_leaf, self.steps.leaf[off.part], off.off)
         reached = score(self.look.samples, copies)
-        return Trial(rows, off, by_leaf, reached, reached - self.settings.firmness * norm(by_leaf))
+        return Trial(rows, off, by_leaf, reached, reached - self.firmness * norm(by_leaf))
 
     def best(self, rows: Rows) -> Rows:
         """The leaves' rows (L, 17) after steps that gain."""
@@ -164,7 +170,7 @@ class Polish:
         share = (off.off / at.by_leaf[leaf]) ** _POWER
         felt = np.flatnonzero(share > _LEAST_SHARE)
         in_all = np.bincount(leaf[felt], share[felt], len(at.by_leaf))
-        of_leaf = self.settings.firmness * (at.by_leaf / norm(at.by_leaf)) ** 3
+        of_leaf = self.firmness * (at.by_leaf / norm(at.by_leaf)) ** 3
         price = of_leaf[leaf[felt]] * share[felt] / in_all[leaf[felt]]
         points, outside = off.points[felt], off.distance[felt] > 0
         slope = price * np.where(outside, -1.0, 1.0) * off.times[felt]  # of the price by the field
