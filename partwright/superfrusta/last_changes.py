@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from partwright.fields.columns import Column
 from partwright.shapes import Shape
-from partwright.superfrusta.close_look import CloseLook
+from partwright.superfrusta.close_look import CloseLook, Seen
 from partwright.superfrusta.growing import finalists
 from partwright.superfrusta.last_polish import BRIEF, MOST_COPIES, SPENT, Polish, Trial
 from partwright.superfrusta.mending import Mending
@@ -37,6 +37,7 @@ _HOPELESS, _STILL = 0.01, 0.003  # of the value: so much worse before it is poli
 _PRICE = 2.0  # times the settings', as lengths count twice as much: what is new has to be worth that
 _GAIN = 2e-4  # of the value, for a change to be kept
 _WAYS = 3  # to repeat what is new, at most
+_TOGETHER, _AS_FAR = 4, 0.8  # places at once, at most, that are off by this share of the furthest
 _REMOVALS = 3  # at most
 _REMOVED = 3  # parts that are tried for each
 _OVERLAP = 0.03  # of what parts cover: so much more may be covered twice in the end
@@ -177,21 +178,47 @@ class _LastChanges:
         return None
 
     def ways(self, best: _State, worst: int) -> Iterator[_State]:
-        """What is about a point cut or filled, and the part there fitted anew; not polished yet."""
-        off = best.trial.off
-        copy = int(off.part[worst])
-        leaf = int(best.leaf[copy])
-        row = best.rows[copy]
-        if self.has_room(best, leaf):
-            new = [] if off.distance[worst] <= 0 or not self.settings.carving else self.cuts(best, worst)
-            if off.distance[worst] <= 0:
-                missed = self.mending.missed(best.rows, off, worst)[:1]
-                new = [self.mending.fitted(voxels, best.rows, row)[0] for voxels in missed]
-            for one in new:
-                yield self.repeated(best, one, leaf)
+        """What is about a point cut or filled, there alone and at others that are as far off, and the part
+        there fitted anew; not polished yet."""
+        for one in self.with_new(best, worst):
+            yield one
+            together = self.with_others(one, best, worst)
+            if together is not one:
+                yield together
+        leaf = int(best.leaf[best.trial.off.part[worst]])
         anew = [self.looked_at(leaves, best.moving) for leaves in self.anew(best, leaf)]
         if anew:
             yield max(anew, key=lambda one: one.value)
+
+    def with_new(self, best: _State, worst: int) -> list[_State]:
+        """With one part more that cuts or fills what is about a point; none where there is no room for it."""
+        off = best.trial.off
+        copy = int(off.part[worst])
+        leaf = int(best.leaf[copy])
+        if not self.has_room(best, leaf):
+            return []
+        if off.distance[worst] > 0:
+            new = self.cuts(best, worst) if self.settings.carving else []
+        else:
+            missed = self.mending.missed(best.rows, off, worst)[:1]
+            new = [self.mending.fitted(voxels, best.rows, best.rows[copy])[0] for voxels in missed]
+        return [self.repeated(best, one, leaf) for one in new]
+
+    def with_others(self, one: _State, best: _State, worst: int) -> _State:
+        """The same at other places, cut or filled likewise, that are nearly as far off: while one of them is
+        left, the others are no gain."""
+        off = best.trial.off
+        for _ in range(_TOGETHER - 1):
+            there = one.trial.off
+            further = self.worst(one, [off.points[worst]])
+            if further is None or there.off[further] < _AS_FAR * off.off[worst]:
+                break
+            alike = _is_outside(there, further) == _is_outside(off, worst)
+            found = self.with_new(one, further) if alike else []
+            if not found:
+                break
+            one = found[0]
+        return one
 
     def cuts(self, best: _State, worst: int) -> list[NDArray[np.float32]]:
         return list(self.mending.holes(best.rows, best.trial.off, worst)[:1])
@@ -248,3 +275,7 @@ class _LastChanges:
         trials = np.stack([folded(occupied[one], added[one]) for one in left])
         lost = occupancy_score(self.samples, folded(occupied, added)) - occupancy_score(self.samples, trials)
         return np.where([added[one].any() for one in left], lost, np.inf)
+
+
+def _is_outside(off: Seen, point: int) -> bool:
+    return bool(off.distance[point] > 0)

@@ -37,6 +37,8 @@ _LINEAR = 4.0  # sharpness at which an occupancy near the surface is the distanc
 _LEAST_OFF = 1e-4  # unit lengths
 _GAIN = 2e-5  # of the value, from which on a step is taken
 FIRMER = 2.0  # times the settings' price on lengths: what is seen counts more, once all parts are there
+_GLARING = 0.08  # unit lengths: 2.5 % of the longest side outwards, or 4.5 % that is missing
+_GLARES = 2.0  # price on each unit length beyond, part by part: worth several parts, which the norm is not
 SPENT = 5e-3  # of R, at most, for lengths
 _OVERLAP = 0.01  # of what parts cover: so much more may be covered twice, which thin shapes hardly feel
 _LEAST_DAMPING = 1e-3
@@ -113,7 +115,8 @@ class Polish:
         by_leaf = np.zeros(len(rows))
         np.maximum.at(by_leaf, self.steps.leaf[off.part], off.off)
         reached = score(self.look.samples, copies)
-        return Trial(rows, off, by_leaf, reached, reached - self.firmness * norm(by_leaf))
+        price = self.firmness * norm(by_leaf) + _GLARES * float(np.maximum(by_leaf - _GLARING, 0).sum())
+        return Trial(rows, off, by_leaf, reached, reached - price)
 
     def best(self, rows: Rows) -> Rows:
         """The leaves' rows (L, 17) after steps that gain."""

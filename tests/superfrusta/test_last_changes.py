@@ -10,7 +10,8 @@ import trimesh
 
 from partwright.fields.columns import Column
 from partwright.shapes import Shape, load_shape
-from partwright.superfrusta import Settings
+from partwright.superfrusta import Settings, last_polish
+from partwright.superfrusta import last_changes as last_changes_module
 from partwright.superfrusta.close_look import CloseLook
 from partwright.superfrusta.last_changes import last_changes
 from partwright.superfrusta.last_polish import Polish
@@ -64,6 +65,26 @@ def test_what_is_covered_is_cut_unless_that_is_forbidden(notched: Shape) -> None
     assert [leaf.row[Column.SIGN] for leaf in after] == [1, -1]
     assert off(notched, after) < 0.3 * off(notched, before)
     assert all(leaf.row[Column.SIGN] > 0 for leaf in changed(notched, before, subtract=False))
+
+
+def test_what_glares_is_worth_several_parts(notched: Shape, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = plain(((1.8, 0.8, 0.5), (0.0, 0.0, 0.0)))
+    assert len(changed(notched, before, alpha=0.16)) == 2
+    monkeypatch.setattr(last_polish, "_GLARES", 0.0)
+    assert changed(notched, before, alpha=0.16) is before
+
+
+def test_pockets_that_are_as_deep_are_cut_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While one is left, the others are no gain: what is furthest off stays as far."""
+    places = [(-0.5, 0.2), (0.1, -0.15), (0.6, 0.1)]
+    pockets = [box((0.14, 0.1 + 0.05 * i, 0.3), (*place, 0.25)) for i, place in enumerate(places)]
+    shape = load_shape(trimesh.boolean.difference([trimesh.creation.box((1.8, 0.8, 0.5)), *pockets]))
+    before = plain(((1.8, 0.8, 0.5), (0.0, 0.0, 0.0)))
+    after = changed(shape, before, alpha=0.02)
+    assert [leaf.row[Column.SIGN] for leaf in after] == [1, -1, -1, -1]
+    assert off(shape, after) < 0.3 * off(shape, before)
+    monkeypatch.setattr(last_changes_module, "_TOGETHER", 1)
+    assert changed(shape, before, alpha=0.02) is before
 
 
 def test_what_is_missing_is_added_within_a_budget(tabbed: Shape) -> None:
