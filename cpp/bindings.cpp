@@ -1,5 +1,5 @@
 // The Python face of the kernel. Arguments are checked by its callers: fields/kernel.py, fields/profile_distance.py,
-// meshing/hulls.py, approximation/half_space.py, approximation/sketches/chains.py, partsdf/part_networks.py.
+// meshing/hulls.py, shapes/distance.py, approximation/half_space.py, approximation/sketches/chains.py, partsdf/part_networks.py.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
@@ -16,6 +16,7 @@
 #include "optimise.hpp"
 #include "part_networks.hpp"
 #include "profile.hpp"
+#include "triangle_tree.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -309,6 +310,24 @@ NB_MODULE(_kernel, m) {
     return out;
   }, "values"_a, "origin"_a, "spacing"_a, "points"_a,
      "Distance (N,) at points (N, 3), interpolated in a grid (X, Y, Z); beyond it that of its nearest place, and the way there.");
+
+  nb::class_<TriangleTree>(m, "TriangleTree", "Triangles in a tree of boxes.")
+      .def("__init__", [](TriangleTree* self, In<double> vertices, In<int64_t> faces) {
+        nb::gil_scoped_release release;
+        new (self) TriangleTree(vertices.data(), faces.data(), int64_t(faces.shape(0)));
+      }, "vertices"_a, "faces"_a)
+      .def("squared_distances", [](const TriangleTree& self, In<double> points, int threads) {
+        auto out = array<double>({points.shape(0)});
+        nb::gil_scoped_release release;
+        self.squared_distances(points.data(), int64_t(points.shape(0)), out.data(), threads);
+        return out;
+      }, "points"_a, "threads"_a, "Squared distances (N,) of points (N, 3) to the nearest triangle.")
+      .def("windings", [](const TriangleTree& self, In<double> points, int threads) {
+        auto out = array<int32_t>({points.shape(0)});
+        nb::gil_scoped_release release;
+        self.windings(points.data(), int64_t(points.shape(0)), out.data(), threads);
+        return out;
+      }, "points"_a, "threads"_a, "How often (N,) triangles without open edges wind around points (N, 3).");
 
   m.def("networks_distances", [](In<float> local, std::vector<In<float>> weights, std::vector<In<float>> shifts, In<float> scale,
                                  In<float> room, In<float> unit, float reach, int octaves, int threads) {
