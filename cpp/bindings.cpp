@@ -1,5 +1,5 @@
 // The Python face of the kernel. Arguments are checked by its callers: fields/kernel.py, fields/profile_distance.py,
-// meshing/hulls.py, shapes/distance.py, approximation/half_space.py, approximation/sketches/chains.py, partsdf/part_networks.py.
+// meshing/hulls.py, shapes/distance.py, shapes/topology.py, approximation/half_space.py, approximation/sketches/chains.py, partsdf/part_networks.py.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/vector.h>
@@ -8,6 +8,7 @@
 
 #include "beyond_planes.hpp"
 #include "chains.hpp"
+#include "connected.hpp"
 #include "evaluate.hpp"
 #include "grid_values.hpp"
 #include "hull.hpp"
@@ -310,6 +311,13 @@ NB_MODULE(_kernel, m) {
     return out;
   }, "values"_a, "origin"_a, "spacing"_a, "points"_a,
      "Distance (N,) at points (N, 3), interpolated in a grid (X, Y, Z); beyond it that of its nearest place, and the way there.");
+
+  m.def("connected", [](In<int64_t> groups, int64_t nodes) {
+    auto component = array<int64_t>({size_t(nodes)});
+    nb::gil_scoped_release release;
+    connected(groups.data(), int64_t(groups.shape(0)), int64_t(groups.shape(1)), nodes, component.data());
+    return component;
+  }, "groups"_a, "nodes"_a, "Which component (N,) each node is of, where groups (G, K) hang together; by their first nodes.");
 
   nb::class_<TriangleTree>(m, "TriangleTree", "Triangles in a tree of boxes.")
       .def("__init__", [](TriangleTree* self, In<double> vertices, In<int64_t> faces) {

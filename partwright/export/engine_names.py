@@ -14,7 +14,6 @@ from collections.abc import Iterable
 from partwright.approximation.collision import Geometry
 from partwright.fields import Box, Capsule, Cylinder, Field, Sphere
 
-ENGINES = ("unreal", "godot")
 KINDS: dict[str, tuple[type[Field], ...]] = {
     "unreal": (Box, Sphere, Capsule),
     "godot": (Box, Cylinder, Sphere, Capsule),

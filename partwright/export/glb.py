@@ -14,7 +14,7 @@ together, shared out among their nodes.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,14 +31,8 @@ from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError, SettingError
 from partwright.export.axes import to_gltf
 from partwright.export.formats import Format, Holds
-from partwright.export.glb_colliders import (
-    KHR,
-    add_named_colliders,
-    add_rigid_body,
-    check_physics,
-    collider_body,
-)
 from partwright.export.glb_joined import add_patches
+from partwright.export.glb_physics import KHR, check_physics
 from partwright.export.identifiers import free_name
 from partwright.export.shared_groups import Shared, shared
 from partwright.export.texturing import own_colour, textured
@@ -77,35 +71,62 @@ def write(
         NoSurfaceError: the assembly does not end.
         SettingError: there is no such physics, a density or joint without it, or joined with it.
     """
-    from trimesh.exchange.gltf import export_glb
-
     check_physics(physics, density, free_joint)
     if joined and physics is not None:
         raise SettingError("joined: parts of one surface have no colliders; leave out joined or physics")
+    # Engines find colliders by the names of nodes, so nodes that share a mesh would be without.
+    made = _scene(assembly, resolution, bodily=physics == KHR, joined=joined, sharing=physics in (None, KHR))
+    collide = None
+    if physics is not None:
+        from partwright.export.glb_colliders import add_named_colliders, add_rigid_body, collider_body
+
+        body = collider_body(assembly, physics, density, tolerance)
+        if physics == KHR:
+            collide = add_rigid_body(made.scene, made.body, body, free_joint, made.taken)
+        else:
+            collide = add_named_colliders(made.scene, physics, body, made.shown)
+        body.write_report(path)
+    write_bytes(path, _document(made, collide))
+
+
+def document(assembly: Assembly) -> bytes:
+    """What `write` writes where nothing else is asked for.
+
+    Raises:
+        what `Format.check` and `write` raise.
+    """
+    FORMAT.check(assembly, {})
+    return _document(_scene(assembly))
+
+
+def _scene(
+    assembly: Assembly,
+    resolution: int | None = None,
+    *,
+    bodily: bool = False,
+    joined: bool = False,
+    sharing: bool = True,
+) -> _Scene:
     check_ends(assembly)
+    cells = resolution or (_WHOLE if joined else _PART)
+    made = _Scene(assembly, cells, bodily, joined, sharing)
+    require_some(assembly, list(made.scene.geometry))
+    return made
+
+
+def _document(made: _Scene, collide: Callable[[dict[str, Any]], None] | None = None) -> bytes:
+    """The file's bytes; collide: what is done to its tree in the end."""
+    from trimesh.exchange.gltf import export_glb
 
     def describe(tree: dict[str, Any]) -> None:
         tree["asset"]["generator"] = f"Partwright {__version__}"
-        tree["asset"]["extras"] = _about(assembly)
+        tree["asset"]["extras"] = _about(made.assembly)
         _name_attributes(tree)
         _say_targets(tree)
         if collide is not None:
             collide(tree)
 
-    cells = resolution or (_WHOLE if joined else _PART)
-    # Engines find colliders by the names of nodes, so nodes that share a mesh would be without.
-    made = _Scene(assembly, cells, bodily=physics == KHR, joined=joined, sharing=physics in (None, KHR))
-    scene, collide = made.scene, None
-    require_some(assembly, list(scene.geometry))
-    if physics is not None:
-        body = collider_body(assembly, physics, density, tolerance)
-        if physics == KHR:
-            collide = add_rigid_body(scene, made.body, body, free_joint, made.taken)
-        else:
-            collide = add_named_colliders(scene, physics, body, made.shown)
-        body.write_report(path)
-    data = export_glb(scene, include_normals=False, tree_postprocessor=describe)
-    write_bytes(path, data)
+    return bytes(export_glb(made.scene, include_normals=False, tree_postprocessor=describe))
 
 
 def _name_attributes(tree: dict[str, Any]) -> None:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from partwright.approximation.collision import TOLERANCE
-from partwright.errors import SettingError
 from partwright.export.axes import to_gltf
 from partwright.export.collider_meshes import collider_mesh
-from partwright.export.engine_names import ENGINES, KINDS, collider_names, plain_name
+from partwright.export.engine_names import KINDS, collider_names, plain_name
+from partwright.export.glb_physics import KHR
 from partwright.export.gltf_physics import SHAPES, add_body
 from partwright.export.identifiers import free_name
 from partwright.export.rigid_body import DENSITY, Body
@@ -21,17 +21,8 @@ if TYPE_CHECKING:
 
     from partwright.assembly import Assembly
 
-KHR = "khr"
 _CELLS = 24  # along a part that becomes a hull
 Postprocess = Callable[[dict[str, Any]], None]
-
-
-def check_physics(physics: str | None, density: float | None, free_joint: bool) -> None:
-    """Raises SettingError for a kind of physics that there is not, or for what it has no place for."""
-    if physics not in (None, KHR, *ENGINES):
-        raise SettingError(f"physics: expected one of {', '.join((KHR, *ENGINES))}, got {physics!r}")
-    if physics != KHR and (density is not None or free_joint):
-        raise SettingError("density and free_joint are of rigid bodies: they need physics khr")
 
 
 def collider_body(

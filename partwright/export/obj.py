@@ -14,8 +14,9 @@ from partwright.assembly import Similarity
 from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError, SettingError
 from partwright.export.collider_meshes import collider_mesh
-from partwright.export.engine_names import ENGINES, KINDS, collider_names, plain_name
+from partwright.export.engine_names import KINDS, collider_names, plain_name
 from partwright.export.formats import Format, Holds
+from partwright.export.glb_physics import ENGINES
 from partwright.export.identifiers import free_name
 from partwright.export.rigid_body import DENSITY, Body
 

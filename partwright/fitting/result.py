@@ -6,13 +6,13 @@ import dataclasses
 import json
 import re
 import time
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from partwright.assembly import Assembly
 from partwright.atomic_io import finishing, replacing_files, write_bytes
+from partwright.fitting.ahead import Ahead
 from partwright.fitting.report import check_density_of, masses
 from partwright.methods import CurvePoint
 from partwright.shapes import Shape
@@ -47,6 +47,8 @@ class Result:
     report: dict[str, Any]
     curve: tuple[CurvePoint, ...] = ()
     clean: Cleaned | None = None
+    ahead: Ahead | None = field(default=None, repr=False, compare=False)
+    """What `save` will write, begun already."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -71,25 +73,25 @@ class Result:
         Raises:
             OutputError: they cannot be written there.
         """
-        from partwright.export import export
         from partwright.export.ply import write_mesh
-        from partwright.render import preview
 
         started = time.perf_counter()
         with finishing(), replacing_files(folder, CURVE_FILES) as staging:
-            picture = staging / "preview.png"
-            with ThreadPoolExecutor(1) as beside:
-                drawn = beside.submit(
-                    preview, self.shape, self.assembly, self.surface, picture, title=self.shape.name
-                )
-                self.assembly.save(staging / "assembly.json")
-                export(self.assembly, staging / "parts.glb")
-                write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
-                drawn.result()
+            ahead = self._ahead()
+            self.assembly.save(staging / "assembly.json")
+            write_mesh(self.surface, staging / "surface.ply", self.assembly.unit)
+            ahead.write(staging)
             if self.curve:
                 self._save_curve(staging)
             self._count_writing(time.perf_counter() - started)
             write_bytes(staging / "report.json", (json.dumps(self.report, indent=2) + "\n").encode())
+
+    def _ahead(self) -> Ahead:
+        if self.ahead is not None and self.ahead.is_of(self.shape, self.assembly, self.surface):
+            return self.ahead
+        ahead = Ahead(self.shape, self.assembly)
+        ahead.draw(self.surface)
+        return ahead
 
     def _count_writing(self, spent: float) -> None:
         """Among the seconds, in place of those of an earlier `save`."""

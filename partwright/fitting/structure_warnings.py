@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.assembly import Assembly, Node, Part
+from partwright.rows import crosses, dots
 from partwright.shapes import Shape
 
 if TYPE_CHECKING:
@@ -48,8 +49,8 @@ def _bodies(vertices: np.ndarray, faces: np.ndarray) -> list[tuple[float, np.nda
     count, piece = components(faces, len(vertices))
     own = piece[faces[:, 0]]
     origin = vertices.mean(axis=0)
-    a, b, c = (vertices[faces[:, k]] - origin for k in range(3))
-    volume = np.bincount(own, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6, minlength=count)
+    a, b, c = (vertices.take(faces[:, k], axis=0) - origin for k in range(3))
+    volume = np.bincount(own, dots(a, crosses(b, c)) / 6, minlength=count)
     kept = np.flatnonzero(volume > _CRUMB * np.abs(volume).max(initial=0.0))
     return [(float(volume[k]), (v := vertices[piece == k]).min(axis=0) / 2 + v.max(axis=0) / 2) for k in kept]
 

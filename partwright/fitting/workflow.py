@@ -12,6 +12,7 @@ from partwright.assembly import Assembly
 from partwright.assembly.checks import MAX_NAME
 from partwright.blas import one_blas_thread
 from partwright.errors import CancelledError, SettingError
+from partwright.fitting.ahead import Ahead
 from partwright.fitting.former import former
 from partwright.fitting.options import Clean, Start, Tolerance, check_able, suitable
 from partwright.fitting.report import report
@@ -57,6 +58,7 @@ def fit(
     clean: bool | Clean = False,
     progress: Callable[[Progress], None] | None = None,
     cancel: Cancellation | None = None,
+    saving: bool = False,
     **settings: Any,
 ) -> Result:
     """Fit an assembly to a shape.
@@ -75,6 +77,8 @@ def fit(
         clean: make numbers plain and relations exact after the fit.
         progress: told at each step; its `assembly()` is the best so far.
         cancel: ends the fit with its best so far, from any thread. If not given, Ctrl-C does.
+        saving: the result will be saved: begin with what takes longest of that while scores are taken, unless
+            `threads` is 1.
         settings: of the method: max_parts (at most so many), min_iou (the fewest parts that reach it), curve
             (an assembly of every size, `Result.curve`), symmetry, subtract, and all that its settings have.
 
@@ -99,7 +103,8 @@ def fit(
             tolerance=given["tolerance"], clean=given["clean"], progress=progress, cancel=cancel, **settings,
         )  # fmt: skip
     run = Run(seed, device, threads, progress, cancel or Cancellation())
-    return _Task.of(shape, method, quality, run, settings, **given).result(listen=cancel is None)
+    task = _Task.of(shape, method, quality, run, settings, **given)
+    return task.result(listen=cancel is None, saving=saving)
 
 
 def fit_nodes(
@@ -114,6 +119,7 @@ def fit_nodes(
     clean: bool | Clean = False,
     progress: Callable[[Progress], None] | None = None,
     cancel: Cancellation | None = None,
+    saving: bool = False,
     **settings: Any,
 ) -> Result:
     """Fit each node of a scene by itself: the assembly's children are named after the nodes.
@@ -126,7 +132,7 @@ def fit_nodes(
     task = _Task.of(
         shape, method, quality, run, settings, tolerance=tolerance, clean=clean, pieces=shape.split_nodes()
     )
-    return task.result(listen=cancel is None)
+    return task.result(listen=cancel is None, saving=saving)
 
 
 @dataclass(frozen=True)
@@ -184,12 +190,12 @@ class _Task:
             begin.check_size(shape)
         return cls(shape, pieces, found, own, quality, run, begin, bounds, cleaning)
 
-    def result(self, listen: bool) -> Result:
-        """The work. listen: Ctrl-C cancels it."""
+    def result(self, listen: bool, saving: bool) -> Result:
+        """The work. listen: Ctrl-C cancels it. saving: it will be saved."""
         with interruptible(self.run.cancel) if listen else nullcontext(), one_blas_thread():
-            return self.done()
+            return self.done(saving and Ahead.pays(self.run.threads))
 
-    def done(self) -> Result:
+    def done(self, saving: bool) -> Result:
         started = time.perf_counter()
         fitted = self.fitted(self.settings)
         assembly, seconds = self.assembled(fitted), {"reading": self.shape.reading_seconds} | _seconds(fitted)
@@ -205,13 +211,19 @@ class _Task:
                 cleaned, outcome = self.cleaned(assembly, outcome)
             assembly = cleaned.assembly if cleaned else assembly
         made = fitted[0].surface if len(fitted) == 1 and not (enforced or cleaned) else None
-        scores, surface = _scored(self.shape, assembly, self.run.seed, seconds, made)
+        ahead = Ahead(self.shape, assembly) if saving else None
+        try:
+            scores, surface = _scored(self.shape, assembly, self.run.seed, seconds, made, ahead)
+        except BaseException:
+            if ahead is not None:
+                ahead.give_up()
+            raise
         seconds["all"] = self.shape.reading_seconds + time.perf_counter() - started
         told = report(
             self.shape, assembly, surface, scores, how=self.how(outcome), run=self.run, seconds=seconds,
             fitted=fitted, enforced=enforced, cleaned=cleaned,
         )  # fmt: skip
-        return Result(self.shape, assembly, outcome, scores, surface, told, fitted[0].curve, cleaned)
+        return Result(self.shape, assembly, outcome, scores, surface, told, fitted[0].curve, cleaned, ahead)
 
     def how(self, outcome: str) -> dict[str, Any]:
         """What the report says of the fit itself."""
@@ -312,13 +324,20 @@ def _seconds(fitted: Sequence[Fitted]) -> dict[str, float]:
 
 
 def _scored(
-    shape: Shape, assembly: Assembly, seed: int, seconds: dict[str, float], made: trimesh.Trimesh | None
+    shape: Shape,
+    assembly: Assembly,
+    seed: int,
+    seconds: dict[str, float],
+    made: trimesh.Trimesh | None,
+    ahead: Ahead | None,
 ) -> tuple[Scores, trimesh.Trimesh]:
     from partwright.meshing import mesh_assembly
     from partwright.metrics import evaluate
 
     with timed(seconds, "meshing"):
         surface = made if made is not None else mesh_assembly(assembly)
+    if ahead is not None:
+        ahead.draw(surface)
     with timed(seconds, "scores"):
         scores = evaluate(assembly, shape, seed=seed, emd=False, surface=surface)
     return scores, surface

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.joint import is_joint
 from partwright.errors import NoSurfaceError
-from partwright.fields import Pipe, SuperFrustum, Swept
+from partwright.fields import Field, Pipe, SuperFrustum, Swept
 from partwright.fields.base import LIPSCHITZ
 from partwright.meshing.csg import check_count, has_exact_mesh, mesh_csg
 from partwright.meshing.marching import mesh_field
@@ -32,6 +32,7 @@ _LEAST = 24  # cells along the longest side of a thin part, or of what cuts it
 _SCRAP = 8  # what is nowhere nearer to the assembly than this part of a cell is none of it
 _CHORDS = 32  # a chord of an exact mesh is this part of a cell from its surface at most
 _ROOM = 1e-3  # of the longest side, around the bounds
+_MESHES_KEPT = 8  # of parts in their own frames, for what comes again soon: some megabytes each
 
 
 def mesh_assembly(
@@ -140,7 +141,30 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
     if mesh is not None:
         mesh.vertices = part.pose(mesh.vertices)
         return _repeated(mesh, part.instances)
-    field = part.field.superfrustum() or part.field
+    import trimesh
+
+    field = part.field.superfrustum()
+    if field is not None:
+        frame, vertices, faces = _kept_in_own_frame(field, repr(field), resolution, sharp)
+    else:
+        frame, vertices, faces = _in_own_frame(part.field, resolution, sharp)
+    pose = part.pose @ frame.inverse()
+    return _repeated(trimesh.Trimesh(pose(vertices), faces.copy(), process=False), part.instances)
+
+
+@lru_cache(_MESHES_KEPT)
+def _kept_in_own_frame(
+    field: SuperFrustum, said: str, resolution: int, sharp: bool
+) -> tuple[Similarity, np.ndarray, np.ndarray]:
+    """`_in_own_frame`, which copies of a part share.
+
+    said: the field's repr, as 0 and -0 are the same number, but not to the bit.
+    """
+    return _in_own_frame(field, resolution, sharp)
+
+
+def _in_own_frame(field: Field, resolution: int, sharp: bool) -> tuple[Similarity, np.ndarray, np.ndarray]:
+    """The frame in which a field is meshed, and the vertices (V, 3) and faces (F, 3) there."""
     lower, upper = field.bounds()
     frame = _frame(lower, upper)
     local = field.scaled(frame.scale)
@@ -156,9 +180,7 @@ def mesh_part(part: Part, resolution: int = 64, *, sharp: bool = True) -> trimes
         return local(points - centre.astype(np.float32))
 
     mesh = mesh_field(distance, -extent / 2, extent / 2, counts, lipschitz=local.lipschitz, sharp=sharp)
-    pose = part.pose @ frame.inverse()
-    mesh.vertices = pose(mesh.vertices)
-    return _repeated(mesh, part.instances)
+    return frame, np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
 
 def lipschitz(node: Assembly | Part) -> float:

@@ -132,8 +132,13 @@ def _welded(lattice: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarr
     x, y, z = (lattice - low).T
     _, ny, nz = high - low + 1
     key = ((x * ny + y) * nz + z) * 3 + axis
-    _, representative, number = np.unique(key, return_index=True, return_inverse=True)
-    return representative, number
+    # As np.unique has them, whose stable sort takes four times as long.
+    order = np.argsort(key)
+    ordered = key[order]
+    begins = np.concatenate([np.ones(min(len(key), 1), bool), ordered[1:] != ordered[:-1]])
+    number = np.empty(len(key), np.int64)
+    number[order] = np.cumsum(begins) - 1
+    return np.minimum.reduceat(order, np.flatnonzero(begins)), number
 
 
 def _on_zero_level(

@@ -11,7 +11,7 @@ from partwright.assembly import Assembly, Part, Similarity
 from partwright.assembly.similarity import rotation_matrix
 from partwright.errors import NoSurfaceError, ParameterError
 from partwright.meshing.assemblies import mesh_assembly, mesh_part
-from partwright.rows import corners
+from partwright.rows import corners, crosses, dots
 
 if TYPE_CHECKING:
     import trimesh
@@ -77,14 +77,14 @@ def mass_properties(solid: Assembly | Part | trimesh.Trimesh, resolution: int = 
 
 def _moments(vertices: np.ndarray, faces: np.ndarray) -> MassProperties:
     """Sums over the tetrahedra from the origin to each triangle (Tonon 2004)."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    six = np.einsum("ij,ij->i", a, np.cross(b, c))
+    a, b, c = (vertices.take(faces[:, i], axis=0) for i in range(3))
+    six = dots(a, crosses(b, c))
     volume = float(six.sum() / 6)
     if volume <= 0:
         raise NoSurfaceError(f"the mesh encloses no volume ({volume:g}), so it has no mass")
     total = a + b + c
     centre = six @ total / 24 / volume
-    products = sum(np.einsum("i,ij,ik->jk", six, p, p) for p in (a, b, c, total)) / 120
+    products = sum((six[:, None] * p).T @ p for p in (a, b, c, total)) / 120
     products = products - volume * np.outer(centre, centre)
     return MassProperties(volume, centre, np.trace(products) * np.eye(3) - products)
 

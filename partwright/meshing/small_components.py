@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from partwright import _kernel
+
 _SMALLEST = 3.0  # cells; a component that is shorter along each axis is small
 
 
 def components(faces: np.ndarray, count: int) -> tuple[int, np.ndarray]:
     """How many components faces (F, 3) between `count` vertices V make, and which each vertex (V,) is of."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    links = coo_array((np.ones(len(start), dtype=bool), (start, end)), shape=(count, count))
-    pieces, piece = connected_components(links, directed=False)
-    return int(pieces), piece
+    piece = _kernel.connected(np.ascontiguousarray(faces, dtype=np.int64), count)
+    return int(piece.max(initial=-1)) + 1, piece
 
 
 def without_small_components(

@@ -49,7 +49,10 @@ def thin_solids(node: Node, thin: Thin, mesh: Mesher) -> list[Manifold]:
     ]
     if not (found and cut):
         return found
-    taken = [one for cutter in node.children[1:] for one in _solids(cutter, mesh)]
+    boxes = [_box(one) for one in found]
+    cutters = [copy for cutter in node.children[1:] for copy in _copies(cutter)]
+    reaching = [one for one in cutters if any(_meet(box, one.bounds()) for box in boxes)]
+    taken = [one for cutter in reaching for one in _solids(cutter, mesh)]
     return [_without(solid, taken) for solid in found]
 
 
@@ -78,9 +81,13 @@ def united(mesh: trimesh.Trimesh | None, solids: list[Manifold]) -> trimesh.Trim
 def _solids(node: Node, mesh: Mesher) -> list[Manifold]:
     """A node as solids, each copy of a part by itself, as copies may overlap; none of what has no volume."""
     try:
-        return [as_manifold(mesh(copy)) for copy in (node.copies if node.is_part else (node,))]
+        return [as_manifold(mesh(copy)) for copy in _copies(node)]
     except NoSurfaceError:
         return []
+
+
+def _copies(node: Node) -> tuple[Node, ...]:
+    return node.copies if node.is_part else (node,)
 
 
 def _bounds(nodes: tuple[Node, ...]) -> np.ndarray:
@@ -88,6 +95,17 @@ def _bounds(nodes: tuple[Node, ...]) -> np.ndarray:
 
 
 def _without(solid: Manifold, taken: list[Manifold]) -> Manifold:
+    """Less what reaches its box: manifold3d would unite all of it first."""
     from manifold3d import Manifold, OpType
 
-    return Manifold.batch_boolean([solid, *taken], OpType.Subtract)
+    reaching = [one for one in taken if _meet(_box(solid), _box(one))]
+    return Manifold.batch_boolean([solid, *reaching], OpType.Subtract) if reaching else solid
+
+
+def _box(solid: Manifold) -> np.ndarray:
+    """(2, 3) lowest and highest corner."""
+    return np.reshape(solid.bounding_box(), (2, 3))
+
+
+def _meet(one: np.ndarray, other: np.ndarray) -> bool:
+    return bool((one[0] <= other[1]).all() and (other[0] <= one[1]).all())

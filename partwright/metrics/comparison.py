@@ -6,11 +6,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from partwright.meshing import mesh_assembly
 from partwright.metrics.deviation import COUNT, Deviation, surface_deviation
 from partwright.metrics.frames import in_unit_frame
-from partwright.shapes.sampling import sample_triangles
+from partwright.shapes.sampling import running_area, sample_triangles
 
 if TYPE_CHECKING:
     import trimesh
@@ -60,12 +61,16 @@ class Comparison:
             self.on_shape(COUNT, 0),
         )
 
+    @cached_property
+    def _area(self) -> NDArray[np.float64]:
+        return running_area(self.vertices, np.asarray(self.surface.faces))
+
     def on_result(self, count: int, stream: int) -> np.ndarray:
         """(count, 3) points of the assembly's surface, unit frame; other points for each stream, 0 to 4."""
         key = ("result", count, stream)
         if key not in self._samples:
-            faces = np.asarray(self.surface.faces)
-            self._samples[key] = sample_triangles(self.vertices, faces, count, self.streams[stream])[0]
+            faces, seed = np.asarray(self.surface.faces), self.streams[stream]
+            self._samples[key] = sample_triangles(self.vertices, faces, count, seed, self._area)[0]
         return self._samples[key]
 
     def on_shape(self, count: int, stream: int) -> np.ndarray:

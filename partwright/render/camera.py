@@ -106,7 +106,8 @@ class Camera:
         half = (tangent * width / height, tangent)
         lowest, highest = corners(points)
         middle = (lowest + highest) / 2
-        x, y, z = ((points - middle) @ axis for axis in (right, up, back))
+        centred = points - middle
+        x, y, z = (centred @ axis for axis in (right, up, back))
         # Not at the very tip of a needle that points at the viewer.
         distance, shift = z.max() + _NEAREST * (highest - lowest).max(), []
         for offset, share in ((x, half[0]), (y, half[1])):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from partwright.rows import lengths
 from partwright.shapes.topology import area_vectors
 
 _CREASE = 0.77  # cosine of the angle between faces (about 40 degrees) beyond which an edge stays sharp
@@ -12,7 +13,7 @@ _CROWDED = 256  # at a corner of more faces than this, flat shading is all there
 
 def face_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) normals whose length is twice the face's area."""
-    return area_vectors(vertices[faces])
+    return area_vectors(vertices.take(faces, axis=0))
 
 
 def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -55,5 +56,5 @@ def _sums(vectors: np.ndarray, group: np.ndarray, groups: int) -> np.ndarray:
 
 
 def _normalised(vectors: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    length = lengths(vectors)[..., None]
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)

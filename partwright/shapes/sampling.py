@@ -45,19 +45,30 @@ class Samples:
 
 
 def sample_triangles(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], count: int, seed: int
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    count: int,
+    seed: int,
+    running: NDArray[np.float64] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """`count` points (N, 3) spread evenly over the area, and the triangle (N,) of each.
 
     Stratified along the running area, so that the number of points on any part is as even as it can be.
+
+    running: the `running_area`, where it is known.
     """
     rng = np.random.default_rng(seed)
-    running = np.cumsum(doubled_areas(vertices, faces))
+    running = running_area(vertices, faces) if running is None else running
     target = (np.arange(count) + rng.random(count)) * (running[-1] / max(count, 1))
     face = np.minimum(np.searchsorted(running, target, side="right"), len(faces) - 1)
     root, second = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
     a, b, c = vertices[faces[face]].transpose(1, 0, 2)
     return (1 - root) * a + root * ((1 - second) * b + second * c), face
+
+
+def running_area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Twice the area (F,) of each triangle and all before it."""
+    return np.cumsum(doubled_areas(vertices, faces))
 
 
 def sample_with_normals(

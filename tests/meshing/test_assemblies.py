@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from partwright.assembly import Assembly, Part, Similarity
 from partwright.errors import NoSurfaceError
 from partwright.fields import Box, Cylinder, Sphere, SuperFrustum, Torus
-from partwright.meshing import mesh_assembly, mesh_part, occupancy_grid
+from partwright.meshing import assemblies, mesh_assembly, mesh_part, occupancy_grid
 
 HALF_TURN = float(np.sqrt(0.5))
 
@@ -110,6 +111,39 @@ def test_a_thin_wall_that_a_cut_leaves() -> None:
     assert mesh.volume == pytest.approx(np.pi * (0.25 - 0.48**2 * 0.98), rel=0.03)
     thick = Part(Cylinder(0.5, 1.0), rotation=turn) - Part(Cylinder(0.3, 2.0), rotation=turn)
     assert len(mesh_assembly(thick, 60, exact=False).faces) < len(mesh.faces) / 3  # of cells as asked for
+
+
+def test_what_does_not_reach_a_sheet_is_not_meshed_to_cut_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    sheet = Part(Box((1.0, 1.0, 0.001)), translation=(0.0, 0.0, 1.0), name="sheet")
+    body = Part(Box((1.0, 1.0, 0.5)), name="body") | sheet
+    near = Part(Cylinder(0.2, 0.4), translation=(0.0, 0.0, 1.0), name="near")
+    far = Part(Cylinder(0.2, 2.0), translation=(0.0, 0.0, -1.0), name="far")
+    meshed = []
+    own = assemblies._alone
+
+    def alone(cell: float, sharp: bool, node: Part) -> trimesh.Trimesh:
+        meshed.append(node.name)
+        return own(cell, sharp, node)
+
+    monkeypatch.setattr(assemblies, "_alone", alone)
+    mesh = mesh_assembly(Assembly((body, near, far), "difference"), 32, exact=False)
+    assert set(meshed) == {"sheet", "near"}
+    assert mesh.is_volume
+    _, sheet = sorted(mesh.split(), key=lambda one: one.bounds[1, 2])
+    assert sheet.volume == pytest.approx(0.001 * (1 - np.pi * 0.04), rel=0.03)
+
+
+def test_copies_of_a_part_are_meshed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+    own = assemblies.mesh_field
+    monkeypatch.setattr(assemblies, "mesh_field", lambda *a, **k: calls.append(a) or own(*a, **k))
+    field = SuperFrustum((1.0, 0.8, 0.6), 0.4, 0.01, 0.9, 0.1234, 0.0)
+    turned = Part(field, (5.0, 0.0, 0.0), (0.8, 0.6, 0.0, 0.0))
+    first, second = mesh_part(Part(field), 16), mesh_part(turned, 16)
+    assert len(calls) == 1
+    np.testing.assert_allclose(second.vertices, turned.pose(first.vertices), atol=1e-12)
+    first.vertices += 1.0  # its own
+    np.testing.assert_array_equal(mesh_part(turned, 16).vertices, second.vertices)
 
 
 def test_a_sheet_is_whole_beside_thick_parts_and_is_cut_with_them() -> None:

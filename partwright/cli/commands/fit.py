@@ -35,6 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
         "threads": arguments.threads,
         "tolerance": Tolerance(arguments.tolerance, arguments.contain, arguments.inside),
         "cancel": cancel,
+        "saving": True,
         "clean": Clean.keeping(arguments.clean, arguments.clean_tolerance),
         **given_settings(arguments),
     }
