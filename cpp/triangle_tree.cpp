@@ -91,6 +91,7 @@ struct TriangleTree::Item {
 };
 
 TriangleTree::TriangleTree(const double* vertices, const int64_t* faces, int64_t count) {
+  if (count == 0) return;
   std::vector<Item> items(count);
   for (int64_t f = 0; f < count; ++f) {
     const double *a = vertices + 3 * faces[3 * f], *b = vertices + 3 * faces[3 * f + 1], *c = vertices + 3 * faces[3 * f + 2];
@@ -170,7 +171,7 @@ double TriangleTree::squared_distance(const double* place) const {
   double best = std::numeric_limits<double>::infinity();
   std::array<Waiting, DEEPEST> waiting;
   int count = 0;
-  waiting[count++] = {0, 0.0};
+  if (!nodes_.empty()) waiting[count++] = {0, 0.0};
   while (count > 0) {
     const auto [index, square] = waiting[--count];
     if (square >= best) continue;
@@ -192,7 +193,7 @@ int32_t TriangleTree::winding(const double* place) const {
   std::array<int32_t, DEEPEST> waiting;
   int count = 0;
   int32_t sum = 0;
-  waiting[count++] = 0;
+  if (!nodes_.empty()) waiting[count++] = 0;
   while (count > 0) {
     const int32_t index = waiting[--count];
     const Node& node = nodes_[index];

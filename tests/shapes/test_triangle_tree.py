@@ -71,3 +71,10 @@ def test_signs_of_a_closed_surface_do_without_the_fast_winding_number(
     outside = np.linalg.norm(points, axis=1) > 1
     clear = np.abs(np.linalg.norm(points, axis=1) - 1) > 0.02
     np.testing.assert_array_equal((surface.signed(points) > 0)[clear], outside[clear])
+
+
+def test_without_triangles_all_is_far_and_outside() -> None:
+    tree = TriangleTree(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
+    points = np.zeros((2, 3))
+    assert np.isinf(tree.squared_distances(points, 0)).all()
+    assert not tree.windings(points, 0).any()
