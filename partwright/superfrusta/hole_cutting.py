@@ -27,6 +27,7 @@ _NEAR = 2  # voxels from a hole
 _MOST_REFITTED = 200  # copies: the normal equations grow with their square
 _BEYOND = 0.03  # unit lengths that a cut goes on where the hole ends in the open
 _LOOKED = 0.03  # unit lengths from a hole's end at which it is open or not
+_PRICE = 0.5  # of a part's: a hole that holds too little to pay for one is seen as well as another part is
 _ROUNDNESS = (0.05, 0.95)  # of a box and of a rod, free to move either way
 _BLEND = 0.01  # unit lengths
 _SECTION = 0.25  # of its depth, from the middle: sections as far stand for what lies beyond its ends
@@ -42,19 +43,23 @@ def with_holes(
     """Leaves with those patterns cut out of them that are worth a part, all refitted; the same leaves where
     none is."""
     cuts = [RepeatedPart(hole_part(samples, one, settings), one.isometries) for one in patterns]
-    best = as_found = measured(samples, list(leaves), settings)
+    best = as_found = _measured(samples, list(leaves), settings)
     # What is there was fitted to voxels where holes were full, or was set back for what it covered.
     beside = refit(_beside(samples, patterns), leaves, _STAGES, settings, locked)
-    for trial in (as_found, measured(samples, beside, settings)):
+    for trial in (as_found, _measured(samples, beside, settings)):
         with_cuts = trial
         for cut in cuts:
-            with_cuts = _better(with_cuts, measured(samples, [*with_cuts.leaves, cut], settings))
+            with_cuts = _better(with_cuts, _measured(samples, [*with_cuts.leaves, cut], settings))
         if with_cuts is not trial:
             best = _better(best, with_cuts)
     if len(leaves) < len(best.leaves) and len(expanded(best.leaves)) <= _MOST_REFITTED:
         fitted = refit(samples, best.leaves, _STAGES, settings, locked)
-        best = _better(best, measured(samples, fitted, settings))
+        best = _better(best, _measured(samples, fitted, settings))
     return best.leaves
+
+
+def _measured(samples: FitSamples, leaves: list[RepeatedPart], settings: Settings) -> Trial:
+    return measured(samples, leaves, settings, _PRICE)
 
 
 def _better(one: Trial, other: Trial) -> Trial:

@@ -16,7 +16,6 @@ from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, refit
 from partwright.superfrusta.symmetry import TOLERANCE, Symmetry, groups
 
-_PRICE = 0.5  # of a part's: at the whole price repeats that save a part buy it with much of the surface
 _TRIED = 64  # repeats at most
 _NEARLY = 1  # planes, the most exact first, that are tried part by part
 _GIVEN_UP = 1  # of those that are chosen, at most
@@ -24,7 +23,8 @@ _UNREFITTED_SCORE_LOSS = 0.01  # of R: what a repeat may cost before a refit bey
 _UNREFITTED_OFF = 0.03  # unit lengths: so much more than before a part may be off before a refit
 _GRID_EVERY = 3
 _HOPELESS = 0.004  # of the value: what is so much worse after a brief refit gets no longer one
-_FURTHER = 0.0045  # unit lengths, a quarter percent of the longest side: likewise, after it
+_FURTHER = 0.009  # unit lengths, half a percent of the longest side: likewise, after it
+_NEAR = 0.045  # unit lengths, 2.5 % of the longest side: what is no further off is left to the last steps
 _LOOSER = (
     2.0  # times the median distance from the surface to the assembly, which what is missing hardly moves
 )
@@ -54,13 +54,15 @@ def repeat(
 
     Repeats are taken that are worth the most: the parts that they save, less what they cost of R. The copies
     of each leaf are refitted as one. Together they may not lower the objective, nor leave a part further off
-    than any was, by over a quarter percent of the longest side; where they do, they are given up one by one.
+    than 2.5 % of the longest side and than any was by over half a percent; where they do, they are given up
+    one by one.
     An IoU that the settings ask for is kept. The first `locked` rows stay leaves of their own.
     """
     whole = measured(samples, _leaves(rows, []), settings)
+    furthest = max(whole.off + _FURTHER, _NEAR)
 
     def good(trial: Trial) -> bool:
-        if trial.off > whole.off + _FURTHER or trial.value < whole.value:
+        if trial.off > furthest or trial.value < whole.value:
             return False
         if settings.min_iou is None:
             return True
@@ -77,7 +79,7 @@ def repeat(
             for stages in _REFITS:
                 leaves = refit(samples, trials[0].leaves, stages, settings, locked)
                 trials.append(measured(samples, leaves, settings))
-                nearer = trials[-1].off <= whole.off + 2 * _FURTHER
+                nearer = trials[-1].off <= furthest + _FURTHER
                 if not nearer or trials[-1].value < whole.value - _HOPELESS:
                     break
             better = [trial for trial in trials if good(trial)]
@@ -105,12 +107,14 @@ def _without_the_worst(
     return max(rest, key=lambda some: measured(samples, _leaves(rows, some), settings).value)
 
 
-def measured(samples: FitSamples, leaves: list[RepeatedPart], settings: Settings) -> Trial:
-    """Of copies the one that is furthest off counts."""
+def measured(
+    samples: FitSamples, leaves: list[RepeatedPart], settings: Settings, price: float = 1.0
+) -> Trial:
+    """Of copies the one that is furthest off counts. price: of a leaf, in parts'."""
     rows = expanded(leaves)
     firsts = np.cumsum([0, *(1 + len(leaf.isometries) for leaf in leaves[:-1])])
     off = np.maximum.reduceat(deviations(samples, rows).by_part, firsts)
-    value = score(samples, rows) - _PRICE * settings.alpha * len(leaves) - settings.firmness * norm(off)
+    value = score(samples, rows) - price * settings.alpha * len(leaves) - settings.firmness * norm(off)
     return Trial(leaves, value, float(off.max()))
 
 
@@ -136,9 +140,9 @@ def _choices(
     scores = [score(samples, expanded(_leaves(rows, [one]))) for one in wanted]
     costs = score(samples, rows) - np.array(scores)
     saved = np.array([len(one.replaced) for one in wanted])
-    likely = costs - _PRICE * settings.alpha * saved <= _UNREFITTED_SCORE_LOSS
+    likely = costs - settings.alpha * saved <= _UNREFITTED_SCORE_LOSS
     every = np.flatnonzero(likely).tolist()
-    cheap = sorted(every, key=lambda i: float(costs[i] - _PRICE * settings.alpha * saved[i]))
+    cheap = sorted(every, key=lambda i: float(costs[i] - settings.alpha * saved[i]))
     many = sorted(every, key=lambda i: (-int(saved[i]), float(costs[i])))
     alone = {i: measured(samples, _leaves(rows, [wanted[i]]), settings) for i in cheap}
     near = [i for i, trial in alone.items() if trial.off <= whole.off + _UNREFITTED_OFF]

@@ -279,7 +279,7 @@ class ResidualFit:
         assert self.best is not None
         with self.timed("symmetry"):
             tolerance = symmetry_tolerance(self.samples, self.best)
-            nearly = symmetries(shape, self.settings, self.samples.seed, max(tolerance, NEARLY))
+            nearly = symmetries(shape, self.settings, tolerance=max(tolerance, NEARLY))
             found = [one for one in nearly if one.error <= tolerance]
             self.leaves = repeat(self.samples, self.best, found, self.settings, self.locked, nearly)
             rows = expanded(self.leaves)

@@ -17,7 +17,7 @@ from partwright.superfrusta.settings import Settings
 
 Floats = NDArray[np.float64]
 
-TOLERANCE = 3e-3  # unit lengths: mean distance from the surface to its own image
+TOLERANCE = 6e-3  # unit lengths: mean distance from the surface to its own image
 NEARLY = 0.02  # likewise: what holds so far may hold for parts after a small motion of theirs
 _PROMISING = 0.06  # mean distance before refinement
 _ORDERS = range(2, 13)

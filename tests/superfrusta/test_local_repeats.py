@@ -94,10 +94,23 @@ def test_a_symmetry_need_not_hold_better_than_the_assembly_fits() -> None:
     boxes: list[Box] = [((2, 1.2, 0.15), (0, 0, 1.0))]
     boxes += [((0.15, 0.15, 1.05), (x, y, 0.5)) for x in (-0.85, 0.85) for y in (-0.5, 0.5)]
     rough = table().subdivide_to_size(0.15)
-    rough.vertices += np.random.default_rng(0).normal(0, 0.008, rough.vertices.shape)
+    rough.vertices += np.random.default_rng(0).normal(0, 0.016, rough.vertices.shape)
     samples, found = known(rough, boxes)
     shape = load_shape(rough)
     assert symmetries(shape, DRAFT) == ()
     tolerance = symmetry_tolerance(samples, found)
     assert {one.kind for one in symmetries(shape, DRAFT, tolerance=tolerance)} == {"mirror", "rotation"}
     assert symmetry_tolerance(*known(table(), boxes)) == TOLERANCE
+
+
+@pytest.mark.parametrize(("taller", "counts"), [(0.04, [1, 2]), (0.1, [1, 1, 1])])
+def test_parts_become_one_where_they_differ_by_less_than_one_is_worth(
+    taller: float, counts: list[int]
+) -> None:
+    posts = [((0.2, 0.2, 0.8 + up), (0, y, 0.5 + up / 2)) for y, up in ((0.7, 0.0), (-0.7, taller))]
+    boxes: list[Box] = [((1.0, 1.6, 0.3), (0, 0, 0)), *posts]
+    samples, found = known(union(*(box(*one) for one in boxes)), boxes)
+    across = (Symmetry("mirror", 2, mirror(np.eye(3)[1], np.zeros(3)), 0.0),)
+    leaves = repeat(samples, found, across, DRAFT)
+    assert [1 + len(leaf.isometries) for leaf in leaves] == counts
+    assert score(samples, found) - score(samples, expanded(leaves)) < DRAFT.alpha

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,14 +17,24 @@ from partwright.assembly.rows import rows
 from partwright.fields import SuperFrustum, kernel
 from partwright.fields.columns import ROTATION as ROTATION_OF
 from partwright.fields.columns import STEP_WIDTH, TRANSLATION, Column
-from partwright.methods import FitRequest
+from partwright.methods import FitRequest, Run
 from partwright.shapes import load_shape
+from partwright.superfrusta import repeated_parts, resfit
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.repeated_parts import repeat
+from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetric_fit import LeafSteps, RepeatedPart, expanded, images, refit, rigid
-from partwright.superfrusta.symmetry import Isometry, Symmetry, groups, mirror, rotation, symmetries
+from partwright.superfrusta.symmetry import (
+    TOLERANCE,
+    Isometry,
+    Symmetry,
+    groups,
+    mirror,
+    rotation,
+    symmetries,
+)
 from tests.assembly.strategies import ROTATION, SUPERFRUSTA, VECTOR
 from tests.superfrusta.meshes import box, table, union
 from tests.superfrusta.rows import subtracting
@@ -145,6 +156,38 @@ def test_repeats_that_would_hurt_are_refused() -> None:
     ]
     leaves = repeat(samples, exact, shifted, DRAFT)
     assert score(samples, expanded(leaves)) >= score(samples, exact) - 2e-3 - 1e-9
+
+
+@pytest.mark.parametrize(("off", "counts"), [(0.04, [1, 4]), (0.05, [1, 1, 1, 1, 1])])
+def test_what_is_2_5_percent_off_is_left_to_the_last_steps(monkeypatch, off: float, counts) -> None:
+    """Though nothing was off before; lengths are of the unit frame."""
+    samples, exact, found = known_table()
+    looks = iter([0.0])
+
+    def seen(_: FitSamples, rows: np.ndarray) -> SimpleNamespace:
+        return SimpleNamespace(by_part=np.full(len(rows), next(looks, off)))
+
+    monkeypatch.setattr(repeated_parts, "deviations", seen)
+    leaves = repeat(samples, exact, found, replace(DRAFT, firmness=0.0))
+    assert [1 + len(leaf.isometries) for leaf in leaves] == counts
+
+
+def test_a_plane_that_holds_but_for_noise_is_found_and_is_the_same_at_each_seed(monkeypatch) -> None:
+    rough = table().subdivide_to_size(0.15)
+    rough.vertices += np.random.default_rng(0).normal(0, 0.008, rough.vertices.shape)
+    shape = load_shape(rough)
+    _, exact, _ = known_table()
+    told: list[tuple[Symmetry, ...]] = []
+    monkeypatch.setattr(resfit, "repeat", lambda *given: told.append(given[2]) or [RepeatedPart(exact[0])])
+    # The fit is as good as exact: it is the shape that says how far a plane has to hold.
+    monkeypatch.setattr(resfit, "symmetry_tolerance", lambda *_: TOLERANCE)
+    for seed in (0, 1):
+        search = ResidualFit(FitSamples.of(shape, DRAFT, Run(seed)), DRAFT, best=exact)
+        search.find_repeats(shape)
+    first, second = told
+    assert ("mirror", 2) in kinds(first)
+    assert all(0.003 < one.error < TOLERANCE for one in first if one.kind == "mirror")
+    assert [one.isometry.shift.tolist() for one in first] == [one.isometry.shift.tolist() for one in second]
 
 
 BODY, POST, BAR = (
