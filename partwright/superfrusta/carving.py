@@ -9,11 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from partwright.errors import CancelledError
 from partwright.superfrusta.frontier import Frontier
 from partwright.superfrusta.growing import carve
 from partwright.superfrusta.hollows import with_hollows_filled
 from partwright.superfrusta.hull_start import convex_hull_start
+from partwright.superfrusta.mending import Mending
+from partwright.superfrusta.recombining import recombined
 from partwright.superfrusta.samples import NOTHING, Rows
 from partwright.superfrusta.settings import Settings
 
@@ -27,6 +31,7 @@ _GOOD = 0.93  # likewise, when it has ended: what is worse is tried again with p
 _AHEAD = 0.05  # of the objective, at the same number of parts: what leads by so much is gone on with alone
 _TO_COME = 0.15  # of the objective: what growth that adds may gain yet after its first rounds
 _TELLING = 0.6  # of the objective: of a shape that so few parts explain less of, the lead says nothing
+_OTHERS = 3  # attempts at most, the best of them, that parts are taken from
 _WORTH_CUTS = 0.01  # of the objective that parts to subtract must gain, for they are the harder to edit
 
 
@@ -130,6 +135,32 @@ class Carving:
             if search.best is whole:
                 search.settings = settings
         return converged or search.best is whole
+
+    def recombined(self, rows: Rows) -> Rows:
+        """With groups of parts of other attempts in place of some, where that serves what mending serves.
+
+        What was given up as a whole has often found what the best has not: a cut that empties a ring.
+        """
+        search, settings = self.search, self.search.settings
+        others = list({id(one): one for one in search.attempts if one is not rows}.values())
+        if not others or settings.min_iou is not None or settings.curve:
+            return rows
+        most = max(len(rows), settings.max_parts or len(search.samples.points))
+        mending = Mending(search.samples, settings, search.locked)
+
+        def value(trial: Rows) -> float:
+            return mending.trial(trial).value if len(trial) <= most else -np.inf
+
+        found = rows
+        with search.timed("recombine"):
+            for other in sorted(others, key=search.objective, reverse=True)[:_OTHERS]:
+                found = recombined(search.samples, found, other, settings, value, search.locked)
+        if found is rows:
+            return rows
+        thinned = search.another(replace(settings, merging=False))
+        found = thinned.thinning(found)  # what came may make others vain
+        search.take_samples(thinned.samples)
+        return found
 
     def started(self) -> Rows:
         """Where parts may be subtracted from the first round on: a few rounds from nothing and from bodies to

@@ -51,7 +51,8 @@ class ResidualFit:
 
     report: told of each step. assembled: makes the assembly of rows. rival: the objective that an attempt to
     carve must reach to be kept. reached: what this attempt has by growth; reached_before: what those before
-    it had. furthest: that progress was told. unmended: the best before it was mended.
+    it had. furthest: that progress was told. attempts: what each came to. unmended: the best before it was
+    mended.
     """
 
     samples: FitSamples
@@ -67,6 +68,7 @@ class ResidualFit:
     reached_before: Frontier = field(default_factory=Frontier)
     furthest: float = 0.0
     earlier: Rows | None = None
+    attempts: list[Rows] = field(default_factory=list)
     unmended: Rows | None = None
     seconds: dict[str, float] = field(default_factory=dict)
     history: list[dict[str, float | str]] = field(default_factory=list)
@@ -91,6 +93,10 @@ class ResidualFit:
         carving = Carving(self)
         converged = carving.contest() if carving.allowed and not len(start) else self.attempt(start)
         if self.best is not None:
+            found = carving.recombined(self.best) if self.mending else self.best
+            if found is not self.best:
+                self.best = found
+                self.report_progress("recombine", self.settings.rounds, found, MENDED)
             self.unmended = self.best
             if self.mending:
                 self.mend(self.best)
@@ -119,6 +125,7 @@ class ResidualFit:
         """Grown from the start, from round `first` on, and thinned out, beside an earlier attempt; says
         whether growth converged."""
         if self.best is not None:
+            self.attempts.append(self.best)
             self.earlier = self.best
             self.best, self.best_objective = None, -np.inf
             self.reached_before.rounds += self.reached.rounds
@@ -128,6 +135,8 @@ class ResidualFit:
         rows, converged = self.growth(start, range(first, self.settings.rounds))
         if not self.trailing and not self.out_of_reach(self.best_objective):
             self.thin(rows)
+        if self.best is not None:
+            self.attempts.append(self.best)
         return converged
 
     def thin(self, rows: Rows) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,10 +12,11 @@ from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Settings, carving
 from partwright.superfrusta.carving import Carving
 from partwright.superfrusta.frontier import Frontier
-from partwright.superfrusta.objective import volume_iou
+from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.resfit import ResidualFit
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
-from tests.superfrusta.meshes import drilled_block, table
+from tests.superfrusta import meshes
+from tests.superfrusta.meshes import drilled_block, table, union
 from tests.superfrusta.rows import box
 
 SETTINGS = Settings(near=8000, uniform=8000, resolution=64, mends=0, symmetry=False)
@@ -99,3 +102,40 @@ def test_an_attempt_that_its_pace_leaves_behind_is_given_up(
 @pytest.fixture
 def table_search() -> ResidualFit:
     return search_of(load_shape(table()))
+
+
+POSTS = [((0.2, 0.2, 1.0), (x, 0.0, 0.0)) for x in (-0.6, 0.6)]
+
+
+def slab_search(**changes: object) -> ResidualFit:
+    """Of a slab with two posts through it, with an attempt that has found the second post alone."""
+    shape = load_shape(union(meshes.box((1.8, 1.0, 0.2)), *(meshes.box(*post) for post in POSTS)))
+    settings = replace(SETTINGS, mends=4, **changes)
+    search = ResidualFit(FitSamples.of(shape, settings, Run(threads=1)), settings)
+    search.attempts = [box((1.6, 1.2, 0.15), (0.0, 0.0, 0.0))[None], box(*POSTS[1])[None]]
+    return search
+
+
+def test_what_another_attempt_has_found_is_taken_from_it() -> None:
+    search = slab_search()
+    best = np.concatenate([SLAB, box(*POSTS[0])[None]])
+    found = Carving(search).recombined(best)
+    assert len(found) == 3
+    assert score(search.samples, found) > 0.98 > 0.95 > score(search.samples, best)
+    assert Carving(search).recombined(found) is found  # there is nothing more to take
+
+
+@pytest.mark.parametrize("asked", [{"max_parts": 2}, {"min_iou": 0.5}, {"curve": True}])
+def test_nothing_is_taken_from_others_where_a_size_or_an_iou_is_asked_for(asked: dict[str, object]) -> None:
+    best = np.concatenate([SLAB, box(*POSTS[0])[None]])
+    assert len(Carving(slab_search(**asked)).recombined(best)) == 2
+
+
+def test_what_each_attempt_came_to_is_kept_until_all_have_ended() -> None:
+    search = search_of(load_shape(table()))
+    search.attempt(NOTHING)
+    first = search.best
+    search.settings = Carving(search).settings
+    search.attempt(NOTHING, 9)
+    assert search.attempts[0] is first
+    assert search.attempts[-1] is search.best
