@@ -24,6 +24,9 @@ constexpr int BLOCK = 128;
 constexpr int MOST_PIECES = 16;
 constexpr int LEAST_BLOCKS = 8;  // of a piece, where there is more than one
 
+// Parts at points that are worth another thread, which may take some tens of microseconds until it is awake.
+constexpr int64_t LEAST_VALUES = 1 << 15;
+
 // The fold of no parts: farther than any point, and small enough for sums to stay finite.
 constexpr float FAR = 1e6f;
 

@@ -8,7 +8,7 @@
 namespace partwright {
 namespace {
 
-constexpr int64_t ENOUGH_FOR_THREADS = 1 << 20;  // bytes: less is summed before a thread is up
+constexpr int64_t LEAST_BYTES = 1 << 19;  // of a thread: less is summed before one is awake
 
 // The sum of v times by, lane by lane and then of the lanes.
 PW_CLONES double dot(const float* __restrict v, const float* __restrict by) {
@@ -58,7 +58,8 @@ PW_CLONES void block_sums(const uint8_t* __restrict occupied, const uint8_t* __r
 
 // Calls work(block, first, n) for all points, each time with the next n of them, some blocks a thread at once.
 template <typename Work>
-void over_blocks(const float* points, int64_t count, int threads, Work work) {
+void over_blocks(const std::vector<Part>& parts, const float* points, int64_t count, int threads, Work work) {
+  threads = worth_their_while(threads, int64_t(parts.size()) * count, LEAST_VALUES);
   const int64_t blocks = (count + BLOCK - 1) / BLOCK, batch = 16;
   parallel_for((blocks + batch - 1) / batch, threads, [&](int64_t item) {
     Block block;
@@ -78,7 +79,7 @@ double sum(const float* v) {
 }  // namespace
 
 void evaluate(const std::vector<Part>& parts, const float* points, int64_t count, float* out, int threads) {
-  over_blocks(points, count, threads, [&](const Block& block, int64_t first, int n) {
+  over_blocks(parts, points, count, threads, [&](const Block& block, int64_t first, int n) {
     alignas(64) float field[BLOCK], g[BLOCK], weight[BLOCK];
     const Ball ball = around(block);
     for (size_t m = 0; m < parts.size(); ++m) {
@@ -96,7 +97,7 @@ void evaluate(const std::vector<Part>& parts, const float* points, int64_t count
 }
 
 void evaluate_parts(const std::vector<Part>& parts, const float* points, int64_t count, float* out, int threads) {
-  over_blocks(points, count, threads, [&](const Block& block, int64_t first, int n) {
+  over_blocks(parts, points, count, threads, [&](const Block& block, int64_t first, int n) {
     alignas(64) float g[BLOCK];
     for (size_t m = 0; m < parts.size(); ++m) {
       values(parts[m], block, g);
@@ -106,7 +107,7 @@ void evaluate_parts(const std::vector<Part>& parts, const float* points, int64_t
 }
 
 void covered(const std::vector<Part>& parts, const float* points, int64_t count, uint8_t* out, int threads) {
-  over_blocks(points, count, threads, [&](const Block& block, int64_t first, int n) {
+  over_blocks(parts, points, count, threads, [&](const Block& block, int64_t first, int n) {
     alignas(64) float g[BLOCK];
     const Ball ball = around(block);
     for (size_t m = 0; m < parts.size(); ++m) {
@@ -123,7 +124,7 @@ void covered(const std::vector<Part>& parts, const float* points, int64_t count,
 
 void occupancy_sums(const uint8_t* occupied, int64_t rows, const uint8_t* inside, const float* weight, int64_t count,
                     int64_t split, double* out, int threads) {
-  if (rows * count < ENOUGH_FOR_THREADS) threads = 1;
+  threads = worth_their_while(threads, rows * count, LEAST_BYTES);
   const int64_t ends[3] = {0, split, count};
   parallel_for(2 * rows, threads, [&](int64_t item) {
     const uint8_t* mine = occupied + item / 2 * count;

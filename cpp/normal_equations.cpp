@@ -242,6 +242,7 @@ bool update(const std::vector<Part>& parts, size_t m, const SampleBlocks& sample
 }  // namespace
 
 void measure(const std::vector<Part>& parts, const SampleBlocks& samples, int threads, PartDistances& distances) {
+  threads = worth_their_while(threads, int64_t(parts.size()) * samples.count(), LEAST_VALUES);
   parallel_for(piece_count(samples.count()), threads, [&](int64_t piece) {
     const auto [first, last] = piece_range(samples.count(), piece);
     for (int64_t b = first; b < last; ++b) {

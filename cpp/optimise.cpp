@@ -60,11 +60,11 @@ constexpr double ROUNDED = 1e-9;
 // stages: each with the samples at its sharpness.
 using Sharpened = std::vector<std::pair<Stage, SampleBlocks>>;
 
-Sharpened sharpened(const Samples& samples, bool compact, const std::vector<Stage>& stages) {
+Sharpened sharpened(const Samples& samples, bool compact, const std::vector<Stage>& stages, int threads) {
   Sharpened result;
   for (const Stage& stage : stages) {
     if (result.empty())
-      result.emplace_back(stage, SampleBlocks(samples, compact));
+      result.emplace_back(stage, SampleBlocks(samples, compact, threads));
     else
       result.emplace_back(stage, result.back().second);
     result.back().second.sharpen(stage.beta);
@@ -136,7 +136,7 @@ Outcome minimised(std::vector<float> rows, const std::vector<char>& free, const 
 Outcome levenberg_marquardt(std::vector<float> rows, const std::vector<char>& free, const std::vector<char>& tied,
                             const Samples& samples, const std::vector<Stage>& stages, Penalties penalties,
                             const Limits& limits, int threads) {
-  return minimised(std::move(rows), free, tied, sharpened(samples, rows.size() > COLUMNS, stages), penalties, limits, threads);
+  return minimised(std::move(rows), free, tied, sharpened(samples, rows.size() > COLUMNS, stages, threads), penalties, limits, threads);
 }
 
 std::vector<Outcome> fit_starts(const std::vector<float>& starts, const std::vector<int64_t>& first,
@@ -154,7 +154,7 @@ std::vector<Outcome> fit_starts(const std::vector<float>& starts, const std::vec
     const int64_t a = first[begun[size_t(run)]];
     const Samples own{samples.points + 3 * a, samples.distance + a, samples.weight + a,
                       samples.background ? samples.background + a : nullptr, last[begun[size_t(run)]] - a};
-    shared[size_t(run)] = sharpened(own, false, stages);
+    shared[size_t(run)] = sharpened(own, false, stages, 1);
   });
   std::vector<Outcome> out(first.size());
   parallel_for(int64_t(first.size()), threads, [&](int64_t start) {

@@ -1,36 +1,44 @@
-// Static and dynamic loops over threads. Work items never share output, so results do not depend on the
-// number of threads.
+// Loops over threads, which take their items one after another. Work items never share output, so results do not depend
+// on the number of threads.
 #pragma once
 
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
-#include <thread>
-#include <vector>
+#include <functional>
 
 namespace partwright {
 
-inline int thread_count(int requested) {
-  if (requested > 0) return requested;
-  // Asked once: the answer is read from a file, which takes as long as many a loop.
-  static const int hardware = std::max(1, int(std::thread::hardware_concurrency()));
-  return hardware;
+// How many threads are meant: 0 is one a core.
+int thread_count(int requested);
+
+// As many of the threads as each have at least so much of the work: a call that is shorter than the way to another
+// thread is done before that is awake.
+inline int worth_their_while(int threads, int64_t work, int64_t least) {
+  return int(std::clamp<int64_t>(work / least, 1, thread_count(threads)));
 }
+
+// Calls `run` in this thread, and at the same time in up to threads - 1 others, which stay from one call to the next.
+// Those that come too late are not waited for, so `run` must do all that is left to do wherever it is called. Calls of
+// several threads share the cores; of a call within a call the inner one mostly runs alone.
+void together(int threads, const std::function<void()>& run);
 
 // Calls work(item, state) for every item, each on one thread, in no particular order. Each thread makes a state of
 // its own, once.
 template <typename Make, typename Work>
 void parallel_for(int64_t items, int threads, Make make, Work work) {
-  threads = int(std::min<int64_t>(thread_count(threads), items));
   std::atomic<int64_t> next{0};
-  auto run = [&] {
+  const auto run = [&] {
+    int64_t i = next++;
+    if (i >= items) return;
     auto state = make();
-    for (int64_t i = next++; i < items; i = next++) work(i, state);
+    for (; i < items; i = next++) work(i, state);
   };
-  std::vector<std::thread> pool;
-  for (int i = 1; i < threads; ++i) pool.emplace_back(run);
-  run();
-  for (auto& thread : pool) thread.join();
+  threads = int(std::min<int64_t>(thread_count(threads), items));
+  if (threads > 1)
+    together(threads, run);
+  else
+    run();
 }
 
 // The same for work without a state.

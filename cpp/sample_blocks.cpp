@@ -5,8 +5,12 @@
 #include <cmath>
 #include <limits>
 
+#include "parallel.hpp"
+
 namespace partwright {
 namespace {
+
+constexpr int64_t LEAST_SPLIT = 1 << 11;  // samples of a thread: to split less is done before one is awake
 
 struct Place {
   std::array<float, 3> at;
@@ -14,7 +18,7 @@ struct Place {
 };
 
 // Halves across the longest side of their box, at a whole number of blocks, until each is one block.
-void split(Place* places, int64_t count) {
+void split(Place* places, int64_t count, int threads) {
   if (count <= BLOCK) return;
   std::array<float, 3> low, high;
   low.fill(std::numeric_limits<float>::infinity());
@@ -30,18 +34,20 @@ void split(Place* places, int64_t count) {
   const int64_t middle = (count + 2 * BLOCK - 1) / (2 * BLOCK) * BLOCK;
   std::nth_element(places, places + middle, places + count,
                    [longest](const Place& a, const Place& b) { return a.at[longest] < b.at[longest]; });
-  split(places, middle);
-  split(places + middle, count - middle);
+  const int half_of_them = std::max(1, threads / 2);
+  parallel_for(2, worth_their_while(threads, count, LEAST_SPLIT), [&](int64_t half) {
+    half ? split(places + middle, count - middle, half_of_them) : split(places, middle, half_of_them);
+  });
 }
 
 }  // namespace
 
-SampleBlocks::SampleBlocks(const Samples& given, bool compact)
+SampleBlocks::SampleBlocks(const Samples& given, bool compact, int threads)
     : blocks_(size_t((given.count + BLOCK - 1) / BLOCK)), count_(given.count), background_(given.background) {
   std::vector<Place> places(static_cast<size_t>(given.count));
   for (int64_t i = 0; i < given.count; ++i)
     places[size_t(i)] = {{given.points[3 * i], given.points[3 * i + 1], given.points[3 * i + 2]}, i};
-  if (compact) split(places.data(), given.count);
+  if (compact) split(places.data(), given.count, thread_count(threads));
   for (size_t b = 0; b < blocks_.size(); ++b) {
     SampleBlock& block = blocks_[b];
     const Place* mine = &places[b * BLOCK];

@@ -33,7 +33,7 @@ class SampleBlocks {
  public:
   // compact: in an order in which the samples of a block lie close together: most parts are then far from most
   // blocks.
-  SampleBlocks(const Samples& given, bool compact);
+  SampleBlocks(const Samples& given, bool compact, int threads = 1);
 
   // Sets the targets; every use is at the sharpness `beta` from then on.
   void sharpen(float beta);
