@@ -8,7 +8,8 @@ Derivatives are in the order of `columns.Tangent`: translation (3), a local rota
 R <- R exp(w) (3), size (3), roundness, dilation, taper, bulge, onion, blend. `partwright.fields.reference` is
 the slow form that tests compare with.
 
-`threads=0` means one thread per core. Results do not depend on the number of threads.
+`threads=0` means one thread per core, and where several jobs run at once (at_once.py) each has its share of
+them. Results do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from partwright import _kernel
+from partwright.at_once import share_of
 from partwright.fields.columns import STEP_WIDTH, UNSIGNED, WIDTH
 
 Rows = NDArray[np.float32]
@@ -49,17 +51,17 @@ def _points(points: ArrayLike) -> Floats:
 
 def evaluate(parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> Floats:
     """Distances (N,) of M parts, folded first to last: smooth unions (SuperFrusta, eq. 4) and differences."""
-    return _kernel.evaluate(_rows(parameters), _points(points), threads)
+    return _kernel.evaluate(_rows(parameters), _points(points), share_of(threads))
 
 
 def evaluate_parts(parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> Floats:
     """Distances (M, N) of each part alone."""
-    return _kernel.evaluate_parts(_rows(parameters), _points(points), threads)
+    return _kernel.evaluate_parts(_rows(parameters), _points(points), share_of(threads))
 
 
 def covered(parameters: ArrayLike, points: ArrayLike, threads: int = 0) -> NDArray[np.bool_]:
     """Whether each part alone covers each point (M, N): where its distance is below 0."""
-    return _kernel.covered(_rows(parameters), _points(points), threads)
+    return _kernel.covered(_rows(parameters), _points(points), share_of(threads))
 
 
 def occupancy_sums(
@@ -79,7 +81,7 @@ def occupancy_sums(
     if not 0 <= split <= len(weights):
         raise ValueError(f"split: expected 0 to {len(weights)}, got {split}")
     covered, true = (np.ascontiguousarray(one, dtype=bool).view(np.uint8) for one in (occupied, inside))
-    return _kernel.occupancy_sums(covered, true, weights, split, threads)
+    return _kernel.occupancy_sums(covered, true, weights, split, share_of(threads))
 
 
 def gradients(
@@ -90,7 +92,7 @@ def gradients(
     weights = np.ascontiguousarray(upstream, dtype=np.float32)
     if weights.shape != (len(points),):
         raise ValueError(f"upstream must be ({len(points)},), got {weights.shape}")
-    return _kernel.gradients(_rows(parameters), points, weights, threads)
+    return _kernel.gradients(_rows(parameters), points, weights, share_of(threads))
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,7 @@ def normal_equations(
     rows = _rows(parameters)
     live = np.ones(len(rows), np.uint8)
     return _kernel.normal_equations(
-        rows, live, *target.arrays(), beta, penalties.overlap, penalties.blending, threads
+        rows, live, *target.arrays(), beta, penalties.overlap, penalties.blending, share_of(threads)
     )
 
 
@@ -161,7 +163,7 @@ def loss(
 ) -> float:
     """Half the sum of squared residuals, as in `normal_equations`."""
     return _kernel.loss(
-        _rows(parameters), *target.arrays(), beta, penalties.overlap, penalties.blending, threads
+        _rows(parameters), *target.arrays(), beta, penalties.overlap, penalties.blending, share_of(threads)
     )
 
 
@@ -186,7 +188,7 @@ def levenberg_marquardt(
     fitted, loss, iterations = _kernel.levenberg_marquardt(
         rows, free.astype(np.uint8), tied.astype(np.uint8), *target.arrays(),
         np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(),
-        threads,
+        share_of(threads),
     )  # fmt: skip
     return like(fitted, parameters), loss, iterations
 
@@ -211,7 +213,7 @@ def fit_starts(
     fitted, losses = _kernel.fit_starts(
         rows, first, last, free.astype(np.uint8), tied.astype(np.uint8), *target.arrays(),
         np.ascontiguousarray(stages, np.float32), penalties.overlap, penalties.blending, limits.array(),
-        threads,
+        share_of(threads),
     )  # fmt: skip
     return like(fitted, starts), losses
 
@@ -225,7 +227,7 @@ def removal_counts(
     """
     return _kernel.removal_counts(
         _rows(parameters), _points(points), np.ascontiguousarray(inside, np.uint8),
-        np.ascontiguousarray(weight, np.float32), threads,
+        np.ascontiguousarray(weight, np.float32), share_of(threads),
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from partwright.assembly import Assembly
 from partwright.assembly.checks import MAX_NAME
+from partwright.at_once import limited
 from partwright.blas import one_blas_thread
 from partwright.errors import CancelledError, SettingError
 from partwright.fitting.ahead import Ahead
@@ -192,7 +193,8 @@ class _Task:
 
     def result(self, listen: bool, saving: bool) -> Result:
         """The work. listen: Ctrl-C cancels it. saving: it will be saved."""
-        with interruptible(self.run.cancel) if listen else nullcontext(), one_blas_thread():
+        listening = interruptible(self.run.cancel) if listen else nullcontext()
+        with listening, one_blas_thread(), limited(self.run.threads):
             return self.done(saving and Ahead.pays(self.run.threads))
 
     def done(self, saving: bool) -> Result:

@@ -7,13 +7,14 @@ filled the field of the parts beside it is a fraction of that.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from partwright.at_once import at_once, share_of, thread_count
 from partwright.fields.columns import Column
 from partwright.metrics.deviation import buried
 from partwright.shapes import Shape
@@ -80,18 +81,21 @@ class CloseLook:
         """Of an assembly."""
         added = np.flatnonzero(rows[:, Column.SIGN] > 0)
         surfaces = surface_points(rows)
-        of_solid = (
-            of_parts(self.samples, rows, added, surfaces, onto_blends=True),
-            of_voxels(self.samples, rows, added),
-            of_far_cells(self.samples, rows, added, surfaces[added]),
+        samples, on_parts = self.samples, surfaces.reshape(-1, 3).astype(np.float32)
+        looks = (
+            partial(of_parts, samples, rows, added, surfaces, onto_blends=True),
+            partial(of_voxels, samples, rows, added),
+            partial(of_far_cells, samples, rows, added, surfaces[added]),
+            partial(self._of_surfaces, rows, on_parts),
         )
+        *of_solid, (field, on_it) = at_once(looks, samples.threads)
         points, distance, off, part = (np.concatenate(one) for one in zip(*of_solid, strict=True))
         off = self._exactly(points, distance, off)
         beside = self._beside(rows, points, distance, off, part)
         joined = zip((points, distance, off, part), beside, strict=True)
         points, distance, off, part = (np.concatenate(one) for one in joined)
         least = max(CLOSE, _FELT * float(off.max(initial=0)))
-        of_shape = self._of_shape(rows, added, surfaces.reshape(-1, 3).astype(np.float32), least)
+        of_shape = self._of_shape(rows, added, field, on_it, least)
         times = np.where(distance > 0, np.float32(STICKS_OUT), np.float32(1))
         both = zip((points, distance, off, part, times), (*of_shape, np.ones_like(of_shape[2])), strict=True)
         points, distance, off, part, times = (np.concatenate(one) for one in both)
@@ -136,24 +140,30 @@ class CloseLook:
         place, best = place[moved].astype(np.float32), best[moved].astype(np.float32)
         return place, best, best, part[far[moved]]
 
+    def _of_surfaces(self, rows: Rows, on_parts: Floats) -> tuple[Floats, Floats]:
+        """The assembly's field (N,) at the shape's points, and those (K, 3) of its parts that are on its own
+        surface."""
+        field = self.samples.distance_of(rows, self.points)
+        return field, on_parts[np.abs(self.samples.distance_of(rows, on_parts)) < ON]
+
     def _of_shape(
-        self, rows: Rows, added: NDArray[np.int64], surfaces: Floats, least: float
+        self, rows: Rows, added: NDArray[np.int64], field: Floats, on_it: Floats, least: float
     ) -> tuple[NDArray[Any], ...]:
         """Points of the shape's surface further than `least` from the assembly's, filled or not covered.
 
-        surfaces: (K, 3) of its parts.
+        field: (N,) there. on_it: (K, 3) of the assembly's surface.
         """
         samples = self.samples
-        field = samples.distance_of(rows, self.points)
         mine = self._suspects(rows[added], field, least)
-        on_it = surfaces[np.abs(samples.distance_of(rows, surfaces)) < ON]
         if not len(mine) or not len(on_it):
             return self.points[:0], field[:0], field[:0], added[:0]
         # Between the points of the assembly's surface these are rather too far than too near.
         tree = cKDTree(on_it, balanced_tree=False, compact_nodes=False)  # a few queries are not worth those
-        mine = mine[np.isinf(tree.query(self.points[mine], distance_upper_bound=least)[0])]
+        threads = thread_count(share_of(samples.threads))
+        away, _ = tree.query(self.points[mine], distance_upper_bound=least, workers=threads)
+        mine = mine[np.isinf(away)]
         points, field = self.points[mine], field[mine]
-        nearest = np.maximum(tree.query(points)[0], np.abs(field))
+        nearest = np.maximum(tree.query(points, workers=threads)[0], np.abs(field))
         off = self._measured(rows, points, field, nearest)
         far = off > least
         mine, points, field, off = mine[far], points[far], field[far], off[far]

@@ -6,11 +6,13 @@ An overlap hardly feels either: a tab as thin as a sheet holds no volume, and is
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.at_once import at_once
 from partwright.fields.columns import Column
 from partwright.superfrusta.far_cells import CELL, middles_within
 from partwright.superfrusta.part_surfaces import surface_points
@@ -72,13 +74,13 @@ def deviations(samples: FitSamples, rows: Rows) -> Deviations:
     """Of an assembly, over points of its parts' surfaces and of the shape's."""
     added = np.flatnonzero(rows[:, Column.SIGN] > 0)
     surfaces = surface_points(rows)
-    found = zip(
-        of_parts(samples, rows, added, surfaces),
-        _of_shape(samples, rows, added),
-        of_voxels(samples, rows, added),
-        of_far_cells(samples, rows, added, surfaces[added]),
-        strict=True,
+    looks = (
+        partial(of_parts, samples, rows, added, surfaces),
+        partial(_of_shape, samples, rows, added),
+        partial(of_voxels, samples, rows, added),
+        partial(of_far_cells, samples, rows, added, surfaces[added]),
     )
+    found = zip(*at_once(looks, samples.threads), strict=True)
     points, distance, off, part = (np.concatenate(one) for one in found)
     # At an edge, what is read off the grid may be wrong by half a voxel.
     kept = off > max(CLOSE, samples.grid.spacing / 2)

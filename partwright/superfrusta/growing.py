@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from partwright.at_once import at_once
 from partwright.fields import kernel
 from partwright.fields.columns import Column
 from partwright.rows import corners
@@ -84,10 +86,10 @@ class View:
 def regions(samples: FitSamples, rows: Rows, settings: Settings) -> list[Region]:
     """Pieces of the residual max(S, -F), to add, and, where settings allow, of max(F, -S), to subtract."""
     field = samples.grid_field(rows)
-    found = _pieces(samples, samples.grid.values, field, rows, settings, 1.0)
+    jobs = [partial(_pieces, samples, samples.grid.values, field, rows, settings, 1.0)]
     if settings.subtract and len(rows):
-        found += _excess(samples, field, rows, settings)
-    return found
+        jobs.append(partial(_excess, samples, field, rows, settings))
+    return [one for found in at_once(jobs, samples.threads) for one in found]
 
 
 def _excess(samples: FitSamples, field: NDArray[np.float32], rows: Rows, settings: Settings) -> list[Region]:
@@ -211,8 +213,9 @@ def finalists(
     # best for the first of them: others are hardly better.
     first = {id(region.voxels): i for i, region in reversed([*enumerate(wanted)])}
     points = {key: samples.grid_points[np.flatnonzero(wanted[i].voxels)] for key, i in first.items()}
-    views = [_view(samples, region, points[id(region.voxels)]) for region in wanted]
-    guesses = [_guesses(samples, wanted[i], points[key], settings) for key, i in first.items()]
+    looks = [partial(_view, samples, region, points[id(region.voxels)]) for region in wanted]
+    guessing = [partial(_guesses, samples, wanted[i], points[key], settings) for key, i in first.items()]
+    views, guesses = at_once(looks, samples.threads), at_once(guessing, samples.threads)
     owner = np.repeat(list(first.values()), [len(g) for g in guesses])
     depth = float(np.median([region.depth for region in wanted]))
     rows = np.concatenate(guesses)

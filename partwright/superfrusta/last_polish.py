@@ -7,11 +7,13 @@ here the steps of the overlaps' normal equations bend to the slopes of the lengt
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.at_once import both
 from partwright.fields import kernel
 from partwright.fields.columns import Column
 from partwright.fields.kernel import Target
@@ -110,11 +112,11 @@ class Polish:
 
     def trial(self, rows: Rows) -> Trial:
         self.looks += 1
-        copies = self.steps.copies(rows)
-        off = self.look.deviations(copies)
+        copies, samples = self.steps.copies(rows), self.look.samples
+        looked, scored = partial(self.look.deviations, copies), partial(score, samples, copies)
+        off, reached = both(looked, scored, samples.threads)
         by_leaf = np.zeros(len(rows))
         np.maximum.at(by_leaf, self.steps.leaf[off.part], off.off)
-        reached = score(self.look.samples, copies)
         price = self.firmness * norm(by_leaf) + _GLARES * float(np.maximum(by_leaf - _GLARING, 0).sum())
         return Trial(rows, off, by_leaf, reached, reached - price)
 
@@ -133,7 +135,8 @@ class Polish:
             if not best.by_leaf.any() or vain == len(_SCALES) or given_up:
                 break
             if not vain:
-                overlaps, lengths = self.overlaps(best), self.lengths(best)
+                terms = partial(self.overlaps, best), partial(self.lengths, best)
+                overlaps, lengths = both(*terms, self.look.samples.threads)
             gradient, matrix = (scale * one + other for one, other in zip(overlaps, lengths, strict=True))
             stiff = np.diag(np.diag(matrix) + _STIFFNESS)
             vain += 1

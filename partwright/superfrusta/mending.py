@@ -6,17 +6,16 @@ fitted anew, split, joined by another or taken away, whichever serves an objecti
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
-from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from partwright.at_once import at_once, in_turn, thread_count
 from partwright.fields.columns import ROTATION, Column
 from partwright.fields.kernel import Target
 from partwright.superfrusta.deviations import Deviations, deviations
@@ -111,11 +110,15 @@ class Mending:
     def promising(self, changes: Iterable[tuple[Rows, Mask]]) -> list[tuple[Trial, Mask]]:
         """The changes that are worth the most; others are not looked at closer than it takes to know that."""
         found: list[tuple[Trial, Mask]] = []
-        order = sorted(((self.most(rows), rows, moving) for rows, moving in changes), key=lambda one: -one[0])
-        for most, rows, moving in order:
+        changes, threads = list(changes), self.samples.threads
+        worth = at_once([partial(self.most, rows) for rows, _ in changes], threads)
+        pairs = zip(worth, changes, strict=True)
+        order = [(most, *change) for most, change in sorted(pairs, key=lambda one: -one[0])]
+        trials = in_turn([partial(self.trial, rows, most) for most, rows, _ in order], threads)
+        for most, _, moving in order:
             if len(found) == _REFITTED and most <= found[-1][0].value:
                 break
-            found = sorted([*found, (self.trial(rows, most), moving)], key=lambda one: -one[0].value)
+            found = sorted([*found, (next(trials), moving)], key=lambda one: -one[0].value)
             del found[_REFITTED:]
         return found
 
@@ -148,13 +151,16 @@ class Mending:
             return best
         found = fit_regions(samples, regions, self.settings, self.settings.overlap)
         trials = [_with(rows, part, new) for part, new in zip(parts, found, strict=True)]
-        gains = np.array([score(samples, trial) for trial in trials]) - score(samples, rows)
-        for i in np.argsort(-gains, kind="stable"):
-            if gains[i] < _WORTH_A_TRY:
-                break
-            trial = self.trial(_with(best.rows, parts[i], found[i]))
-            if trial.value > best.value + self.settings.alpha and self.allowed(trial.rows, best.rows):
-                best = trial
+        scores = at_once([partial(score, samples, trial) for trial in trials], samples.threads)
+        gains = np.array(scores) - score(samples, rows)
+        left = [int(i) for i in np.argsort(-gains, kind="stable") if gains[i] >= _WORTH_A_TRY]
+        while left:
+            ways = [partial(self.trial, _with(best.rows, parts[i], found[i])) for i in left]
+            for trial in in_turn(ways, samples.threads):
+                left = left[1:]
+                if trial.value > best.value + self.settings.alpha and self.allowed(trial.rows, best.rows):
+                    best = trial
+                    break
         return best
 
     def joined(self, best: Trial) -> Trial:
@@ -167,7 +173,7 @@ class Mending:
         part_of = np.arange(len(best.rows))  # which of the parts as they were each row is; -1: a joined one
         while left := [one for one in left if one.gain > -_HOPELESS and np.isin(one.pair, part_of).all()]:
             first = left[:_JOINED]
-            tried = self.at_once([partial(self.merged, best, one, part_of) for one in first])
+            tried = at_once([partial(self.merged, best, one, part_of) for one in first], self.samples.threads)
             gaining = [(trial, one) for trials, one in zip(tried, first, strict=True) for trial in trials]
             if not gaining:
                 break
@@ -208,17 +214,16 @@ class Mending:
         if part < self.locked:
             return [self.firmed(best, moving)]
         changes = self.promising(self.changes(best, part, moving))
-        refits = [partial(self.refitted, trial, changed, best) for trial, changed in changes]
-        # The change that promises most is mostly the best; another is only tried where it does not help.
-        tried = self.at_once([lambda: [self.firmed(best, moving)], *refits[:1]])
+        jobs: list[Callable[[], list[Trial]]] = [lambda: [self.firmed(best, moving)]]
+        jobs += [partial(self.refitted, trial, changed, best) for trial, changed in changes]
+        # The change that promises most is mostly the best; another only counts where it does not help, and is
+        # tried before that is known where a core would be idle.
+        threads, needed = self.samples.threads, 2
+        known = at_once(jobs[: max(needed, thread_count(threads))], threads)
+        tried = known[:needed]
         if all(trial.value <= best.value for trials in tried for trial in trials):
-            tried = self.at_once(refits[1:])
+            tried = known[needed:] + at_once(jobs[len(known) :], threads)
         return [trial for trials in tried for trial in trials]
-
-    def at_once(self, jobs: Sequence[Callable[[], list[Trial]]]) -> list[list[Trial]]:
-        """What jobs return, which take turns on the threads: half of their work is none of the kernel's."""
-        with ThreadPoolExecutor(self.samples.threads or cpu_count() or 1) as pool:
-            return [future.result() for future in [pool.submit(job) for job in jobs]]
 
     def refitted(self, changed: Trial, moving: Mask, best: Trial) -> list[Trial]:
         """A change, its parts moved to where they explain the most, and to where they are nowhere far off."""
@@ -249,41 +254,61 @@ class Mending:
             (weight / weight.sum()).astype(np.float32),
         )
 
-    def changes(self, best: Trial, part: int, moving: Mask) -> Iterator[tuple[Rows, Mask]]:
+    def changes(self, best: Trial, part: int, moving: Mask) -> list[tuple[Rows, Mask]]:
         """Assemblies before any refit, and which of their parts move: those marked, and new ones."""
-        samples, rows, off = self.samples, best.rows, best.off
-        worst = off.worst(part)
-        others, still = np.delete(rows, part, axis=0), np.delete(moving, part)
-
-        def with_new(new: Rows) -> tuple[Rows, Mask]:
-            return np.concatenate([rows, new]), np.append(moving, _all(new))
-
-        if (others[:, Column.SIGN] > 0).any():
-            yield others, still
-        mine = owners(samples, rows) == part
-        if mine.any():
-            # In the part's own place, what is new is cut by what cuts the part.
-            cut = _cut(rows, part)
-            place = [part if cut else len(others)]
-            new = self.fitted(mine, others, rows[part], cut)
-            yield np.insert(others, place, new, axis=0), np.insert(still, place, True)
+        off, worst = best.off, best.off.worst(part)
+        jobs = [self.without, self.with_another]
         if off.off[worst] > _FAR:
-            grown = grow(samples, others, self.settings, _REGROWN)
-            if len(grown):
-                begun = np.insert(still, [self.locked] * len(grown.first), True)
-                yield grown.joined(others, self.locked), np.append(begun, _all(grown.last))
-        if self.settings.carving and off.distance[worst] > 0:
-            carved = self.carved(rows)
-            if len(carved):
-                yield with_new(carved.last)
-            for one in self.holes(rows, off, worst):
-                yield with_new(one[None])
-        missed = self.missed(rows, off, worst) if off.distance[worst] <= 0 else []
-        found = [self.fitted(voxels, rows, rows[part]) for voxels in missed]
-        if found:
-            yield with_new(found[0])
+            jobs.append(self.regrown)
+        if off.distance[worst] <= 0:
+            jobs.append(self.filled)
+        elif self.settings.carving:
+            jobs += [self.cut, self.drilled]
+        found = at_once([partial(job, best, part, moving) for job in jobs], self.samples.threads)
+        return [one for of_job in found for one in of_job]
+
+    def without(self, best: Trial, part: int, moving: Mask) -> list[tuple[Rows, Mask]]:
+        others = np.delete(best.rows, part, axis=0)
+        return [(others, np.delete(moving, part))] if (others[:, Column.SIGN] > 0).any() else []
+
+    def with_another(self, best: Trial, part: int, moving: Mask) -> list[tuple[Rows, Mask]]:
+        """In the part's own place, where what is new is cut by what cuts the part."""
+        mine = owners(self.samples, best.rows) == part
+        if not mine.any():
+            return []
+        others, still = np.delete(best.rows, part, axis=0), np.delete(moving, part)
+        cut = _cut(best.rows, part)
+        place = [part if cut else len(others)]
+        new = self.fitted(mine, others, best.rows[part], cut)
+        return [(np.insert(others, place, new, axis=0), np.insert(still, place, True))]
+
+    def regrown(self, best: Trial, part: int, moving: Mask) -> list[tuple[Rows, Mask]]:
+        others, still = np.delete(best.rows, part, axis=0), np.delete(moving, part)
+        grown = grow(self.samples, others, self.settings, _REGROWN)
+        if not len(grown):
+            return []
+        begun = np.insert(still, [self.locked] * len(grown.first), True)
+        return [(grown.joined(others, self.locked), np.append(begun, _all(grown.last)))]
+
+    def cut(self, best: Trial, part: int, moving: Mask) -> list[tuple[Rows, Mask]]:
+        carved = self.carved(best.rows)
+        return [_with_new(best.rows, moving, carved.last)] if len(carved) else []
+
+    def drilled(self, best: Trial, part: int, moving: Mask) -> list[tuple[Rows, Mask]]:
+        holes = self.holes(best.rows, best.off, best.off.worst(part))
+        return [_with_new(best.rows, moving, one[None]) for one in holes]
+
+    def filled(self, best: Trial, part: int, moving: Mask) -> list[tuple[Rows, Mask]]:
+        """What is missing about the worst place, alone and with what else is."""
+        rows = best.rows
+        missed = self.missed(rows, best.off, best.off.worst(part))
+        found = at_once(
+            [partial(self.fitted, voxels, rows, rows[part]) for voxels in missed], self.samples.threads
+        )
+        ways = [found[0]] if found else []
         if len(found) > 1:
-            yield with_new(np.concatenate(found))
+            ways.append(np.concatenate(found))
+        return [_with_new(rows, moving, new) for new in ways]
 
     def carved(self, rows: Rows) -> Grown:
         """What could be subtracted anywhere: the same for every part that is tried in vain."""
@@ -350,6 +375,10 @@ def next_to_mend(best: Trial, given_up: list[tuple[NDArray[np.float32], float]])
 
 def _all(rows: Rows) -> Mask:
     return np.ones(len(rows), bool)
+
+
+def _with_new(rows: Rows, moving: Mask, new: Rows) -> tuple[Rows, Mask]:
+    return np.concatenate([rows, new]), np.append(moving, _all(new))
 
 
 def _cut(rows: Rows, part: int) -> bool:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.at_once import at_once, in_turn
 from partwright.fields.columns import ROTATION, Column
 from partwright.meshing.hulls import hull_volume
 from partwright.superfrusta.growing import Region, fit_regions
@@ -42,18 +44,27 @@ def merge(samples: FitSamples, rows: Rows, settings: Settings, locked: int = 0) 
     The most promising mergers are tried one after another with a refit of their neighbours.
     """
     whole = score(samples, rows)
-    gone: set[int] = set()
-    alive = np.arange(len(rows))
-    for merger in mergers(samples, rows, settings, locked)[:_TRIED]:
-        if merger.gain < -_UNREFITTED_SCORE_LOSS or gone & set(merger.pair):
-            continue
+    alive = np.arange(len(rows))  # which of the parts as they were each row is; -1: a merged one
+
+    def merged(merger: Merger) -> tuple[Rows, float]:
         first, second = (int(np.flatnonzero(alive == part)[0]) for part in merger.pair)
         trial = carried_out(samples, rows, first, second, merger.part, settings, locked)
-        reached = score(samples, trial)
-        if reached + settings.alpha >= whole:
-            rows, whole = trial, reached
-            gone |= set(merger.pair)
-            alive = np.delete(alive, second)
+        return trial, score(samples, trial)
+
+    first = mergers(samples, rows, settings, locked)[:_TRIED]
+    left = [one for one in first if one.gain >= -_UNREFITTED_SCORE_LOSS]
+    while left:
+        tried = in_turn([partial(merged, one) for one in left], samples.threads)
+        for index, (trial, reached) in enumerate(tried):
+            if reached + settings.alpha >= whole:
+                # Those that come after it are tried beside it.
+                rows, whole, pair = trial, reached, left[index].pair
+                alive[alive == pair[0]] = -1
+                alive = alive[alive != pair[1]]
+                left = [one for one in left[index + 1 :] if np.isin(one.pair, alive).all()]
+                break
+        else:
+            break
     return rows
 
 
@@ -64,13 +75,14 @@ def cheapest_merger(
 
     Any two parts may merge, near or far: a pair of legs into one block.
     """
-    best: tuple[Rows, float] | None = None
-    for merger in mergers(samples, rows, settings, locked, apart=True)[: 2 * settings.trials]:
+
+    def merged(merger: Merger) -> tuple[Rows, float]:
         trial = carried_out(samples, rows, *merger.pair, merger.part, settings, locked)
-        reached = coverage(samples, trial)
-        if best is None or reached > best[1]:
-            best = trial, reached
-    return best
+        return trial, coverage(samples, trial)
+
+    tried = mergers(samples, rows, settings, locked, apart=True)[: 2 * settings.trials]
+    found = at_once([partial(merged, one) for one in tried], samples.threads)
+    return max(found, key=lambda one: one[1], default=None)
 
 
 def mergers(
@@ -90,7 +102,8 @@ def mergers(
 
     every = list(filter(suited, combinations(range(len(rows)), 2) if apart else touching))
     cheap = sorted(every, key=lambda pair: (-max(without[list(pair)]), pair))[:_FITTED]
-    filled = _hulls_filled(rows, [pair for pair in touching if suited(pair) and pair not in cheap])
+    others = [pair for pair in touching if suited(pair) and pair not in cheap]
+    filled = _hulls_filled(rows, others, samples.threads)
     full = [pair for pair in sorted(filled, key=lambda pair: -filled[pair]) if filled[pair] > _FULL]
     pairs = cheap + full[:_FILLED]
     if not pairs:
@@ -121,14 +134,15 @@ def mergers(
     return [Merger(pairs[i], merged[i], float(gains[i])) for i in np.argsort(-gains, kind="stable")]
 
 
-def _hulls_filled(rows: Rows, pairs: list[tuple[int, int]]) -> dict[tuple[int, int], float]:
+def _hulls_filled(rows: Rows, pairs: list[tuple[int, int]], threads: int) -> dict[tuple[int, int], float]:
     """The volume of both parts' convex hulls, by that of the hull of both."""
-    points = {part: surface_points(rows[[part]])[0] for part in {i for pair in pairs for i in pair}}
-    own = {part: hull_volume(places) for part, places in points.items()}
-    return {
-        (i, j): (own[i] + own[j]) / max(hull_volume(np.concatenate([points[i], points[j]])), 1e-12)
-        for i, j in pairs
-    }
+    parts = sorted({i for pair in pairs for i in pair})
+    points = {part: surface_points(rows[[part]])[0] for part in parts}
+    bodies = [points[part] for part in parts] + [np.concatenate([points[i], points[j]]) for i, j in pairs]
+    volumes = at_once([partial(hull_volume, body) for body in bodies], threads)
+    own = dict(zip(parts, volumes, strict=False))
+    both = zip(pairs, volumes[len(parts) :], strict=True)
+    return {(i, j): (own[i] + own[j]) / max(volume, 1e-12) for (i, j), volume in both}
 
 
 def _touching_pairs(samples: FitSamples, rows: Rows) -> list[tuple[int, int]]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from partwright.at_once import at_once
 from partwright.fields.columns import Column
 from partwright.superfrusta.objective import removal_scores, score
 from partwright.superfrusta.refining import TOUCH_UP, refine
@@ -48,21 +50,21 @@ def cheapest_removal(
     """
     without, whole = removal_scores(samples, rows)
     without[~_removable(rows, locked)] = -np.inf
-    best: tuple[Rows, float] | None = None
-    for index in np.argsort(-without, kind="stable")[: settings.trials]:
-        if not np.isfinite(without[index]):
-            continue
-        moving = neighbours(samples, rows, int(index))
+
+    def removed(index: int) -> tuple[Rows, float]:
+        moving = neighbours(samples, rows, index)
         moving[:locked] = False
         thinned = refine(
             samples, np.delete(rows, index, axis=0), TOUCH_UP, settings, np.delete(moving, index)
         )
-        kept = measure(samples, thinned)
-        if best is None or kept > best[1]:
-            best = thinned, kept
-    if best is None:
+        return thinned, measure(samples, thinned)
+
+    first = np.argsort(-without, kind="stable")[: settings.trials]
+    tried = [partial(removed, int(index)) for index in first if np.isfinite(without[index])]
+    found = at_once(tried, samples.threads)
+    if not found:
         return rows, whole, whole
-    return best[0], best[1], whole
+    return *max(found, key=lambda one: one[1]), whole
 
 
 def _removable(rows: Rows, locked: int) -> NDArray[np.bool_]:

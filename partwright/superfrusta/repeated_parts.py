@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from partwright.at_once import at_once
 from partwright.superfrusta.deviations import deviations, norm
 from partwright.superfrusta.local_repeats import LOCAL_TOLERANCE, local_repeats
 from partwright.superfrusta.objective import score
@@ -73,15 +75,22 @@ def repeat(
     wanted = repeat_candidates(samples, rows, groups(found), locked)
     mirrors = [one.isometry for one in nearly if one.kind == "mirror"]
     wanted += local_repeats(samples, rows, locked, tolerance, mirrors[:_NEARLY])
-    for chosen in _choices(samples, whole, wanted, settings):
+
+    def refitted(chosen: Sequence[Repeat]) -> list[Trial]:
+        trials = [measured(samples, _leaves(rows, chosen), settings)]
+        for stages in _REFITS:
+            leaves = refit(samples, trials[0].leaves, stages, settings, locked)
+            trials.append(measured(samples, leaves, settings))
+            nearer = trials[-1].off <= furthest + _FURTHER
+            if not nearer or trials[-1].value < whole.value - _HOPELESS:
+                break
+        return trials
+
+    choices = _choices(samples, whole, wanted, settings)
+    tried = at_once([partial(refitted, chosen) for chosen in choices], samples.threads)
+    for chosen, first in zip(choices, tried, strict=True):
         for left in range(_GIVEN_UP, -1, -1):
-            trials = [measured(samples, _leaves(rows, chosen), settings)]
-            for stages in _REFITS:
-                leaves = refit(samples, trials[0].leaves, stages, settings, locked)
-                trials.append(measured(samples, leaves, settings))
-                nearer = trials[-1].off <= furthest + _FURTHER
-                if not nearer or trials[-1].value < whole.value - _HOPELESS:
-                    break
+            trials = first if left == _GIVEN_UP else refitted(chosen)
             better = [trial for trial in trials if good(trial)]
             best = max([best, *better], key=lambda trial: trial.value)
             if best is not whole or len(chosen) == 1 or not left:
@@ -104,7 +113,10 @@ def _without_the_worst(
     samples: FitSamples, rows: Rows, chosen: Sequence[Repeat], settings: Settings
 ) -> list[Repeat]:
     rest = [[other for other in chosen if other is not one] for one in chosen]
-    return max(rest, key=lambda some: measured(samples, _leaves(rows, some), settings).value)
+    trials = at_once(
+        [partial(measured, samples, _leaves(rows, some), settings) for some in rest], samples.threads
+    )
+    return max(zip(rest, trials, strict=True), key=lambda one: one[1].value)[0]
 
 
 def measured(
@@ -128,7 +140,7 @@ def _grid_iou(samples: FitSamples, trial: Trial) -> float:
 
 def _choices(
     samples: FitSamples, whole: Trial, wanted: list[Repeat], settings: Settings
-) -> Iterator[list[Repeat]]:
+) -> list[list[Repeat]]:
     """Repeats that get along, in several ways, none twice.
 
     Those are taken first that are worth the most by themselves, that save the most for what they cost of R
@@ -137,14 +149,16 @@ def _choices(
     """
     rows = expanded(whole.leaves)
     wanted = sorted(wanted, key=lambda one: -len(one.replaced))[:_TRIED]
-    scores = [score(samples, expanded(_leaves(rows, [one]))) for one in wanted]
+    threads = samples.threads
+    scores = at_once([partial(score, samples, expanded(_leaves(rows, [one]))) for one in wanted], threads)
     costs = score(samples, rows) - np.array(scores)
     saved = np.array([len(one.replaced) for one in wanted])
     likely = costs - settings.alpha * saved <= _UNREFITTED_SCORE_LOSS
     every = np.flatnonzero(likely).tolist()
     cheap = sorted(every, key=lambda i: float(costs[i] - settings.alpha * saved[i]))
     many = sorted(every, key=lambda i: (-int(saved[i]), float(costs[i])))
-    alone = {i: measured(samples, _leaves(rows, [wanted[i]]), settings) for i in cheap}
+    looks = [partial(measured, samples, _leaves(rows, [wanted[i]]), settings) for i in cheap]
+    alone = dict(zip(cheap, at_once(looks, threads), strict=True))
     near = [i for i, trial in alone.items() if trial.off <= whole.off + _UNREFITTED_OFF]
     worthy = sorted(near, key=lambda i: -alone[i].value)
     seen: list[list[int]] = [[]]
@@ -157,7 +171,7 @@ def _choices(
                 taken |= wanted[i].parts
         if chosen not in seen:
             seen.append(chosen)
-            yield [wanted[i] for i in chosen]
+    return [[wanted[i] for i in chosen] for chosen in seen[1:]]
 
 
 def _leaves(rows: Rows, repeats: Sequence[Repeat]) -> list[RepeatedPart]:

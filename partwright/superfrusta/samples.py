@@ -33,6 +33,7 @@ _LOCAL_SAMPLES = 6000
 _EXACT_WITHIN = 1.6  # voxels from the surface: between voxels that are, all are exact
 _FAR = 0.1  # unit lengths from the shape
 _NOT_FAR = 0.3
+_REMEMBERED = 3  # assemblies, beside the last, whose field at the samples is kept
 _FAR_COUNT = 400  # about so many samples stand for all that are far
 
 
@@ -288,13 +289,14 @@ class FitSamples:
         return Target(self.points[index], self.distance[index], weight / max(float(weight.sum()), 1e-9))
 
     def field(self, rows: Rows) -> NDArray[np.float32]:
-        """Distance (N,) of the assembly at the samples. Of the one that was asked for last it is known: a
-        search asks for its score, its IoU and whether it is the best."""
+        """Distance (N,) of the assembly at the samples. Of those that were asked for last it is known: a
+        search asks for its score, its IoU and whether it is the best, and may try several at once."""
         key = rows.tobytes()
         known = self._last.get(key)
         if known is None:
             known = self.distance_of(rows, self.points)
-            self._last.clear()
+            for oldest in list(self._last)[:-_REMEMBERED]:
+                self._last.pop(oldest, None)
             self._last[key] = known
         return known
 
