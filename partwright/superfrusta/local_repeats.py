@@ -128,7 +128,9 @@ class _Forms:
         """The best way onto each part of the same form."""
         if len(self.surfaces[base]) < _FEWEST:
             return
-        ratio = np.maximum(self.extents / self.extents[base], self.extents[base] / self.extents).max(axis=1)
+        own = self.extents[base]
+        with np.errstate(divide="ignore", invalid="ignore"):  # what has no extent at all is like none
+            ratio = np.maximum(self.extents / own, own / self.extents).max(axis=1)
         alike = (ratio < _ALIKE) & (self.rows[:, Column.SIGN] == self.rows[base, Column.SIGN])
         alike[: self.locked] = alike[base] = False
         for other in np.flatnonzero(alike).tolist():
