@@ -38,7 +38,7 @@ _LEAST_SHARE = 0.01  # of what the furthest counts
 _LINEAR = 4.0  # sharpness at which an occupancy near the surface is the distance, but for its sign
 _LEAST_OFF = 1e-4  # unit lengths
 _GAIN = 2e-5  # of the value, from which on a step is taken
-FIRMER = 2.5  # times the settings' price on lengths: what is seen counts more, once all parts are there
+_FIRMER = 2.5  # times the settings' price on lengths: what is seen counts more, once all parts are there
 _GLARING = 0.08  # unit lengths: 2.5 % of the longest side outwards, or 4.5 % that is missing
 _GLARES = 2.0  # price on each unit length beyond, part by part: worth several parts, which the norm is not
 SPENT = 5e-3  # of R, at most, for lengths
@@ -108,7 +108,7 @@ class Polish:
     @property
     def firmness(self) -> float:
         """Price on each unit length that leaves are off."""
-        return FIRMER * self.settings.firmness
+        return _FIRMER * self.settings.firmness
 
     def trial(self, rows: Rows) -> Trial:
         self.looks += 1
