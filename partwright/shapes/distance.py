@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from partwright._kernel import TriangleTree
+from partwright.at_once import share_of
 from partwright.shapes.topology import area_vectors
 from partwright.shapes.winding import closing_fans, winding_grid
 
@@ -123,7 +124,9 @@ class MeshDistance:
         """
         if len(points) == 0:
             return np.zeros(0)
-        return np.sqrt(self._tree.squared_distances(np.ascontiguousarray(points, dtype=np.float64), 0))
+        return np.sqrt(
+            self._tree.squared_distances(np.ascontiguousarray(points, dtype=np.float64), share_of(0))
+        )
 
     def closest(self, points: NDArray[Any]) -> NDArray[np.float32]:
         """Nearest surface point (N, 3) of each of the points (N, 3)."""
@@ -214,7 +217,7 @@ class MeshDistance:
         """Whether points (N, 3) lie inside."""
         if self._closed and len(points):
             places = np.ascontiguousarray(points, dtype=np.float64)
-            return self._winding_tree.windings(places, 0) > 0
+            return self._winding_tree.windings(places, share_of(0)) > 0
         return self.winding(points) > _INSIDE
 
     def inside_grid(
