@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from partwright.assembly import Assembly
+from partwright.at_once import thread_count
 from partwright.atomic_io import write_bytes
 from partwright.shapes import Shape
 
@@ -31,7 +31,7 @@ class Ahead:
     @staticmethod
     def pays(threads: int) -> bool:
         """Whether there is a processor for it; threads: that may be used, 0 for one a core."""
-        return threads != 1 and (os.cpu_count() or 1) > 1
+        return min(thread_count(threads), thread_count(0)) > 1
 
     def draw(self, surface: trimesh.Trimesh) -> None:
         """Begin with the picture."""

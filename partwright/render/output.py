@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from partwright.atomic_io import replacing
+from partwright.atomic_io import replacing, write_bytes
 
 _LEVEL = 4  # of 9: a tenth larger than by the default of 6, in a third of the time
 
 
-def write(path: str | Path, save: Callable[[Path], object]) -> None:
+def write(path: str | Path, save: Callable[[Path], None]) -> None:
     """Call `save` with a temporary name beside `path`, then rename.
 
     Raises OutputError where the folder is missing or cannot be written to.
@@ -24,7 +24,7 @@ def write(path: str | Path, save: Callable[[Path], object]) -> None:
 
 def write_png(path: str | Path, image: np.ndarray) -> None:
     """Write a picture (H, W, 3) uint8 as PNG."""
-    write(path, lambda name: name.write_bytes(png(image)))
+    write_bytes(path, png(image))
 
 
 def png(image: np.ndarray) -> bytes:

@@ -180,7 +180,8 @@ class _LastChanges:
     def ways(self, best: _State, worst: int) -> Iterator[_State]:
         """What is about a point cut or filled, there alone and at others that are as far off, and the part
         there fitted anew; not polished yet."""
-        for one in self.with_new(best, worst):
+        one = self.with_new(best, worst)
+        if one is not None:
             yield one
             together = self.with_others(one, best, worst)
             if together is not one:
@@ -190,19 +191,20 @@ class _LastChanges:
         if anew:
             yield max(anew, key=lambda one: one.value)
 
-    def with_new(self, best: _State, worst: int) -> list[_State]:
-        """With one part more that cuts or fills what is about a point; none where there is no room for it."""
+    def with_new(self, best: _State, worst: int) -> _State | None:
+        """With one part more that cuts or fills what is about a point; None where there is none, or no room
+        for it."""
         off = best.trial.off
         copy = int(off.part[worst])
         leaf = int(best.leaf[copy])
         if not self.has_room(best, leaf):
-            return []
+            return None
         if off.distance[worst] > 0:
             new = self.cuts(best, worst) if self.settings.carving else []
         else:
             missed = self.mending.missed(best.rows, off, worst)[:1]
             new = [self.mending.fitted(voxels, best.rows, best.rows[copy])[0] for voxels in missed]
-        return [self.repeated(best, one, leaf) for one in new]
+        return self.repeated(best, new[0], leaf) if new else None
 
     def with_others(self, one: _State, best: _State, worst: int) -> _State:
         """The same at other places, cut or filled likewise, that are nearly as far off: while one of them is
@@ -214,10 +216,10 @@ class _LastChanges:
             if further is None or there.off[further] < _AS_FAR * off.off[worst]:
                 break
             alike = _is_outside(there, further) == _is_outside(off, worst)
-            found = self.with_new(one, further) if alike else []
-            if not found:
+            found = self.with_new(one, further) if alike else None
+            if found is None:
                 break
-            one = found[0]
+            one = found
         return one
 
     def cuts(self, best: _State, worst: int) -> list[NDArray[np.float32]]:

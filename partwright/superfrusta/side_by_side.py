@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from os import cpu_count
 from queue import SimpleQueue
 from typing import Generic, TypeVar
 
+from partwright.at_once import thread_count
 from partwright.methods import Cancellation, Checkpoint, Progress
 from partwright.superfrusta.samples import FitSamples
 
@@ -32,7 +32,7 @@ class SideBySide(Generic[Result]):
 
     def __call__(self, growth: Growth[Result], count: int) -> list[Result]:
         """What `growth(number, samples, checkpoint, told)` returns, by number."""
-        threads = self.samples.threads or cpu_count() or 1
+        threads = thread_count(self.samples.threads)
         # An accelerator has work enough for all of its cores with one.
         workers = 1 if self.samples.device == "cuda" else min(count, threads)
         steps: SimpleQueue[tuple[int, Progress] | None] = SimpleQueue()
