@@ -127,7 +127,8 @@ def test_what_stands_out_or_is_covered_of_new_vehicles_is_put_back(
     before = judge(made)
     assert fault in before.faults()
     after = _mended(Sample(made, before, 1), judge, [], keep_layout=False)
-    assert after.soundness.faults() == []
+    others = [one for one in before.faults() if "stands out" not in one and "is covered" not in one]
+    assert set(after.soundness.faults()) <= set(others)  # such as a window in two pieces
     rest = [model.index(name) for name in ("body", "wheel_front_left", "mirror_left")]
     for mine, theirs in zip(
         (after.shape.latents, *after.shape.poses), (made.latents, *made.poses), strict=True
