@@ -15,6 +15,7 @@ from partwright.fields.columns import Column
 from partwright.rows import corners
 from partwright.superfrusta import solid_starts
 from partwright.superfrusta.families import locked_values, with_locked_values
+from partwright.superfrusta.images import first_alike
 from partwright.superfrusta.initialisation import starts
 from partwright.superfrusta.limits import LIMITS
 from partwright.superfrusta.objective import occupancy_score
@@ -22,6 +23,7 @@ from partwright.superfrusta.refining import freedom, sharpened, ties
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.solid_kinds import plainness
+from partwright.superfrusta.symmetric_fit import images
 
 _LEAST_DEPTH = 0.15  # voxels: thinner regions are noise (half a voxel would lose thin walls)
 _LEAST_VOLUME = 2e-4  # of the shape
@@ -166,9 +168,20 @@ def carve(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Gro
 def _grown(samples: FitSamples, wanted: list[Region], rows: Rows, settings: Settings, most: int) -> Grown:
     if not wanted or most <= 0:
         return Grown(NOTHING, NOTHING)
+    wanted = _unlike(samples, wanted)
     field = samples.field(rows)  # which all regions are fitted beside
     candidates = fit_regions(samples, wanted, settings)
     return _select(samples, candidates, rows, field < 0, settings.price / _PRICE_DIVISOR, most)
+
+
+def _unlike(samples: FitSamples, wanted: list[Region]) -> list[Region]:
+    """Without regions that are images of others: what is fitted to those is tried in place of these, too."""
+    if not samples.images:
+        return wanted
+    by_voxels = {(id(region.voxels), region.sign): region for region in wanted}
+    first = first_alike(samples, [(region.voxels, region.sign) for region in by_voxels.values()])
+    kept = {key for index, key in enumerate(by_voxels) if first[index] == index}
+    return [region for region in wanted if (id(region.voxels), region.sign) in kept]
 
 
 def _view(samples: FitSamples, region: Region, points: NDArray[np.float32]) -> View:
@@ -287,28 +300,37 @@ def _select(
     samples: FitSamples, candidates: Rows, rows: Rows, covered: NDArray[np.bool_], price: float, most: int
 ) -> Grown:
     """Greedy choice beside rows that cover samples (N,): whichever candidate raises R most joins, until none
-    pays its price.
+    pays its price, or `most` have joined.
 
-    What is added may join before the parts that are subtracted, or after them.
+    What is added may join before the parts that are subtracted, or after them. Images of what has joined,
+    under the symmetries of the shape, are candidates, too, and do not count among those.
     """
+    fitted, left = len(candidates), most
     occupied = samples.covered_by(candidates, samples.points)
-    added, cuts = candidates[:, Column.SIGN, None] > 0, rows[rows[:, Column.SIGN] < 0]
+    cuts = rows[rows[:, Column.SIGN] < 0]
     carved = samples.covered_by(cuts, samples.points).any(axis=0) if len(cuts) else None
     chosen: list[tuple[bool, int]] = []
     current = float(occupancy_score(samples, covered))
-    while len(chosen) < most:
-        more = covered | occupied
-        ways = {False: more if added.all() else np.where(added, more, covered > occupied)}
+    while (first_open := 0 if left else fitted) < len(candidates):
+        some, added = occupied[first_open:], candidates[first_open:, Column.SIGN, None] > 0
+        more = covered | some
+        ways = {False: more if added.all() else np.where(added, more, covered > some)}
         if carved is not None:
-            ways[True] = np.where(added, covered | (occupied > carved), covered)
+            ways[True] = np.where(added, covered | (some > carved), covered)
         scores = {under: occupancy_score(samples, way) for under, way in ways.items()}
         under = max(scores, key=lambda u: (float(scores[u].max()), u))
-        best = int(scores[under].argmax())
-        if scores[under][best] < current + price:
+        which = int(scores[under].argmax())
+        if scores[under][which] < current + price:
             break
+        best = first_open + which
         chosen.append((under, best))
-        covered, current = ways[under][best], float(scores[under][best])
-        if carved is not None and not added[best, 0]:
+        covered, current = ways[under][which], float(scores[under][which])
+        if carved is not None and not added[which, 0]:
             carved = carved | occupied[best]
+        left -= best < fitted
+        if best < fitted and samples.images:
+            others = images(candidates[[best]], samples.images)[:, 0]
+            candidates = np.concatenate([candidates, others])
+            occupied = np.concatenate([occupied, samples.covered_by(others, samples.points)])
     first, last = ([i for u, i in chosen if u is under] for under in (True, False))
     return Grown(candidates[first], candidates[last])

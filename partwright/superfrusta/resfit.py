@@ -288,7 +288,9 @@ class ResidualFit:
         assert self.best is not None
         with self.timed("symmetry"):
             tolerance = symmetry_tolerance(self.samples, self.best)
-            nearly = symmetries(shape, self.settings, tolerance=max(tolerance, NEARLY))
+            nearly = self.samples.find_symmetries()
+            if tolerance > NEARLY:  # what holds less well was not looked for
+                nearly = symmetries(shape, self.settings, tolerance=tolerance)
             found = [one for one in nearly if one.error <= tolerance]
             self.leaves = repeat(self.samples, self.best, found, self.settings, self.locked, nearly)
             rows = expanded(self.leaves)

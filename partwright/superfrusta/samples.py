@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from partwright.superfrusta.backend import Kernel, backend, watched
 from partwright.superfrusta.far_cells import ALONG, CELL, HALF_SIDE, beyond_too, cell_middles, cell_of
 from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.settings import Settings
+from partwright.superfrusta.symmetry import NEARLY, Isometry, Symmetry, symmetries, together
 
 Rows = NDArray[np.float32]
 NOTHING: Rows = np.empty((0, WIDTH), np.float32)
@@ -34,6 +35,7 @@ _EXACT_WITHIN = 1.6  # voxels from the surface: between voxels that are, all are
 _FAR = 0.1  # unit lengths from the shape
 _NOT_FAR = 0.3
 _REMEMBERED = 3  # assemblies, beside the last, whose field at the samples is kept
+_ALIKE = 0.0125  # unit lengths: mean distance of the surface from its image
 _FAR_COUNT = 400  # about so many samples stand for all that are far
 
 
@@ -66,6 +68,8 @@ class FitSamples:
     """(n, 3) points that are no samples yet, where a part that goes astray is looked for."""
     surface: NDArray[np.float32]
     """(n, 3) points of the shape's surface that can be seen, as many to each unit of area."""
+    find_symmetries: Callable[[], tuple[Symmetry, ...]] = tuple
+    """Looks, at the first call, for those of the shape that hold nearly, the most exact first."""
     growth: int = 0
     """Which of several growths they serve: each optimises on others of them."""
     _last: dict[bytes, NDArray[np.float32]] = field(default_factory=dict, init=False, compare=False)
@@ -94,6 +98,7 @@ class FitSamples:
             settings.uniform / float(np.prod(grid.spacing * np.array(grid.values.shape))),
             _probes(grid),
             _seen(shape, run.seed),
+            cache(partial(symmetries, shape, settings, tolerance=NEARLY)) if settings.symmetry else tuple,
         )
 
     def variant(self, growth: int, checkpoint: Checkpoint, threads: int) -> FitSamples:
@@ -150,7 +155,8 @@ class FitSamples:
         """These and more, with another grid, a little beyond the box between two corners (3,).
 
         carved: the assembly from which something is to be subtracted there. The grid then holds what that
-        takes, and the shape's exact distance only where it is needed.
+        takes, and the shape's exact distance only where it is needed. These know of no other places, so of no
+        symmetries.
         """
         room = _LOCAL_ROOM * float((high - low).max())
         low, high = low - room, high + room
@@ -168,6 +174,7 @@ class FitSamples:
             distance=np.concatenate([self.distance, self.measure(local)]),
             weight=np.concatenate([self.weight, np.ones(len(local), np.float32)]),
             grid=grid,
+            find_symmetries=tuple,
         )
 
     def _where_covered(self, rows: Rows, places: NDArray[np.float32], spacing: float) -> NDArray[np.float32]:
@@ -197,6 +204,11 @@ class FitSamples:
     @property
     def _probe_weight(self) -> float:
         return self.density * CELL**3
+
+    @cached_property
+    def images(self) -> tuple[Isometry, ...]:
+        """What takes the shape to itself, well enough for a part to be tried where they take it."""
+        return together(self.find_symmetries(), _ALIKE)
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:

@@ -150,6 +150,18 @@ def groups(found: Sequence[Symmetry], most: int = 24) -> list[tuple[Isometry, ..
     return [group for group in [*together, *cyclic] if group]
 
 
+def together(found: Sequence[Symmetry], tolerance: float, most: int = 24) -> tuple[Isometry, ...]:
+    """What the symmetries that hold to a tolerance generate together, the most exact first, and none that
+    makes more than `most` of them; the identity is left out."""
+    generators: list[Isometry] = []
+    generated: tuple[Isometry, ...] = ()
+    for one in found:
+        wider = _generated([*generators, one.isometry], most) if one.error <= tolerance else ()
+        if wider:
+            generators, generated = [*generators, one.isometry], wider
+    return generated
+
+
 def _generated(generators: list[Isometry], most: int) -> tuple[Isometry, ...]:
     """All products but the identity; none if there are more than `most`."""
     elements = [Isometry(np.eye(3), np.zeros(3))]

@@ -1,0 +1,46 @@
+"""What the symmetries of a shape take a part, or a region, to: what serves one place serves the others.
+
+A search that finds each leg of a table by itself takes as many rounds, and gives legs that differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from partwright.superfrusta.samples import FitSamples, voxel_of
+
+_POINTS = 200  # of a region
+_COVERED = 0.7  # share of them whose images lie in another, for it to be its image
+_AS_LARGE = 0.6  # of the larger one, at least
+
+
+def first_alike(samples: FitSamples, regions: Sequence[tuple[NDArray[np.bool_], float]]) -> list[int]:
+    """For each region, its voxels (X * Y * Z,) and its sign, the first that it is an image of, else its own
+    index."""
+    alike: list[int] = []
+    sizes = [int(np.count_nonzero(voxels)) for voxels, _ in regions]
+    for index, (voxels, sign) in enumerate(regions):
+
+        def may_be(other: int, size: int = sizes[index], sign: float = sign) -> bool:
+            least, most = sorted((size, sizes[other]))
+            return alike[other] == other and regions[other][1] == sign and least >= _AS_LARGE * most
+
+        rivals = [regions[other][0] if may_be(other) else None for other in range(index)]
+        places = _images(samples, voxels) if any(rival is not None for rival in rivals) else []
+        same = (
+            other
+            for other, rival in enumerate(rivals)
+            if rival is not None and any(rival[place].mean() > _COVERED for place in places)
+        )
+        alike.append(next(same, index))
+    return alike
+
+
+def _images(samples: FitSamples, region: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Voxels (n,) that images of some of a region's lie in, for each isometry."""
+    voxels = np.flatnonzero(region)
+    points = samples.grid_points[voxels[:: -(-len(voxels) // _POINTS)]]
+    return [voxel_of(samples.grid, image(points).astype(np.float32)) for image in samples.images]
