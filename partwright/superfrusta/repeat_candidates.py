@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from partwright.fields.columns import Column
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.symmetric_fit import images
-from partwright.superfrusta.symmetry import Isometry
+from partwright.superfrusta.symmetry import Isometry, Symmetry
 
 _EVERY = 6  # samples that matching looks at
 _SELF = 0.5  # IoU from which a part and its image are the same place
@@ -49,6 +49,25 @@ def repeat_candidates(
     seen = Occupancies.of(samples, rows)
     every = range(locked, len(rows))
     return without_twins(one for group in found for one in seen.candidates(group, every, locked))
+
+
+def whole_sides(samples: FitSamples, rows: Rows, planes: Sequence[Symmetry], locked: int) -> list[Repeat]:
+    """All that lies on one side of a mirror plane for all that lies on the other, and the other way about.
+
+    However differently both were cut into parts, and whatever they have in common.
+    """
+    seen = Occupancies.of(samples, rows)
+    sizes = np.maximum(seen.parts.sum(axis=1), 1)
+    found = []
+    for plane in planes:
+        above = (seen.points - plane.centre) @ plane.axis > 0
+        share = (seen.parts & above).sum(axis=1) / sizes
+        share[:locked] = 0.5  # which counts as on neither
+        sides = [np.flatnonzero(one >= _ON_ONE_SIDE).tolist() for one in (share, 1 - share)]
+        if all(sides):
+            for bases, replaced in (sides, sides[::-1]):
+                found.append(Repeat(tuple(bases), (plane.isometry,), frozenset(replaced)))
+    return found
 
 
 def without_twins(wanted: Iterable[Repeat]) -> list[Repeat]:

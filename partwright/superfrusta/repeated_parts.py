@@ -12,7 +12,7 @@ from partwright.at_once import at_once
 from partwright.superfrusta.deviations import deviations, norm
 from partwright.superfrusta.local_repeats import LOCAL_TOLERANCE, local_repeats
 from partwright.superfrusta.objective import score
-from partwright.superfrusta.repeat_candidates import Repeat, repeat_candidates
+from partwright.superfrusta.repeat_candidates import Repeat, repeat_candidates, whole_sides
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, refit
@@ -20,6 +20,7 @@ from partwright.superfrusta.symmetry import TOLERANCE, Symmetry, groups
 
 _TRIED = 64  # repeats at most
 _NEARLY = 1  # planes, the most exact first, that are tried part by part
+_PLANES = 2  # likewise, of which all on one side is tried for all on the other
 _GIVEN_UP = 1  # of those that are chosen, at most
 _UNREFITTED_SCORE_LOSS = 0.01  # of R: what a repeat may cost before a refit beyond the parts that it saves
 _UNREFITTED_OFF = 0.03  # unit lengths: so much more than before a part may be off before a refit
@@ -54,10 +55,10 @@ def repeat(
     """The assembly as leaves, of which those that repeat under the symmetries, or in several places, are one
     each. A plane that holds only `nearly` for the whole may hold for a part after a small motion.
 
-    Repeats are taken that are worth the most: the parts that they save, less what they cost of R. The copies
-    of each leaf are refitted as one. Together they may not lower the objective, nor leave a part further off
-    than 2.5 % of the longest side and than any was by over half a percent; where they do, they are given up
-    one by one.
+    Repeats are taken that are worth the most: the parts that they save, less what they cost of R; or all that
+    is on one side of a plane stands for the other. The copies of each leaf are refitted as one. Together they
+    may not lower the objective, nor leave a part further off than 2.5 % of the longest side and than any was
+    by over half a percent; where they do, they are given up one by one.
     An IoU that the settings ask for is kept. The first `locked` rows stay leaves of their own.
     """
     whole = measured(samples, _leaves(rows, []), settings)
@@ -76,17 +77,23 @@ def repeat(
     mirrors = [one.isometry for one in nearly if one.kind == "mirror"]
     wanted += local_repeats(samples, rows, locked, tolerance, mirrors[:_NEARLY])
 
+    planes = [one for one in found if one.kind == "mirror"]
+    sides = whole_sides(samples, rows, planes[:_PLANES], locked)
+
     def refitted(chosen: Sequence[Repeat]) -> list[Trial]:
         trials = [measured(samples, _leaves(rows, chosen), settings)]
+        # Which is far from its best until it is refitted twice.
+        of_side = any(chosen[0] is side for side in sides)
         for stages in _REFITS:
-            leaves = refit(samples, trials[0].leaves, stages, settings, locked)
+            start = trials[-1 if of_side else 0]
+            leaves = refit(samples, start.leaves, stages, settings, locked)
             trials.append(measured(samples, leaves, settings))
             nearer = trials[-1].off <= furthest + _FURTHER
-            if not nearer or trials[-1].value < whole.value - _HOPELESS:
+            if not of_side and (not nearer or trials[-1].value < whole.value - _HOPELESS):
                 break
         return trials
 
-    choices = _choices(samples, whole, wanted, settings)
+    choices = _choices(samples, whole, wanted, settings) + [[side] for side in sides]
     tried = at_once([partial(refitted, chosen) for chosen in choices], samples.threads)
     for chosen, first in zip(choices, tried, strict=True):
         for left in range(_GIVEN_UP, -1, -1):

@@ -19,7 +19,7 @@ from partwright.fields.columns import ROTATION as ROTATION_OF
 from partwright.fields.columns import STEP_WIDTH, TRANSLATION, Column
 from partwright.methods import FitRequest, Run
 from partwright.shapes import load_shape
-from partwright.superfrusta import repeated_parts, resfit
+from partwright.superfrusta import repeat_candidates, repeated_parts, resfit
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.repeated_parts import repeat
 from partwright.superfrusta.resfit import ResidualFit
@@ -141,6 +141,28 @@ def test_legs_of_a_table_become_one_leaf() -> None:
     leaves = repeat(samples, exact, found, DRAFT)
     assert [1 + len(leaf.isometries) for leaf in leaves] == [1, 4]
     assert score(samples, expanded(leaves)) == pytest.approx(score(samples, exact), abs=1e-6)
+
+
+def test_a_side_stands_for_the_other_however_both_are_cut_into_parts() -> None:
+    """A table's two legs on the left for four halves on the right, and these for them; what is locked is on
+    neither side, and neither is the top."""
+    samples, exact, found = known_table()
+    left, right = (exact[1:][(exact[1:, 0] > 0) == side] for side in (False, True))
+    halves = np.concatenate([right, right])
+    halves[:, Column.SZ] /= 2
+    halves[:, 2] += np.repeat([-0.25, 0.25], 2) * exact[1, Column.SZ]
+    rows = np.concatenate([exact[:1], left, halves])
+    plane = next(one for one in found if one.kind == "mirror" and abs(one.axis[0]) > 0.99)
+    both = {((1, 2), (3, 4, 5, 6)), ((3, 4, 5, 6), (1, 2))}
+    sides = repeat_candidates.whole_sides(samples, rows, [plane], 0)
+    assert {(one.bases, tuple(sorted(one.replaced))) for one in sides} == both
+    assert all(one.isometries == (plane.isometry,) for one in sides)
+    fewer = repeat_candidates.whole_sides(samples, rows, [plane], 2)
+    assert {one.bases for one in fewer} == {(2,), (3, 4, 5, 6)}
+    assert repeat_candidates.whole_sides(samples, rows[:3], [plane], 0) == []
+    leaves = repeat(samples, rows, found, DRAFT)
+    assert score(samples, expanded(leaves)) == pytest.approx(score(samples, exact), abs=5e-3)
+    assert [1 + len(leaf.isometries) for leaf in leaves] == [1, 4]
 
 
 def test_locked_parts_stay_as_they_are() -> None:
